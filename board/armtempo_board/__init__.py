@@ -1,0 +1,1 @@
+"""The board program: MicroPython for the STM32F407."""

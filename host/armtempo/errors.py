@@ -1,0 +1,50 @@
+"""What can go wrong, as one tree of exceptions.
+
+::
+
+    ArmtempoError                exit code 1 unless a subclass says otherwise
+    ├── InputError               the user's file, option or argument is wrong (exit code 2)
+    ├── PlanError                no plan under these limits, or no posture for this pose
+    ├── RunFolderError           a recorded run cannot be read or is not whole
+    └── LinkError                the board cannot be reached or stopped answering
+        └── BoardError           the board answered, and refused; carries its code
+
+Every message says what is wrong, where, and what to do.
+"""
+
+from __future__ import annotations
+
+
+class ArmtempoError(Exception):
+    """Base of all errors that are shown to the user as one message, without a traceback."""
+
+    exit_code = 1
+
+
+class InputError(ArmtempoError):
+    """A file, option or argument from the user is wrong."""
+
+    exit_code = 2
+
+
+class PlanError(ArmtempoError):
+    """The input is well formed but has no solution, and the message says why."""
+
+
+class RunFolderError(ArmtempoError):
+    """A run folder is incomplete or contradicts itself."""
+
+
+class LinkError(ArmtempoError):
+    """No board, no answer, or the connection broke."""
+
+
+class BoardError(LinkError):
+    """The board refused a command or reported a fault.
+
+    ``code`` is the number from ``armtempo_shared.wire.ERRORS``.
+    """
+
+    def __init__(self, message: str, code: int) -> None:
+        super().__init__(message)
+        self.code = code

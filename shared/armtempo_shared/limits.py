@@ -1,0 +1,27 @@
+"""Figures of the board that host and board must agree on: ticks, sampling, highest rates, sizes."""
+
+TICK_HZ = 84_000_000
+"""Timer ticks per second: TIM2 and TIM5 unscaled (RM0090, APB1 timer clock at 168 MHz core)."""
+
+TICK_FRACTION_BITS = 16
+"""Fraction bits of time control points on the wire (ticks / 2**16)."""
+
+STEP_FRACTION_BITS = 28
+"""Fraction bits of angle control points on the wire (steps / 2**28)."""
+
+SAMPLE_TICKS = TICK_HZ // 10
+"""Ticks between two samples: 0.1 s exactly."""
+
+MAX_JOINTS = 6
+MAX_ENCODERS = 4
+MAX_SEGMENTS = 512
+"""Most time-axis segments in one motion record."""
+
+MAX_NAME = 24
+"""Longest name of a stored trajectory, in bytes; letters, digits, '-', '_'."""
+
+MAX_STEP_RATE = 333_000
+"""Highest step rate of one joint, steps/s."""
+
+MAX_STEP_RATE_SUM = 1_000_000
+"""Highest sum of the step rates of all joints, steps/s."""

@@ -1,0 +1,102 @@
+"""The motion record: what the host uploads, the flash keeps and the evaluator reads.
+
+Little endian. Control points are exact integers, so host and board mean the same spline to the bit:
+angles in steps / 2**28, times in ticks / 2**16.
+
+::
+
+    offset  type   field
+    0       4s     magic  b"ATM1"
+    4       B      degree k, 3 or 5
+    5       B      joints
+    6       B      flags: bit 0, all joints share one time axis
+    7       B      0
+    8       H      segments n of the angle splines
+    10      H      refine R: the time axes have n * R segments
+    12      I      brake_ticks: in how many ticks the motion may brake to rest anywhere (0: not at all)
+    16      I      crc32 of the arm record it was made for
+    20      q[]    per joint: n + k angle control points; its n * R + k time control points,
+                   or, with a shared axis, those once behind the last joint
+    end     I      crc32 over all before it
+"""
+
+import struct
+from binascii import crc32
+
+from armtempo_shared.limits import MAX_JOINTS, MAX_SEGMENTS
+
+MAGIC = b"ATM1"
+SHARED_AXIS = 1
+_HEAD = "<4sBBBBHHII"
+HEAD_SIZE = struct.calcsize(_HEAD)
+
+
+class MotionError(ValueError):
+    """The record is damaged or asks for what this program does not know."""
+
+
+def size(degree, joints, shared, segments, refine):
+    """Bytes of a whole motion record."""
+    axes = 1 if shared else joints
+    points = joints * (segments + degree) + axes * (segments * refine + degree)
+    return HEAD_SIZE + 8 * points + 4
+
+
+def pack(degree, angles, times, segments, refine, brake_ticks, arm_crc):
+    """A motion record.
+
+    ``angles``: per joint its n + k control points (int, steps * 2**28); ``times``: per joint, or one for
+    all, its n * R + k control points (int, ticks * 2**16).
+    """
+    shared = len(times) == 1 and len(angles) > 1
+    flags = SHARED_AXIS if shared else 0
+    head = struct.pack(
+        _HEAD, MAGIC, degree, len(angles), flags, 0, segments, refine, brake_ticks, arm_crc
+    )
+    body = []
+    for joint, points in enumerate(angles):
+        body.extend(points)
+        if not shared:
+            body.extend(times[joint])
+    if shared:
+        body.extend(times[0])
+    data = head + struct.pack("<%dq" % len(body), *body)
+    return data + struct.pack("<I", crc32(data))
+
+
+class Motion:
+    """A checked view of a motion record; copies nothing but the header.
+
+    Raises MotionError where the record is cut, damaged or of an unknown kind. It does not judge the
+    motion itself (ranges, rates, order of times): that is the board's check before a start.
+    """
+
+    def __init__(self, data):
+        if len(data) < HEAD_SIZE + 4:
+            raise MotionError("too short")
+        (magic, self.degree, self.joints, flags, zero, self.segments, self.refine, self.brake_ticks,
+         self.arm_crc) = struct.unpack_from(_HEAD, data, 0)  # fmt: skip
+        if magic != MAGIC or zero != 0 or flags & ~SHARED_AXIS:
+            raise MotionError("not a motion record of this version")
+        if self.degree not in (3, 5) or not 1 <= self.joints <= MAX_JOINTS:
+            raise MotionError("unknown degree or number of joints")
+        if self.segments < 1 or self.refine < 1 or self.segments * self.refine > MAX_SEGMENTS:
+            raise MotionError("number of segments out of range")
+        self.shared = bool(flags & SHARED_AXIS)
+        if len(data) != size(self.degree, self.joints, self.shared, self.segments, self.refine):
+            raise MotionError("length does not fit the header")
+        if crc32(memoryview(data)[:-4]) != struct.unpack_from("<I", data, len(data) - 4)[0]:
+            raise MotionError("checksum")
+        self.data = data
+
+    def angle_offset(self, joint):
+        """Byte offset of the joint's first angle control point."""
+        points = self.segments + self.degree
+        if not self.shared:
+            points += self.segments * self.refine + self.degree
+        return HEAD_SIZE + 8 * joint * points
+
+    def time_offset(self, joint):
+        """Byte offset of the joint's first time control point."""
+        last = self.joints - 1 if self.shared else joint
+        return self.angle_offset(last) + 8 * (self.segments + self.degree)
