@@ -1,0 +1,73 @@
+"""What every search needs: a counted function, the best point so far, and its history."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Function = Callable[[Array], Array]
+"""Values (N,) of points (N, d)."""
+Progress = Callable[[int, int], None]
+"""Called with the iterations done and their number."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """Outcome of a search: best point ``x`` (d,), its ``value``, and what it took.
+
+    ``history`` (iterations + 1,) is the best value of the first population and after each iteration.
+    """
+
+    x: Array
+    value: float
+    evaluations: int
+    history: Array
+
+
+class Tracker:
+    """Evaluates points for a search, counts them, and remembers the best.
+
+    Use: ``evaluate`` for every population, ``iteration_done`` after the first population and after
+    each iteration, ``result`` at the end.
+    """
+
+    def __init__(self, function: Function, iterations: int, progress: Progress | None) -> None:
+        self._function = function
+        self._iterations = iterations
+        self._progress = progress
+        self._history: list[float] = []
+        self._x: Array = np.empty(0)
+        self.value = float("inf")
+        """Best value so far."""
+        self.evaluations = 0
+
+    @property
+    def x(self) -> Array:
+        """Best point so far, (d,)."""
+        return self._x
+
+    def evaluate(self, points: Array) -> Array:
+        """Values (N,) of ``points`` (N, d); not-a-number comes back as infinity."""
+        values = self._function(points)
+        self.evaluations += len(points)
+        if np.isnan(values.min(initial=np.inf)):
+            values = np.where(np.isnan(values), np.inf, values)
+        best = int(values.argmin())
+        if values[best] < self.value or not self._x.size:
+            self.value = float(values[best])
+            self._x = points[best].copy()
+        return values
+
+    def iteration_done(self) -> None:
+        """Closes the first population (first call) or an iteration (later calls)."""
+        self._history.append(self.value)
+        if self._progress is not None and len(self._history) > 1:
+            self._progress(len(self._history) - 1, self._iterations)
+
+    def result(self) -> Result:
+        """The best point found, with the history as far as it went."""
+        return Result(self._x, self.value, self.evaluations, np.array(self._history))
