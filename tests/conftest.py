@@ -1,0 +1,27 @@
+"""Fixtures for all tests: the interpreters, and what had to be left out."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from tests import interpreters
+
+
+@pytest.fixture(params=interpreters.AVAILABLE)
+def interpreter(request: pytest.FixtureRequest) -> str:
+    """Each interpreter that is here, by name; for ``interpreters.run``."""
+    return str(request.param)
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """In CI nothing may be left out."""
+    if interpreters.MISSING and os.environ.get("CI"):
+        pytest.exit(f"CI needs the interpreters {', '.join(interpreters.MISSING)}", returncode=1)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Say at the end what was not run here."""
+    for name in interpreters.MISSING:
+        terminalreporter.write_line(f"left out: all tests under {name}, which is not on this machine", red=True)

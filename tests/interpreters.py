@@ -1,0 +1,51 @@
+"""Run a script of board code under CPython and under the MicroPython interpreters of .cache/micropython."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+VIRTUAL = ROOT / "host" / "armtempo" / "virtual"
+_CACHE = ROOT / ".cache" / "micropython"
+_STARTERS = {
+    "cpython": Path(sys.executable),
+    "micropython": _CACHE / "micropython",
+    "micropython-arm": _CACHE / "micropython-arm",
+}
+AVAILABLE = [name for name, starter in _STARTERS.items() if starter.exists()]
+MISSING = [name for name in _STARTERS if name not in AVAILABLE]
+_BOARD_PATH = [ROOT / "shared", ROOT / "board", VIRTUAL / "hardware"]
+
+
+def starter(name: str) -> str:
+    """Path of the program that starts the interpreter."""
+    return str(_STARTERS[name])
+
+
+def environment(name: str) -> dict[str, str]:
+    """Environment in which board code finds its packages and the simulated hardware."""
+    path = list(_BOARD_PATH)
+    if name == "cpython":
+        path.append(VIRTUAL / "cpython")
+    variable = "PYTHONPATH" if name == "cpython" else "MICROPYPATH"
+    value = os.pathsep.join(str(folder) for folder in path)
+    if name != "cpython":
+        value += os.pathsep + ".frozen"
+    return {**os.environ, variable: value, "PYTHONDONTWRITEBYTECODE": "1"}
+
+
+def run(name: str, script: Path | str, *arguments: str, timeout: float = 300.0, heap: str = "") -> str:
+    """What the script prints; AssertionError with its error output where it fails.
+
+    ``heap``: heap size for MicroPython, as its ``-X heapsize=`` takes it.
+    """
+    command = [starter(name)]
+    if heap and name != "cpython":
+        command += ["-X", f"heapsize={heap}"]
+    command += [str(script), *arguments]
+    done = subprocess.run(command, env=environment(name), capture_output=True, text=True, timeout=timeout)
+    assert done.returncode == 0, f"{name} {script} ended with {done.returncode}:\n{done.stdout}\n{done.stderr}"
+    return done.stdout
