@@ -2,8 +2,20 @@
 
 from __future__ import annotations
 
+import string
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
+
+from armtempo_shared.limits import MAX_NAME, MAX_SEGMENTS
+
+from armtempo import tomlcheck
+from armtempo.arm import Arm
+from armtempo.errors import InputError
+from armtempo.tomlcheck import Table
+
+OPTIMISERS = ("acs", "cs", "ga", "iaga", "pso", "hpso")
+"""Names of the search algorithms (Table 4)."""
 
 
 @dataclass(frozen=True)
@@ -37,3 +49,87 @@ class Job:
     """Range of a time interval in the search (the paper: 0.1 to 3)."""
     polish: bool = False
     source: str = ""
+
+
+def default_path() -> Path:
+    """The job file that ships with armtempo: the paper's feeding motion."""
+    return Path(__file__).parent / "data" / "feeding.toml"
+
+
+def load_job(path: Path | str, arm: Arm) -> Job:
+    """The job described by a TOML file, for this arm.
+
+    Raises InputError, naming file, key and value, for anything missing, unknown or not allowed.
+    """
+    top = tomlcheck.read(path)
+    low, high = top.numbers("bounds_s", 2, Job.bounds_s)
+    if not 0.0 < low < high:
+        raise top.fail("bounds_s", "two times in seconds above 0, the shorter first")
+    parameters = top.table("parameters")
+    job = Job(
+        name=_name(top),
+        via=_vias(top, arm),
+        degree=top.choice("degree", (3, 5), Job.degree),
+        timing=top.choice("timing", ("per-joint", "shared"), Job.timing),
+        refine=top.integer("refine", Job.refine, least=1, most=64),
+        optimiser=top.choice("optimiser", OPTIMISERS, Job.optimiser),
+        population=top.integer("population", Job.population, least=4, most=100_000),
+        iterations=top.integer("iterations", Job.iterations, least=1, most=1_000_000),
+        parameters=parameters.rest() if parameters else {},
+        seed=top.integer("seed", Job.seed, least=0, most=2**63 - 1),
+        bounds_s=(low, high),
+        polish=top.boolean("polish", Job.polish),
+        source=str(path),
+    )
+    top.done()
+    return job
+
+
+def _name(top: Table) -> str:
+    name = top.text("name")
+    allowed = string.ascii_letters + string.digits + "-_"
+    if len(name) > MAX_NAME or any(letter not in allowed for letter in name):
+        raise top.fail("name", f"at most {MAX_NAME} of the characters a-z A-Z 0-9 - _")
+    return name
+
+
+def _vias(top: Table, arm: Arm) -> tuple[tuple[float, ...] | Pose, ...]:
+    """``via_deg``: lists of angles; or ``via``: tables with ``angles_deg`` or a pose."""
+    if top.has("via_deg") == top.has("via"):
+        raise top.fail("via_deg", "given, or else [[via]] tables, but not both")
+    if top.has("via_deg"):
+        rows = top.array("via_deg", "a list of lists of angles")
+        named = Table({f"via_deg[{n}]": row for n, row in enumerate(rows, 1)}, top.file)
+        vias: list[tuple[float, ...] | Pose] = [
+            _angles(named, f"via_deg[{n}]", arm) for n in range(1, len(rows) + 1)
+        ]
+    else:
+        vias = [_via(table, arm) for table in top.tables("via")]
+    if len(vias) < 2:
+        raise InputError(f"{top.file}: {len(vias)} via point is not a motion; at least 2 are needed")
+    if len(vias) - 1 > MAX_SEGMENTS:
+        raise InputError(f"{top.file}: {len(vias)} via points; the board holds at most {MAX_SEGMENTS + 1}")
+    return tuple(vias)
+
+
+def _via(table: Table, arm: Arm) -> tuple[float, ...] | Pose:
+    if table.has("angles_deg"):
+        angles = _angles(table, "angles_deg", arm)
+        table.done()
+        return angles
+    posture = table.numbers("posture_deg", len(arm.joints)) if table.has("posture_deg") else None
+    matrix = table.array("matrix", "given where there are no angles_deg: the 4 rows of a pose, lengths in mm")
+    rows = Table({f"row {n}": row for n, row in enumerate(matrix, 1)}, table.file, "matrix ")
+    if len(matrix) != 4:
+        raise table.fail("matrix", "4 rows of 4 numbers")
+    table.done()
+    return Pose(tuple(rows.numbers(f"row {n}", 4) for n in range(1, 5)), posture)
+
+
+def _angles(table: Table, key: str, arm: Arm) -> tuple[float, ...]:
+    angles = table.numbers(key, len(arm.driven))
+    for joint, angle in zip(arm.driven, angles, strict=True):
+        low, high = joint.range_deg
+        if not low <= angle <= high:
+            raise table.fail(key, f"within the range of {joint.name}, {low:g} to {high:g} degrees")
+    return angles
