@@ -132,11 +132,12 @@ def _max_rate(joint: Joint) -> int:
 
     Raises InputError where the board cannot step that fast.
     """
-    assert joint.limits is not None and joint.motor is not None  # the loader requires both
+    assert joint.limits is not None  # the loader requires it
+    assert joint.motor is not None
     rate = joint.limits.speed_deg_s * joint.motor.steps_per_deg
     if rate > limits.MAX_STEP_RATE:
         raise InputError(
             f"{joint.name}: speed_deg_s = {joint.limits.speed_deg_s:g} means {rate:.0f} steps/s; "
-            f"the board makes at most {limits.MAX_STEP_RATE}. Check the unit, the microsteps or the gear ratio"
+            f"the board makes at most {limits.MAX_STEP_RATE}. Check the unit, microsteps and gear ratio"
         )
     return int(rate * 1.01) + 1

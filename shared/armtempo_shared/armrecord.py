@@ -54,7 +54,7 @@ class ArmRecordError(ValueError):
     """The record is damaged or of another version."""
 
 
-def pack(head, joints):
+def pack(head: "dict[str, int]", joints: "list[dict[str, int]]") -> bytes:
     """An arm record from a dict of the HEAD fields and a list of dicts of the JOINT fields."""
     data = struct.pack(_HEAD_FORMAT, MAGIC, VERSION, len(joints), *[head[name] for name, _ in HEAD])
     for joint in joints:
@@ -62,7 +62,7 @@ def pack(head, joints):
     return data + struct.pack("<I", crc32(data))
 
 
-def unpack(data):
+def unpack(data: bytes) -> "tuple[dict[str, int], list[dict[str, int]], int]":
     """(head dict, list of joint dicts, crc32) of an arm record; ArmRecordError where it is not one."""
     if len(data) < _HEAD_SIZE + 4:
         raise ArmRecordError("too short")

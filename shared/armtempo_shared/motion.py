@@ -35,14 +35,22 @@ class MotionError(ValueError):
     """The record is damaged or asks for what this program does not know."""
 
 
-def size(degree, joints, shared, segments, refine):
+def size(degree: int, joints: int, shared: bool, segments: int, refine: int) -> int:
     """Bytes of a whole motion record."""
     axes = 1 if shared else joints
     points = joints * (segments + degree) + axes * (segments * refine + degree)
     return HEAD_SIZE + 8 * points + 4
 
 
-def pack(degree, angles, times, segments, refine, brake_ticks, arm_crc):
+def pack(
+    degree: int,
+    angles: "list[list[int]]",
+    times: "list[list[int]]",
+    segments: int,
+    refine: int,
+    brake_ticks: int,
+    arm_crc: int,
+) -> bytes:
     """A motion record.
 
     ``angles``: per joint its n + k control points (int, steps * 2**28); ``times``: per joint, or one for
@@ -53,7 +61,7 @@ def pack(degree, angles, times, segments, refine, brake_ticks, arm_crc):
     head = struct.pack(
         _HEAD, MAGIC, degree, len(angles), flags, 0, segments, refine, brake_ticks, arm_crc
     )
-    body = []
+    body: "list[int]" = []
     for joint, points in enumerate(angles):
         body.extend(points)
         if not shared:
@@ -71,7 +79,7 @@ class Motion:
     motion itself (ranges, rates, order of times): that is the board's check before a start.
     """
 
-    def __init__(self, data):
+    def __init__(self, data: bytes) -> None:
         if len(data) < HEAD_SIZE + 4:
             raise MotionError("too short")
         (magic, self.degree, self.joints, flags, zero, self.segments, self.refine, self.brake_ticks,
@@ -89,14 +97,14 @@ class Motion:
             raise MotionError("checksum")
         self.data = data
 
-    def angle_offset(self, joint):
+    def angle_offset(self, joint: int) -> int:
         """Byte offset of the joint's first angle control point."""
-        points = self.segments + self.degree
+        points = int(self.segments + self.degree)
         if not self.shared:
             points += self.segments * self.refine + self.degree
         return HEAD_SIZE + 8 * joint * points
 
-    def time_offset(self, joint):
+    def time_offset(self, joint: int) -> int:
         """Byte offset of the joint's first time control point."""
         last = self.joints - 1 if self.shared else joint
-        return self.angle_offset(last) + 8 * (self.segments + self.degree)
+        return self.angle_offset(last) + 8 * int(self.segments + self.degree)
