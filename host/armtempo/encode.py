@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 from armtempo_shared import armrecord, limits, motion
+from numpy.typing import NDArray
 
 from armtempo.arm import Arm, Joint
 from armtempo.errors import InputError
-from armtempo.trajectory import Array, Trajectory
+from armtempo.trajectory import Trajectory
 
 _TICKS_PER_US = limits.TICK_HZ / 1e6
 
@@ -73,7 +74,7 @@ def counts_per_step(joint: Joint) -> Fraction:
     return counts / (joint.motor.steps_per_rev * joint.motor.microsteps * gear)
 
 
-def _fixed(points: Array, bits: int) -> list[int]:
+def _fixed(points: NDArray[np.float64], bits: int) -> list[int]:
     """Control points as integers with ``bits`` fraction bits."""
     scaled = np.rint(points * 2.0**bits)
     if not np.all(np.abs(scaled) < 2.0**62):

@@ -1,0 +1,80 @@
+"""Encoding for the board: degrees to steps, seconds to ticks, and what does not fit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from armtempo import encode
+from armtempo.arm import Limits, default_path, load_arm
+from armtempo.errors import InputError
+from armtempo.trajectory import JointSpline, Trajectory
+from armtempo_shared import armrecord, limits, motion
+
+ARM = load_arm(default_path())
+
+
+def trajectory(shared: bool) -> Trajectory:
+    """Three joints, two segments, refined twice; control points that are easy to recognise."""
+    splines = tuple(
+        JointSpline(5, 2, np.arange(7.0) + 10 * joint, np.arange(9.0) + (0 if shared else joint))
+        for joint in range(3)
+    )
+    return Trajectory("t", splines, shared)
+
+
+@pytest.mark.parametrize("shared", [False, True])
+def test_control_points_arrive_as_steps_and_ticks(shared: bool) -> None:
+    record = motion.Motion(encode.motion_record(trajectory(shared), ARM, brake_s=0.5))
+    assert (record.degree, record.joints, record.segments, record.refine) == (5, 3, 2, 2)
+    assert record.shared == shared
+    assert record.brake_ticks == limits.TICK_HZ // 2
+    for joint, per_deg in enumerate((6400 / 180, 32000 / 360, 6400 / 180)):
+        angles = np.frombuffer(record.data, "<i8", 7, record.angle_offset(joint)) / 2.0**28
+        np.testing.assert_allclose(angles, (np.arange(7) + 10 * joint) * per_deg, atol=2.0**-28)
+        times = np.frombuffer(record.data, "<i8", 9, record.time_offset(joint)) / 2.0**16
+        np.testing.assert_array_equal(times / limits.TICK_HZ, np.arange(9) + (0 if shared else joint))
+
+
+def test_the_record_names_the_arm_it_was_made_for() -> None:
+    crc = armrecord.unpack(encode.arm_record(ARM))[2]
+    assert motion.Motion(encode.motion_record(trajectory(False), ARM)).arm_crc == crc
+
+
+def test_the_arm_record_speaks_steps_and_counts() -> None:
+    head, joints, _ = armrecord.unpack(encode.arm_record(ARM))
+    assert head["dir_setup_ticks"] == 5 * 84
+    assert head["pulse_ticks"] == 2 * 84
+    ratios = [Fraction(joint["counts_num"], joint["counts_den"]) for joint in joints]
+    assert ratios == [Fraction(4000, 12800), Fraction(4000, 32000), Fraction(4000, 12800)]
+    assert joints[1]["min_steps"] == round(-170 * 32000 / 360)
+    assert joints[1]["max_rate"] > 40 * 32000 / 360
+
+
+def test_an_encoder_on_the_motor_counts_faster() -> None:
+    joint = ARM.driven[0]
+    assert joint.encoder
+    geared = replace(joint, encoder=replace(joint.encoder, on="motor"))
+    assert encode.counts_per_step(geared) == 2 * encode.counts_per_step(joint)
+
+
+def test_a_speed_in_the_wrong_unit_is_refused_with_the_step_rate() -> None:
+    joint = replace(ARM.joints[1], limits=Limits(40_000.0, 30.0, 120.0))
+    arm = replace(ARM, joints=(ARM.joints[0], joint, *ARM.joints[2:]))
+    with pytest.raises(InputError, match=r"joint 2: speed_deg_s = 40000 means 3555556 steps/s"):
+        encode.arm_record(arm)
+
+
+def test_a_trajectory_for_another_arm_is_refused() -> None:
+    two = replace(trajectory(False), joints=trajectory(False).joints[:2])
+    with pytest.raises(InputError, match="has 2 joints, arm 'paper-1to5' drives 3"):
+        encode.motion_record(two, ARM)
+
+
+def test_numbers_the_record_cannot_hold_are_refused() -> None:
+    first, *others = trajectory(False).joints
+    huge = replace(first, angle_points_deg=first.angle_points_deg * 1e12)
+    with pytest.raises(InputError, match="too large"):
+        encode.motion_record(replace(trajectory(False), joints=(huge, *others)), ARM)

@@ -1,0 +1,82 @@
+"""Job files: the shipped one, and the message for everything that can be wrong in one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from armtempo.arm import default_path as arm_path
+from armtempo.arm import load_arm
+from armtempo.errors import InputError
+from armtempo.job import OPTIMISERS, Pose, default_path, load_job
+from armtempo.optimise import ALGORITHMS
+
+ARM = load_arm(arm_path())
+TWO = "via_deg = [[0, -60, 40], [20, -75, 50]]\n"
+
+
+def written(tmp_path: Path, text: str) -> Path:
+    """A job file with this text behind its name."""
+    path = tmp_path / "job.toml"
+    path.write_text('name = "t"\n' + text)
+    return path
+
+
+def test_the_shipped_job_is_table_3_with_its_misprint_mended() -> None:
+    job = load_job(default_path(), ARM)
+    assert [via[2] for via in job.via if not isinstance(via, Pose)] == [40, 50, 70, 40, 10, -20, -52]
+    assert (job.degree, job.timing, job.optimiser, job.population, job.iterations) == (
+        5,
+        "per-joint",
+        "acs",
+        10,
+        500,
+    )
+    assert job.bounds_s == (0.1, 3.0)
+
+
+def test_the_optimisers_a_job_may_name_are_those_there_are() -> None:
+    assert set(OPTIMISERS) == set(ALGORITHMS)
+
+
+def test_poses_and_angles_may_be_mixed(tmp_path: Path) -> None:
+    matrix = "[[0, 0, -1, -536.404], [0, 1, 0, 0], [1, 0, 0, 434.698], [0, 0, 0, 1]]"
+    text = f"[[via]]\nangles_deg = [0, -60, 40]\n[[via]]\nmatrix = {matrix}\n"
+    job = load_job(written(tmp_path, text), ARM)
+    assert job.via[0] == (0, -60, 40)
+    assert isinstance(job.via[1], Pose)
+    assert job.via[1].matrix[0] == (0, 0, -1, -536.404)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", ["via_deg is missing", "[[via]]"]),
+        ("via_deg = []\n", ["via_deg = []", "list of lists"]),
+        ("via_deg = [[0, -60, 40]]\n", ["1 via point is not a motion", "at least 2"]),
+        ("via_deg = [[0, -60, 40], [20, -75]]\n", ["via_deg[2] = [20, -75]", "list of 3 numbers"]),
+        ("via_deg = [[0, -60, 40], [20, nan, 50]]\n", ["via_deg[2]", "list of 3 numbers"]),
+        ("via_deg = [[0, -60, 40], [200, -75, 50]]\n", ["via_deg[2]", "range of joint 1, -10 to 190"]),
+        (TWO + "degree = 4\n", ["degree = 4", "3, 5"]),
+        (TWO + 'timing = "fast"\n', ["timing = 'fast'", "'per-joint', 'shared'"]),
+        (TWO + 'optimiser = "magic"\n', ["optimiser = 'magic'", "'acs'"]),
+        (TWO + "population = 2\n", ["population = 2", "from 4"]),
+        (TWO + "bounds_s = [3.0, 0.1]\n", ["bounds_s", "shorter first"]),
+        (TWO + "seeds = 3\n", ["seeds: unknown key", "'seed'"]),
+        ("[[via]]\nmatrix = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n", ["via[1].matrix", "4 rows of 4 numbers"]),
+        ("[[via]]\nangle = 3\n", ["via[1].matrix is missing"]),
+    ],
+)
+def test_what_is_wrong_is_said(tmp_path: Path, text: str, said: list[str]) -> None:
+    path = written(tmp_path, text)
+    with pytest.raises(InputError) as error:
+        load_job(path, ARM)
+    for part in [str(path), *said]:
+        assert part in str(error.value)
+
+
+def test_a_name_the_board_cannot_store(tmp_path: Path) -> None:
+    path = tmp_path / "job.toml"
+    path.write_text('name = "a/b"\n' + TWO)
+    with pytest.raises(InputError, match="a-z A-Z 0-9"):
+        load_job(path, ARM)
