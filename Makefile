@@ -7,13 +7,13 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test check bench clean
+.PHONY: demo test check clean
 
 demo: $(VENV)/demo
 	"$(BIN)/armtempo" demo
 
 test: $(VENV)/test
-	"$(BIN)/python" tests/get_micropython.py
+	"$(BIN)/python" .ci/get_micropython.py
 	"$(BIN)/python" -m pytest $(PYTEST_ARGS)
 
 check: $(VENV)/test
@@ -22,8 +22,7 @@ check: $(VENV)/test
 	"$(BIN)/mypy" --strict host/armtempo shared/armtempo_shared
 
 $(BIN)/python:
-	$(PYTHON) -c 'import sys; sys.exit("armtempo needs Python 3.11 or newer, this is " + sys.version.split()[0] + "; set PYTHON=") if sys.version_info < (3, 11) else None'
-	$(PYTHON) -m venv $(VENV)
+	$(PYTHON) .ci/make_venv.py
 
 $(VENV)/demo: pyproject.toml | $(BIN)/python
 	"$(BIN)/python" -m pip install --quiet --disable-pip-version-check -e '.[plot]'

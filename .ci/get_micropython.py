@@ -10,83 +10,17 @@ from __future__ import annotations
 
 import os
 import platform
-import re
 import shlex
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+from debian import Archive, Missing, need_debian
+
 CACHE = Path(__file__).resolve().parent.parent / ".cache" / "micropython"
-SUITE = "trixie"
-KEYRING = "/usr/share/keyrings/debian-archive-keyring.gpg"
 LIBRARIES = ["libc6", "libffi8", "libmbedcrypto16", "libmbedtls21", "libmbedx509-7"]
 PROBE = "import struct; print(struct.calcsize('P'))"
-
-
-class Missing(Exception):
-    """Why an interpreter could not be brought."""
-
-
-def archive_address() -> str:
-    """The Debian archive that this machine's own apt uses."""
-    files = [Path("/etc/apt/sources.list"), *sorted(Path("/etc/apt/sources.list.d").glob("*"))]
-    for file in files:
-        if not file.is_file():
-            continue
-        for line in file.read_text(errors="replace").splitlines():
-            if re.match(r"\s*(URIs:|deb\s)", line):
-                for address in re.findall(r"[a-z+]+:/\S+", line):
-                    if re.search(r"/debian/?$", address):
-                        return str(address)
-    raise Missing("apt on this machine names no Debian archive")
-
-
-class Archive:
-    """Debian 13 packages of one architecture, seen through lists of our own."""
-
-    def __init__(self, architecture: str) -> None:
-        self.architecture = architecture
-        self.folder = CACHE / f"apt-{architecture}"
-        lists = self.folder / "lists"
-        for folder in (lists / "partial", self.folder / "cache" / "archives" / "partial"):
-            folder.mkdir(parents=True, exist_ok=True)
-        signed = f"[signed-by={KEYRING}] " if Path(KEYRING).exists() else ""
-        (self.folder / "sources.list").write_text(f"deb {signed}{archive_address()} {SUITE} main\n")
-        (self.folder / "status").touch()
-        config = {
-            "Dir::Etc::sourcelist": "sources.list",
-            "Dir::Etc::sourceparts": "/dev/null",
-            "Dir::State::Lists": "lists",
-            "Dir::State::status": "status",
-            "Dir::Cache": "cache",
-            "APT::Architecture": architecture,
-            "APT::Architectures": architecture,
-            "APT::Sandbox::User": "",
-            "Acquire::Languages": "none",
-            "Acquire::Retries": "3",
-        }
-        self.options = []
-        for key, value in config.items():
-            if key.startswith("Dir::") and not value.startswith("/"):
-                value = str(self.folder / value)
-            self.options += ["-o", f"{key}={value}"]
-        self._run("apt-get", *self.options, "-q", "update")
-
-    def _run(self, *command: str) -> None:
-        done = subprocess.run(command, cwd=self.folder, capture_output=True, text=True)
-        if done.returncode:
-            tail = (done.stderr or done.stdout).strip().splitlines()[-1:]
-            raise Missing(f"{command[0]} failed: {' '.join(tail)}")
-
-    def unpack(self, packages: list[str], root: Path) -> None:
-        """Download the packages and unpack them below ``root``."""
-        for old in self.folder.glob("*.deb"):
-            old.unlink()
-        self._run("apt-get", *self.options, "-q", "download", *packages)
-        root.mkdir(parents=True, exist_ok=True)
-        for package in self.folder.glob("*.deb"):
-            self._run("dpkg", "-x", str(package), str(root))
 
 
 def write_starter(name: str, command: list[str]) -> None:
@@ -105,13 +39,6 @@ def word_size(name: str) -> int:
     return int(done.stdout) if done.returncode == 0 and done.stdout.strip().isdigit() else 0
 
 
-def need_debian() -> None:
-    """Missing where Debian's packages cannot be used."""
-    for tool in ("apt-get", "dpkg"):
-        if shutil.which(tool) is None:
-            raise Missing(f"there is no {tool} here to bring it")
-
-
 def bring_native() -> None:
     """``micropython`` of this machine."""
     found = shutil.which("micropython")
@@ -123,7 +50,7 @@ def bring_native() -> None:
     if architecture is None:
         raise Missing(f"no package is known for {platform.machine()}")
     root = CACHE / "root"
-    Archive(architecture).unpack(["micropython", *LIBRARIES], root)
+    Archive(architecture, CACHE).unpack(["micropython", *LIBRARIES], root)
     loader = next(root.glob("usr/lib*/ld-linux-*")) if any(root.glob("usr/lib*/ld-linux-*")) else None
     loader = loader or next(root.glob("usr/lib/*/ld-linux-*"))
     library = next(root.glob("usr/lib/*-linux-gnu"))
@@ -138,10 +65,10 @@ def bring_arm() -> None:
     emulator = shutil.which("qemu-arm") or shutil.which("qemu-arm-static")
     if emulator is None:
         architecture = {"x86_64": "amd64", "aarch64": "arm64"}.get(platform.machine(), "amd64")
-        Archive(architecture).unpack(["qemu-user"], CACHE / "qemu")
+        Archive(architecture, CACHE).unpack(["qemu-user"], CACHE / "qemu")
         emulator = str(CACHE / "qemu/usr/bin/qemu-arm")
     root = CACHE / "root-arm"
-    Archive("armhf").unpack(["micropython", "libgcc-s1", *LIBRARIES], root)
+    Archive("armhf", CACHE).unpack(["micropython", "libgcc-s1", *LIBRARIES], root)
     if not (root / "lib").exists():
         (root / "lib").symlink_to("usr/lib")
     write_starter("micropython-arm", [emulator, "-L", str(root), str(root / "usr/bin/micropython")])
@@ -162,7 +89,9 @@ def main() -> int:
             print(f"{name}: not here: {reason}", file=sys.stderr)
             continue
         print(f"{name}: ready")
-    if os.environ.get("CI") and not all((CACHE / name).exists() for name in ("micropython", "micropython-arm")):
+    if os.environ.get("CI") and not all(
+        (CACHE / name).exists() for name in ("micropython", "micropython-arm")
+    ):
         print("CI needs both interpreters", file=sys.stderr)
         return 1
     return 0
