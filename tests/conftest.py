@@ -24,4 +24,6 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Say at the end what was not run here."""
     for name in interpreters.MISSING:
-        terminalreporter.write_line(f"left out: all tests under {name}, which is not on this machine", red=True)
+        terminalreporter.write_line(
+            f"left out: all tests under {name}, which is not on this machine", red=True
+        )

@@ -47,5 +47,7 @@ def run(name: str, script: Path | str, *arguments: str, timeout: float = 300.0, 
         command += ["-X", f"heapsize={heap}"]
     command += [str(script), *arguments]
     done = subprocess.run(command, env=environment(name), capture_output=True, text=True, timeout=timeout)
-    assert done.returncode == 0, f"{name} {script} ended with {done.returncode}:\n{done.stdout}\n{done.stderr}"
+    assert done.returncode == 0, (
+        f"{name} {script} ended with {done.returncode}:\n{done.stdout}\n{done.stderr}"
+    )
     return done.stdout

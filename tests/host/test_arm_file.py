@@ -43,7 +43,11 @@ def test_the_shipped_arm_is_the_papers() -> None:
         ("speed_deg_s = 50.0", "speed_deg_s = nan", ["joint[1].limits.speed_deg_s = nan", "a number"]),
         ("speed_deg_s = 50.0", 'speed_deg_s = "50"', ["speed_deg_s = '50'", "a number"]),
         ("speed_deg_s = 50.0, ", "", ["joint[1].limits.speed_deg_s is missing"]),
-        ("microsteps = 8", "microsteps = 8.5", ["joint[2].motor.microsteps = 8.5", "whole number from 1 to 256"]),
+        (
+            "microsteps = 8",
+            "microsteps = 8.5",
+            ["joint[2].motor.microsteps = 8.5", "whole number from 1 to 256"],
+        ),
         ("microsteps = 8", "microstep = 8", ["joint[2].motor.microsteps is missing"]),
         ("gear_ratio = 20.0", "gear_ratio = 20.0, wheels = 3", ["joint[2].motor.wheels: unknown key"]),
         ("home_deg = 40.0", "home_def = 40.0", ["joint[3].home_def: unknown key", "'home_deg'"]),
