@@ -58,9 +58,7 @@ def pack(
     """
     shared = len(times) == 1 and len(angles) > 1
     flags = SHARED_AXIS if shared else 0
-    head = struct.pack(
-        _HEAD, MAGIC, degree, len(angles), flags, 0, segments, refine, brake_ticks, arm_crc
-    )
+    head = struct.pack(_HEAD, MAGIC, degree, len(angles), flags, 0, segments, refine, brake_ticks, arm_crc)
     body: "list[int]" = []
     for joint, points in enumerate(angles):
         body.extend(points)
