@@ -16,10 +16,11 @@ test: $(VENV)/test
 	"$(BIN)/python" .ci/get_micropython.py
 	"$(BIN)/python" -m pytest $(PYTEST_ARGS)
 
-check: $(VENV)/test
+check: $(VENV)/test .cache/typings
 	"$(BIN)/ruff" check .
 	"$(BIN)/ruff" format --check .
 	"$(BIN)/mypy" --strict host/armtempo shared/armtempo_shared
+	"$(BIN)/mypy" --config-file board/mypy.ini board/armtempo_board
 
 $(BIN)/python:
 	$(PYTHON) .ci/make_venv.py
@@ -31,6 +32,10 @@ $(VENV)/demo: pyproject.toml | $(BIN)/python
 $(VENV)/test: pyproject.toml | $(BIN)/python
 	"$(BIN)/python" -m pip install --quiet --disable-pip-version-check -e '.[plot,cluster,mpy]' -r tests/requirements.txt
 	@touch $@ $(VENV)/demo
+
+.cache/typings: board/mypy.ini | $(VENV)/test
+	"$(BIN)/python" -m pip install --quiet --disable-pip-version-check --upgrade --target $@ micropython-stm32-stubs
+	@touch $@
 
 clean:
 	rm -rf $(VENV) .cache build dist
