@@ -1,0 +1,157 @@
+"""The board as an object: one method a command of the message table."""
+
+from __future__ import annotations
+
+import secrets
+from binascii import crc32
+from collections.abc import Callable, Sequence
+
+from armtempo_shared import limits, wire
+from armtempo_shared.messages import MAX_PAYLOAD
+
+from armtempo.errors import BoardError
+from armtempo.link import messages
+from armtempo.link.session import PATIENCE_S, NoAnswer, Session
+
+SLOW_S = 30.0
+"""Silence allowed where the board erases flash or checks a whole motion before it answers."""
+HELLO_S = 1.2
+"""Silence allowed at the first word; with the look at what else is there, under 2 s."""
+SMALLEST_PIECE = 32
+LARGEST_PIECE = MAX_PAYLOAD - 4
+PIECE_PATIENCE_S = 0.5
+
+Progress = Callable[[int, int], None]
+"""Called with what is done and the whole."""
+
+
+class Board:
+    """A board at the other end of a session; methods raise BoardError where it refuses, LinkError where
+    it is gone."""
+
+    def __init__(self, session: Session, session_number: int | None = None) -> None:
+        self.session = session
+        self._number = secrets.randbits(32) if session_number is None else session_number
+        self._piece = LARGEST_PIECE
+
+    def hello(self) -> messages.Hello:
+        """Begin a session; NoAnswer within about a second and a half where nobody speaks the protocol."""
+        values, board_id = self.session.command(
+            "hello", (wire.PROTOCOL_VERSION, self._number), silence_s=HELLO_S, patience_s=HELLO_S
+        )
+        fields = [*values, board_id]
+        fields[3] = messages.state_name(values[3])
+        return messages.Hello(*fields)
+
+    def status(self) -> messages.Status:
+        """What the board is doing and where the joints stand."""
+        values, tail = self.session.command("status")
+        fields = [messages.state_name(values[0]), *values[1:], messages.stand(tail)]
+        return messages.Status(*fields)
+
+    def upload(self, name: str, data: bytes, progress: Progress | None = None) -> None:
+        """Store a record under a name; the board keeps the old one until all of the new one has arrived."""
+        crc = crc32(data)
+        self.session.command("put_begin", (len(data), crc), name, silence_s=SLOW_S)
+        offset = 0
+        while offset < len(data):
+            offset = self._put_piece(data, offset)
+            if progress is not None:
+                progress(offset, len(data))
+        self.session.command("put_commit", (crc,), silence_s=SLOW_S, patience_s=SLOW_S)
+
+    def _put_piece(self, data: bytes, offset: int) -> int:
+        """Send the next piece; pieces become smaller while the link loses them, and larger again."""
+        repeats = self.session.repeats
+        try:
+            values, _ = self.session.command(
+                "put_data", (offset,), data[offset : offset + self._piece], patience_s=self._patience_s()
+            )
+        except NoAnswer:
+            if self._piece == SMALLEST_PIECE:
+                raise
+            self._piece = max(SMALLEST_PIECE, self._piece // 2)
+            return offset
+        if self.session.repeats == repeats:
+            self._piece = min(LARGEST_PIECE, 2 * self._piece)
+        return int(values[0])
+
+    def _patience_s(self) -> float:
+        return PATIENCE_S if self._piece == SMALLEST_PIECE else PIECE_PATIENCE_S
+
+    def stored(self) -> list[messages.Stored]:
+        """All stored trajectories."""
+        found: list[messages.Stored] = []
+        while True:
+            try:
+                (count, size, crc, duration, joints, default), name = self.session.command(
+                    "list", (len(found),)
+                )
+            except BoardError as error:
+                if error.code == wire.ERROR_CODES["not_found"]:
+                    return found
+                raise
+            if not name:
+                return found
+            found.append(messages.Stored(name, size, crc, duration, joints, bool(default)))
+            if len(found) >= count:
+                return found
+
+    def find(self, name: str) -> messages.Stored | None:
+        """The stored trajectory of this name, or None."""
+        return next((entry for entry in self.stored() if entry.name == name), None)
+
+    def fetch(self, name: str) -> bytes:
+        """A stored record, read back."""
+        data = b""
+        piece: bytes
+        while True:
+            (size,), piece = self.session.command("get", (len(data), MAX_PAYLOAD - 64), name)
+            data += piece
+            if len(data) >= size or not piece:
+                return data
+
+    def remove(self, name: str) -> None:
+        """Remove a stored trajectory."""
+        self.session.command("remove", (), name, silence_s=SLOW_S)
+
+    def rename(self, old: str, new: str) -> None:
+        """Give a stored trajectory another name."""
+        self.session.command("rename", (len(old.encode()),), old + new, silence_s=SLOW_S)
+
+    def set_default(self, name: str) -> None:
+        """What the board's button starts; "" for nothing."""
+        self.session.command("set_default", (), name, silence_s=SLOW_S)
+
+    def home(self, steps: Sequence[int | None]) -> None:
+        """Declare where the joints stand, in steps; None leaves a joint as it is."""
+        mask = sum(1 << joint for joint, value in enumerate(steps) if value is not None)
+        tail = b"".join((value or 0).to_bytes(4, "little", signed=True) for value in steps)
+        self.session.command("home", (mask,), tail)
+
+    def start(self, name: str, crc: int, flags: int = 0) -> tuple[int, float]:
+        """Start a stored motion; gives the number of the run and its length in seconds."""
+        (run, duration), _ = self.session.command(
+            "start", (flags, crc), name, silence_s=SLOW_S, patience_s=SLOW_S
+        )
+        return run, duration / limits.TICK_HZ
+
+    def stop(self, now: bool = False) -> None:
+        """Brake along the path, or freeze."""
+        self.session.command("stop", (int(now),))
+
+    def clear(self) -> None:
+        """Clear a fault."""
+        self.session.command("clear")
+
+    def leave(self) -> None:
+        """End the board program; the port becomes MicroPython's REPL."""
+        self.session.command("leave")
+
+    def samples(self, acknowledged: int, wanted: int = 0) -> tuple[int, int]:
+        """All samples before ``acknowledged`` have arrived; ask for up to ``wanted`` from there on again.
+
+        Gives the index of the oldest sample the board still has and how many it has.
+        """
+        (first, count), _ = self.session.command("samples", (acknowledged, wanted))
+        return first, count

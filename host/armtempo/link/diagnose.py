@@ -1,0 +1,42 @@
+"""What sits on a port where nobody answers ``hello``."""
+
+from __future__ import annotations
+
+from armtempo.errors import LinkError
+from armtempo.link.transport import Transport
+
+LOOK_S = 0.4
+_REPL_SIGNS = (b">>>", b"raw REPL", b"MicroPython", b"Traceback (most recent call last)")
+_NUDGE = b"\r\x02\r"
+"""Ends a line, leaves a raw REPL, asks for a prompt; without meaning to the board program."""
+
+
+def explain(transport: Transport, heard: bytes) -> LinkError:
+    """The error to raise: silence, a bare MicroPython REPL, or something else; ``heard`` so far."""
+    transport.write(_NUDGE)
+    heard += _listen(transport)
+    where = f"the board on {transport.name}"
+    if any(sign in heard for sign in _REPL_SIGNS):
+        return LinkError(
+            f"{where} runs MicroPython but not the armtempo program; install it with 'armtempo deploy'"
+        )
+    if heard:
+        return LinkError(
+            f"something else than armtempo answers on {transport.name} (it says {_excerpt(heard)}); "
+            "'armtempo ports' lists the other ports"
+        )
+    return LinkError(
+        f"{where} does not answer within 2 s: check the cable, that the board is powered, and that this is "
+        "its port ('armtempo ports'); a board that hangs starts afresh with its reset button"
+    )
+
+
+def _listen(transport: Transport) -> bytes:
+    heard = b""
+    for _ in range(4):
+        heard += transport.read(LOOK_S / 4)
+    return heard
+
+
+def _excerpt(heard: bytes) -> str:
+    return repr(heard[:40])[1:]

@@ -1,0 +1,151 @@
+"""What the board tells, as dataclasses: the host's view of the message table in ``armtempo_shared.wire``."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from typing import Any
+
+from armtempo_shared import wire
+
+Frame = tuple[int, int, bytes]
+"""Sequence number, message id, payload."""
+
+
+@dataclass(frozen=True)
+class Hello:
+    """Who answers on the port."""
+
+    protocol: int
+    joints: int
+    encoders: int
+    state: str
+    tick_hz: int
+    max_rate: int
+    max_rate_sum: int
+    free_flash: int
+    free_heap: int
+    arm_crc: int
+    program_crc: int
+    boot: int
+    board_id: str
+
+
+@dataclass(frozen=True)
+class Stand:
+    """Where the joints stand: steps commanded so far and encoder counts, one entry a joint."""
+
+    commanded_steps: tuple[int, ...]
+    counts: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Status:
+    """The board's answer to ``status``."""
+
+    state: str
+    fault: int
+    fault_joint: int
+    known: int
+    run: int
+    ticks: int
+    samples_kept: int
+    samples_lost: int
+    frames_bad: int
+    stand: Stand
+
+    @property
+    def moving(self) -> bool:
+        """Whether steps may still come."""
+        return self.state in ("moving", "braking")
+
+    def joint_known(self, joint: int) -> bool:
+        """Whether the position of this joint (from 0) is known."""
+        return bool(self.known >> joint & 1)
+
+
+@dataclass(frozen=True)
+class Stored:
+    """One stored trajectory."""
+
+    name: str
+    size: int
+    crc: int
+    duration_ticks: int
+    joints: int
+    default: bool
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One sample; ``ticks`` is the motion clock."""
+
+    run: int
+    index: int
+    ticks: int
+    flags: int
+    stand: Stand
+
+
+@dataclass(frozen=True)
+class Done:
+    """A motion ended as planned, or after a stop."""
+
+    run: int
+    ticks: int
+    samples: int
+    lost: int
+    stand: Stand
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A motion ended by a fault."""
+
+    run: int
+    code: int
+    joint: int
+    ticks: int
+    stand: Stand
+
+
+@dataclass(frozen=True)
+class Notice:
+    """Words from the board program."""
+
+    text: str
+
+
+Event = Sample | Done | Fault | Notice
+
+
+def state_name(number: int) -> str:
+    """Name of a state; a number the host does not know is shown as such."""
+    return wire.STATES[number] if number < len(wire.STATES) else f"state {number}"
+
+
+def stand(tail: bytes) -> Stand:
+    """The tail of status, sample, done and fault: two int32 a joint; WireError where it does not fit."""
+    if len(tail) % 8:
+        raise wire.WireError("length")
+    values = struct.unpack(f"<{len(tail) // 4}i", tail)
+    return Stand(values[0::2], values[1::2])
+
+
+def event(number: int, payload: bytes) -> Event:
+    """An event from its message id and payload; WireError where it is none."""
+    entry = wire.EVENT_BY_ID.get(number)
+    if entry is None:
+        raise wire.WireError("not an event")
+    values, tail = wire.decode(entry, payload)
+    return _event(entry[0], values, tail)
+
+
+def _event(name: str, values: tuple[Any, ...], tail: Any) -> Event:
+    if name == "notice":
+        return Notice(tail)
+    kinds: dict[str, type[Sample | Done | Fault]] = {"sample": Sample, "done": Done, "fault": Fault}
+    if name not in kinds:
+        raise wire.WireError("not an event")
+    fields = [*values, stand(tail)]
+    return kinds[name](*fields)

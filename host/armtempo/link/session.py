@@ -1,0 +1,165 @@
+"""Commands and events over a transport: sequence numbers, time-outs, repeats.
+
+One command is under way at a time. Its frame is sent again, under the same sequence number, until the
+board answers; the board acts once on a number and repeats its answer. Events that arrive meanwhile wait
+in ``events``.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from armtempo_shared import wire
+
+from armtempo.errors import BoardError, LinkError
+from armtempo.link import messages
+from armtempo.link.transport import Transport
+
+REPEAT_S = 0.2
+"""A command without an answer is sent again after this time."""
+SILENCE_S = 3.0
+"""No byte for so long: the board is not there any more."""
+PATIENCE_S = 20.0
+"""Bytes but no answer for so long: the link is too disturbed."""
+QUIET_S = 0.05
+"""Half a frame, then nothing for so long: its rest is not coming."""
+RECENT = 512
+"""So many of the latest bytes are kept, to tell what sits on a port that does not answer."""
+
+
+Answer = tuple[tuple[Any, ...], Any]
+"""Field values (int) and tail (bytes or str) of an answer."""
+
+
+class NoAnswer(LinkError):
+    """The board did not answer a command in time."""
+
+
+class Session:
+    """The host's end of the protocol; ``clock`` gives seconds and is replaced in tests."""
+
+    def __init__(self, transport: Transport, clock: Callable[[], float] = time.monotonic) -> None:
+        self.transport = transport
+        self.clock = clock
+        self.events: deque[messages.Event] = deque()
+        self.recent = bytearray()
+        self.repeats = 0
+        self._parser = wire.Parser()
+        self._sequence = 0
+        self._heard_s = clock()
+
+    @property
+    def frames_bad(self) -> int:
+        """Stretches of received bytes that were no frame."""
+        return int(self._parser.bad)
+
+    def command(
+        self,
+        name: str,
+        values: Sequence[int] = (),
+        tail: bytes | str = b"",
+        *,
+        silence_s: float = SILENCE_S,
+        patience_s: float = PATIENCE_S,
+    ) -> Answer:
+        """(fields, tail) of the board's answer.
+
+        Raises BoardError where the board refuses, NoAnswer after ``silence_s`` without a byte or
+        ``patience_s`` without an answer, LinkError where the port breaks.
+        """
+        number = wire.COMMAND[name][1]
+        self._sequence = (self._sequence + 1) % 256
+        data = wire.frame(self._sequence, number, wire.encode(wire.COMMAND[name], values, tail))
+        begin_s = self._heard_s = self.clock()
+        while True:
+            self.transport.write(data)
+            reply = self._reply(self.clock() + REPEAT_S, number)
+            if reply is not None:
+                return _answer(name, *reply)
+            now_s = self.clock()
+            if now_s - self._heard_s >= silence_s or now_s - begin_s >= patience_s:
+                raise NoAnswer(self._no_answer(name, now_s - begin_s))
+            self.repeats += 1
+
+    def poll(self, timeout_s: float) -> messages.Event | None:
+        """The oldest event; waits up to ``timeout_s`` for one."""
+        deadline_s = self.clock() + timeout_s
+        while not self.events:
+            left_s = deadline_s - self.clock()
+            frame = self._frame(max(0.0, left_s))
+            if frame is not None:
+                self._keep_event(frame)
+            elif left_s <= 0:
+                return None
+        return self.events.popleft()
+
+    def _no_answer(self, name: str, waited_s: float) -> str:
+        what = f"the board on {self.transport.name} did not answer '{name}' within {waited_s:.1f} s"
+        if self.frames_bad:
+            return f"{what}; {self.frames_bad} damaged stretches received: check the cable"
+        return f"{what}; check the cable and that the board is powered"
+
+    def _reply(self, deadline_s: float, number: int) -> messages.Frame | None:
+        while (left_s := deadline_s - self.clock()) > 0:
+            frame = self._frame(left_s)
+            if frame is None:
+                continue
+            if frame[1] in _REPLY_IDS:
+                if frame[0] == self._sequence and frame[2][:1] == bytes((number,)):
+                    return frame
+            else:
+                self._keep_event(frame)
+        return None
+
+    def _frame(self, timeout_s: float) -> messages.Frame | None:
+        frame = self._next_frame()
+        if frame is not None:
+            return frame
+        data = self.transport.read(min(timeout_s, QUIET_S))
+        if data:
+            self._heard_s = self.clock()
+            self.recent = (self.recent + data)[-RECENT:]
+            self._parser.feed(data)
+        elif self._parser.pending() and self.clock() - self._heard_s >= QUIET_S:
+            self._parser.drop()
+        return self._next_frame()
+
+    def _next_frame(self) -> messages.Frame | None:
+        frame: messages.Frame | None = self._parser.next()
+        return frame
+
+    def _keep_event(self, frame: messages.Frame) -> None:
+        try:
+            self.events.append(messages.event(frame[1], frame[2]))
+        except wire.WireError:
+            return  # a reply to an older command, or a message of a newer protocol
+
+
+_REPLY_IDS = tuple(wire.EVENT[name][1] for name in ("ok", "error"))
+
+
+def _answer(name: str, sequence: int, number: int, payload: bytes) -> Answer:
+    try:
+        values, tail = wire.decode(wire.EVENT_BY_ID[number], payload)
+        if wire.EVENT_BY_ID[number][0] == "error":
+            raise refusal(f"the board refused '{name}'", *values[1:])
+        answer: Answer = wire.decode(wire.ANSWER[name], tail)
+    except wire.WireError as error:
+        raise LinkError(
+            f"the board's answer to '{name}' does not fit protocol {wire.PROTOCOL_VERSION} ({error}); "
+            "run 'armtempo deploy'"
+        ) from error
+    return answer
+
+
+def refusal(what: str, code: int, joint: int = 255, value: int = 0) -> BoardError:
+    """A BoardError with the sentence for an error or fault code."""
+    _, meaning, cure = wire.ERRORS.get(
+        code, ("", f"error {code}, unknown to this version", "update armtempo")
+    )
+    where = f" (joint {joint + 1})" if joint < 6 else ""
+    detail = f" [{value}]" if value else ""
+    return BoardError(f"{what}: {meaning}{where}{detail}; {cure}", code)

@@ -1,0 +1,140 @@
+"""The traffic log: every byte to and from the board, decoded beside it.
+
+A log is a text file, one line a chunk of bytes, tab-separated::
+
+    seconds since the start | ">" to the board, "<" from it | the bytes in hex | what they say
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TextIO
+
+from armtempo_shared import wire
+
+from armtempo.errors import InputError
+from armtempo.link.transport import Transport
+
+HEADER = "# armtempo traffic 1"
+TO_BOARD = ">"
+FROM_BOARD = "<"
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """Bytes that went one way together."""
+
+    time_s: float
+    direction: str
+    data: bytes
+
+
+Sink = Callable[[Chunk, list[str]], None]
+"""Takes a chunk and the descriptions of the frames that it completes."""
+
+
+class Decoder:
+    """Turns the chunks of both directions into words; keeps half frames for the next chunk."""
+
+    def __init__(self) -> None:
+        self._parsers = {TO_BOARD: wire.Parser(), FROM_BOARD: wire.Parser()}
+
+    def feed(self, direction: str, data: bytes) -> list[str]:
+        """The frames that this chunk completes, one description each, and a word about damaged bytes."""
+        parser = self._parsers[direction]
+        bad_before = parser.bad
+        parser.feed(data)
+        lines = []
+        while (frame := parser.next()) is not None:
+            lines.append(describe(direction, *frame))
+        if parser.bad != bad_before:
+            lines.append("(bytes outside of any frame)")
+        return lines
+
+
+def describe(direction: str, sequence: int, number: int, payload: bytes) -> str:
+    """One frame in words: ``12 status``, ``12 ok status state=2 …``."""
+    table = wire.COMMAND_BY_ID if direction == TO_BOARD else wire.EVENT_BY_ID
+    entry = table.get(number)
+    if entry is None:
+        return f"{sequence} message {number:#04x}, unknown"
+    try:
+        return f"{sequence} {_words(entry, payload)}"
+    except wire.WireError:
+        return f"{sequence} {entry[0]}, malformed"
+
+
+def _words(entry: tuple[Any, ...], payload: bytes) -> str:
+    values, tail = wire.decode(entry, payload)
+    if entry[0] == "ok" and values[0] in wire.ANSWER_BY_ID:
+        return "ok " + _words(wire.ANSWER_BY_ID[values[0]], tail)
+    if entry[0] == "error" and values[0] in wire.COMMAND_BY_ID:
+        name = wire.ERRORS.get(values[1], (f"code {values[1]}",))[0]
+        return f"error {wire.COMMAND_BY_ID[values[0]][0]} {name} joint={values[2]} value={values[3]}"
+    words = [f"{name}={value}" for name, value in zip(entry[3], values, strict=True)]
+    if tail:
+        words.append(repr(tail) if isinstance(tail, str) else f"+{len(tail)} bytes")
+    return " ".join([entry[0], *words])
+
+
+class LoggedTransport:
+    """A transport that hands what passes through it to a sink as well."""
+
+    def __init__(self, inner: Transport, sink: Sink) -> None:
+        self.name = inner.name
+        self._inner = inner
+        self._sink = sink
+        self._decoder = Decoder()
+        self._start = time.monotonic()
+
+    def read(self, timeout_s: float) -> bytes:
+        """See Transport."""
+        data = self._inner.read(timeout_s)
+        if data:
+            self._log(FROM_BOARD, data)
+        return data
+
+    def write(self, data: bytes) -> None:
+        """See Transport."""
+        self._log(TO_BOARD, data)
+        self._inner.write(data)
+
+    def close(self) -> None:
+        """See Transport."""
+        self._inner.close()
+
+    def _log(self, direction: str, data: bytes) -> None:
+        chunk = Chunk(time.monotonic() - self._start, direction, data)
+        self._sink(chunk, self._decoder.feed(direction, data))
+
+
+def writer(file: TextIO) -> Sink:
+    """A sink that writes a log; each line is flushed, so that a killed program leaves a readable log."""
+    print(HEADER, file=file, flush=True)
+
+    def write(chunk: Chunk, words: list[str]) -> None:
+        fields = (f"{chunk.time_s:.4f}", chunk.direction, chunk.data.hex(), "; ".join(words))
+        print("\t".join(fields), file=file, flush=True)
+
+    return write
+
+
+def read_log(path: Path) -> Iterator[Chunk]:
+    """The chunks of a recorded log; InputError where it is none. A cut last line is left out."""
+    try:
+        lines = path.read_text(encoding="utf-8").split("\n")
+    except (OSError, UnicodeError) as error:
+        raise InputError(f"{path}: the traffic log cannot be read: {error}") from error
+    if lines[0] != HEADER:
+        raise InputError(f"{path}: not a traffic log of armtempo (its first line should be {HEADER!r})")
+    for number, line in enumerate(lines[1:-1], start=2):
+        fields = line.split("\t")
+        try:
+            if len(fields) != 4 or fields[1] not in (TO_BOARD, FROM_BOARD):
+                raise ValueError("four columns expected, the second > or <")
+            yield Chunk(float(fields[0]), fields[1], bytes.fromhex(fields[2]))
+        except ValueError as error:
+            raise InputError(f"{path}, line {number}: not a line of a traffic log: {error}") from error

@@ -1,0 +1,89 @@
+"""Bytes to and from a board: a serial port (or whatever pyserial can open), nothing above that."""
+
+from __future__ import annotations
+
+import errno
+from typing import Protocol
+
+import serial
+
+from armtempo.errors import InputError, LinkError
+
+BAUD_RATE = 115_200
+"""Without meaning over USB; a plain UART between host and board would use it."""
+_ADVICE = "'armtempo ports' lists what is there"
+
+
+class Transport(Protocol):
+    """A pair of byte streams."""
+
+    name: str
+
+    def read(self, timeout_s: float) -> bytes:
+        """What has arrived; waits up to ``timeout_s`` for the first byte, then gives ``b""``."""
+
+    def write(self, data: bytes) -> None:
+        """Send all of it."""
+
+    def close(self) -> None:
+        """Free the port; may be called twice."""
+
+
+class SerialTransport:
+    """A transport over pyserial: a device name, or a URL such as ``socket://host:port``.
+
+    Raises InputError where there is no such port, LinkError where it is in use or breaks.
+    """
+
+    def __init__(self, port: str) -> None:
+        self.name = port
+        self._serial = _open(port)
+
+    def read(self, timeout_s: float) -> bytes:
+        """See Transport."""
+        try:
+            self._serial.timeout = timeout_s
+            return bytes(self._serial.read(max(1, self._serial.in_waiting)))
+        except (serial.SerialException, OSError, TypeError) as error:  # TypeError: pyserial, closed meanwhile
+            raise LinkError(f"the connection to {self.name} broke: {error}") from error
+
+    def write(self, data: bytes) -> None:
+        """See Transport."""
+        try:
+            self._serial.write(data)
+        except (serial.SerialException, OSError) as error:
+            raise LinkError(f"the connection to {self.name} broke: {error}") from error
+
+    def close(self) -> None:
+        """See Transport."""
+        self._serial.close()
+
+
+def _open(port: str) -> serial.Serial:
+    try:
+        device = serial.serial_for_url(port, do_not_open=True)
+        device.baudrate = BAUD_RATE
+        device.write_timeout = 2.0
+        if "://" not in port:
+            device.exclusive = True
+        device.open()
+    except ValueError as error:
+        raise InputError(f"{port}: not a port or URL: {error}; {_ADVICE}") from error
+    except (serial.SerialException, OSError) as error:
+        raise _open_error(port, error) from error
+    return device
+
+
+def _open_error(port: str, error: Exception) -> LinkError | InputError:
+    number = getattr(error, "errno", None)
+    text = str(error)
+    if number == errno.ENOENT or "FileNotFoundError" in text:
+        return InputError(f"there is no port {port}; {_ADVICE}")
+    if number in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in text:
+        return LinkError(f"port {port} is in use by another program; close it and try again")
+    if number == errno.EACCES or "PermissionError" in text:
+        return LinkError(
+            f"no permission to open {port}: another program holds it, or your user may not use serial ports "
+            "(on Debian: 'sudo adduser $USER dialout', then log in again)"
+        )
+    return LinkError(f"port {port} cannot be opened: {text}; {_ADVICE}")
