@@ -1,0 +1,182 @@
+"""What the samples of a run say: mean and scatter over repetitions, deviation from theory, limits, lag."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armtempo.arm import Limits
+from armtempo.differentiate import derivative, noise, quantisation_sigma
+from armtempo.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+SAMPLE_S = 0.1
+ORDERS = ("angle", "speed", "acceleration")
+EDGE_S = 1.0
+"""Length of the stretch at start and end over which the lag is taken."""
+
+
+@dataclass(frozen=True)
+class Repetition:
+    """The samples of one replay: times (M,), commanded and measured angles (M, J)."""
+
+    times_s: Array
+    commanded_deg: Array
+    measured_deg: Array
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Angle, speed and acceleration on the common time grid.
+
+    ``times_s`` (K,); ``each`` (R, 3, K, J) for every repetition, NaN where samples are missing; ``mean``,
+    ``sem`` (standard error of the mean; NaN with one repetition) and ``theory``, each (3, K, J).
+    """
+
+    times_s: Array
+    each: Array
+    mean: Array
+    sem: Array
+    theory: Array
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """Mean curve against theory, for one joint and one of ORDERS."""
+
+    rms: float
+    largest: float
+    final: float
+
+
+@dataclass(frozen=True)
+class LimitCheck:
+    """A measured peak beside its limit; ``sigma`` is the peak's uncertainty from encoder rounding."""
+
+    peak: float
+    limit: float
+    sigma: float
+
+    @property
+    def verdict(self) -> str:
+        """``"kept"``, ``"kept within uncertainty"`` (3 sigma) or ``"exceeded"``."""
+        if self.peak <= self.limit:
+            return "kept"
+        return "kept within uncertainty" if self.peak <= self.limit + 3.0 * self.sigma else "exceeded"
+
+
+def curves(repetitions: Sequence[Repetition], trajectory: Trajectory) -> Curves:
+    """Mean, scatter and theory of the repetitions of one trajectory.
+
+    Raises ValueError where there is no sample at all.
+    """
+    count = max((_grid_size(repetition) for repetition in repetitions), default=0)
+    if count == 0:
+        raise ValueError("no samples to analyse")
+    times = np.arange(count) * SAMPLE_S
+    each = np.stack([_differentiated(_on_grid(repetition, count)) for repetition in repetitions])
+    theory = np.stack([trajectory(times, order) for order in range(3)])
+    present = np.sum(~np.isnan(each), axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.nansum(each, axis=0) / present
+        spread = np.sqrt(np.nansum((each - mean) ** 2, axis=0) / (present - 1))
+        sem = np.where(present > 1, spread / np.sqrt(present), np.nan)
+    return Curves(times, each, mean, sem, theory)
+
+
+def deviations(found: Curves) -> list[list[Deviation]]:
+    """``[order][joint]``: how far the mean curve is from theory."""
+    error = found.mean - found.theory
+    return [[_deviation(error[order, :, joint]) for joint in range(error.shape[2])] for order in range(3)]
+
+
+def final_errors(repetition: Repetition, trajectory: Trajectory) -> Array:
+    """Measured minus planned angle (J,) at the last sample, in degrees."""
+    planned: Array = trajectory(repetition.times_s[-1], 0)
+    return np.asarray(repetition.measured_deg[-1] - planned)
+
+
+def limit_checks(
+    found: Curves, limits: Sequence[Limits], resolutions_deg: Sequence[float]
+) -> list[list[LimitCheck]]:
+    """``[joint]``: speed and acceleration peaks of the mean curve beside the limits.
+
+    ``resolutions_deg``: degrees per encoder count; its rounding, averaged over the repetitions that are
+    there, gives the uncertainty.
+    """
+    runs = len(found.each)
+    checks = []
+    for joint, (limit, resolution) in enumerate(zip(limits, resolutions_deg, strict=True)):
+        sigma = quantisation_sigma(resolution) / np.sqrt(runs)
+        allowed = (limit.speed_deg_s, limit.acceleration_deg_s2)
+        checks.append(
+            [
+                LimitCheck(
+                    float(np.nanmax(np.abs(found.mean[order, :, joint]))),
+                    allowed[order - 1],
+                    noise(order, SAMPLE_S, float(sigma)),
+                )
+                for order in (1, 2)
+            ]
+        )
+    return checks
+
+
+def lags_s(found: Curves, trajectory: Trajectory) -> Array:
+    """How far the mean speed lags behind theory, in seconds: (2, J), over the first and the last EDGE_S.
+
+    The shift that fits best in the sense of least squares, to first order: positive is late.
+    """
+    ends = np.array([spline.duration_s for spline in trajectory.joints])
+    lags = np.full((2, len(ends)), np.nan)
+    for joint, end in enumerate(ends):
+        for row, (low, high) in enumerate(((0.0, EDGE_S), (end - EDGE_S, end))):
+            inside = (found.times_s >= low) & (found.times_s <= high) & ~np.isnan(found.mean[1, :, joint])
+            slope = found.theory[2, inside, joint]
+            error = found.mean[1, inside, joint] - found.theory[1, inside, joint]
+            if slope @ slope > 0.0:
+                lags[row, joint] = -(error @ slope) / (slope @ slope)
+    return lags
+
+
+def _deviation(error: Array) -> Deviation:
+    known = error[~np.isnan(error)]
+    if not len(known):
+        return Deviation(np.nan, np.nan, np.nan)
+    return Deviation(float(np.sqrt(np.mean(known**2))), float(np.abs(known).max()), float(known[-1]))
+
+
+def _indices(repetition: Repetition) -> NDArray[np.int64]:
+    """Index of each sample on the 0.1 s grid; -1 for the one at the end, which falls between."""
+    place = repetition.times_s / SAMPLE_S
+    index = np.rint(place).astype(np.int64)
+    return np.where(np.abs(place - index) < 1e-3, index, -1)
+
+
+def _grid_size(repetition: Repetition) -> int:
+    return int(_indices(repetition).max(initial=-1)) + 1
+
+
+def _on_grid(repetition: Repetition, count: int) -> Array:
+    """Measured angles (count, J), NaN where a sample is missing."""
+    index = _indices(repetition)
+    grid = np.full((count, repetition.measured_deg.shape[1]), np.nan)
+    grid[index[index >= 0]] = repetition.measured_deg[index >= 0]
+    return grid
+
+
+def _differentiated(angles: Array) -> Array:
+    """(3, K, J): angle, speed, acceleration; every stretch without a gap by itself."""
+    result = np.full((3, *angles.shape), np.nan)
+    result[0] = angles
+    for joint in range(angles.shape[1]):
+        known = ~np.isnan(angles[:, joint])
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], known, [False]))))
+        for start, stop in edges.reshape(-1, 2):
+            for order in (1, 2):
+                result[order, start:stop, joint] = derivative(angles[start:stop, joint], SAMPLE_S, order)
+    return result

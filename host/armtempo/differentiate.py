@@ -1,0 +1,59 @@
+"""Derivatives of sampled angles: local least-squares polynomials, with their noise and bias stated.
+
+Each sample's derivative is that of the polynomial of degree ``DEGREE`` fitted to the ``WINDOW`` samples
+around it (Savitzky and Golay, Anal. Chem. 36 (1964) 1627); at the ends the window is one-sided. Inside, the
+window is symmetric, so there is no lag: polynomials up to ``DEGREE`` come out exactly, everywhere.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+WINDOW = 7
+DEGREE = 3
+
+
+def weights(order: int, at: int, window: int = WINDOW, degree: int = DEGREE) -> Array:
+    """Weights (window,) of the samples for the derivative at sample ``at`` of the window, unit spacing."""
+    offsets = np.arange(window) - at
+    powers = np.vander(offsets, degree + 1, increasing=True).astype(float)
+    fit: Array = np.linalg.pinv(powers)[order] * math.factorial(order)
+    return fit
+
+
+def derivative(values: Array, step_s: float, order: int) -> Array:
+    """Derivative of the given order of values (M, ...) sampled every ``step_s``; same shape.
+
+    With fewer than WINDOW samples, the window shrinks to what is there; NaN where even DEGREE does not fit.
+    """
+    count = len(values)
+    window = min(WINDOW, count)
+    if window <= DEGREE:
+        return np.full_like(np.asarray(values, float), np.nan)
+    half = window // 2
+    result = np.empty_like(np.asarray(values, float))
+    for at in range(window):
+        row = weights(order, at, window)
+        if at == half:
+            blocks = np.lib.stride_tricks.sliding_window_view(values, window, axis=0)
+            result[half : half + len(blocks)] = blocks @ row
+        elif at < half:
+            result[at] = np.tensordot(row, values[:window], 1)
+        else:
+            result[count - window + at] = np.tensordot(row, values[-window:], 1)
+    return result / step_s**order
+
+
+def noise(order: int, step_s: float, sigma: float) -> float:
+    """Standard deviation of the derivative inside, for white noise ``sigma`` on the samples."""
+    return float(sigma * np.linalg.norm(weights(order, WINDOW // 2)) / step_s**order)
+
+
+def quantisation_sigma(resolution: float) -> float:
+    """Standard deviation of the rounding to steps of ``resolution``: resolution / sqrt(12)."""
+    return resolution / math.sqrt(12.0)
