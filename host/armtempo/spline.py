@@ -1,0 +1,117 @@
+"""Uniform B-splines: fit through points (Eqs. 13 and 14) and their polynomials (Eq. 15)."""
+
+from __future__ import annotations
+
+from functools import cache
+from math import comb
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armtempo.errors import InputError
+from armtempo_shared.basis import BASIS, FACTORIAL
+
+Array = NDArray[np.float64]
+
+_REST_ROWS: dict[int, tuple[tuple[float, ...], ...]] = {
+    3: ((-1, 0, 1),),
+    5: ((1, 2, -6, 2, 1), (-1, -10, 0, 10, 1)),
+}
+"""Derivatives at a point that vanish at rest, highest order first; the first derivative of the cubic,
+the second and first of the quintic."""
+
+
+@cache
+def basis(degree: int) -> Array:
+    """Eq. (15) without its powers of u: (degree + 1, degree + 1), power by control point.
+
+    Raises InputError for a degree other than 3 or 5.
+    """
+    if degree not in BASIS:
+        raise InputError(f"spline degree {degree}: there are 3 (cubic) and 5 (quintic)")
+    matrix = np.array(BASIS[degree], dtype=float) / FACTORIAL[degree]
+    matrix.setflags(write=False)
+    return matrix
+
+
+def fit(points_deg: ArrayLike, degree: int) -> Array:
+    """Control points of the spline through ``points_deg`` that starts and ends at rest.
+
+    ``points_deg``: (n + 1,) or (n + 1, J). Returns (n + degree,) or (n + degree, J). A banded solve of
+    Eq. (13) or (14); the cubic rests in speed, the quintic also in acceleration. Raises InputError for
+    fewer than two points or values that are not finite.
+    """
+    from scipy.linalg import solve_banded
+
+    points = np.asarray(points_deg, dtype=float)
+    row = basis(degree)[0, :-1]
+    if len(points) < 2 or not np.all(np.isfinite(points)):
+        raise InputError("a spline needs at least two points, all of them finite")
+    edge = (degree - 1) // 2
+    right = np.zeros((len(points) + degree - 1, *points.shape[1:]))
+    right[edge : edge + len(points)] = points
+    return np.asarray(solve_banded((degree - 1, degree - 1), _bands(len(right), row, degree), right))
+
+
+def _bands(size: int, row: Array, degree: int) -> Array:
+    """The matrix of Eq. (13) or (14) in LAPACK band storage, (2 degree - 1, size)."""
+    edge, width = (degree - 1) // 2, degree - 1
+    bands = np.zeros((2 * width + 1, size))
+
+    def put(at: int, first: int, values: ArrayLike) -> None:
+        columns = first + np.arange(degree)
+        bands[width + at - columns, columns] = values
+
+    for at, rest in enumerate(_REST_ROWS[degree]):
+        put(at, 0, rest)
+        put(size - 1 - at, size - degree, rest)
+    for at in range(edge, size - edge):
+        put(at, at - edge, row)
+    return bands
+
+
+def polynomials(control_points: Array, degree: int) -> Array:
+    """Power coefficients of each segment over u in [0, 1].
+
+    ``control_points``: (n + degree, ...). Returns (n, degree + 1, ...).
+    """
+    windows = np.lib.stride_tricks.sliding_window_view(control_points, degree + 1, axis=0)
+    return np.asarray(np.einsum("pc,s...c->sp...", basis(degree), windows))
+
+
+def subdivide(coefficients: Array, parts: int) -> Array:
+    """The same curve with each segment cut into ``parts`` equal ones, each over [0, 1] again.
+
+    ``coefficients``: (n, k + 1, ...), power basis. Returns (n * parts, k + 1, ...).
+    """
+    if parts == 1:
+        return coefficients
+    pieces = np.einsum("rpc,sc...->srp...", _shifts(coefficients.shape[1] - 1, parts), coefficients)
+    return np.asarray(pieces.reshape(-1, *coefficients.shape[1:]))
+
+
+@cache
+def _shifts(degree: int, parts: int) -> Array:
+    """Power coefficients of p((r + v) / parts) from those of p(u): (parts, degree + 1, degree + 1)."""
+    matrix = np.zeros((parts, degree + 1, degree + 1))
+    for part in range(parts):
+        for power in range(degree + 1):
+            for low in range(power + 1):
+                matrix[part, low, power] = comb(power, low) * part ** (power - low) / parts**power
+    return matrix
+
+
+def derivative(coefficients: Array, order: int = 1) -> Array:
+    """Power coefficients of the derivative with respect to u: (n, k + 1 - order, ...)."""
+    for _ in range(order):
+        powers = np.arange(1, coefficients.shape[1], dtype=float)
+        coefficients = coefficients[:, 1:] * powers.reshape(-1, *([1] * (coefficients.ndim - 2)))
+    return coefficients
+
+
+def evaluate(coefficients: Array, segment: NDArray[np.intp], u: Array) -> Array:
+    """Value at ``u`` of the given ``segment``, arrays of one shape; ``coefficients`` (n, k + 1)."""
+    value = coefficients[segment, -1]
+    for power in range(coefficients.shape[1] - 2, -1, -1):
+        value = value * u + coefficients[segment, power]
+    return value
