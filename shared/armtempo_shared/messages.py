@@ -13,7 +13,7 @@ OVERHEAD = 9
 COMMANDS = (
     ("hello", 0x01, (("protocol", "B"), ("session", "I")), ""),
     ("status", 0x02, (), ""),
-    ("put_begin", 0x10, (("size", "I"), ("crc", "I")), "text"),  # tail: name
+    ("put_begin", 0x10, (("size", "I"), ("crc", "I")), "text"),  # tail: name; crc: the record's last 4 bytes
     ("put_data", 0x11, (("offset", "I"),), "bytes"),
     ("put_commit", 0x12, (("crc", "I"),), ""),
     ("list", 0x13, (("index", "H"),), ""),  # the index-th stored trajectory

@@ -81,6 +81,14 @@ def decode(entry: "Any", payload: bytes) -> "tuple[tuple[Any, ...], Any]":
     return struct.unpack_from(fields, payload, 0), tail
 
 
+def record_crc(data: bytes) -> int:
+    """What names a record in commands and answers: its own crc32, the last four bytes.
+
+    (The crc32 over all of a record that ends with its crc32 is the same number for every record.)
+    """
+    return int(struct.unpack_from("<I", data, len(data) - 4)[0])
+
+
 def frame(sequence: int, number: int, payload: bytes) -> bytes:
     """The bytes of one frame."""
     body = struct.pack("<HBB", len(payload), sequence, number) + payload

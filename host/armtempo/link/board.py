@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import secrets
-from binascii import crc32
 from collections.abc import Callable, Sequence
 
 from armtempo_shared import limits, wire
@@ -51,7 +50,7 @@ class Board:
 
     def upload(self, name: str, data: bytes, progress: Progress | None = None) -> None:
         """Store a record under a name; the board keeps the old one until all of the new one has arrived."""
-        crc = crc32(data)
+        crc = wire.record_crc(data)
         self.session.command("put_begin", (len(data), crc), name, silence_s=SLOW_S)
         offset = 0
         while offset < len(data):
