@@ -29,22 +29,23 @@ class ArmPart(NamedTuple):
     radii: Radii
 
 
-def solve_arm(shape: Shape, x: Array, y: Array, z: Array, previous: Array) -> ArmPart:
-    """Find joints 1 to 3 for wrist centres (N,), (N,), (N,).
+def solve_arm(shape: Shape, wrist: Array, previous: Array) -> ArmPart:
+    """Find joints 1 to 3 for wrist centres, shape (3, N).
 
     ``previous``, (N, 6) or (6,), holds the Denavit-Hartenberg angles that decide where the pose leaves
     joint 1 (wrist centre on axis 1) or joint 2 (wrist centre on the shoulder axis) free.
     """
+    x, y, z = wrist
     measured = radii(shape, x, y, z)
     theta1 = _base(shape, x, y, measured, previous[..., 0])
     forward = np.stack((measured.forward, -measured.forward))
     theta2, stretch = _triangle(shape, forward - shape.shoulder, shape.sign1 * (z - shape.height), measured)
     folded = measured.shoulder <= shape.near
     if folded.any():
-        free = np.broadcast_to(previous[..., 1] - shape.turn2, folded.shape)
+        free = np.broadcast_to(previous[..., 1], folded.shape)
         np.copyto(theta2, free[:, None], where=folded[:, None])
-    theta3 = shape.sign2 * (stretch - shape.bend)
-    return ArmPart(theta1, theta2 + shape.turn2, theta3, theta2 + shape.turn2 + stretch - shape.bend, measured)
+    bent = stretch - shape.bend
+    return ArmPart(theta1, theta2, shape.sign2 * bent, theta2 + bent, measured)
 
 
 def _base(shape: Shape, x: Array, y: Array, measured: Radii, previous: Array) -> Array:
@@ -71,7 +72,8 @@ def _triangle(shape: Shape, out: Array, up: Array, measured: Radii) -> tuple[Arr
     elbow = np.arctan2(opened, folded) * 2.0
     lift = np.arctan2(opened * folded, r * r + (upper - fore) * (upper + fore))
     sign = elbow_signs(shape)
-    return np.arctan2(up, out)[:, None] - sign * lift[:, None], sign * elbow[:, None]
+    direction = np.arctan2(up, out) + shape.turn2
+    return direction[:, None] - sign * lift[:, None], sign * elbow[:, None]
 
 
 def elbow_signs(shape: Shape) -> NDArray[np.float64]:

@@ -77,7 +77,7 @@ def wrist_centre(shape: Shape, pose: Array) -> Array:
 
 def _solve(shape: Shape, matrices: Array, previous: Array) -> tuple[ArmPart, WristPart]:
     pose = np.ascontiguousarray(matrices.T)
-    arm = solve_arm(shape, *wrist_centre(shape, pose), previous)
+    arm = solve_arm(shape, wrist_centre(shape, pose), previous)
     cos, sin = shape.flange_twist
     n, o, a = pose[0:12:4], pose[1:12:4], pose[2:12:4]
     axes = np.stack((n, o, a) if sin == 0.0 and cos == 1.0 else (n, cos * o - sin * a, cos * a + sin * o))

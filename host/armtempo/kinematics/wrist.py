@@ -16,7 +16,8 @@ from armtempo.kinematics.regions import Mask
 from armtempo.kinematics.shape import Shape
 
 SINGULAR = 1e-10
-"""Sine of joint 5 below which theta4 is taken from the previous posture; the orientation is off by no more."""
+"""Sine of theta5 up to which theta4 is taken from the previous posture, and the error of orientation, in rad,
+that this allows."""
 
 
 class WristPart(NamedTuple):
