@@ -1,7 +1,7 @@
 """Figures of plans and runs, drawn with matplotlib (the optional extra ``plot``).
 
-Every function returns a matplotlib Figure; ``save`` writes it as PNG or SVG, ``inline_svg`` as text for a page.
-Colours are legible on white and on black; on a page, axes and text take the page's own colour.
+Every function returns a matplotlib Figure; ``save`` writes it as PNG or SVG, ``inline_svg`` gives it as
+text for a page. Colours are legible on white and on black; on a page, axes and text take the page's own colour.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ def save(figure: Figure, path: Path) -> None:
 
 
 def inline_svg(figure: Figure, name: str, description: str) -> str:
-    """The figure as an ``<svg>`` element for a page, in the page's colour, with its description for readers."""
+    """The figure as an ``<svg>`` element in the page's colour, with a description for screen readers."""
     text = _svg(figure)
     text = text[text.index("<svg") :].replace(_PAGE_COLOUR, "currentColor")
     text = re.sub(r'(width|height)="[\d.]+pt" ', "", text, count=2)
