@@ -1,13 +1,15 @@
 """Stands in for MicroPython's ``micropython`` module when the board program runs under CPython.
 
-Pointer annotations of ``@viper`` functions get views that behave like the chip's memory: 8, 16 or 32 bit
-wide, stores wrap, loads of ``ptr8`` and ``ptr16`` are unsigned, loads of ``ptr32`` signed. Everything else
+Pointer annotations of ``@viper`` functions, and casts such as ``ptr32(address)`` inside them, get views that
+behave like the chip's memory: 8, 16 or 32 bit wide, stores wrap, loads of ``ptr8`` and ``ptr16`` are
+unsigned, loads of ``ptr32`` signed. Everything else
 in a viper function is left as it is: board code keeps its words within 31 bits (or lets only a store wrap).
 """
 
 from __future__ import annotations
 
 import builtins
+import ctypes
 import functools
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -16,12 +18,15 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 class _Pointer:
-    """Memory of an array or a buffer, seen in words of ``width`` bytes, little endian."""
+    """Memory of an array or a buffer, or at an address, seen in words of ``width`` bytes, little endian."""
 
     width = 1
     signed = False
+    reach = 4096  # bytes that can be reached from an address
 
     def __init__(self, target: Any, offset: int = 0) -> None:
+        if isinstance(target, int):
+            target = (ctypes.c_ubyte * self.reach).from_address(target)
         self._bytes = memoryview(target).cast("B")
         self._offset = offset
 
@@ -81,10 +86,7 @@ def _uint(value: Any) -> int:
     return int(value) & 0xFFFFFFFF
 
 
-def _named(name: str) -> type:
-    return type(name, (), {})
-
-
-for _name in _POINTERS:
-    setattr(builtins, _name, _named(_name))
+for _name, _kind in _POINTERS.items():
+    _kind.__name__ = _name  # as annotations name them
+    setattr(builtins, _name, _kind)
 builtins.uint = _uint  # type: ignore[attr-defined]
