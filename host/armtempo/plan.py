@@ -1,0 +1,50 @@
+"""A finished plan: the trajectory with all that led to it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from armtempo.arm import Arm
+from armtempo.extremes import Extremes
+from armtempo.job import Job
+from armtempo.spline import Array
+from armtempo.trajectory import Trajectory
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """How the time axis of one joint, or the shared one, was found."""
+
+    joints: tuple[int, ...]
+    """Indices, among the driven joints, of those that the axis serves."""
+    intervals_s: Array
+    """Intervals of the time axis as planned, (n * refine,)."""
+    total_s: float
+    """Their sum: the motion time."""
+    searched_s: float
+    """What the search alone reached, without polish or refinement."""
+    evaluations: int
+    """Fitness evaluations of the search."""
+    history_s: Array
+    """Best fitness of the first population and after each iteration, (iterations + 1,)."""
+    floor_s: float
+    """No motion along this path keeps the limits in less."""
+    floor_kind: str
+    """How the floor was found."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A motion for ``arm`` that does ``job`` and keeps every limit; ``versions`` made it."""
+
+    arm: Arm
+    job: Job
+    via_deg: Array
+    """Angles of the driven joints at the via points, (n + 1, J)."""
+    trajectory: Trajectory
+    searches: tuple[Search, ...]
+    """One for each joint that moves, or one for the shared time axis."""
+    extremes: tuple[Extremes, ...]
+    """For each driven joint."""
+    versions: Mapping[str, str]
