@@ -20,6 +20,11 @@ class Limits:
     acceleration_deg_s2: float
     jerk_deg_s3: float
 
+    @property
+    def values(self) -> tuple[float, float, float]:
+        """Speed, acceleration, jerk."""
+        return self.speed_deg_s, self.acceleration_deg_s2, self.jerk_deg_s3
+
 
 @dataclass(frozen=True)
 class Motor:

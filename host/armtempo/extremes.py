@@ -33,7 +33,9 @@ class Extremes:
     acceleration_deg_s2: float
     jerk_deg_s3: float
 
-    def __array__(self, dtype: object = None, copy: object = None) -> Array:
+    @property
+    def values(self) -> Array:
+        """Speed, acceleration, jerk: (3,)."""
         return np.array([self.speed_deg_s, self.acceleration_deg_s2, self.jerk_deg_s3])
 
 

@@ -29,9 +29,14 @@ class Fitness:
     """
 
     def __init__(
-        self, angle_points_deg: Array, degree: int, limits: Sequence[Limits], refine: int = 1, samples: int = SAMPLES
+        self,
+        angle_points_deg: Array,
+        degree: int,
+        limits: Sequence[Limits],
+        refine: int = 1,
+        samples: int = SAMPLES,
     ) -> None:
-        self.limits = np.array([[x.speed_deg_s, x.acceleration_deg_s2, x.jerk_deg_s3] for x in limits])
+        self.limits = np.array([limit.values for limit in limits])
         pieces = spline.subdivide(spline.polynomials(angle_points_deg, degree), refine)
         self.intervals = len(pieces)
         u = np.linspace(0.0, 1.0, max(5, -(-samples // refine) + 1))
@@ -79,7 +84,7 @@ class Fitness:
 
 def stretch_of(ratios: Array) -> Array:
     """Least factor on time that brings ``ratios`` (3, ...) of speed, acceleration and jerk down to 1."""
-    return np.maximum(np.maximum(ratios[0], np.sqrt(ratios[1])), np.cbrt(ratios[2]))
+    return np.asarray(np.maximum(np.maximum(ratios[0], np.sqrt(ratios[1])), np.cbrt(ratios[2])))
 
 
 def _on_grid(pieces: Array, u: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import platform
 from collections.abc import Callable
 from importlib.metadata import version
@@ -20,7 +21,7 @@ from armtempo.spline import Array
 from armtempo.trajectory import JointSpline, Trajectory
 
 TOLERANCE = 1e-9
-"""Largest excess over a limit, relative, and largest excess over a range, degrees, that rounding may leave."""
+"""What rounding may leave: largest excess over a limit, relative, and over a range, in degrees."""
 
 Progress = Callable[[float], None]
 """Called with the part done, 0 to 1."""
@@ -39,7 +40,9 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     _check_ranges(arm, points, job.degree)
     moving = [int(joint) for joint in np.flatnonzero(np.ptp(via, axis=0) > TOLERANCE)]
     if not moving:
-        raise PlanError(f"job {job.name!r}: all via points are the same, so there is nothing to plan; give it a motion")
+        raise PlanError(
+            f"job {job.name!r}: all via points are the same, so nothing moves; change at least one angle"
+        )
     groups = [moving] if job.timing == "shared" else [[joint] for joint in moving]
     searches = []
     for number, joints in enumerate(groups):
@@ -71,7 +74,8 @@ def via_angles(arm: Arm, job: Job) -> Array:
     via = np.array(job.via, dtype=float)
     if via.ndim != 2 or len(via) < 2 or via.shape[1] != len(arm.driven):
         raise InputError(
-            f"job {job.name!r}: needs at least 2 via points with {len(arm.driven)} angles each, one for each driven joint"
+            f"job {job.name!r}: needs at least 2 via points with {len(arm.driven)} angles each, "
+            "one for each driven joint"
         )
     if not np.all(np.isfinite(via)):
         raise InputError(f"job {job.name!r}: a via angle is not a finite number")
@@ -88,9 +92,11 @@ def _checked_limits(arm: Arm) -> list[Limits]:
     for joint in arm.driven:
         if joint.limits is None:
             raise InputError(f"arm {arm.name!r}: {joint.name} has a motor but no limits; add a limits table")
-        values = np.array([joint.limits.speed_deg_s, joint.limits.acceleration_deg_s2, joint.limits.jerk_deg_s3])
-        if not np.all(np.isfinite(values) & (values > 0)):
-            raise InputError(f"arm {arm.name!r}: the limits of {joint.name} must be positive numbers, not {values}")
+        values = joint.limits.values
+        if not all(math.isfinite(value) and value > 0 for value in values):
+            raise InputError(
+                f"arm {arm.name!r}: the limits of {joint.name} must be positive numbers, not {values}"
+            )
         _check_step_rate(arm, joint, joint.limits.speed_deg_s)
         limits.append(joint.limits)
     if not limits:
@@ -103,8 +109,9 @@ def _check_step_rate(arm: Arm, joint: Joint, speed_deg_s: float) -> None:
     rate = speed_deg_s * joint.motor.steps_per_deg
     if rate > MAX_STEP_RATE:
         raise InputError(
-            f"arm {arm.name!r}: {joint.name} at its speed limit of {speed_deg_s:g} deg/s needs {rate:.0f} steps/s, "
-            f"the board does {MAX_STEP_RATE} at most; check the unit, lower the limit, or use fewer microsteps"
+            f"arm {arm.name!r}: {joint.name} at its speed limit of {speed_deg_s:g} deg/s needs {rate:.0f} "
+            f"steps/s, the board does {MAX_STEP_RATE} at most; check the unit, lower the limit, or use "
+            "fewer microsteps"
         )
 
 
@@ -113,8 +120,8 @@ def _check_job(arm: Arm, job: Job) -> None:
         raise InputError(f"job {job.name!r}: timing {job.timing!r} must be 'per-joint' or 'shared'")
     if job.refine < 1 or (len(job.via) - 1) * job.refine > MAX_SEGMENTS:
         raise InputError(
-            f"job {job.name!r}: {len(job.via) - 1} segments with refine {job.refine} make more than the board's "
-            f"{MAX_SEGMENTS}; lower refine or use fewer via points"
+            f"job {job.name!r}: {len(job.via) - 1} segments with refine {job.refine} make more than the "
+            f"board's {MAX_SEGMENTS}; lower refine or use fewer via points"
         )
     kind = job.parameters.get("fitness", timing.FITNESS[0])
     if kind not in timing.FITNESS:
@@ -129,8 +136,9 @@ def _check_ranges(arm: Arm, points: Array, degree: int) -> None:
         least, most = joint.range_deg
         if lowest < least - TOLERANCE or highest > most + TOLERANCE:
             raise PlanError(
-                f"{joint.name}: the path reaches {lowest:.3f} to {highest:.3f} degrees, its range is {least:g} to "
-                f"{most:g}; move the via points away from the end of the range, or add one where it swings out"
+                f"{joint.name}: the path reaches {lowest:.3f} to {highest:.3f} degrees, its range is "
+                f"{least:g} to {most:g}; move the via points away from the end of the range, or add one where it "
+                "swings out"
             )
 
 
@@ -162,13 +170,14 @@ def _check(arm: Arm, limits: list[Limits], reached: tuple[Extremes, ...]) -> Non
     """No plan leaves here that exceeds a limit, or the board's step rates."""
     rates = 0.0
     for joint, limit, extreme in zip(arm.driven, limits, reached, strict=True):
-        allowed = np.array([limit.speed_deg_s, limit.acceleration_deg_s2, limit.jerk_deg_s3])
-        if not np.all(np.array(extreme) <= allowed * (1 + TOLERANCE)):
-            raise PlanError(f"{joint.name}: the plan reaches {np.array(extreme)}, over its limits {allowed}")
+        if not np.all(extreme.values <= np.array(limit.values) * (1 + TOLERANCE)):
+            raise PlanError(
+                f"{joint.name}: the plan reaches {extreme.values}, over its limits {limit.values}"
+            )
         assert joint.motor is not None
         rates += extreme.speed_deg_s * joint.motor.steps_per_deg
     if rates > MAX_STEP_RATE_SUM:
         raise PlanError(
-            f"the joints together could need {rates:.0f} steps/s, the board does {MAX_STEP_RATE_SUM} at most; "
-            "lower the speed limits or use fewer microsteps"
+            f"the joints together could need {rates:.0f} steps/s, the board does {MAX_STEP_RATE_SUM} "
+            "at most; lower the speed limits or use fewer microsteps"
         )

@@ -6,10 +6,10 @@ from functools import cache
 from math import comb
 
 import numpy as np
+from armtempo_shared.basis import BASIS, FACTORIAL
 from numpy.typing import ArrayLike, NDArray
 
 from armtempo.errors import InputError
-from armtempo_shared.basis import BASIS, FACTORIAL
 
 Array = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ def fit(points_deg: ArrayLike, degree: int) -> Array:
     Eq. (13) or (14); the cubic rests in speed, the quintic also in acceleration. Raises InputError for
     fewer than two points or values that are not finite.
     """
-    from scipy.linalg import solve_banded
+    from scipy.linalg import solve_banded  # here, because loading it takes longer than most commands
 
     points = np.asarray(points_deg, dtype=float)
     row = basis(degree)[0, :-1]
@@ -114,4 +114,4 @@ def evaluate(coefficients: Array, segment: NDArray[np.intp], u: Array) -> Array:
     value = coefficients[segment, -1]
     for power in range(coefficients.shape[1] - 2, -1, -1):
         value = value * u + coefficients[segment, power]
-    return value
+    return np.asarray(value)

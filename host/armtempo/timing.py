@@ -14,8 +14,9 @@ from armtempo.job import Job
 from armtempo.spline import Array
 
 FITNESS = ("stretched", "penalised")
-"""Names for the job's parameter ``fitness``: ``stretched`` scales each candidate to its limits, ``penalised`` is
-Eq. (21) as the paper has it."""
+"""Values of the job's parameter ``fitness``: ``stretched`` scales each candidate until it just keeps its
+limits,
+``penalised`` is Eq. (21) as the paper has it."""
 
 MIN_DURATION_S = 0.01
 """No motion is planned shorter: a tenth of the time between two samples."""
@@ -63,7 +64,9 @@ def axis(
     return Timed(intervals, found, searched)
 
 
-def within_limits(angle_points_deg: Array, intervals_s: Array, limits: Sequence[Limits], degree: int) -> Array:
+def within_limits(
+    angle_points_deg: Array, intervals_s: Array, limits: Sequence[Limits], degree: int
+) -> Array:
     """The intervals stretched or shrunk until the motion just keeps every limit: (m,), proven.
 
     Scaling time by s scales speed by 1/s, acceleration by 1/s², jerk by 1/s³.
@@ -71,7 +74,7 @@ def within_limits(angle_points_deg: Array, intervals_s: Array, limits: Sequence[
     segments = len(angle_points_deg) - degree
     pieces = spline.subdivide(spline.polynomials(angle_points_deg, degree), len(intervals_s) // segments)
     angle = np.ascontiguousarray(np.moveaxis(pieces, 2, 0))
-    allowed = np.array([[x.speed_deg_s, x.acceleration_deg_s2, x.jerk_deg_s3] for x in limits])
+    allowed = np.array([limit.values for limit in limits])
     for _ in range(2):  # the second round takes out the rounding of a large first factor
         time = spline.polynomials(timeaxis.control_points(intervals_s, degree), degree)
         factor = float(stretch_of((extremes.magnitudes(angle, time) / allowed).T).max())

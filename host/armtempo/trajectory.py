@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from armtempo import spline, timeaxis
 from armtempo.spline import Array
@@ -59,10 +59,11 @@ class JointSpline:
         return value
 
 
-def derivatives(angle: Array, time: Array, segment: Array, u: Array, order: int) -> Array:
+def derivatives(angle: Array, time: Array, segment: NDArray[np.intp], u: Array, order: int) -> Array:
     """The ``order``-th derivative of angle by time at (segment, u), from power coefficients of both."""
+
     def at(coefficients: Array, n: int) -> Array:
-        return spline.evaluate(spline.derivative(coefficients, n), segment, u)  # type: ignore[arg-type]
+        return spline.evaluate(spline.derivative(coefficients, n), segment, u)
 
     if order == 0:
         return at(angle, 0)

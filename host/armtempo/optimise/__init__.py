@@ -58,7 +58,9 @@ def minimise(
     module = _module(algorithm)
     box = _checked_bounds(bounds)
     if population < 4 or iterations < 1:
-        raise InputError(f"optimiser: population {population} must be at least 4, iterations {iterations} at least 1")
+        raise InputError(
+            f"optimiser: population {population} must be at least 4, iterations {iterations} at least 1"
+        )
     known = _checked_parameters(algorithm, module.PARAMETERS, parameters)
     result: Result = module.search(function, box, rng, population, iterations, progress, **known)
     return result
@@ -84,10 +86,13 @@ def _checked_parameters(
     for name, value in given.items():
         if name not in known:
             raise InputError(
-                f"optimiser {algorithm!r} has no parameter {name!r}; it has {', '.join(sorted(known)) or 'none'}"
+                f"optimiser {algorithm!r} has no parameter {name!r}; "
+                f"it has {', '.join(sorted(known)) or 'none'}"
             )
         if not _same_kind(known[name], value):
-            raise InputError(f"optimiser {algorithm!r}: {name} = {value!r} must be of the kind of {known[name]!r}")
+            raise InputError(
+                f"optimiser {algorithm!r}: {name} = {value!r} must be of the kind of {known[name]!r}"
+            )
     return {**known, **given}
 
 

@@ -33,14 +33,18 @@ def search(
     scale = levy_scale(beta)
     for t in range(1, iterations + 1):
         alpha = 0.01 * a * population**b * math.exp(-t * min(values.mean(), 50.0) / iterations)
-        steps = rng.standard_normal(nests.shape) * scale / np.abs(rng.standard_normal(nests.shape)) ** (1 / beta)
+        steps = (
+            rng.standard_normal(nests.shape) * scale / np.abs(rng.standard_normal(nests.shape)) ** (1 / beta)
+        )
         trial = np.clip(nests + alpha * steps * (nests - tracker.x), low, high)
         trial_values = tracker.evaluate(trial)
         better = trial_values < values
         nests[better], values[better] = trial[better], trial_values[better]
         first, second = rng.permutation(population), rng.permutation(population)
         moved = rng.random(nests.shape) < pa
-        trial = np.clip(nests + moved * rng.random((population, 1)) * (nests[first] - nests[second]), low, high)
+        trial = np.clip(
+            nests + moved * rng.random((population, 1)) * (nests[first] - nests[second]), low, high
+        )
         trial_values = tracker.evaluate(trial)
         better = trial_values < values
         nests[better], values[better] = trial[better], trial_values[better]

@@ -1,0 +1,98 @@
+"""The trajectory file: a plan as JSON, whole enough to run it and to plan it again."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from armtempo_shared.basis import BASIS
+
+from armtempo import extremes, strictjson
+from armtempo.errors import InputError
+from armtempo.plan import Plan
+from armtempo.trajectory import JointSpline
+
+FORMAT = "armtempo trajectory"
+VERSION = 1
+
+
+def save(plan: Plan, path: Path | str) -> None:
+    """Writes the plan aside and renames it, so that no half file is ever seen.
+
+    Raises InputError where the file cannot be written.
+    """
+    content = {"format": FORMAT, "version": VERSION, "plan": strictjson.encode(plan)}
+    text = json.dumps(content, indent=1, allow_nan=False)
+    target = Path(path)
+    aside = target.with_name(f".{target.name}.{os.getpid()}.new")
+    try:
+        aside.write_text(text + "\n", encoding="utf-8")
+        os.replace(aside, target)
+    except OSError as error:
+        aside.unlink(missing_ok=True)
+        raise InputError(f"{path}: cannot be written: {error.strerror}; choose another place") from None
+
+
+def load(path: Path | str) -> Plan:
+    """The plan of a trajectory file.
+
+    Raises InputError for a file that is missing, cut, of another format or version, or holds a key, value or
+    shape that this program does not understand.
+    """
+    content = _read(path)
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise InputError(f"{path}: is not a trajectory file; make one with: armtempo plan")
+    if content.get("version") != VERSION:
+        raise InputError(
+            f"{path}: has version {content.get('version')!r}, this program reads version {VERSION}; "
+            "plan it again"
+        )
+    if content.keys() != {"format", "version", "plan"}:
+        raise InputError(f"{path}: unknown or missing key beside format, version and plan")
+    plan: Plan = strictjson.decode(Plan, content["plan"], f"{path}: plan")
+    _check(plan, path)
+    return plan
+
+
+def _read(path: Path | str) -> Any:
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {error}") from None
+    try:
+        return json.loads(text, parse_constant=_refuse)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path}: damaged or cut: {error}; plan it again or copy it again") from None
+
+
+def _refuse(name: str) -> None:
+    raise ValueError(f"{name} is not a number")
+
+
+def _check(plan: Plan, path: Path | str) -> None:
+    """What the types cannot say: shapes, time that runs forward, one joint for each drive."""
+    joints, driven = plan.trajectory.joints, plan.arm.driven
+    if not joints or len(joints) != len(driven) or plan.via_deg.shape[1:] != (len(driven),):
+        raise InputError(f"{path}: {len(joints)} joints in the trajectory, the arm drives {len(driven)}")
+    for number, joint in enumerate(joints, 1):
+        _check_joint(joint, len(plan.via_deg) - 1, f"{path}: trajectory joint {number}")
+
+
+def _check_joint(joint: JointSpline, segments: int, where: str) -> None:
+    if joint.degree not in BASIS or joint.refine < 1:
+        raise InputError(f"{where}: degree {joint.degree} with refine {joint.refine} is not known")
+    for what, points, pieces in (
+        ("angle", joint.angle_points_deg, segments),
+        ("time", joint.time_points_s, segments * joint.refine),
+    ):
+        if points.shape != (pieces + joint.degree,):
+            raise InputError(f"{where}: {points.size} {what} control points do not fit {pieces} segments")
+    if not np.all(np.diff(joint.time_points_s) > 0):
+        raise InputError(f"{where}: its time control points do not increase")
+    if not np.all(np.isfinite(extremes.of_joint(joint).values)):
+        raise InputError(f"{where}: speed, acceleration or jerk has no bound")
