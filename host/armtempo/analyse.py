@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armtempo.arm import Limits
-from armtempo.differentiate import derivative, noise, quantisation_sigma
+from armtempo.differentiate import WINDOW, derivative, noise, quantisation_sigma
+from armtempo.record import COMPLETE
+from armtempo.runs import Samples
 from armtempo.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -18,15 +20,6 @@ SAMPLE_S = 0.1
 ORDERS = ("angle", "speed", "acceleration")
 EDGE_S = 1.0
 """Length of the stretch at start and end over which the lag is taken."""
-
-
-@dataclass(frozen=True)
-class Repetition:
-    """The samples of one replay: times (M,), commanded and measured angles (M, J)."""
-
-    times_s: Array
-    commanded_deg: Array
-    measured_deg: Array
 
 
 @dataclass(frozen=True)
@@ -69,7 +62,7 @@ class LimitCheck:
         return "kept within uncertainty" if self.peak <= self.limit + 3.0 * self.sigma else "exceeded"
 
 
-def curves(repetitions: Sequence[Repetition], trajectory: Trajectory) -> Curves:
+def curves(repetitions: Sequence[Samples], trajectory: Trajectory) -> Curves:
     """Mean, scatter and theory of the repetitions of one trajectory.
 
     Raises ValueError where there is no sample at all.
@@ -78,7 +71,7 @@ def curves(repetitions: Sequence[Repetition], trajectory: Trajectory) -> Curves:
     if count == 0:
         raise ValueError("no samples to analyse")
     times = np.arange(count) * SAMPLE_S
-    each = np.stack([_differentiated(_on_grid(repetition, count)) for repetition in repetitions])
+    each = np.stack([_differentiated(_on_grid(repetition, count), repetition) for repetition in repetitions])
     theory = np.stack([trajectory(times, order) for order in range(3)])
     present = np.sum(~np.isnan(each), axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -94,10 +87,10 @@ def deviations(found: Curves) -> list[list[Deviation]]:
     return [[_deviation(error[order, :, joint]) for joint in range(error.shape[2])] for order in range(3)]
 
 
-def final_errors(repetition: Repetition, trajectory: Trajectory) -> Array:
+def final_errors(repetition: Samples, trajectory: Trajectory) -> Array:
     """Measured minus planned angle (J,) at the last sample, in degrees."""
-    planned: Array = trajectory(repetition.times_s[-1], 0)
-    return np.asarray(repetition.measured_deg[-1] - planned)
+    planned: Array = trajectory(repetition.time_s[-1], 0)
+    return np.asarray(repetition.angle_deg[-1] - planned)
 
 
 def limit_checks(
@@ -150,33 +143,40 @@ def _deviation(error: Array) -> Deviation:
     return Deviation(float(np.sqrt(np.mean(known**2))), float(np.abs(known).max()), float(known[-1]))
 
 
-def _indices(repetition: Repetition) -> NDArray[np.int64]:
+def _indices(repetition: Samples) -> NDArray[np.int64]:
     """Index of each sample on the 0.1 s grid; -1 for the one at the end, which falls between."""
-    place = repetition.times_s / SAMPLE_S
+    place = repetition.time_s / SAMPLE_S
     index = np.rint(place).astype(np.int64)
     return np.where(np.abs(place - index) < 1e-3, index, -1)
 
 
-def _grid_size(repetition: Repetition) -> int:
+def _grid_size(repetition: Samples) -> int:
     return int(_indices(repetition).max(initial=-1)) + 1
 
 
-def _on_grid(repetition: Repetition, count: int) -> Array:
+def _on_grid(repetition: Samples, count: int) -> Array:
     """Measured angles (count, J), NaN where a sample is missing."""
     index = _indices(repetition)
-    grid = np.full((count, repetition.measured_deg.shape[1]), np.nan)
-    grid[index[index >= 0]] = repetition.measured_deg[index >= 0]
+    grid = np.full((count, repetition.angle_deg.shape[1]), np.nan)
+    grid[index[index >= 0]] = repetition.angle_deg[index >= 0]
     return grid
 
 
-def _differentiated(angles: Array) -> Array:
-    """(3, K, J): angle, speed, acceleration; every stretch without a gap by itself."""
+def _differentiated(angles: Array, repetition: Samples) -> Array:
+    """(3, K, J): angle, speed, acceleration; every stretch without a gap by itself.
+
+    The arm rests before a motion and after a complete one, so at these ends the rest goes into the window.
+    """
     result = np.full((3, *angles.shape), np.nan)
     result[0] = angles
     for joint in range(angles.shape[1]):
         known = ~np.isnan(angles[:, joint])
         edges = np.flatnonzero(np.diff(np.concatenate(([False], known, [False]))))
         for start, stop in edges.reshape(-1, 2):
+            before = WINDOW // 2 if start == 0 else 0
+            after = WINDOW // 2 if stop == len(angles) and repetition.state == COMPLETE else 0
+            padded = np.pad(angles[start:stop, joint], (before, after), mode="edge")
             for order in (1, 2):
-                result[order, start:stop, joint] = derivative(angles[start:stop, joint], SAMPLE_S, order)
+                found = derivative(padded, SAMPLE_S, order)
+                result[order, start:stop, joint] = found[before : len(found) - after]
     return result

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-WINDOW = 7
+WINDOW = 5
 DEGREE = 3
 
 
