@@ -1,0 +1,65 @@
+"""Cuckoo search: X.-S. Yang and S. Deb, "Cuckoo search via Lévy flights", NaBIC 2009, pp. 210-214.
+
+Details as in the program its first author published with "Nature-Inspired Metaheuristic Algorithms"
+(2nd edition, Luniver 2010): steps are scaled by the distance to the best nest, a new egg competes
+with the nest it came from, and abandoned coordinates move along the difference of two other nests.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from armtempo.optimise.levy import levy_steps
+from armtempo.optimise.tracker import Array, Function, Progress, Result, Tracker
+
+PARAMETERS: dict[str, float | str | bool] = {"alpha": 0.01, "pa": 0.25, "beta": 1.5}
+
+
+def search(
+    function: Function,
+    bounds: Array,
+    rng: np.random.Generator,
+    population: int,
+    iterations: int,
+    progress: Progress | None = None,
+    *,
+    alpha: float = 0.01,
+    pa: float = 0.25,
+    beta: float = 1.5,
+) -> Result:
+    """Minimises ``function``: N evaluations of Lévy flights and at most N of new nests an iteration.
+
+    ``alpha`` scales the flights, ``pa`` is the chance that a coordinate is abandoned, ``beta`` the
+    index of the Lévy distribution. A nest without an abandoned coordinate is not evaluated again.
+    """
+    low, high = bounds.T
+    tracker = Tracker(function, iterations, progress)
+    nests = rng.uniform(low, high, (population, len(low)))
+    values = tracker.evaluate(nests)
+    tracker.iteration_done()
+    for _ in range(iterations):
+        flights = alpha * levy_steps(rng, nests.shape, beta) * rng.standard_normal(nests.shape)
+        eggs = np.clip(nests + flights * (nests - tracker.x), low, high)
+        _keep_better(nests, values, eggs, tracker.evaluate(eggs), np.arange(population))
+        eggs, changed = _new_nests(nests, rng, pa)
+        eggs = np.clip(eggs, low, high)
+        if changed.size:
+            _keep_better(nests, values, eggs, tracker.evaluate(eggs), changed)
+        tracker.iteration_done()
+    return tracker.result()
+
+
+def _new_nests(nests: Array, rng: np.random.Generator, pa: float) -> tuple[Array, np.ndarray]:
+    """New places for the nests that lose a coordinate (K, d), and their indices (K,)."""
+    abandoned = rng.random(nests.shape) < pa
+    difference = nests[rng.permutation(len(nests))] - nests[rng.permutation(len(nests))]
+    eggs = nests + rng.random() * difference * abandoned
+    changed = np.flatnonzero(abandoned.any(axis=1))
+    return eggs[changed], changed
+
+
+def _keep_better(nests: Array, values: Array, eggs: Array, egg_values: Array, index: np.ndarray) -> None:
+    """Puts each egg (K, d) into nest ``index[k]`` where it is better, in place."""
+    better = egg_values < values[index]
+    nests[index[better]] = eggs[better]
+    values[index[better]] = egg_values[better]

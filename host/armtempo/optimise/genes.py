@@ -1,0 +1,59 @@
+"""Bit strings as the genetic algorithms use them: decoding, selection, crossover, mutation."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armtempo.optimise.tracker import Array
+
+Bits = NDArray[np.bool_]
+"""A population: individuals × variables × bits, the first bit of a variable counting most."""
+
+
+def random_bits(rng: np.random.Generator, population: int, variables: int, bits: int) -> Bits:
+    """A random population (population, variables, bits)."""
+    return rng.random((population, variables, bits)) < 0.5
+
+
+def decode(genes: Bits, bounds: Array) -> Array:
+    """The points (N, d) of ``genes`` (N, d, bits), evenly spread over ``bounds`` (d, 2)."""
+    weights = 0.5 ** np.arange(1, genes.shape[2] + 1)
+    fraction = (genes @ weights) / weights.sum()
+    low, high = bounds.T
+    points: Array = low + np.minimum(fraction, 1.0) * (high - low)
+    return np.clip(points, low, high)
+
+
+def fitness(values: Array) -> Array:
+    """What selection maximises, >= 0: how far each value (N,) lies below the worst finite one."""
+    finite = np.isfinite(values)
+    worst = values[finite].max(initial=-np.inf)
+    return np.where(finite, worst - np.where(finite, values, worst), 0.0)
+
+
+def roulette(merit: Array, rng: np.random.Generator) -> NDArray[np.intp]:
+    """Indices (N,) of parents, drawn with chances in proportion to ``merit`` (N,)."""
+    total = merit.sum()
+    chances = merit / total if total > 0.0 else None
+    return rng.choice(len(merit), size=len(merit), p=chances)
+
+
+def crossover(parents: Bits, rng: np.random.Generator, probability: float | Array) -> Bits:
+    """One-point crossover of parents 0 and 1, 2 and 3, …, each pair with its ``probability`` (N // 2,)."""
+    count = len(parents) // 2
+    children = parents.reshape(len(parents), -1).copy()
+    first, second = children[0 : 2 * count : 2], children[1 : 2 * count : 2]
+    length = children.shape[1]
+    cut = rng.integers(1, length, count)
+    crossing = rng.random(count) < probability
+    swap = crossing[:, None] & (np.arange(length) >= cut[:, None])
+    first[swap], second[swap] = second[swap], first[swap]
+    return children.reshape(parents.shape)
+
+
+def mutate(genes: Bits, rng: np.random.Generator, probability: float | Array) -> Bits:
+    """Flips each bit of an individual with that individual's ``probability``, a number or (N,)."""
+    chance = np.asarray(probability, dtype=float).reshape(-1, 1, 1)
+    flipped: Bits = genes ^ (rng.random(genes.shape) < chance)
+    return flipped
