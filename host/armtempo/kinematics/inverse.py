@@ -91,6 +91,7 @@ def _angles_into(out: Array, shape: Shape, arm: ArmPart, wrist: WristPart) -> No
     wide = (arm.theta1[:, None], arm.theta2, arm.theta3)
     for joint, theta in enumerate(wide):
         out[joint] = _wrapped(theta - shape.joint_offset[joint])[:, :, None]
+    np.copyto(out[0], np.nan, where=np.isnan(out[1]))
     flipped = (wrist.theta4 - half_turn4, -wrist.theta5, wrist.theta6 - half_turn6)
     for joint, (plain, turned) in enumerate(zip(wrist[:3], flipped, strict=True), start=3):
         out[joint, :, :, 0], out[joint, :, :, 1] = plain, turned

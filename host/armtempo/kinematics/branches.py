@@ -1,0 +1,61 @@
+"""The eight branches of the inverse, by name, and the branch that given angles belong to."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armtempo.kinematics.geometry import Geometry
+from armtempo.kinematics.shape import Shape
+
+BORDER = 1e-9
+"""Sine, or length relative to the reach, below which an arm stands between two branches."""
+
+
+class Branch(NamedTuple):
+    """How the arm stands; "" where it stands between the two."""
+
+    base: str
+    """"front": the arm reaches forwards over its shoulder; "rear": backwards."""
+    elbow: str
+    """"up" or "down"."""
+    wrist: str
+    """"plain": sine of theta5 positive; "flipped": negative."""
+
+    def __str__(self) -> str:
+        return " ".join(word or "either" for word in self)
+
+    def differs(self, other: Branch) -> tuple[str, ...]:
+        """Which of the three changes from this branch to ``other`` without doubt."""
+        return tuple(
+            part
+            for part, mine, theirs in zip(self._fields, self, other, strict=True)
+            if mine and theirs and mine != theirs
+        )
+
+
+BASES, ELBOWS, WRISTS = ("front", "rear"), ("up", "down"), ("plain", "flipped")
+BRANCHES = tuple(Branch(base, elbow, wrist) for base in BASES for elbow in ELBOWS for wrist in WRISTS)
+"""In the order of ``Solutions``."""
+
+
+def branch_of(geometry: Geometry, angles_rad: ArrayLike) -> Branch:
+    """Name the branch of joint angles, shape (6,). Raises InputError for an arm outside the class."""
+    shape = Shape.of(geometry)
+    theta = np.asarray(angles_rad, dtype=np.float64) + np.array(shape.joint_offset)
+    stretch = shape.sign2 * theta[2] + shape.bend
+    direction = theta[1] - shape.turn2
+    forward = shape.shoulder + shape.upper * np.cos(direction) + shape.fore * np.cos(direction + stretch)
+    base = _sign(forward / geometry.reach)
+    elbow = -shape.sign1 * (base or 1) * _sign(np.sin(stretch))
+    return Branch(_word(BASES, base), _word(ELBOWS, elbow), _word(WRISTS, _sign(np.sin(theta[4]))))
+
+
+def _sign(value: np.float64) -> float:
+    return 0.0 if abs(value) < BORDER else float(np.sign(value))
+
+
+def _word(words: tuple[str, str], sign: float) -> str:
+    return words[sign < 0] if sign else ""

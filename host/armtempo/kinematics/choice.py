@@ -1,0 +1,79 @@
+"""The automatic choice: of the eight solutions the one nearest to the previous posture, within the ranges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armtempo.kinematics.branches import BRANCHES, Branch
+from armtempo.kinematics.geometry import Array, Geometry
+from armtempo.kinematics.inverse import inverse, wrist_centre
+from armtempo.kinematics.ranges import Ranges
+from armtempo.kinematics.regions import classify
+from armtempo.kinematics.rejection import Rejection, reasons
+from armtempo.kinematics.shape import Shape
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One of the eight solutions of a pose."""
+
+    number: int
+    """1 to 8."""
+    branch: Branch
+    angles_rad: Array
+    """(6,): whole turns added to lie in the ranges, nearest to the previous posture; NaN if unreachable."""
+    rejections: tuple[Rejection, ...]
+    """Why not; empty for a solution that can be used."""
+    singular: int
+    """Bits as in ``Solutions.singular``."""
+    distance_rad: float
+    """Root of the sum of squares of the joints' ways from the previous posture."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """All solutions of a pose and the one chosen."""
+
+    candidates: tuple[Candidate, ...]
+    chosen: Candidate | None
+    """None: no solution can be used."""
+    region: str
+    """Of Fig. 3, as in ``Regions.names``."""
+    postures: int
+    """Arm postures in that region, 0 to 4."""
+    on_axis: bool
+    """Wrist centre on axis 1: joint 1 is kept as in the previous posture."""
+
+
+def choose(
+    geometry: Geometry, pose: ArrayLike, ranges: Ranges, previous_rad: ArrayLike, unit: str = "mm"
+) -> Choice:
+    """Solve one pose, shape (4, 4), and choose; ``previous_rad`` has shape (6,).
+
+    ``unit`` names the geometry's unit of length in the reasons. Raises InputError for an arm outside the
+    class.
+    """
+    shape = Shape.of(geometry)
+    matrix = np.asarray(pose, dtype=np.float64)
+    previous = np.asarray(previous_rad, dtype=np.float64)
+    solutions = inverse(geometry, matrix, previous)
+    wrist = wrist_centre(shape, matrix.reshape(16, 1))[:, 0]
+    placed = ranges.place(solutions.angles_rad[0], previous)
+    distances = np.sqrt(np.sum(np.square(placed - previous), axis=-1))
+    candidates = []
+    for i, branch in enumerate(BRANCHES):
+        outcome, singular = int(solutions.outcome[0, i]), int(solutions.singular[0, i])
+        why = reasons(shape, wrist, i, outcome, singular, ranges, placed[i], unit)
+        candidates.append(Candidate(i + 1, branch, placed[i], why, singular, float(distances[i])))
+    usable = [candidate for candidate in candidates if not candidate.rejections]
+    region = classify(shape, wrist)
+    return Choice(
+        tuple(candidates),
+        min(usable, key=lambda candidate: candidate.distance_rad, default=None),
+        region.names[0],
+        int(region.postures[0]),
+        bool(region.axis[0]),
+    )

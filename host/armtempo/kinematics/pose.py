@@ -1,0 +1,111 @@
+"""Poses from what people write: a matrix, or a position with roll-pitch-yaw angles or a quaternion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armtempo.errors import InputError
+from armtempo.kinematics.geometry import Array
+
+ROUNDED = 1e-3
+"""How far a rotation or a unit quaternion may be off by rounding of the printed numbers."""
+
+
+def checked(matrix: ArrayLike, what: str = "the pose") -> Array:
+    """Return a (4, 4) pose, its rotation part made exact; InputError, naming ``what``, if it is no pose.
+
+    Rounding to three digits is put right by the nearest rotation (of singular value decomposition).
+    """
+    pose = np.array(matrix, dtype=np.float64)
+    if pose.shape == (3, 4):
+        pose = np.vstack((pose, (0.0, 0.0, 0.0, 1.0)))
+    if pose.shape != (4, 4):
+        raise InputError(f"{what}: a pose is a matrix of 4 rows of 4 numbers, or its first 3 rows")
+    if not np.isfinite(pose).all():
+        raise InputError(f"{what}: every number of a pose must be finite")
+    if np.abs(pose[3] - (0.0, 0.0, 0.0, 1.0)).max() > 1e-9:
+        raise InputError(
+            f"{what}: the last row of a pose is 0 0 0 1, not {' '.join(f'{v:g}' for v in pose[3])}"
+        )
+    pose[:3, :3] = _nearest_rotation(pose[:3, :3], what)
+    pose[3] = (0.0, 0.0, 0.0, 1.0)
+    return pose
+
+
+def _nearest_rotation(part: Array, what: str) -> Array:
+    left, stretch, right = np.linalg.svd(part)
+    off = float(np.abs(stretch - 1.0).max())
+    if off > ROUNDED:
+        raise InputError(
+            f"{what}: the 3 x 3 part is not a rotation: its columns must have length 1 and be square to each "
+            f"other (off by {off:.3g}, {ROUNDED:g} allowed)"
+        )
+    rotation: Array = left @ right
+    if np.linalg.det(rotation) < 0.0:
+        raise InputError(f"{what}: the 3 x 3 part is a mirror image (left-handed); swap or negate a column")
+    # An exact matrix stays as it is, to the last bit.
+    return part if np.abs(rotation - part).max() < 1e-14 else rotation
+
+
+def from_rpy(position: Sequence[float], rpy_deg: Sequence[float], what: str = "the pose") -> Array:
+    """Pose of shape (4, 4): roll about x, then pitch about y, then yaw about z, all axes of the base."""
+    cosines, sines = zip(*((_cos_deg(angle), _sin_deg(angle)) for angle in rpy_deg), strict=True)
+    (cr, cp, cy), (sr, sp, sy) = cosines, sines
+    rotation = (
+        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+        (-sp, cp * sr, cp * cr),
+    )
+    return _joined(rotation, position, what)
+
+
+def from_quaternion(position: Sequence[float], wxyz: Sequence[float], what: str = "the pose") -> Array:
+    """Pose of shape (4, 4) from a unit quaternion, real part w first; rounding of its length is put right."""
+    length = math.hypot(*wxyz)
+    if not abs(length - 1.0) <= ROUNDED:
+        raise InputError(
+            f"{what}: a quaternion w x y z of length 1 is needed; this one has length {length:.6g}"
+        )
+    w, x, y, z = (value / length for value in wxyz)
+    rotation = (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+    return _joined(rotation, position, what)
+
+
+def from_numbers(numbers: Sequence[float], what: str = "the pose") -> Array:
+    """Pose from 16 or 12 numbers (matrix rows), 7 (x y z w x y z: quaternion) or 6 (x y z roll pitch yaw)."""
+    if len(numbers) in (12, 16):
+        return checked(np.reshape(numbers, (-1, 4)), what)
+    if len(numbers) == 7:
+        return from_quaternion(numbers[:3], numbers[3:], what)
+    if len(numbers) == 6:
+        return from_rpy(numbers[:3], numbers[3:], what)
+    raise InputError(
+        f"{what}: {len(numbers)} numbers are no pose; give 6 (x y z roll pitch yaw), 7 (x y z and quaternion "
+        "w x y z), 12 (3 rows of a matrix) or 16 (4 rows)"
+    )
+
+
+def _joined(rotation: ArrayLike, position: Sequence[float], what: str) -> Array:
+    return checked(np.column_stack((rotation, position)), what)
+
+
+def _cos_deg(angle_deg: float) -> float:
+    """Cosine, exact at multiples of a quarter turn."""
+    return _sin_deg(90.0 - angle_deg)
+
+
+def _sin_deg(angle_deg: float) -> float:
+    """Sine, exact at multiples of a quarter turn; NaN for an angle that is not finite."""
+    if not math.isfinite(angle_deg):
+        return math.nan
+    quarter, rest = divmod(angle_deg + 45.0, 90.0)
+    rest = math.radians(rest - 45.0)
+    return (math.sin(rest), math.cos(rest), -math.sin(rest), -math.cos(rest))[int(quarter) % 4]

@@ -1,0 +1,110 @@
+"""Why a solution is not to be had: each reason with its numbers and as a sentence."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from armtempo.kinematics.geometry import Array
+from armtempo.kinematics.inverse import DUPLICATE, ELBOW_STRETCHED, IN_OFFSET, TOO_FAR, TOO_NEAR
+from armtempo.kinematics.ranges import Ranges
+from armtempo.kinematics.regions import radii
+from armtempo.kinematics.shape import Shape
+
+
+@dataclass(frozen=True)
+class Rejection:
+    """One reason."""
+
+    kind: str
+    """"unreachable", "duplicate" or "range"."""
+    text: str
+    amount: float = 0.0
+    """How far: a length for "unreachable", degrees for "range" (negative below the range)."""
+    joint: int | None = None
+    """For "range": 1 to 6."""
+    inequality: int | None = None
+    """For "unreachable": the line of Eq. (3) that is violated; None: the shoulder offset's own."""
+    twin: int | None = None
+    """For "duplicate": the solution it equals, 1 to 8."""
+
+
+def unreachable(shape: Shape, wrist: Array, index: int, outcome: int, unit: str) -> Rejection:
+    """Say which inequality of Eq. (3) the wrist centre, shape (3,), violates for solution ``index``."""
+    x, y, z = wrist[:, None]
+    if outcome == IN_OFFSET:
+        return _in_offset(shape, math.hypot(x[0], y[0]), unit)
+    r = float(radii(shape, x, y, z).shoulder[index // 4, 0])
+    if outcome == TOO_NEAR:
+        text = (
+            f"out of reach by {shape.nearest - r:.6g} {unit}: wrist centre {r:.6g} {unit} from the shoulder "
+            f"axis, at least |L2 - L34| = {shape.nearest:.6g} {unit} needed (Eq. (3), line 4)"
+        )
+        return Rejection("unreachable", text, shape.nearest - r, inequality=4)
+    assert outcome == TOO_FAR
+    line = _outer_line(shape, float(z[0]))
+    text = (
+        f"out of reach by {r - shape.farthest:.6g} {unit}: wrist centre {r:.6g} {unit} from the shoulder "
+        f"axis, at most L2 + L34 = {shape.farthest:.6g} {unit} allowed (Eq. (3), line {line})"
+    )
+    return Rejection("unreachable", text, r - shape.farthest, inequality=line)
+
+
+def _in_offset(shape: Shape, planar: float, unit: str) -> Rejection:
+    missing = abs(shape.offset) - planar
+    text = (
+        f"out of reach by {missing:.6g} {unit}: wrist centre {planar:.6g} {unit} from axis 1, "
+        f"at least the shoulder offset |d2 + d3| = {abs(shape.offset):.6g} {unit} needed"
+    )
+    return Rejection("unreachable", text, missing)
+
+
+def _outer_line(shape: Shape, z: float) -> int:
+    """Line 2 or 3 of Eq. (3) where the wrist centre is too low or too high for any distance from axis 1."""
+    highest = math.sqrt(max(shape.farthest**2 - shape.shoulder**2, 0.0))
+    if z <= shape.height - highest:
+        return 2
+    return 3 if z >= shape.height + highest else 1
+
+
+def duplicate(index: int, singular: int) -> Rejection:
+    """Say which earlier solution the one at ``index`` equals, on a border."""
+    if index & 2 and singular & ELBOW_STRETCHED:
+        twin, why = index - 2, "the elbow is stretched or folded"
+    else:
+        twin, why = index ^ 6, "the wrist centre is as near to axis 1 as the shoulder offset allows"
+    return Rejection("duplicate", f"equals solution {twin + 1}: {why}", twin=twin + 1)
+
+
+def out_of_range(ranges: Ranges, angles: Array) -> tuple[Rejection, ...]:
+    """Say which joints are outside their ranges and by how much; ``angles`` (6,) from ``Ranges.place``."""
+    return tuple(
+        Rejection("range", _range_text(ranges, joint, angles[joint]), math.degrees(excess), joint=joint + 1)
+        for joint, excess in enumerate(ranges.excess(angles))
+        if excess
+    )
+
+
+def _range_text(ranges: Ranges, joint: int, angle: float) -> str:
+    low, high, at = np.degrees((ranges.low[joint], ranges.high[joint], angle))
+    side, by = ("below", low - at) if at < low else ("above", at - high)
+    return f"joint {joint + 1} at {at:.4g} deg is {by:.4g} deg {side} its range {low:g} to {high:g}"
+
+
+def reasons(
+    shape: Shape,
+    wrist: Array,
+    index: int,
+    outcome: int,
+    singular: int,
+    ranges: Ranges,
+    angles: Array,
+    unit: str,
+) -> tuple[Rejection, ...]:
+    """Collect everything against solution ``index``, 0 to 7; empty if nothing is."""
+    if outcome in (TOO_FAR, TOO_NEAR, IN_OFFSET):
+        return (unreachable(shape, wrist, index, outcome, unit),)
+    found = out_of_range(ranges, angles)
+    return (duplicate(index, singular), *found) if outcome == DUPLICATE else found
