@@ -23,8 +23,8 @@ from armtempo.trajectory import JointSpline, Trajectory
 TOLERANCE = 1e-9
 """What rounding may leave: largest excess over a limit, relative, and over a range, in degrees."""
 
-Progress = Callable[[float], None]
-"""Called with the part done, 0 to 1."""
+Progress = Callable[[float, float], None]
+"""Called with the work done and the whole of it."""
 
 
 def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
@@ -83,7 +83,7 @@ def via_angles(arm: Arm, job: Job) -> Array:
 
 
 def _part(progress: Progress, number: int, parts: int) -> Progress:
-    return lambda done: progress((number + done) / parts)
+    return lambda done, whole: progress(number + done / whole, parts)
 
 
 def _checked_limits(arm: Arm) -> list[Limits]:
@@ -137,8 +137,8 @@ def _check_ranges(arm: Arm, points: Array, degree: int) -> None:
         if lowest < least - TOLERANCE or highest > most + TOLERANCE:
             raise PlanError(
                 f"{joint.name}: the path reaches {lowest:.3f} to {highest:.3f} degrees, its range is "
-                f"{least:g} to {most:g}; move the via points away from the end of the range, or add one where it "
-                "swings out"
+                f"{least:g} to {most:g}; move the via points away from the end of the range, or add one "
+                "where it swings out"
             )
 
 

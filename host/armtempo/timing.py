@@ -21,8 +21,8 @@ limits,
 MIN_DURATION_S = 0.01
 """No motion is planned shorter: a tenth of the time between two samples."""
 
-Progress = Callable[[float], None]
-"""Called with the part done, 0 to 1."""
+Progress = Callable[[float, float], None]
+"""Called with the work done and the whole of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ def axis(
         job.population,
         job.iterations,
         job.optimiser,
-        None if progress is None else lambda done, of: progress(done / of),
+        progress,
         **parameters,
     )
     intervals = within_limits(angle_points_deg, found.x, limits, job.degree)

@@ -1,0 +1,67 @@
+"""The ``armtempo`` command: its subcommands are imported only when one is used."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+import click
+
+from armtempo import __version__
+from armtempo.errors import ArmtempoError
+from armtempo.interrupt import terminate_as_interrupt
+
+COMMANDS = (
+    "demo",
+    "plan",
+    "upload",
+    "run",
+    "goto",
+    "home",
+    "stop",
+    "clear",
+    "status",
+    "list",
+    "show",
+    "remove",
+    "rename",
+    "ports",
+    "monitor",
+)
+"""In the order of the help page. Each is ``command`` in the module of its name ('-' written as '_')."""
+
+INTERRUPTED = 130
+
+
+class LazyGroup(click.Group):
+    """A group that imports a command's module when it is asked for it."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """All names, in the order of the table."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+        """The command of that name."""
+        if name not in COMMANDS:
+            return None
+        module = import_module(f"{__name__}.{name.replace('-', '_')}")
+        command: click.Command = module.command
+        return command
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command; what the user can mend is said in one message, without a traceback."""
+        terminate_as_interrupt()
+        try:
+            return super().invoke(ctx)
+        except ArmtempoError as error:
+            click.echo(f"armtempo: {error}", err=True)
+            ctx.exit(error.exit_code)
+        except KeyboardInterrupt:
+            click.echo("armtempo: interrupted", err=True)
+            ctx.exit(INTERRUPTED)
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="armtempo")
+def main() -> None:
+    """Time-optimal B-spline motions for stepper arms, replayed by an STM32F407 with MicroPython."""
