@@ -20,8 +20,13 @@ SMALLEST_PIECE = 32
 LARGEST_PIECE = MAX_PAYLOAD - 4
 PIECE_PATIENCE_S = 0.5
 
-Progress = Callable[[int, int], None]
+Progress = Callable[[float, float], None]
 """Called with what is done and the whole."""
+
+
+def record_crc(data: bytes) -> int:
+    """The checksum by which a record is known: its last four bytes."""
+    return int.from_bytes(data[-4:], "little")
 
 
 class Board:
@@ -32,6 +37,7 @@ class Board:
         self.session = session
         self._number = secrets.randbits(32) if session_number is None else session_number
         self._piece = LARGEST_PIECE
+        self.info: messages.Hello | None = None
 
     def hello(self) -> messages.Hello:
         """Begin a session; NoAnswer within about a second and a half where nobody speaks the protocol."""
@@ -40,7 +46,8 @@ class Board:
         )
         fields = [*values, board_id]
         fields[3] = messages.state_name(values[3])
-        return messages.Hello(*fields)
+        self.info = messages.Hello(*fields)
+        return self.info
 
     def status(self) -> messages.Status:
         """What the board is doing and where the joints stand."""

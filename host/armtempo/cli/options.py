@@ -1,0 +1,68 @@
+"""Options that several commands share, and what they open."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from armtempo.arm import Arm
+    from armtempo.link import Board
+
+port = click.option(
+    "--port",
+    envvar="ARMTEMPO_PORT",
+    default="sim",
+    show_default=True,
+    show_envvar=True,
+    metavar="PORT",
+    help="Serial device or URL of the board; 'sim' starts a virtual board for this command.",
+)
+log_traffic = click.option(
+    "--log-traffic",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Write every byte to and from the board to FILE ('armtempo monitor FILE' shows it).",
+)
+arm = click.option(
+    "--arm",
+    "arm_path",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Arm file (TOML); without it the paper's 1:5 arm.",
+)
+job = click.option(
+    "--job",
+    "job_path",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Job file (TOML); without it the paper's feeding job.",
+)
+out = click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=Path("runs"),
+    show_default=True,
+    metavar="FOLDER",
+    help="Where run folders go; each run makes a new one.",
+)
+
+
+def load_arm(path: Path | None) -> Arm:
+    """The arm of ``--arm``."""
+    from armtempo import arm as arms
+
+    return arms.load_arm(path or arms.default_path())
+
+
+@contextmanager
+def board(port: str, log_traffic: Path | None = None) -> Iterator[Board]:
+    """The board of ``--port``, greeted."""
+    from armtempo.link import open_board
+
+    with open_board(port, log_traffic) as found:
+        yield found

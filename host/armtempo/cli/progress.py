@@ -1,0 +1,46 @@
+"""Progress bars: on a terminal only, and only for what takes longer than a second."""
+
+from __future__ import annotations
+
+import sys
+import time
+from contextlib import ExitStack
+from types import TracebackType
+from typing import Any, Self
+
+import click
+
+_PATIENCE_S = 1.0
+
+
+class Progress:
+    """Call it with (done, whole); a bar appears once a second has passed and work is left."""
+
+    def __init__(self, label: str) -> None:
+        self._label = label
+        self._start_s = time.monotonic()
+        self._stack = ExitStack()
+        self._bar: Any = None
+        self._shown = 0
+
+    def __call__(self, done: float, whole: float) -> None:
+        """Show how far the work is."""
+        if self._bar is None and done < whole and self._wanted():
+            self._bar = self._stack.enter_context(
+                click.progressbar(length=1000, label=self._label, file=sys.stderr)
+            )
+        if self._bar is not None:
+            now = int(1000 * done / whole)
+            self._bar.update(now - self._shown)
+            self._shown = now
+
+    def _wanted(self) -> bool:
+        return sys.stderr.isatty() and time.monotonic() - self._start_s >= _PATIENCE_S
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stack.close()

@@ -1,0 +1,181 @@
+"""What is done with a board: give it the arm, store a motion, home, replay, go to a posture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+from armtempo_shared import limits, wire
+
+from armtempo import encode, moves
+from armtempo.arm import Arm
+from armtempo.errors import BoardError, LinkError
+from armtempo.interrupt import StopRequest
+from armtempo.link import Board
+from armtempo.link.board import Progress, record_crc
+from armtempo.link.follow import Follower, RunEnd
+from armtempo.link.messages import Sample
+from armtempo.link.session import refusal
+from armtempo.record import COMPLETE, FAULT, INTERRUPTED, RunFolder
+from armtempo.spline import Array
+from armtempo.trajectory import Trajectory
+
+Take = Callable[[Sample, float], None]
+"""Gets each sample and the length of the motion in seconds."""
+
+TEMPORARY = "tmp-"
+"""Names of motions that are removed after use begin so."""
+
+
+@dataclass(frozen=True)
+class Stored:
+    """A motion on the board, known by name and checksum."""
+
+    name: str
+    crc: int
+
+
+def configure(board: Board, arm: Arm) -> None:
+    """Make sure the board has this arm's record; a new one makes all positions unknown.
+
+    Raises BoardError where it has another one and something is moving.
+    """
+    data = encode.arm_record(arm)
+    assert board.info is not None  # greeted
+    if board.info.arm_crc != record_crc(data):
+        board.upload(wire.ARM_RECORD_NAME, data)
+        board.hello()
+
+
+def store(board: Board, name: str, data: bytes, progress: Progress | None = None) -> Stored:
+    """Upload a motion record under ``name``, unless the board has just this one already."""
+    stored = Stored(name, record_crc(data))
+    found = board.find(name)
+    if found is None or found.crc != stored.crc:
+        board.upload(name, data, progress)
+    return stored
+
+
+def replay(board: Board, motion: Stored, stop: StopRequest, take: Take = lambda *_: None) -> RunEnd:
+    """Start a stored motion and follow it to its end; a stop request makes the board brake.
+
+    Raises BoardError where the board refuses to start.
+    """
+    run, duration_s = board.start(motion.name, motion.crc)
+    follower = Follower(board, run)
+    for sample in follower.samples(_Brake(board, stop)):
+        take(sample, duration_s)
+    assert follower.end is not None  # set when samples() is exhausted
+    return follower.end
+
+
+class _Brake:
+    """Called between two messages: passes a stop request on to the board, once."""
+
+    def __init__(self, board: Board, stop: StopRequest) -> None:
+        self._board = board
+        self._stop = stop
+        self._told = False
+
+    def __call__(self) -> None:
+        if self._stop.wanted and not self._told:
+            self._told = True
+            try:
+                self._board.stop()
+            except BoardError as error:
+                if error.code != wire.ERROR_CODES["not_moving"]:
+                    raise
+
+
+def replay_recorded(
+    board: Board, motion: Stored, folder: RunFolder, stop: StopRequest, progress: Progress | None = None
+) -> RunEnd:
+    """One repetition into the run folder, however it ends."""
+    show = _shown(progress)
+    with folder.begin_repetition() as file:
+
+        def take(sample: Sample, duration_s: float) -> None:
+            file.append(sample)
+            show(sample, duration_s)
+
+        end = replay(board, motion, stop, take)
+        state = FAULT if end.fault else INTERRUPTED if stop.wanted else COMPLETE
+        file.repetition.end(state, fault_name(end.fault), end.ticks, end.stand, end.lost)
+    return end
+
+
+def fault_name(code: int) -> str:
+    """Name of a fault code; "" for 0."""
+    return wire.ERRORS.get(code, (f"code {code}",))[0] if code else ""
+
+
+def raise_fault(end: RunEnd) -> None:
+    """Raise BoardError, with the sentence for the fault, where a run ended by one."""
+    if end.fault:
+        raise refusal("the motion ended by a fault", end.fault, end.fault_joint)
+
+
+def posture_deg(board: Board, arm: Arm) -> Array:
+    """Where the joints stand by the steps commanded, degrees (J,); LinkError where that is unknown."""
+    status = board.status()
+    unknown = [joint.name for index, joint in enumerate(arm.driven) if not status.joint_known(index)]
+    if unknown:
+        raise LinkError(
+            f"the position of {', '.join(unknown)} is unknown; bring the arm to its home posture and run "
+            "'armtempo home'"
+        )
+    return np.array(status.stand.commanded_steps, dtype=float) / _steps_per_deg(arm)
+
+
+def home(board: Board, arm: Arm, angles_deg: Array | None = None) -> None:
+    """Declare that the arm stands at ``angles_deg`` (J,), or at the arm file's home posture."""
+    posture = home_deg(arm) if angles_deg is None else moves.posture(angles_deg, arm)
+    board.home([round(steps) for steps in posture * _steps_per_deg(arm)])
+
+
+def home_deg(arm: Arm) -> Array:
+    """The arm file's home posture, degrees (J,)."""
+    return np.array([joint.home_deg for joint in arm.driven])
+
+
+def stands_at(board: Board, arm: Arm, target_deg: Array) -> bool:
+    """Whether the arm stands within half a step of ``target_deg`` (J,)."""
+    return bool(np.all(np.abs(posture_deg(board, arm) - target_deg) * _steps_per_deg(arm) <= 0.5))
+
+
+def go_to(
+    board: Board, arm: Arm, target_deg: Array, stop: StopRequest, progress: Progress | None = None
+) -> None:
+    """Move straight to a posture (J,) within the limits; nothing happens where the arm stands there.
+
+    Raises BoardError where the board refuses or a fault ends the move.
+    """
+    if not stands_at(board, arm, target_deg):
+        here = posture_deg(board, arm)
+        move_once(board, arm, moves.straight(TEMPORARY + "goto", here, target_deg, arm), stop, progress)
+
+
+def move_once(
+    board: Board, arm: Arm, trajectory: Trajectory, stop: StopRequest, progress: Progress | None = None
+) -> None:
+    """Run a motion that is not kept on the board; BoardError where a fault ends it."""
+    motion = store(board, trajectory.name, encode.motion_record(trajectory, arm))
+    try:
+        raise_fault(replay(board, motion, stop, _shown(progress)))
+    finally:
+        with suppress(LinkError):  # an earlier error says more
+            board.remove(motion.name)
+
+
+def _shown(progress: Progress | None) -> Take:
+    def show(sample: Sample, duration_s: float) -> None:
+        if progress is not None:
+            progress(sample.ticks / limits.TICK_HZ, duration_s)
+
+    return show
+
+
+def _steps_per_deg(arm: Arm) -> Array:
+    return np.array([encode.steps_per_deg(joint) for joint in arm.driven])

@@ -1,0 +1,111 @@
+"""Reading run folders back."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armtempo.errors import RunFolderError
+from armtempo.record import FORMAT, META, TRAJECTORY, VERSION, JointScale
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Samples:
+    """One repetition: N samples of J joints."""
+
+    file: str
+    state: str
+    """How it ended: see the states in ``record``."""
+    index: NDArray[np.int64]
+    """(N,), from 0; a jump is a gap."""
+    time_s: Array
+    """(N,)"""
+    commanded_steps: NDArray[np.int64]
+    """(N, J)"""
+    commanded_deg: Array
+    """(N, J)"""
+    angle_deg: Array
+    """(N, J), from the encoders; NaN for a joint without one."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run folder's content."""
+
+    path: Path
+    meta: dict[str, Any]
+    joints: tuple[JointScale, ...]
+    repetitions: tuple[Samples, ...]
+
+    @property
+    def trajectory_path(self) -> Path | None:
+        """The plan that was run, where it is known."""
+        path = self.path / TRAJECTORY
+        return path if path.is_file() else None
+
+
+def load(path: Path) -> Run:
+    """A run folder, whole or cut short; RunFolderError where it is none or contradicts itself."""
+    meta = _meta(path / META)
+    try:
+        joints = tuple(JointScale(**joint) for joint in meta["joints"])
+        entries = [(str(entry["file"]), str(entry["state"])) for entry in meta["repetitions"]]
+    except (KeyError, TypeError) as error:
+        raise RunFolderError(f"{path / META}: {error} is missing or wrong; the folder is damaged") from error
+    return Run(path, meta, joints, tuple(_samples(path / file, state, joints) for file, state in entries))
+
+
+def _meta(path: Path) -> dict[str, Any]:
+    try:
+        meta = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise RunFolderError(f"{path.parent} is not a run folder: {path.name}: {error.strerror}") from error
+    except ValueError as error:
+        raise RunFolderError(f"{path}: damaged: {error}") from error
+    if not isinstance(meta, dict) or meta.get("format") != FORMAT:
+        raise RunFolderError(f"{path}: not the description of an armtempo run")
+    if meta.get("version") != VERSION:
+        raise RunFolderError(f"{path}: version {meta.get('version')}; this armtempo reads {VERSION}")
+    return meta
+
+
+def _samples(path: Path, state: str, joints: tuple[JointScale, ...]) -> Samples:
+    rows = _rows(path)
+    table = {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}
+    numbers = range(1, len(joints) + 1)
+
+    def joint_columns(name: str) -> Array:
+        empty = ["nan"] * len(rows)
+        cells = [table.get(f"j{number}_{name}", empty) for number in numbers]
+        return np.array(cells, dtype=float).reshape(len(joints), len(rows)).T
+
+    try:
+        return Samples(
+            path.name,
+            state,
+            np.array(table.get("index", []), dtype=np.int64),
+            np.array(table.get("time_s", []), dtype=float),
+            joint_columns("commanded_steps").astype(np.int64),
+            joint_columns("commanded_deg"),
+            joint_columns("angle_deg"),
+        )
+    except ValueError as error:
+        raise RunFolderError(f"{path}: a value is not a number: {error}") from error
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
+    """The whole lines of a sample file; what an interrupt left of the last one is dropped."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeError) as error:
+        raise RunFolderError(f"{path}: cannot be read: {error}; the repetition is missing") from error
+    whole = text[: text.rfind("\n") + 1]
+    return list(csv.DictReader(whole.splitlines()))
