@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Mapping, Sequence
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -92,6 +93,17 @@ def errors(found: Curves, names: Sequence[str]) -> Figure:
     return figure
 
 
+def overlay(runs: Mapping[str, tuple[Array, Array, Array]]) -> Figure:
+    """One joint of several runs: times (K,), mean angle, speed, acceleration (3, K), angle error (K,)."""
+    figure, axes = new_figure(4, 1, 7.5, 8.0)
+    for index, (name, (times, mean, error)) in enumerate(runs.items()):
+        for axis, values in zip(axes[:, 0], (*mean, error), strict=True):
+            axis.plot(times, values, color=COLOURS[index % len(COLOURS)], label=name)
+    axes[0][0].legend(frameon=False)
+    _label(axes, ("",), (*_LABELS[:3], "error (°)"))
+    return figure
+
+
 def convergence(histories: Mapping[str, Array]) -> Figure:
     """Best value after each iteration of the search (Fig. 6)."""
     figure, axes = new_figure(1, 1, 6.4, 3.0)
@@ -137,10 +149,12 @@ def inline_svg(figure: Figure, name: str, description: str) -> str:
     """The figure as an ``<svg>`` element in the page's colour, with a description for screen readers."""
     text = _svg(figure)
     text = text[text.index("<svg") :].replace(_PAGE_COLOUR, "currentColor")
+    width = re.search(r'width="([\d.]+)pt"', text)
+    style = f"max-width: {float(width.group(1)) * 4 / 3:.0f}px" if width else ""
     text = re.sub(r'(width|height)="[\d.]+pt" ', "", text, count=2)
     text = re.sub(r'(\bid=")', rf"\g<1>{name}-", text)
     text = re.sub(r'(xlink:href="#|url\(#)', rf"\g<1>{name}-", text)
-    return text.replace("<svg ", f'<svg role="img" aria-label="{description}" ', 1)
+    return text.replace("<svg ", f'<svg role="img" aria-label="{escape(description)}" style="{style}" ', 1)
 
 
 def _svg(figure: Figure) -> str:

@@ -1,0 +1,31 @@
+"""``armtempo report``: one page and its figures from a recorded run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.argument(
+    "runs", nargs=-1, required=True, type=click.Path(exists=True, file_okay=False, path_type=Path)
+)
+@click.option(
+    "--out",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Page to write when comparing; default: comparison.html beside the first run.",
+)
+def command(runs: tuple[Path, ...], out: Path | None) -> None:
+    """Write report.html and its figures into the run folder RUNS.
+
+    With two or more run folders, each gets its page, and one more page compares them.
+    """
+    from armtempo import comparison, report
+
+    for run in runs:
+        click.echo(f"wrote {report.write(run)}")
+    if len(runs) > 1:
+        click.echo(f"wrote {comparison.write(runs, out or runs[0].parent / comparison.PAGE)}")
+    elif out is not None:
+        raise click.UsageError("--out goes with two or more runs")

@@ -1,0 +1,226 @@
+"""The report of a run: one page and its figures, from a run folder and the plan in it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armtempo import analyse, page, plots, reach, runs, trajectory_file
+from armtempo.arm import Limits
+from armtempo.encode import counts_per_deg
+from armtempo.errors import RunFolderError
+from armtempo.plan import Plan
+from armtempo.record import COMPLETE, replace_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PAGE = "report.html"
+_HEADINGS = {"motion": "The plan", "convergence": "The search", "postures": "The arm along its path"}
+_POSTURES = 7
+_PATH_POINTS = 300
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """A run with its plan, its curves and what is wrong with it."""
+
+    run: runs.Run
+    plan: Plan
+    curves: analyse.Curves
+    complaints: tuple[str, ...]
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the driven joints."""
+        return [joint.name for joint in self.plan.arm.driven]
+
+    @property
+    def limits(self) -> list[Limits]:
+        """Their limits."""
+        return [joint.limits for joint in self.plan.arm.driven if joint.limits]
+
+
+def evaluate(folder: Path) -> Evaluation:
+    """Read and analyse a run folder; what is incomplete is listed in ``complaints``.
+
+    Raises RunFolderError where there is no plan or not one sample.
+    """
+    run = runs.load(folder)
+    if run.trajectory_path is None:
+        raise RunFolderError(f"{folder}: has no trajectory.json, so there is no theory to compare with")
+    plan = trajectory_file.load(run.trajectory_path)
+    usable = [repetition for repetition in run.repetitions if len(repetition.time_s)]
+    if not usable:
+        raise RunFolderError(f"{folder}: holds no sample; run it again")
+    return Evaluation(run, plan, analyse.curves(usable, plan.trajectory), tuple(complaints(run)))
+
+
+def complaints(run: runs.Run) -> list[str]:
+    """What is missing or broken in each repetition, one sentence each."""
+    found = []
+    for repetition in run.repetitions:
+        steps = np.diff(repetition.index)
+        if not len(repetition.time_s):
+            found.append(f"{repetition.file}: no samples")
+            continue
+        if repetition.index[0] > 0:
+            found.append(f"{repetition.file}: the first {repetition.index[0]} samples are missing")
+        for at in np.flatnonzero(steps > 1):
+            first, last = repetition.index[at] + 1, repetition.index[at + 1] - 1
+            found.append(f"{repetition.file}: samples {first} to {last} are missing")
+        if np.any(steps <= 0):
+            found.append(f"{repetition.file}: the sample count starts again in the middle (a reset?)")
+        if repetition.state != COMPLETE:
+            end = repetition.time_s[-1]
+            found.append(f"{repetition.file}: ended as {repetition.state!r} after {end:.1f} s")
+    return found
+
+
+def write(folder: Path) -> Path:
+    """Write report.html and its figures (PNG and SVG) into the run folder; returns the page's path."""
+    found = evaluate(folder)
+    drawn = figures(found)
+    for name, (figure, _) in drawn.items():
+        for suffix in (".png", ".svg"):
+            plots.save(figure, folder / f"{name}{suffix}")
+    path = folder / PAGE
+    replace_text(path, render(found, drawn))
+    return path
+
+
+def figures(found: Evaluation) -> dict[str, tuple[Figure, str]]:
+    """The figures by file name, each with its caption."""
+    plan, names, limits = found.plan, found.names, found.limits
+    times = np.linspace(0.0, plan.trajectory.duration_s, _PATH_POINTS)
+    stops = plan.trajectory(np.linspace(0.0, plan.trajectory.duration_s, _POSTURES))
+    drawn = {
+        "tracking": (
+            plots.tracking(found.curves, plan.trajectory, limits, names),
+            "Measured mean (solid) with its standard error (band), theory (dotted), limits (dashed).",
+        ),
+        "errors": (
+            plots.errors(found.curves, names),
+            "Measured minus planned angle: every repetition (pale) and their mean.",
+        ),
+        "motion": (
+            plots.motion(plan.trajectory, limits, names),
+            "The planned motion and its limits (dashed).",
+        ),
+        "convergence": (
+            plots.convergence({_serves(names, search.joints): search.history_s for search in plan.searches}),
+            "Best motion time with penalties after each iteration of the search.",
+        ),
+    }
+    if len(plan.arm.joints) > 1:
+        drawn["postures"] = (
+            plots.postures(
+                reach.chains_mm(plan.arm, stops), reach.tool_path_mm(plan.arm, plan.trajectory, times)
+            ),
+            f"The arm at {_POSTURES} equally spaced times (paler: earlier) and the path of its tool.",
+        )
+    return drawn
+
+
+def render(found: Evaluation, drawn: dict[str, tuple[Figure, str]]) -> str:
+    """The whole page as HTML text."""
+    meta, plan = found.run.meta, found.plan
+    done = sum(repetition.state == COMPLETE for repetition in found.run.repetitions)
+    sheet = page.Page(
+        f"Run of {meta['name']!r}",
+        f"{meta['started']}, arm {plan.arm.name}, "
+        f"{done} of {len(found.run.repetitions)} repetitions complete",
+    )
+    for text in found.complaints:
+        sheet.note(text, page.BAD)
+    _result_tables(sheet, found)
+    for name, (figure, caption) in drawn.items():
+        if name in _HEADINGS:
+            sheet.heading(_HEADINGS[name])
+        if name == "motion":
+            _plan_table(sheet, found)
+        sheet.figure(plots.inline_svg(figure, name, caption), caption)
+    _origin(sheet, found)
+    return sheet.render()
+
+
+def _result_tables(sheet: page.Page, found: Evaluation) -> None:
+    sheet.heading("Result")
+    last = [repetition for repetition in found.run.repetitions if len(repetition.time_s)][-1]
+    finals = analyse.final_errors(last, found.plan.trajectory)
+    lags = analyse.lags_s(found.curves, found.plan.trajectory)
+    deviation = analyse.deviations(found.curves)
+    rows = [
+        [
+            name,
+            f"{deviation[0][joint].rms:.3f}",
+            f"{deviation[0][joint].largest:.3f}",
+            f"{finals[joint]:+.3f}",
+            f"{deviation[1][joint].rms:.2f}",
+            f"{deviation[2][joint].rms:.2f}",
+            f"{1000 * lags[0, joint]:+.0f}",
+            f"{1000 * lags[1, joint]:+.0f}",
+        ]
+        for joint, name in enumerate(found.names)
+    ]
+    header = (
+        "joint",
+        "angle RMS (°)",
+        "largest (°)",
+        "final (°)",
+        "speed RMS (°/s)",
+        "acceleration RMS (°/s²)",
+    )
+    sheet.table(
+        (*header, "lag at start (ms)", "lag at end (ms)"), rows, "Mean of the repetitions against theory"
+    )
+    _limit_table(sheet, found)
+
+
+def _limit_table(sheet: page.Page, found: Evaluation) -> None:
+    arm = found.plan.arm
+    resolutions = [1.0 / counts_per_deg(joint) if joint.encoder else np.nan for joint in arm.driven]
+    rows: list[Sequence[object]] = []
+    for name, checks in zip(
+        found.names, analyse.limit_checks(found.curves, found.limits, resolutions), strict=True
+    ):
+        for quantity, unit, check in zip(("speed", "acceleration"), ("°/s", "°/s²"), checks, strict=True):
+            kind = page.BAD if check.verdict == "exceeded" else page.GOOD
+            peak = f"{check.peak:.2f} ± {check.sigma:.2f}"
+            rows.append((name, quantity, peak, f"{check.limit:g}", unit, (check.verdict, kind)))
+    caption = "Measured peaks beside the limits; ± one standard deviation from the encoder's rounding"
+    sheet.table(("joint", "quantity", "peak", "limit", "unit", "verdict"), rows, caption)
+
+
+def _plan_table(sheet: page.Page, found: Evaluation) -> None:
+    rows = []
+    for joint, (name, reached, limit) in enumerate(
+        zip(found.names, found.plan.extremes, found.limits, strict=True)
+    ):
+        duration = found.plan.trajectory.joints[joint].duration_s
+        peaks = [f"{value:.3f} of {most:g}" for value, most in zip(reached.values, limit.values, strict=True)]
+        rows.append([name, f"{duration:.4f}", *peaks])
+    header = ("joint", "motion time (s)", "speed (°/s)", "acceleration (°/s²)", "jerk (°/s³)")
+    sheet.table(header, rows, "Motion time and exact extremes of the plan beside the limits")
+
+
+def _origin(sheet: page.Page, found: Evaluation) -> None:
+    job, meta = found.plan.job, found.run.meta
+    sheet.heading("How to repeat it")
+    sheet.code("armtempo run trajectory.json --repeat " + str(len(found.run.repetitions)))
+    rows = [
+        ("optimiser", f"{job.optimiser}, population {job.population}, {job.iterations} iterations"),
+        ("seed", job.seed),
+        ("degree, timing, refine", f"{job.degree}, {job.timing}, {job.refine}"),
+        *((f"version of {name}", value) for name, value in found.plan.versions.items()),
+        *((key, meta[key]) for key in ("port", "board") if key in meta),
+    ]
+    sheet.table(("what", "value"), [(name, str(value)) for name, value in rows])
+
+
+def _serves(names: Sequence[str], joints: Sequence[int]) -> str:
+    return ", ".join(names[joint] for joint in joints)

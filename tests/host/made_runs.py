@@ -1,0 +1,54 @@
+"""Run folders as the recorder writes them, made from a plan with an ideal or a scattered encoder."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from armtempo import arm as arm_file
+from armtempo import job as job_file
+from armtempo import record, trajectory_file
+from armtempo.link.messages import Sample, Stand
+from armtempo.plan import Plan
+from armtempo.planner import plan
+from armtempo_shared.limits import SAMPLE_TICKS, TICK_HZ
+
+
+@cache
+def shipped_plan() -> Plan:
+    """The plan of the shipped job."""
+    arm = arm_file.load_arm(arm_file.default_path())
+    return plan(arm, job_file.load_job(job_file.default_path(), arm))
+
+
+def make(
+    path: Path, repetitions: int = 3, scatter_deg: float = 0.02, seed: int = 1, drop: tuple[int, ...] = ()
+) -> Path:
+    """A run folder at ``path``; ``drop``: indices of samples that the first repetition lost."""
+    made = shipped_plan()
+    rng = np.random.default_rng(seed)
+    path.mkdir(parents=True)
+    trajectory_file.save(made, path / record.TRAJECTORY)
+    folder = record.RunFolder(path, made.job.name, record.scales(made.arm), {"port": "sim"})
+    for number in range(repetitions):
+        with folder.begin_repetition() as file:
+            for sample in _samples(made, scatter_deg, rng):
+                if number or sample.index not in drop:
+                    file.append(sample)
+            file.repetition.end(record.COMPLETE, "", sample.ticks, sample.stand, ())
+    return path
+
+
+def _samples(made: Plan, scatter_deg: float, rng: np.random.Generator) -> list[Sample]:
+    scales = record.scales(made.arm)
+    end = round(made.trajectory.duration_s * TICK_HZ)
+    ticks = [*range(0, end, SAMPLE_TICKS), end]
+    found = []
+    for index, tick in enumerate(ticks):
+        angles = made.trajectory(tick / TICK_HZ)
+        steps = tuple(round(a * s.steps_per_deg) for a, s in zip(angles, scales, strict=True))
+        seen = angles + rng.normal(scale=scatter_deg, size=len(angles))
+        counts = tuple(round(a * s.counts_per_deg) for a, s in zip(seen, scales, strict=True))
+        found.append(Sample(run=1, index=index, ticks=tick, flags=0, stand=Stand(steps, counts)))
+    return found
