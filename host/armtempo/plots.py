@@ -1,7 +1,7 @@
 """Figures of plans and runs, drawn with matplotlib (the optional extra ``plot``).
 
 Every function returns a matplotlib Figure; ``save`` writes it as PNG or SVG, ``inline_svg`` gives it as
-text for a page. Colours are legible on white and on black; on a page, axes and text take the page's own colour.
+text for a page. Colours are legible on white and on black; on a page, axes and text take its own colour.
 """
 
 from __future__ import annotations

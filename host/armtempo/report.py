@@ -66,7 +66,7 @@ def complaints(run: runs.Run) -> list[str]:
     for repetition in run.repetitions:
         steps = np.diff(repetition.index)
         if not len(repetition.time_s):
-            found.append(f"{repetition.file}: no samples")
+            found.append(f"{repetition.file}: {repetition.problem or 'no samples'}")
             continue
         if repetition.index[0] > 0:
             found.append(f"{repetition.file}: the first {repetition.index[0]} samples are missing")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,8 @@ class Samples:
     """(N, J)"""
     angle_deg: Array
     """(N, J), from the encoders; NaN for a joint without one."""
+    problem: str = ""
+    """Why there are no samples, where the file cannot be read."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,10 @@ class Run:
 
 
 def load(path: Path) -> Run:
-    """A run folder, whole or cut short; RunFolderError where it is none or contradicts itself."""
+    """A run folder, whole or cut short; RunFolderError where it is none or contradicts itself.
+
+    A repetition whose file is missing or damaged is there without samples and says why in ``problem``.
+    """
     meta = _meta(path / META)
     try:
         joints = tuple(JointScale(**joint) for joint in meta["joints"])
@@ -78,8 +83,18 @@ def _meta(path: Path) -> dict[str, Any]:
 
 
 def _samples(path: Path, state: str, joints: tuple[JointScale, ...]) -> Samples:
-    rows = _rows(path)
-    table = {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}
+    try:
+        return _parsed(path, state, joints, _rows(path))
+    except OSError as error:
+        problem = f"missing ({error.strerror})"
+    except ValueError as error:
+        problem = f"damaged ({error})"
+    return replace(_parsed(path, state, joints, []), problem=problem)
+
+
+def _parsed(path: Path, state: str, joints: tuple[JointScale, ...], rows: list[dict[str, str]]) -> Samples:
+    """The samples in the rows of a file; ValueError where a value is missing or not a number."""
+    table = {name: [row[name] or "" for row in rows] for name in (rows[0] if rows else ())}
     numbers = range(1, len(joints) + 1)
 
     def joint_columns(name: str) -> Array:
@@ -87,25 +102,19 @@ def _samples(path: Path, state: str, joints: tuple[JointScale, ...]) -> Samples:
         cells = [table.get(f"j{number}_{name}", empty) for number in numbers]
         return np.array(cells, dtype=float).reshape(len(joints), len(rows)).T
 
-    try:
-        return Samples(
-            path.name,
-            state,
-            np.array(table.get("index", []), dtype=np.int64),
-            np.array(table.get("time_s", []), dtype=float),
-            joint_columns("commanded_steps").astype(np.int64),
-            joint_columns("commanded_deg"),
-            joint_columns("angle_deg"),
-        )
-    except ValueError as error:
-        raise RunFolderError(f"{path}: a value is not a number: {error}") from error
+    return Samples(
+        path.name,
+        state,
+        np.array(table.get("index", []), dtype=np.int64),
+        np.array(table.get("time_s", []), dtype=float),
+        joint_columns("commanded_steps").astype(np.int64),
+        joint_columns("commanded_deg"),
+        joint_columns("angle_deg"),
+    )
 
 
 def _rows(path: Path) -> list[dict[str, str]]:
     """The whole lines of a sample file; what an interrupt left of the last one is dropped."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeError) as error:
-        raise RunFolderError(f"{path}: cannot be read: {error}; the repetition is missing") from error
+    text = path.read_text(encoding="utf-8")
     whole = text[: text.rfind("\n") + 1]
     return list(csv.DictReader(whole.splitlines()))

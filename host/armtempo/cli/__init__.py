@@ -14,8 +14,10 @@ from armtempo.interrupt import terminate_as_interrupt
 COMMANDS = (
     "demo",
     "plan",
+    "bench",
     "upload",
     "run",
+    "report",
     "goto",
     "home",
     "stop",

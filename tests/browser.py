@@ -1,0 +1,56 @@
+"""A real browser, headless: what a page looks like and what it asks for."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+_QUIET = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-quic",
+    "--no-first-run",
+    "--host-resolver-rules=MAP * ~NOTFOUND",
+]
+_PROBE = """<script>addEventListener('load', () => {
+  const style = getComputedStyle(document.body);
+  document.body.setAttribute('data-probe', JSON.stringify({
+    fetched: performance.getEntriesByType('resource').map(entry => entry.name),
+    overflow: document.documentElement.scrollWidth - document.documentElement.clientWidth,
+    width: document.documentElement.clientWidth,
+    figures: [...document.querySelectorAll('figure svg')].map(svg => svg.getBoundingClientRect().height),
+    tables: document.querySelectorAll('table').length,
+    text: document.body.innerText,
+    colour: style.color, background: style.backgroundColor,
+  }));
+});</script>"""
+
+
+def _run(page: Path, profile: Path, *options: str) -> str:
+    assert BROWSER
+    command = [BROWSER, *_QUIET, f"--user-data-dir={profile}", *options, page.as_uri()]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def probe(page: Path, folder: Path, width: int, dark: bool = False) -> dict[str, Any]:
+    """What the browser finds in the page at this window width: see ``_PROBE``."""
+    copy = folder / f"probe-{width}-{dark}.html"
+    copy.write_text(page.read_text(encoding="utf-8").replace("</body>", _PROBE + "</body>"), encoding="utf-8")
+    scheme = f"--blink-settings=preferredColorScheme={0 if dark else 1}"
+    dom = _run(copy, folder / "profile", f"--window-size={width},900", scheme, "--dump-dom")
+    found = re.search(r'data-probe="([^"]*)"', dom)
+    assert found, dom[-2000:]
+    text = found.group(1).replace("&quot;", '"').replace("&lt;", "<").replace("&gt;", ">")
+    answer: dict[str, Any] = json.loads(text.replace("&nbsp;", " ").replace("&amp;", "&"))
+    return answer

@@ -1,0 +1,119 @@
+"""The report of a run: complete, self-contained, and right in a real browser."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import pytest
+from armtempo import comparison, report
+from armtempo.cli import main
+from armtempo.errors import RunFolderError
+from click.testing import CliRunner
+
+from tests import browser
+from tests.host import made_runs
+
+FIGURES = ("tracking", "errors", "motion", "convergence", "postures")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of three repetitions with two samples lost, and its report."""
+    path = made_runs.make(tmp_path_factory.mktemp("runs") / "feed-001", drop=(5, 6))
+    report.write(path)
+    return path
+
+
+def test_the_page_and_every_figure_are_written(folder: Path) -> None:
+    text = (folder / report.PAGE).read_text()
+    assert text.count("<svg") == len(FIGURES)
+    for name in FIGURES:
+        assert (folder / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+        assert (folder / f"{name}.svg").read_text().lstrip().startswith("<?xml")
+
+
+def test_nothing_is_fetched_and_no_id_is_used_twice(folder: Path) -> None:
+    text = (folder / report.PAGE).read_text()
+    assert not re.search(r'(src|href)="(?!#)', text.replace('xlink:href="#', ""))
+    assert "@import" not in text
+    ids = re.findall(r'\bid="([^"]+)"', text)
+    assert len(ids) == len(set(ids))
+
+
+def test_what_is_missing_is_said(folder: Path) -> None:
+    assert "samples-01.csv: samples 5 to 6 are missing" in (folder / report.PAGE).read_text()
+
+
+def test_a_repetition_that_is_missing_does_not_hide_the_others(tmp_path: Path) -> None:
+    path = made_runs.make(tmp_path / "run")
+    (path / "samples-02.csv").unlink()
+    (path / "samples-03.csv").write_text((path / "samples-03.csv").read_text()[:900])
+    found = report.evaluate(path)
+    assert any("samples-02.csv" in text and "missing" in text for text in found.complaints)
+    assert len(found.curves.each) == 2
+
+
+def test_a_reset_in_the_middle_is_said(tmp_path: Path) -> None:
+    path = made_runs.make(tmp_path / "run")
+    lines = (path / "samples-01.csv").read_text().splitlines()
+    (path / "samples-01.csv").write_text("\n".join(lines[:20] + lines[1:5]) + "\n")
+    assert any("starts again" in text for text in report.evaluate(path).complaints)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda path: (path / "run.json").unlink(), "not a run folder"),
+        (lambda path: (path / "run.json").write_text("{"), "damaged"),
+        (lambda path: (path / "trajectory.json").unlink(), "no trajectory.json"),
+        (lambda path: [file.write_text("") for file in path.glob("samples-*")], "no sample"),
+    ],
+)
+def test_a_folder_that_is_no_run_is_refused(tmp_path: Path, spoil: object, said: str) -> None:
+    path = made_runs.make(tmp_path / "run", repetitions=1)
+    spoil(path)  # type: ignore[operator]
+    with pytest.raises(RunFolderError, match=said):
+        report.evaluate(path)
+    result = CliRunner().invoke(main, ["report", str(path)])
+    assert result.exit_code == 1
+    assert said in result.output
+    assert "Traceback" not in result.output
+
+
+def test_two_runs_are_compared_on_one_page(tmp_path: Path) -> None:
+    runs = [str(made_runs.make(tmp_path / f"run-{seed}", seed=seed)) for seed in (1, 2)]
+    broken = tmp_path / "broken"
+    broken.mkdir()
+    result = CliRunner().invoke(main, ["report", *runs])
+    assert result.exit_code == 0, result.output
+    page = (tmp_path / comparison.PAGE).read_text()
+    assert "run-1" in page
+    assert page.count("<svg") == 3
+    comparison.write([*map(Path, runs), broken], tmp_path / "three.html")
+    assert "broken is not a run folder" in (tmp_path / "three.html").read_text()
+    with pytest.raises(RunFolderError, match="fewer than two"):
+        comparison.write([Path(runs[0]), broken], tmp_path / "none.html")
+    assert not (tmp_path / "none.html").exists()
+
+
+def test_in_a_browser(folder: Path, tmp_path: Path) -> None:
+    """Wide, on a phone, light and dark: nothing fetched, nothing cut off, all figures there."""
+    if browser.BROWSER is None and not os.environ.get("CI"):
+        pytest.skip("left out: no Chromium on this machine (CI has one)")
+    page = folder / report.PAGE
+    light = browser.probe(page, tmp_path, 1200)
+    dark = browser.probe(page, tmp_path, 1200, dark=True)
+    phone = browser.probe(page, tmp_path, 500)
+    for found in (light, dark, phone):
+        assert found["fetched"] == []
+        assert found["overflow"] <= 0
+        assert len(found["figures"]) == len(FIGURES)
+        assert min(found["figures"]) > 80
+        assert found["tables"] == 4
+        assert "How to repeat it" in found["text"]
+    assert phone["width"] <= 500
+    assert light["background"] == "rgb(255, 255, 255)"
+    assert dark["background"] != light["background"]
+    assert dark["colour"] != light["colour"]
