@@ -14,6 +14,7 @@ from armtempo.interrupt import terminate_as_interrupt
 COMMANDS = (
     "demo",
     "plan",
+    "ik",
     "bench",
     "upload",
     "run",
@@ -29,6 +30,7 @@ COMMANDS = (
     "rename",
     "ports",
     "monitor",
+    "report",
 )
 """In the order of the help page. Each is ``command`` in the module of its name ('-' written as '_')."""
 

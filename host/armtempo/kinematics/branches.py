@@ -25,7 +25,7 @@ class Branch(NamedTuple):
     """"plain": sine of theta5 positive; "flipped": negative."""
 
     def __str__(self) -> str:
-        return " ".join(word or "either" for word in self)
+        return " ".join(filter(None, self)) or "on the border of all branches"
 
     def differs(self, other: Branch) -> tuple[str, ...]:
         """Which of the three changes from this branch to ``other`` without doubt."""

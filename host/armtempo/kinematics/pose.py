@@ -79,20 +79,6 @@ def from_quaternion(position: Sequence[float], wxyz: Sequence[float], what: str 
     return _joined(rotation, position, what)
 
 
-def from_numbers(numbers: Sequence[float], what: str = "the pose") -> Array:
-    """Pose from 16 or 12 numbers (matrix rows), 7 (x y z w x y z: quaternion) or 6 (x y z roll pitch yaw)."""
-    if len(numbers) in (12, 16):
-        return checked(np.reshape(numbers, (-1, 4)), what)
-    if len(numbers) == 7:
-        return from_quaternion(numbers[:3], numbers[3:], what)
-    if len(numbers) == 6:
-        return from_rpy(numbers[:3], numbers[3:], what)
-    raise InputError(
-        f"{what}: {len(numbers)} numbers are no pose; give 6 (x y z roll pitch yaw), 7 (x y z and quaternion "
-        "w x y z), 12 (3 rows of a matrix) or 16 (4 rows)"
-    )
-
-
 def _joined(rotation: ArrayLike, position: Sequence[float], what: str) -> Array:
     return checked(np.column_stack((rotation, position)), what)
 

@@ -4,9 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from armtempo.errors import InputError
 from armtempo.kinematics.geometry import Array
-from armtempo.kinematics.pose import from_numbers
+from armtempo.kinematics.pose import checked, from_quaternion, from_rpy
+
+FORMS = {
+    6: "x y z roll pitch yaw",
+    7: "x y z and quaternion w x y z",
+    12: "3 rows of a matrix",
+    16: "4 rows of a matrix",
+}
+"""How many numbers make a pose."""
 
 
 def read(path: Path | str) -> list[Array]:
@@ -17,7 +27,7 @@ def read(path: Path | str) -> list[Array]:
         raise InputError(f"{path}: cannot be read as text ({error})") from error
     poses = []
     for number, line in enumerate(text.splitlines(), 1):
-        content = line.split("#")[0].replace(",", " ")
+        content = line.split("#")[0]
         if content.strip():
             poses.append(parse(content, f"{path}, line {number}"))
     if not poses:
@@ -25,12 +35,25 @@ def read(path: Path | str) -> list[Array]:
     return poses
 
 
-def parse(text: str, what: str) -> Array:
-    """Return the pose that ``text`` writes as 6, 7, 12 or 16 numbers."""
-    numbers = []
+def parse(text: str, what: str, counts: tuple[int, ...] = (6, 7, 12, 16)) -> Array:
+    """Return the pose that ``text`` writes in as many numbers as ``counts`` allows."""
+    found = numbers(text, what)
+    if len(found) not in counts:
+        allowed = ", ".join(f"{count} ({FORMS[count]})" for count in counts)
+        raise InputError(f"{what}: {len(found)} numbers are no pose; give {allowed}")
+    if len(found) == 6:
+        return from_rpy(found[:3], found[3:], what)
+    if len(found) == 7:
+        return from_quaternion(found[:3], found[3:], what)
+    return checked(np.reshape(found, (-1, 4)), what)
+
+
+def numbers(text: str, what: str) -> list[float]:
+    """Return the numbers of ``text``, separated by blanks or commas; InputError for anything else."""
+    found = []
     for word in text.replace(",", " ").split():
         try:
-            numbers.append(float(word))
+            found.append(float(word))
         except ValueError:
             raise InputError(f"{what}: {word!r} is not a number") from None
-    return from_numbers(numbers, what)
+    return found
