@@ -15,7 +15,7 @@ from armtempo.errors import BoardError, LinkError
 from armtempo.interrupt import StopRequest
 from armtempo.link import Board
 from armtempo.link.board import Progress, record_crc
-from armtempo.link.follow import Follower, RunEnd
+from armtempo.link.follow import CHECK_S, Follower, RunEnd
 from armtempo.link.messages import Sample
 from armtempo.link.session import refusal
 from armtempo.record import COMPLETE, FAULT, INTERRUPTED, RunFolder
@@ -37,16 +37,22 @@ class Stored:
     crc: int
 
 
-def configure(board: Board, arm: Arm) -> None:
+def configure(board: Board, arm: Arm, replace: bool) -> None:
     """Make sure the board has this arm's record; a new one makes all positions unknown.
 
-    Raises BoardError where it has another one and something is moving.
+    Raises LinkError where the board is set up for another arm and ``replace`` is false, BoardError where
+    it is moving.
     """
     data = encode.arm_record(arm)
     assert board.info is not None  # greeted
-    if board.info.arm_crc != record_crc(data):
-        board.upload(wire.ARM_RECORD_NAME, data)
-        board.hello()
+    if board.info.arm_crc == record_crc(data):
+        return
+    if board.info.arm_crc and not replace:
+        raise LinkError(
+            f"the board is set up for another arm than {arm.name!r} ({arm.source}); name its arm file with --arm"
+        )
+    board.upload(wire.ARM_RECORD_NAME, data)
+    board.hello()
 
 
 def store(board: Board, name: str, data: bytes, progress: Progress | None = None) -> Stored:
@@ -61,12 +67,17 @@ def store(board: Board, name: str, data: bytes, progress: Progress | None = None
 def replay(board: Board, motion: Stored, stop: StopRequest, take: Take = lambda *_: None) -> RunEnd:
     """Start a stored motion and follow it to its end; a stop request makes the board brake.
 
-    Raises BoardError where the board refuses to start.
+    Whatever fails here stops the board. Raises BoardError where the board refuses to start.
     """
     run, duration_s = board.start(motion.name, motion.crc)
     follower = Follower(board, run)
-    for sample in follower.samples(_Brake(board, stop)):
-        take(sample, duration_s)
+    try:
+        for sample in follower.samples(_Brake(board, stop)):
+            take(sample, duration_s)
+    except BaseException as error:
+        with suppress(LinkError):  # the first error says more
+            board.stop(now=isinstance(error, KeyboardInterrupt))
+        raise
     assert follower.end is not None  # set when samples() is exhausted
     return follower.end
 
@@ -82,11 +93,24 @@ class _Brake:
     def __call__(self) -> None:
         if self._stop.wanted and not self._told:
             self._told = True
-            try:
-                self._board.stop()
-            except BoardError as error:
-                if error.code != wire.ERROR_CODES["not_moving"]:
-                    raise
+            stop_moving(self._board)
+
+
+def stop_moving(board: Board, now: bool = False) -> None:
+    """Brake along the path, or freeze; nothing happens where nothing moves."""
+    try:
+        board.stop(now)
+    except BoardError as error:
+        if error.code != wire.ERROR_CODES["not_moving"]:
+            raise
+
+
+def stop(board: Board, now: bool) -> None:
+    """Stop and wait until the arm rests."""
+    stop_moving(board, now)
+    while board.status().moving:
+        board.session.poll(CHECK_S)
+        board.session.events.clear()
 
 
 def replay_recorded(

@@ -31,6 +31,8 @@ log_traffic = click.option(
 arm = click.option(
     "--arm",
     "arm_path",
+    envvar="ARMTEMPO_ARM",
+    show_envvar=True,
     type=click.Path(path_type=Path),
     metavar="FILE",
     help="Arm file (TOML); without it the paper's 1:5 arm.",

@@ -1,0 +1,26 @@
+"""``armtempo clear``: clear a fault."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from armtempo.cli import options
+
+
+@click.command()
+@options.port
+@options.log_traffic
+def command(port: str, log_traffic: Path | None) -> None:
+    """Clear the pending fault, once its cause is gone."""
+    from armtempo.operate import fault_name
+
+    with options.board(port, log_traffic) as board:
+        before = board.status()
+        board.clear()
+        after = board.status()
+    if not before.fault:
+        click.echo("no fault was pending")
+    else:
+        click.echo(f"cleared: {fault_name(before.fault)}; the board is {after.state}")

@@ -1,0 +1,33 @@
+"""``armtempo demo``: the whole chain on the paper's feeding motion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from armtempo.cli import options
+from armtempo.cli.progress import Progress
+from armtempo.cli.run import replay
+
+
+@click.command()
+@options.out
+@options.port
+@options.log_traffic
+def command(out: Path, port: str, log_traffic: Path | None) -> None:
+    """Plan the paper's feeding motion, replay it on a board (a virtual one without --port), report."""
+    from armtempo import arm as arms
+    from armtempo import job as jobs
+    from armtempo import operate, pipeline, planner, report, summary
+
+    arm = arms.load_arm(arms.default_path())
+    with Progress("planning") as progress:
+        plan = planner.plan(arm, jobs.load_job(jobs.default_path(), arm), progress)
+    for line in summary.lines(plan):
+        click.echo(line)
+    motion = pipeline.planned(plan)
+    with options.board(port, log_traffic) as board:
+        operate.configure(board, arm, replace=True)
+        folder = replay(board, port, motion, 1, out)
+    click.echo(f"report: {report.write(folder)}")

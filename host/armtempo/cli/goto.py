@@ -1,0 +1,40 @@
+"""``armtempo goto``: move straight to a posture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from armtempo.cli import options, posture
+from armtempo.cli.progress import Progress
+
+
+@click.command()
+@click.argument("where")
+@options.job
+@options.arm
+@options.port
+@options.log_traffic
+def command(
+    where: str, job_path: Path | None, arm_path: Path | None, port: str, log_traffic: Path | None
+) -> None:
+    """Move to WHERE: angles such as '0,-60,40', a via point such as P0, or a trajectory file's start.
+
+    All joints move together, within their limits. The arm must be homed. Ctrl-C brakes.
+    """
+    from armtempo import operate
+    from armtempo.interrupt import StopRequest
+    from armtempo.link.ports import SIM
+
+    arm = options.load_arm(arm_path)
+    target_deg = posture.parse(where, arm, job_path)
+    with options.board(port, log_traffic) as board, StopRequest() as stop, Progress("moving") as progress:
+        operate.configure(board, arm, replace=arm_path is not None)
+        if port == SIM:
+            operate.home(board, arm)
+        operate.go_to(board, arm, target_deg, stop, progress)
+        stands_deg = operate.posture_deg(board, arm)
+    click.echo(f"the arm stands at {posture.words(stands_deg)}")
+    if stop.wanted:
+        raise KeyboardInterrupt

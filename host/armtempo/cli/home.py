@@ -1,0 +1,32 @@
+"""``armtempo home``: declare where the arm stands."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from armtempo.cli import options, posture
+
+
+@click.command()
+@click.argument("where", required=False)
+@options.job
+@options.arm
+@options.port
+@options.log_traffic
+def command(
+    where: str | None, job_path: Path | None, arm_path: Path | None, port: str, log_traffic: Path | None
+) -> None:
+    """Declare that the arm stands at WHERE: angles such as '0,-60,40', or a via point such as P0.
+
+    Without WHERE: at the home posture of the arm file. Nothing moves; afterwards motions may start.
+    """
+    from armtempo import operate
+
+    arm = options.load_arm(arm_path)
+    angles_deg = operate.home_deg(arm) if where is None else posture.parse(where, arm, job_path)
+    with options.board(port, log_traffic) as board:
+        operate.configure(board, arm, replace=arm_path is not None)
+        operate.home(board, arm, angles_deg)
+    click.echo(f"the arm stands at {posture.words(angles_deg)}")

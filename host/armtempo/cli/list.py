@@ -1,0 +1,36 @@
+"""``armtempo list``: what the board keeps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from armtempo.cli import options
+
+if TYPE_CHECKING:
+    from armtempo.link.messages import Stored
+
+
+@click.command()
+@options.port
+@options.log_traffic
+def command(port: str, log_traffic: Path | None) -> None:
+    """List the motions stored on the board; the one marked * is what its button starts."""
+    with options.board(port, log_traffic) as board:
+        found = board.stored()
+    click.echo(f"{'name':<26}{'bytes':>8}{'joints':>8}{'seconds':>10}  checksum")
+    for entry in found:
+        click.echo(_line(entry))
+
+
+def _line(entry: Stored) -> str:
+    from armtempo_shared.limits import TICK_HZ
+
+    name = entry.name + (" *" if entry.default else "")
+    if not entry.joints:
+        return f"{name:<26}{entry.size:>8}  damaged; upload it again or remove it"
+    return (
+        f"{name:<26}{entry.size:>8}{entry.joints:>8}{entry.duration_ticks / TICK_HZ:>10.3f}  {entry.crc:08x}"
+    )

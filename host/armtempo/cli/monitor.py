@@ -1,0 +1,48 @@
+"""``armtempo monitor``: the traffic in words."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from armtempo.cli import options
+
+_EVERY_S = 1.0
+
+
+@click.command()
+@click.argument("file", required=False, type=click.Path(path_type=Path))
+@options.port
+@options.log_traffic
+def command(file: Path | None, port: str, log_traffic: Path | None) -> None:
+    """Show the recorded traffic in FILE; without FILE, ask the board once a second and show what is said.
+
+    Ctrl-C ends it; a motion under way goes on.
+    """
+    if file is not None:
+        _show_file(file)
+        return
+    from armtempo.link import open_board
+
+    with open_board(port, log_traffic, _show) as board:
+        while True:
+            board.status()
+            board.session.poll(_EVERY_S)
+            board.session.events.clear()
+
+
+def _show_file(file: Path) -> None:
+    from armtempo.link import traffic
+
+    decoder = traffic.Decoder()
+    for chunk in traffic.read_log(file):
+        _show(chunk, decoder.feed(chunk.direction, chunk.data))
+
+
+def _show(chunk: object, words: list[str]) -> None:
+    from armtempo.link.traffic import Chunk
+
+    assert isinstance(chunk, Chunk)
+    for line in words:
+        click.echo(f"{chunk.time_s:10.4f} {chunk.direction} {line}")

@@ -1,0 +1,51 @@
+"""Postures as a user writes them: angles, a via point of a job, or a trajectory's start."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armtempo.errors import InputError
+
+if TYPE_CHECKING:
+    from armtempo.arm import Arm
+    from armtempo.spline import Array
+
+
+def parse(text: str, arm: Arm, job_path: Path | None) -> Array:
+    """Angles in degrees (J,): of '0,-60,40', of 'P3' in the job, or of the start of 'file.json'.
+
+    Raises InputError where the text is none of these.
+    """
+    if re.fullmatch(r"[Pp]\d+", text):
+        return _via(int(text[1:]), arm, job_path)
+    if text.endswith(".json"):
+        from armtempo import trajectory_file
+
+        return trajectory_file.load(text).trajectory(0.0)
+    try:
+        return np.array([float(cell) for cell in text.split(",")])
+    except ValueError:
+        raise InputError(
+            f"{text!r} is no posture: give angles in degrees ('0,-60,40'), a via point of the job ('P0'), or a "
+            "trajectory file"
+        ) from None
+
+
+def words(angles_deg: Array) -> str:
+    """The posture for people."""
+    return ", ".join(f"{angle:.2f}" for angle in angles_deg) + " degrees"
+
+
+def _via(index: int, arm: Arm, job_path: Path | None) -> Array:
+    from armtempo import job as jobs
+    from armtempo import planner
+
+    job = jobs.load_job(job_path or jobs.default_path(), arm)
+    via_deg = planner.via_angles(arm, job)
+    if index >= len(via_deg):
+        raise InputError(f"job {job.name!r} has the via points P0 to P{len(via_deg) - 1}, not P{index}")
+    return via_deg[index]

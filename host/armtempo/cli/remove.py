@@ -1,0 +1,21 @@
+"""``armtempo remove``: forget stored motions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from armtempo.cli import options
+
+
+@click.command()
+@click.argument("names", nargs=-1, required=True)
+@options.port
+@options.log_traffic
+def command(names: tuple[str, ...], port: str, log_traffic: Path | None) -> None:
+    """Remove the stored motions NAMES from the board."""
+    with options.board(port, log_traffic) as board:
+        for name in names:
+            board.remove(name)
+            click.echo(f"{name}: removed")

@@ -1,0 +1,46 @@
+"""``armtempo show``: one stored motion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from armtempo.cli import options, posture
+
+if TYPE_CHECKING:
+    from armtempo.pipeline import Motion
+
+
+@click.command()
+@click.argument("name")
+@options.arm
+@options.port
+@options.log_traffic
+def command(name: str, arm_path: Path | None, port: str, log_traffic: Path | None) -> None:
+    """Show the stored motion NAME, read back from the board, in the arm's degrees."""
+    from armtempo import pipeline
+
+    arm = options.load_arm(arm_path)
+    with options.board(port, log_traffic) as board:
+        motion = pipeline.from_board(board, name, arm)
+    for line in _lines(motion):
+        click.echo(line)
+
+
+def _lines(motion: Motion) -> list[str]:
+    import numpy as np
+
+    trajectory = motion.trajectory
+    times = np.linspace(0.0, trajectory.duration_s, 2001)
+    speeds = np.abs(trajectory(times, 1)).max(axis=0)
+    found = [
+        f"{motion.name}: {len(motion.data)} bytes, {trajectory.duration_s:.4f} s, "
+        f"degree {trajectory.joints[0].degree}, {'shared' if trajectory.shared else 'per-joint'} timing",
+        f"from {posture.words(motion.start_deg)}",
+        f"to   {posture.words(trajectory(trajectory.duration_s))}",
+    ]
+    for joint, spline, speed in zip(motion.arm.driven, trajectory.joints, speeds, strict=True):
+        found.append(f"{joint.name:<12}{spline.duration_s:>9.4f} s, up to {speed:.2f} deg/s")
+    return found

@@ -1,0 +1,135 @@
+"""The whole chain, from via angles to pulses and from encoder counts to plots; read this first.
+
+::
+
+    planner.plan             via angles -> splines over time, as fast as the limits allow
+    encode.motion_record     degrees and seconds -> steps and ticks
+    Board.upload, .start     -> flash; there evaluator, rings and timers take over
+    Follower.samples         <- encoder counts every 0.1 s
+    RunFolder                <- run.json, samples-01.csv, …
+    report.write             -> runs, analyse, plots: what was measured beside the plan
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from armtempo_shared.limits import MAX_NAME
+
+from armtempo import decode, encode, moves, operate, record, trajectory_file
+from armtempo.arm import Arm
+from armtempo.errors import InputError, LinkError
+from armtempo.interrupt import StopRequest
+from armtempo.link import Board
+from armtempo.link.board import Progress
+from armtempo.link.ports import SIM
+from armtempo.plan import Plan
+from armtempo.record import Repetition, RunFolder
+from armtempo.spline import Array
+from armtempo.trajectory import Trajectory
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """What is to be replayed: the record for the board and the trajectory that it holds."""
+
+    name: str
+    arm: Arm
+    trajectory: Trajectory
+    data: bytes
+    plan: Plan | None
+    """How it was planned, where that is known."""
+
+    @property
+    def start_deg(self) -> Array:
+        """Where it begins, degrees (J,)."""
+        return self.trajectory(0.0)
+
+
+def planned(plan: Plan, name: str | None = None) -> Motion:
+    """The motion of a plan; ``name`` for the board, else made of the job's."""
+    board_name = name or re.sub(r"[^A-Za-z0-9_-]", "-", plan.job.name)[:MAX_NAME]
+    data = encode.motion_record(plan.trajectory, plan.arm)
+    return Motion(board_name, plan.arm, plan.trajectory, data, plan)
+
+
+def from_file(path: Path, arm: Arm | None, name: str | None = None) -> Motion:
+    """The motion of a trajectory file; InputError where it was planned for another arm than ``arm``."""
+    motion = planned(trajectory_file.load(path), name)
+    if arm is not None and encode.arm_record(arm) != encode.arm_record(motion.arm):
+        raise InputError(f"{path} was planned for another arm than {arm.source}; plan it again with this arm")
+    return motion
+
+
+def from_board(board: Board, name: str, arm: Arm) -> Motion:
+    """A motion that the board keeps."""
+    data = board.fetch(name)
+    return Motion(name, arm, decode.trajectory(data, arm, name), data, None)
+
+
+def bring_to_start(board: Board, port: str, motion: Motion, stop: StopRequest) -> None:
+    """Home a virtual board and move it to the motion's start; a real arm must stand there already.
+
+    Raises LinkError, with what to do, where it does not.
+    """
+    if port == SIM:
+        operate.home(board, motion.arm)
+        operate.go_to(board, motion.arm, motion.start_deg, stop)
+    elif not operate.stands_at(board, motion.arm, motion.start_deg):
+        raise LinkError(
+            f"the arm does not stand where {motion.name!r} begins; bring it there with 'armtempo goto'"
+        )
+
+
+def new_run(parent: Path, motion: Motion, port: str, board: Board) -> RunFolder:
+    """A run folder with everything that is needed to repeat the run."""
+    assert board.info is not None  # greeted
+    origin = {
+        "arm": motion.arm.name,
+        "port": port,
+        "board": vars(board.info),
+        "motion_crc": motion.data[-4:][::-1].hex(),
+    }
+    folder = RunFolder(record.new_folder(parent, motion.name), motion.name, record.scales(motion.arm), origin)
+    (folder.path / record.MOTION).write_bytes(motion.data)
+    if motion.plan is not None:
+        trajectory_file.save(motion.plan, folder.path / record.TRAJECTORY)
+    folder.write()
+    return folder
+
+
+def repeat(
+    board: Board, motion: Motion, folder: RunFolder, times: int, stop: StopRequest, progress: Progress | None
+) -> Iterator[Repetition]:
+    """Upload the motion and replay it ``times`` times, with the motion backwards in between.
+
+    Gives each repetition when it has ended; a fault or a stop request ends the series.
+    """
+    stored = operate.store(board, motion.name, motion.data)
+    back = moves.backwards(motion.trajectory, operate.TEMPORARY + "back")
+    for number in range(times):
+        if number:
+            operate.move_once(board, motion.arm, back, stop)
+        if stop.wanted:
+            return
+        end = operate.replay_recorded(board, motion=stored, folder=folder, stop=stop, progress=progress)
+        yield folder.repetitions[-1]
+        operate.raise_fault(end)
+
+
+def results(motion: Motion, repetition: Repetition) -> list[str]:
+    """What became of each joint, one line each: steps made, and how far the arm ended from the plan."""
+    end_deg = motion.trajectory(motion.trajectory.duration_s)
+    scales = record.scales(motion.arm)
+    lines = [f"{'joint':<12}{'steps':>10}{'angle':>12}{'error':>12}", f"{'':<22}{'deg':>12}{'deg':>12}"]
+    for joint, scale in enumerate(scales):
+        steps = repetition.commanded_steps[joint]
+        angle_deg = steps / scale.steps_per_deg
+        if scale.counts_per_deg:
+            angle_deg = repetition.counts[joint] / scale.counts_per_deg
+        error_deg = angle_deg - end_deg[joint]
+        lines.append(f"{scale.name:<12}{steps:>10}{angle_deg:>12.3f}{error_deg:>+12.4f}")
+    return lines
