@@ -25,3 +25,6 @@ MAX_STEP_RATE = 333_000
 
 MAX_STEP_RATE_SUM = 1_000_000
 """Highest sum of the step rates of all joints, steps/s."""
+
+MAX_MOTION_BYTES = 16384
+"""Largest motion record that the board takes: it must fit into its memory whole."""

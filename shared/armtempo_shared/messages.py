@@ -103,6 +103,7 @@ REPLIES = (
 ARM_RECORD_NAME = "/arm"
 """put_begin with this name carries the arm record, not a trajectory."""
 
+SAMPLE_BRAKING = 1  # flag of a sample: taken while braking
 START_HOMING = 1  # a limit switch ends the motion without a fault
 STATES = ("unconfigured", "unhomed", "idle", "moving", "braking", "fault")
 

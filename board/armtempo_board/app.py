@@ -1,0 +1,297 @@
+"""The board program: one loop from the serial link over store and engine to the samples and back.
+
+::
+
+    link ─▶ commands ─▶ store ─▶ Motion ─▶ engine (evaluator, rings, DMA, pins)
+    link ◀─ events ◀─ samples ◀─────────────┘
+
+States, messages and timings: shared/docs/protocol.md. Anything that goes wrong freezes the engine and
+becomes a fault that stays until the host clears it.
+"""
+
+import gc
+import io
+import os
+import sys
+import time
+from array import array
+
+import machine
+from armtempo_shared import codes
+from armtempo_shared.armrecord import FLAG_STOP_ON_LINK_LOSS, ArmRecordError
+from armtempo_shared.armrecord import unpack as unpack_arm
+from armtempo_shared.limits import MAX_JOINTS
+from armtempo_shared.messages import SAMPLE_BRAKING, START_HOMING, STATES
+from armtempo_shared.motion import Motion, MotionError
+from micropython import const
+
+from armtempo_board import store
+from armtempo_board.commands import Commands
+from armtempo_board.engine import Engine
+from armtempo_board.events import Events
+from armtempo_board.link import Link
+from armtempo_board.octets import places, spread
+from armtempo_board.refusal import Refused
+from armtempo_board.samples import Samples
+
+SAMPLE_MEMORY = const(10240)
+_UNCONFIGURED, _UNHOMED, _IDLE, _MOVING, _BRAKING, _FAULT = range(len(STATES))
+_MOST_FAILURES = const(10)  # failing turns of the loop one after the other, then the program gives up
+
+
+class App:
+    """Holds the parts together; ``stream`` is the serial port, ``root`` the folder of the store.
+
+    ``fault``: what the program begins with, 0 for none.
+    """
+
+    def __init__(self, stream, root, program_crc=0, fault=0):
+        self.store = store.Store(root)
+        self.link = Link(stream)
+        self.engine = None
+        self.samples = Samples(MAX_JOINTS, 0)
+        self.joints = 0
+        self.arm_crc = 0
+        self.program_crc = program_crc
+        self.boot = int.from_bytes(os.urandom(4), "little")
+        self.board_id = _board_id()
+        self.free_flash = 0
+        self.free_heap = 0
+        self.run_number = 0
+        self.duration = 0
+        self._leaving = False
+        self._head = {}
+        self._arm_joints = []
+        self._raw = array("i", [0] * 2)
+        self._fault = fault
+        self._running = False  # a run has begun and its end has not been noted
+        self._braking = False
+        self._by_host = False  # the run was started by a command
+        self._failures = 0
+        self.commands = Commands(self)
+        self.events = Events(self)
+        self.configure()
+
+    # the loop
+
+    def enter(self):
+        """The program begins, perhaps again after it was left."""
+        self._leaving = False
+        self.link.forget()
+
+    def left(self):
+        """Whether somebody has asked for the REPL, and the reply is out."""
+        return self._leaving and self.link.idle()
+
+    def turn(self):
+        """One turn of the loop; an exception in it becomes a fault."""
+        try:
+            self._turn()
+            self._failures = 0
+        except Exception as error:
+            self._fail(error)
+
+    def _turn(self):
+        if self.link.poll():
+            self.commands.act()
+        if self.engine:
+            self.engine.service()
+            self._collect()
+            self._watch()
+        self.events.push()
+        self.link.flush()
+        self._watch_escape()
+
+    def _collect(self):
+        while self.engine.next_sample(self._raw):
+            self.samples.add(self._raw, SAMPLE_BRAKING if self._braking else 0)
+
+    def _watch(self):
+        if self._running:
+            if not self.engine.moving:
+                self._end()
+            elif self._by_host and not self._braking:
+                self._watch_link()
+        self.events.note_fault(self.fault())
+
+    def _watch_link(self):
+        silent_ms = time.ticks_diff(time.ticks_ms(), self.link.heard_ms)
+        if silent_ms > self._head["link_timeout_ms"] and self._head["flags"] & FLAG_STOP_ON_LINK_LOSS:
+            self._fault = codes.LINK_LOST
+            self.stop(0)
+
+    def _watch_escape(self):
+        if self.link.escape:
+            self.link.escape = False
+            if not self.moving():
+                self.link.forget()
+                self._leaving = True
+
+    def _end(self):
+        self._collect()
+        self._running = False
+        self._braking = False
+        if not self.fault():
+            self.events.note_done()
+
+    def _fail(self, error):
+        self._failures += 1
+        self._fault = codes.INTERNAL
+        if self.engine:
+            self.engine.freeze()
+        self.events.note(_traceback(error))
+        self.events.note_fault(codes.INTERNAL)
+        if self._failures >= _MOST_FAILURES:
+            raise error
+
+    # what commands and the button ask for
+
+    def configure(self):
+        """Take the stored arm record; without one the board stays unconfigured."""
+        try:
+            head, joints, crc = unpack_arm(self.store.read(store.ARM))
+        except (Refused, ArmRecordError):
+            return
+        if crc == self.arm_crc:
+            return
+        self.engine = Engine(head, joints)
+        self._head = head
+        self._arm_joints = joints
+        self.joints = len(joints)
+        self.arm_crc = crc
+        self._raw = array("i", [0] * (2 + 2 * self.joints))
+        self.samples = Samples(self.joints, SAMPLE_MEMORY)
+
+    def check_ready(self):
+        """Refuses while a fault is pending or no arm is configured."""
+        if self.fault():
+            raise Refused(codes.FAULT_PENDING, self.fault_joint(), self.fault())
+        if not self.engine:
+            raise Refused(codes.UNCONFIGURED)
+
+    def home(self, mask, steps):
+        """Declare where the joints of ``mask`` stand; ``steps`` has a number for every joint."""
+        for joint in range(self.joints):
+            row = self._arm_joints[joint]
+            if mask >> joint & 1 and not row["min_steps"] <= steps[joint] <= row["max_steps"]:
+                raise Refused(codes.OUT_OF_RANGE, joint, steps[joint])
+        self.engine.home(mask, steps)
+
+    def begin(self, name, flags, crc, by_host=True):
+        """Start a stored motion, or refuse; ``crc`` None takes whatever is stored under the name."""
+        self.check_ready()
+        missing = self._everyone() & ~self.known()
+        if missing:
+            raise Refused(codes.UNHOMED, _lowest(missing))
+        motion = self._load(name, crc)
+        refused = self.engine.load(motion)
+        if refused:
+            raise Refused(*refused)
+        self.samples.clear()
+        self.events.clear()
+        self.duration = self.engine.duration_ticks
+        self.run_number += 1
+        self._by_host = by_host
+        self._braking = False
+        gc.collect()
+        self._running = True
+        self.engine.start(bool(flags & START_HOMING))
+
+    def _load(self, name, crc):
+        data = self.store.read(name + store.MOTION)
+        try:
+            motion = Motion(data)
+        except MotionError:
+            raise Refused(codes.BAD_RECORD)
+        if crc is not None and int.from_bytes(data[-4:], "little") != crc:
+            raise Refused(codes.BAD_CHECKSUM)
+        if motion.arm_crc != self.arm_crc:
+            raise Refused(codes.ARM_MISMATCH)
+        if motion.joints != self.joints:
+            raise Refused(codes.WRONG_JOINTS, value=motion.joints)
+        return motion
+
+    def stop(self, now):
+        """Brake along the path, or freeze."""
+        if now:
+            self.engine.freeze()
+        else:
+            self._braking = True
+            self.engine.brake()
+
+    def clear(self):
+        """Clear what is pending; the cause must be gone."""
+        if self.engine:
+            self.engine.clear()
+        self._fault = 0
+
+    def leave(self):
+        """End the program once the reply is out; the port becomes the REPL."""
+        self._leaving = True
+
+    # what the board tells
+
+    def moving(self):
+        """Whether steps may still come."""
+        return self.engine is not None and self.engine.moving
+
+    def known(self):
+        """Bit a joint: its position is known."""
+        return self.engine.known if self.engine else 0
+
+    def fault(self):
+        """Code of the pending fault, 0 for none."""
+        return self._fault or (self.engine.fault if self.engine else 0)
+
+    def fault_joint(self):
+        """The joint that the fault is about; 255: none."""
+        return self.engine.fault_joint if self.engine and self.engine.fault else 255
+
+    def state(self):
+        """Index into STATES."""
+        if self.moving():
+            return _BRAKING if self._braking else _MOVING
+        if self.fault():
+            return _FAULT
+        if not self.engine:
+            return _UNCONFIGURED
+        return _IDLE if self.known() == self._everyone() else _UNHOMED
+
+    def look_around(self):
+        """Bring ``free_flash`` and ``free_heap`` up to date; costs milliseconds, so not while moving."""
+        if not self.moving():
+            self.free_flash = self.store.free()
+            self.free_heap = _free_heap()
+
+    def stand(self, target, ticks_at, joints_at):
+        """Write motion clock and per joint commanded steps and counts as the wire has them; bytes a tail."""
+        if not self.engine:
+            return 0
+        self.engine.snapshot(self._raw)
+        spread(target, self._raw, places(ticks_at, joints_at), self.joints)
+        return 8 * self.joints
+
+    def _everyone(self):
+        return (1 << self.joints) - 1
+
+
+def _lowest(mask):
+    joint = 0
+    while not mask >> joint & 1:
+        joint += 1
+    return joint
+
+
+def _board_id():
+    return b"".join([b"%02x" % byte for byte in machine.unique_id()]) + b" " + sys.version.encode()
+
+
+def _free_heap():
+    free = getattr(gc, "mem_free", None)
+    return free() if free else 0
+
+
+def _traceback(error):
+    text = io.StringIO()
+    sys.print_exception(error, text)
+    return text.getvalue()

@@ -1,0 +1,260 @@
+"""What the board does for each command of the message table; refusals are raised as ``Refused``.
+
+While a motion runs only ``hello``, ``status``, ``samples`` and ``stop`` are taken, and the last three
+allocate nothing.
+"""
+
+from struct import calcsize, pack_into, unpack_from
+
+from armtempo_shared import codes, limits
+from armtempo_shared.messages import (
+    ANSWERS,
+    ARM_RECORD_NAME,
+    COMMANDS,
+    MAX_PAYLOAD,
+    PROTOCOL_VERSION,
+    REPLIES,
+    layout,
+)
+from armtempo_shared.motion import Motion, MotionError
+from micropython import const
+
+from armtempo_board import evaluator, store
+from armtempo_board.link import PAYLOAD
+from armtempo_board.octets import u32
+from armtempo_board.refusal import Refused
+
+_ANSWER = const(6)  # index in the reply frame of what follows the command's number
+_TICKS = const(8)  # index of the ticks in the answer to status
+_WHILE_MOVING = ("hello", "status", "samples", "stop")
+
+
+class Commands:
+    """Acts on the frame in ``link.reader`` and leaves the reply with the link."""
+
+    def __init__(self, app):
+        self._app = app
+        self._link = app.link
+        self._greeted = False
+        self._session = 0
+        self._table = {}
+        answers = {}
+        for _, number, fields, _ in ANSWERS:
+            answers[number] = layout(fields)
+        for name, number, fields, tail in COMMANDS:
+            form = layout(fields)
+            moving = name in _WHILE_MOVING
+            row = (getattr(self, "_" + name), form, calcsize(form), tail, answers[number], moving)
+            self._table[number] = row
+        self._hello_number = COMMANDS[0][1]
+        self._ok = REPLIES[0][1]
+        self._error = REPLIES[1][1]
+        self._error_form = layout(REPLIES[1][2])
+
+    def act(self):
+        """Act on one command."""
+        number = self._link.reader.data[4]
+        try:
+            self._dispatch(number)
+        except Refused as refused:
+            self._refuse(number, refused.code, refused.joint, refused.value)
+
+    def _dispatch(self, number):
+        row = self._table.get(number)
+        if row is None:
+            return self._refuse(number, codes.UNKNOWN_COMMAND)
+        length = self._link.reader.length()
+        if length < row[2] or (length > row[2] and not row[3]):
+            return self._refuse(number, codes.MALFORMED)
+        if not self._greeted and number != self._hello_number:
+            return self._refuse(number, codes.NO_SESSION)
+        if self._app.moving() and not row[5]:
+            return self._refuse(number, codes.BUSY)
+        self._link.reply[PAYLOAD] = number
+        size = row[0](row, length)
+        return self._link.answer(self._ok, 1 + (size or 0))
+
+    def _refuse(self, number, code, joint=255, value=0):
+        pack_into(self._error_form, self._link.reply, PAYLOAD, number, code, joint, value)
+        self._link.answer(self._error, calcsize(self._error_form))
+
+    def _fields(self, row):
+        return unpack_from(row[1], self._link.reader.data, PAYLOAD)
+
+    def _bytes(self, row, length):
+        return bytes(self._link.reader.data[PAYLOAD + row[2] : PAYLOAD + length])
+
+    def _text(self, row, length):
+        try:
+            return self._bytes(row, length).decode()
+        except UnicodeError:
+            raise Refused(codes.MALFORMED)
+
+    def _reply(self, row, *values):
+        pack_into(row[4], self._link.reply, _ANSWER, *values)
+        return calcsize(row[4])
+
+    def _reply_tail(self, size, tail):
+        self._link.reply[_ANSWER + size : _ANSWER + size + len(tail)] = tail
+        return size + len(tail)
+
+    # session
+
+    def _hello(self, row, length):
+        protocol, session = self._fields(row)
+        if protocol != PROTOCOL_VERSION:
+            raise Refused(codes.PROTOCOL, value=PROTOCOL_VERSION)
+        if not self._greeted or session != self._session:
+            self._begin_session(session)
+        app = self._app
+        app.look_around()
+        size = self._reply(
+            row,
+            PROTOCOL_VERSION,
+            app.joints,
+            limits.MAX_ENCODERS,
+            app.state(),
+            limits.TICK_HZ,
+            limits.MAX_STEP_RATE,
+            limits.MAX_STEP_RATE_SUM,
+            app.free_flash,
+            app.free_heap,
+            app.arm_crc,
+            app.program_crc,
+            app.boot,
+        )
+        return self._reply_tail(size, app.board_id)
+
+    def _begin_session(self, session):
+        self._greeted = True
+        self._session = session
+        self._link.forget()
+        self._app.samples.skip()
+        if not self._app.moving():
+            self._app.store.abandon()
+
+    def _status(self, row, length):
+        app = self._app
+        reply = self._link.reply
+        samples = app.samples
+        pack_into(
+            row[4],
+            reply,
+            _ANSWER,
+            app.state(),
+            app.fault(),
+            app.fault_joint(),
+            app.known(),
+            app.run_number,
+            0,
+            samples.next - samples.first,
+            samples.lost,
+            self._link.reader.bad,
+        )
+        size = calcsize(row[4])
+        return size + app.stand(reply, _ANSWER + _TICKS, _ANSWER + size)
+
+    def _leave(self, row, length):
+        self._app.leave()
+
+    # store
+
+    def _put_begin(self, row, length):
+        size, _ = self._fields(row)
+        name = self._text(row, length)
+        if name == ARM_RECORD_NAME:
+            self._app.store.begin(store.ARM, size)
+            return
+        store.check_name(name)
+        self._app.store.begin(name + store.MOTION, size)
+
+    def _put_data(self, row, length):
+        (offset,) = self._fields(row)
+        return self._reply(row, self._app.store.write(offset, self._bytes(row, length)))
+
+    def _put_commit(self, row, length):
+        (crc,) = self._fields(row)
+        if self._app.store.commit(crc) == store.ARM:
+            self._app.configure()
+
+    def _list(self, row, length):
+        (index,) = self._fields(row)
+        names = self._app.store.names()
+        if index >= len(names):
+            raise Refused(codes.NOT_FOUND)
+        name = names[index]
+        data = self._app.store.read(name + store.MOTION)
+        try:
+            motion = Motion(data)
+            crc, duration, joints = u32(data, len(data) - 4), evaluator.duration_ticks(motion), motion.joints
+        except MotionError:
+            crc = duration = joints = 0
+        default = name == self._app.store.default()
+        size = self._reply(row, len(names), len(data), crc, duration, joints, default)
+        return self._reply_tail(size, name.encode())
+
+    def _remove(self, row, length):
+        name = self._text(row, length)
+        store.check_name(name)
+        self._app.store.remove(name)
+
+    def _rename(self, row, length):
+        (old_length,) = self._fields(row)
+        names = self._text(row, length)
+        old, new = names[:old_length], names[old_length:]
+        store.check_name(old)
+        store.check_name(new)
+        self._app.store.rename(old, new)
+
+    def _get(self, row, length):
+        offset, wanted = self._fields(row)
+        name = self._text(row, length)
+        if name == ARM_RECORD_NAME:
+            file_name = store.ARM
+        else:
+            store.check_name(name)
+            file_name = name + store.MOTION
+        wanted = min(wanted, MAX_PAYLOAD - 1 - calcsize(row[4]))
+        size, data = self._app.store.part(file_name, offset, wanted)
+        return self._reply_tail(self._reply(row, size), data)
+
+    def _set_default(self, row, length):
+        name = self._text(row, length)
+        if name:
+            store.check_name(name)
+        self._app.store.set_default(name)
+
+    # motion
+
+    def _home(self, row, length):
+        (mask,) = self._fields(row)
+        joints = self._app.joints
+        self._app.check_ready()
+        if length - row[2] != 4 * joints or mask >> joints:
+            raise Refused(codes.MALFORMED)
+        self._app.home(mask, unpack_from("<%di" % joints, self._link.reader.data, PAYLOAD + row[2]))
+
+    def _start(self, row, length):
+        flags, crc = self._fields(row)
+        name = self._text(row, length)
+        store.check_name(name)
+        self._app.begin(name, flags, crc)
+        return self._reply(row, self._app.run_number, self._app.duration)
+
+    def _stop(self, row, length):
+        if not self._app.moving():
+            raise Refused(codes.NOT_MOVING)
+        self._app.stop(self._link.reader.data[PAYLOAD])
+        return 0
+
+    def _clear(self, row, length):
+        self._app.clear()
+
+    def _samples(self, row, length):
+        data = self._link.reader.data
+        samples = self._app.samples
+        acknowledged = u32(data, PAYLOAD)
+        samples.acknowledge(acknowledged)
+        samples.again(acknowledged, data[PAYLOAD + 4] | data[PAYLOAD + 5] << 8)
+        pack_into(row[4], self._link.reply, _ANSWER, samples.first, samples.next - samples.first)
+        return calcsize(row[4])

@@ -1,0 +1,95 @@
+"""What the board tells unasked: samples, then the end of the run or its fault; notices."""
+
+from struct import calcsize, pack_into
+
+from armtempo_shared.messages import EVENTS, MAX_PAYLOAD, layout
+from micropython import const
+
+_SAMPLE, _DONE, _FAULT, _NOTICE = EVENTS
+_SAMPLE_HEAD = "<II"  # run and index; the rest of the fields stands in the slot
+_SAMPLE_HEAD_SIZE = const(8)
+_DONE_TICKS = const(4)  # index of the ticks in done
+_FAULT_TICKS = const(6)  # and in fault
+_IN_ONE_TURN = const(4)  # so many samples at most, so that the loop stays short
+
+
+class Events:
+    """Pushes what is waiting as the link takes it."""
+
+    def __init__(self, app):
+        self._app = app
+        self._forms = (layout(_DONE[2]), layout(_FAULT[2]))
+        self._numbers = (_SAMPLE[1], _DONE[1], _FAULT[1], _NOTICE[1])
+        self._noted = 0  # the fault that was told last
+        self._notice = b""
+        self.clear()
+
+    def clear(self):
+        """A new run begins."""
+        self._done = False
+        self._fault = False
+
+    def note_done(self):
+        """The run has ended without a fault."""
+        self._done = True
+
+    def note_fault(self, code):
+        """Called every turn with the pending fault (0: none); tells each once."""
+        if code != self._noted:
+            self._noted = code
+            self._fault = code != 0
+
+    def note(self, text):
+        """Keep words for the host; the first ones where more come than go."""
+        if not self._notice:
+            self._notice = text.encode()[:MAX_PAYLOAD]
+
+    def push(self):
+        """Hand the link what is waiting and has room."""
+        for _ in range(_IN_ONE_TURN):
+            if not self._push_sample():
+                break
+        if self._app.samples.waiting() < 0:
+            self._push_end()
+        self._push_notice()
+
+    def _push_sample(self):
+        samples = self._app.samples
+        index = samples.waiting()
+        if index < 0 or not self._app.link.room(_SAMPLE_HEAD_SIZE + samples.size):
+            return False
+        link = self._app.link
+        at = link.payload()
+        pack_into(_SAMPLE_HEAD, link.out, at, self._app.run_number, index)
+        samples.take(index, link.out, at + _SAMPLE_HEAD_SIZE)
+        link.event(self._numbers[0], _SAMPLE_HEAD_SIZE + samples.size)
+        return True
+
+    def _push_end(self):
+        if self._done and self._room(0):
+            self._done = False
+            samples = self._app.samples
+            self._put(0, _DONE_TICKS, self._app.run_number, 0, samples.next, samples.lost)
+        if self._fault and self._room(1):
+            self._fault = False
+            app = self._app
+            self._put(1, _FAULT_TICKS, app.run_number, app.fault(), app.fault_joint(), 0)
+
+    def _room(self, kind):
+        return self._app.link.room(calcsize(self._forms[kind]) + 8 * self._app.joints)
+
+    def _put(self, kind, ticks, *values):
+        link = self._app.link
+        at = link.payload()
+        pack_into(self._forms[kind], link.out, at, *values)
+        size = calcsize(self._forms[kind])
+        size += self._app.stand(link.out, at + ticks, at + size)
+        link.event(self._numbers[1 + kind], size)
+
+    def _push_notice(self):
+        link = self._app.link
+        if self._notice and link.room(len(self._notice)):
+            at = link.payload()
+            link.out[at : at + len(self._notice)] = self._notice
+            link.event(self._numbers[3], len(self._notice))
+            self._notice = b""

@@ -1,0 +1,5 @@
+"""Becomes ``/flash/main.py``: starts the board program."""
+
+from armtempo_board import program
+
+program.main()

@@ -1,0 +1,84 @@
+"""Starts the board program on the hardware: serial port, watchdog, LEDs, button."""
+
+import os
+
+import machine
+import micropython
+import pyb
+from armtempo_shared import codes
+from armtempo_shared.program import program_crc
+from micropython import const
+
+from armtempo_board.app import App
+from armtempo_board.button import Button
+from armtempo_board.leds import Leds
+from armtempo_board.refusal import Refused
+from armtempo_board.watchdog import Watchdog, bit
+
+ROOT = "/flash/armtempo"
+_CTRL_C = const(3)
+_EXCEPTION_BUFFER = const(100)
+
+app = None
+"""The program's App, kept when it is left for the REPL."""
+
+
+def main(root=ROOT):
+    """Run until somebody asks for the REPL; a button held down at the start asks for it at once."""
+    global app
+    button = Button()
+    if button.held():
+        print("button held: armtempo not started")
+        return
+    micropython.alloc_emergency_exception_buf(_EXCEPTION_BUFFER)
+    leds = Leds()
+    port = pyb.USB_VCP()
+    app = app or App(port, root, program_crc(*_folders()), _fault_at_start())
+    app.enter()
+    watchdog = Watchdog()
+    _detach(port)
+    try:
+        _loop(leds, button, watchdog)
+    finally:
+        watchdog.leave()
+        _attach(port)
+    print("armtempo ended; Ctrl-D starts it again")
+
+
+def _loop(leds, button, watchdog):
+    while not app.left():
+        app.turn()
+        leds.show(app.state())
+        watchdog.feed()
+        if app.moving():
+            continue
+        if button.pressed():
+            _replay_default()
+        machine.idle()
+
+
+def _fault_at_start():
+    return codes.WATCHDOG if bit() else 0
+
+
+def _replay_default():
+    try:
+        app.begin(app.store.default(), 0, None, False)
+    except Refused as refused:
+        app.events.note("button: refused, error %d" % refused.code)
+
+
+def _detach(port):
+    os.dupterm(None, 1)
+    micropython.kbd_intr(-1)
+    port.init(flow=pyb.USB_VCP.RTS)
+
+
+def _attach(port):
+    micropython.kbd_intr(_CTRL_C)
+    os.dupterm(port, 1)
+
+
+def _folders():
+    here = __file__.rsplit("/", 1)[0]
+    return (here, here.rsplit("/", 1)[0] + "/armtempo_shared")

@@ -1,0 +1,280 @@
+"""Records in flash: trajectories, the arm record, the name of the default; never half written.
+
+A record is written to ``NAME.new``, read back, synced and renamed. Where a power cut leaves a ``.new``
+behind, ``recover`` takes it if the old one is gone and the new one is whole, and removes it otherwise.
+"""
+
+import os
+from binascii import crc32
+
+from armtempo_shared import codes
+from armtempo_shared.armrecord import ArmRecordError
+from armtempo_shared.armrecord import unpack as unpack_arm
+from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_NAME
+from armtempo_shared.motion import Motion, MotionError
+from micropython import const
+
+from armtempo_board.refusal import Refused
+
+MOTION = ".atm"
+ARM = "arm.ata"
+_DEFAULT = "default.txt"
+_NEW = ".new"
+_ENOSPC = const(28)
+_PIECE = const(512)
+_MOST_FREE = const(0x3FFFFFFF)
+
+
+def check_name(name):
+    """Refuses a name that is no name for a trajectory."""
+    if not 0 < len(name) <= MAX_NAME:
+        raise Refused(codes.BAD_NAME)
+    for letter in name:
+        if not ("a" <= letter <= "z" or "A" <= letter <= "Z" or "0" <= letter <= "9" or letter in "-_"):
+            raise Refused(codes.BAD_NAME)
+
+
+def _sync():
+    sync = getattr(os, "sync", None)
+    if sync:
+        sync()
+
+
+def _whole(file_name, data):
+    """Whether the bytes are a whole record of the kind that the name tells."""
+    if file_name.endswith(MOTION):
+        try:
+            Motion(data)
+        except MotionError:
+            return False
+        return True
+    if file_name == ARM:
+        try:
+            unpack_arm(data)
+        except ArmRecordError:
+            return False
+        return True
+    return data.endswith(b"\n")
+
+
+class Store:
+    """The folder ``root``; every method refuses with FLASH_ERROR or FLASH_FULL where the flash fails."""
+
+    def __init__(self, root):
+        self._root = root
+        self._file = None  # the upload under way,
+        self._target = ""  # its file name,
+        self._size = 0  # bytes announced
+        self._received = 0  # and received so far
+        self.recover()
+
+    def recover(self):
+        """Make the folder if it is missing, finish or undo what a power cut interrupted."""
+        try:
+            os.mkdir(self._root)
+        except OSError:
+            pass
+        for name in self._files():
+            if name.endswith(_NEW):
+                self._recover(name[: -len(_NEW)])
+
+    def free(self):
+        """Bytes free in the flash, as far as a small integer can tell."""
+        try:
+            stat = os.statvfs(self._root)
+        except OSError:
+            return 0
+        return min(stat[0] * stat[3], _MOST_FREE)
+
+    def names(self):
+        """Names of the stored trajectories, sorted."""
+        return sorted([name[: -len(MOTION)] for name in self._files() if name.endswith(MOTION)])
+
+    def begin(self, file_name, size):
+        """Begin an upload; gives up one that was under way."""
+        self.abandon()
+        if size > MAX_MOTION_BYTES:
+            raise Refused(codes.TOO_LONG, value=MAX_MOTION_BYTES)
+        if size + _PIECE > self.free():
+            raise Refused(codes.FLASH_FULL, value=self.free())
+        self._other_case(file_name)
+        self._file = self._guard(open, self._path(file_name + _NEW), "wb")
+        self._target = file_name
+        self._size = size
+        self._received = 0
+
+    def write(self, offset, data):
+        """Add a piece; one that came before is passed over. Returns the offset of the next."""
+        if not self._file or not offset <= self._received or offset + len(data) > self._size:
+            raise Refused(codes.BAD_OFFSET, value=self._received)
+        fresh = data[self._received - offset :]
+        if fresh:
+            try:
+                self._put(self._file, fresh)
+            except Refused:
+                self.abandon()
+                raise
+            self._received += len(fresh)
+        return self._received
+
+    def commit(self, crc):
+        """Check the upload as it stands in the flash and put it in place; returns its file name."""
+        if not self._file or self._received != self._size:
+            raise Refused(codes.BAD_OFFSET, value=self._received)
+        name = self._target
+        try:
+            self._close()
+            data = self._read(name + _NEW)
+            if int.from_bytes(data[-4:], "little") != crc or crc32(memoryview(data)[:-4]) != crc:
+                raise Refused(codes.BAD_CHECKSUM)
+            if not _whole(name, data):
+                raise Refused(codes.BAD_RECORD)
+            self._replace(name)
+        except Refused:
+            self._discard(name + _NEW)
+            raise
+        return name
+
+    def abandon(self):
+        """Give up the upload under way, if any."""
+        if self._file:
+            try:
+                self._file.close()
+            except OSError:
+                pass
+            self._file = None
+            self._discard(self._target + _NEW)
+
+    def read(self, file_name):
+        """All bytes of a file; NOT_FOUND, or TOO_LONG where they do not fit into memory."""
+        return self._read(file_name)
+
+    def part(self, file_name, offset, length):
+        """(size of the file, bytes from offset on)."""
+        size = self.size(file_name)
+        file = self._guard(open, self._path(file_name), "rb")
+        try:
+            self._guard(file.seek, min(offset, size))
+            return size, self._guard(file.read, length)
+        finally:
+            file.close()
+
+    def size(self, file_name):
+        """Bytes of a file; NOT_FOUND."""
+        try:
+            return os.stat(self._path(file_name))[6]
+        except OSError:
+            raise Refused(codes.NOT_FOUND)
+
+    def remove(self, name):
+        """Remove a trajectory."""
+        self.size(name + MOTION)
+        self._guard(os.remove, self._path(name + MOTION))
+        self._guard(_sync)
+
+    def rename(self, old, new):
+        """Give a trajectory another name; the default goes with it."""
+        self.size(old + MOTION)
+        if new.lower() in [name.lower() for name in self.names() if name != old] or new == old:
+            raise Refused(codes.EXISTS)
+        was_default = self.default() == old
+        if was_default:
+            self._write_default(new + "\n" + old)
+        self._guard(os.rename, self._path(old + MOTION), self._path(new + MOTION))
+        self._guard(_sync)
+        if was_default:
+            self._write_default(new)
+
+    def default(self):
+        """Name of the default trajectory, "" for none."""
+        try:
+            lines = self._read(_DEFAULT).decode().split("\n")
+        except (Refused, UnicodeError):
+            return ""
+        names = self.names()
+        for name in lines:
+            if name in names:
+                return name
+        return ""
+
+    def set_default(self, name):
+        """Make a stored trajectory the default; "" for none."""
+        if name:
+            self.size(name + MOTION)
+        self._write_default(name)
+
+    def _write_default(self, text):
+        file = self._guard(open, self._path(_DEFAULT + _NEW), "wb")
+        try:
+            self._put(file, text.encode() + b"\n")
+        except Refused:
+            file.close()
+            self._discard(_DEFAULT + _NEW)
+            raise
+        self._guard(file.close)
+        self._replace(_DEFAULT)
+
+    def _other_case(self, file_name):
+        """FAT does not tell upper from lower case: two names must differ in more than that."""
+        for name in self._files():
+            if name != file_name and name.lower() == file_name.lower():
+                raise Refused(codes.EXISTS)
+
+    def _files(self):
+        try:
+            return os.listdir(self._root)
+        except OSError:
+            return []
+
+    def _path(self, file_name):
+        return self._root + "/" + file_name
+
+    def _read(self, file_name):
+        size = self.size(file_name)
+        if size > MAX_MOTION_BYTES:
+            raise Refused(codes.TOO_LONG, value=size)
+        file = self._guard(open, self._path(file_name), "rb")
+        try:
+            return self._guard(file.read)
+        except MemoryError:
+            raise Refused(codes.TOO_LONG, value=size)
+        finally:
+            file.close()
+
+    def _put(self, file, data):
+        if self._guard(file.write, data) != len(data):
+            raise Refused(codes.FLASH_FULL)
+
+    def _close(self):
+        file = self._file
+        self._file = None
+        self._guard(file.close)
+        self._guard(_sync)
+
+    def _replace(self, name):
+        self._guard(os.rename, self._path(name + _NEW), self._path(name))
+        self._guard(_sync)
+
+    def _discard(self, file_name):
+        try:
+            os.remove(self._path(file_name))
+        except OSError:
+            pass
+
+    def _recover(self, name):
+        if name in self._files():
+            self._discard(name + _NEW)
+            return
+        try:
+            if _whole(name, self._read(name + _NEW)):
+                self._replace(name)
+                return
+        except Refused:
+            pass
+        self._discard(name + _NEW)
+
+    def _guard(self, function, *arguments):
+        try:
+            return function(*arguments)
+        except OSError as error:
+            raise Refused(codes.FLASH_FULL if error.args[0] == _ENOSPC else codes.FLASH_ERROR)

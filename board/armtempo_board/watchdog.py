@@ -1,0 +1,48 @@
+"""The watchdog: resets the chip when the loop hangs.
+
+Once started the hardware cannot be stopped, so whoever leaves the program for the REPL leaves a timer
+behind that feeds it; ``boot.py`` does the same after a soft reset.
+"""
+
+import machine
+import pyb
+from micropython import const
+
+_TIMEOUT_MS = const(8000)
+_RELOAD = const(0x40003008)  # IWDG_RLR, RM0090 page 714
+_UNTOUCHED = const(0xFFF)  # its value after a reset
+_TIMER = const(7)  # used by nothing else
+_FEEDS_HZ = const(1)
+
+_kept = None
+
+
+class Watchdog:
+    """Starts with the loop, never before: a program that fails on the way there leaves a usable REPL."""
+
+    def __init__(self):
+        self._watchdog = machine.WDT(timeout=_TIMEOUT_MS)
+        self.feed = self._watchdog.feed
+        if _kept:
+            _kept.deinit()
+
+    def leave(self):
+        """Feed it from a timer interrupt from now on."""
+        keep_fed()
+
+
+def bit():
+    """Whether the last reset was its doing."""
+    return machine.reset_cause() == machine.WDT_RESET
+
+
+def running():
+    """Whether it was started since the last hard reset."""
+    return machine.mem32[_RELOAD] & _UNTOUCHED != _UNTOUCHED
+
+
+def keep_fed():
+    """Feed it once a second from a timer interrupt, which allocates nothing."""
+    global _kept
+    feed = machine.WDT(timeout=_TIMEOUT_MS).feed
+    _kept = pyb.Timer(_TIMER, freq=_FEEDS_HZ, callback=lambda timer: feed())
