@@ -1,0 +1,95 @@
+"""Where the runs of a comparison are computed: the cores of this machine, or a Dask cluster."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import multiprocessing
+import os
+import signal
+from collections.abc import Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
+from importlib import import_module
+from typing import Any
+
+import armtempo
+from armtempo.errors import ArmtempoError, InputError
+
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_CONNECT_S = 10
+
+
+@contextmanager
+def local(workers: int | None = None) -> Iterator[Executor]:
+    """Processes on this machine, by default one for each core. Leaving by an exception ends them at once."""
+    before = set(multiprocessing.active_children())
+    context = multiprocessing.get_context("spawn")
+    executor = ProcessPoolExecutor(workers, mp_context=context, initializer=_ignore_interrupt)
+    try:
+        with _one_thread_each():
+            yield executor
+    except BaseException:
+        executor.shutdown(wait=False, cancel_futures=True)
+        for process in set(multiprocessing.active_children()) - before:
+            process.terminate()
+        raise
+    finally:
+        executor.shutdown()
+
+
+@contextmanager
+def cluster(address: str) -> Iterator[Executor]:
+    """The workers of the Dask scheduler at ``address``.
+
+    Raises ArmtempoError where the extra ``cluster`` is missing here or armtempo is missing or another
+    version on a worker, InputError where no scheduler answers.
+    """
+    try:
+        distributed: Any = import_module("distributed")
+    except ImportError:
+        raise ArmtempoError(
+            "--scheduler needs distributed, which is not installed; "
+            "install it with: pip install 'armtempo[cluster]'"
+        ) from None
+    try:
+        client = distributed.Client(address, timeout=_CONNECT_S, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise InputError(f"--scheduler {address}: no Dask scheduler answers there ({error})") from None
+    with client:
+        _check_workers(address, client.run(importlib.metadata.version, "armtempo", on_error="return"))
+        yield client.get_executor(pure=False)
+
+
+def _check_workers(address: str, versions: dict[str, object]) -> None:
+    """``versions``: what each worker says, a version or the exception of not having one."""
+    if not versions:
+        raise InputError(
+            f"--scheduler {address}: the cluster has no workers; start some with: dask worker {address}"
+        )
+    for worker, found in versions.items():
+        if found != armtempo.__version__:
+            what = "no armtempo" if isinstance(found, Exception) else f"armtempo {found}"
+            raise ArmtempoError(
+                f"worker {worker} has {what}, here is {armtempo.__version__}; "
+                "install this version on all workers"
+            )
+
+
+@contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """Processes started meanwhile keep their linear algebra to one thread: they shall not fight for cores."""
+    before = {name: os.environ.get(name) for name in _THREADS}
+    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def _ignore_interrupt() -> None:
+    """Ctrl-C reaches every process of the terminal; the workers leave it to the main one."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,0 +1,146 @@
+"""``armtempo bench``: Table 4 and Fig. 6 of the paper, repeated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from armtempo.cli import INTERRUPTED, options
+from armtempo.cli.progress import Progress
+from armtempo.errors import ArmtempoError
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from armtempo.bench import Case, Problem
+    from armtempo.bench_store import Store
+    from armtempo.bench_table import Row
+
+
+def _names(ctx: click.Context, parameter: click.Parameter, value: str) -> list[str]:
+    """Algorithms, separated by commas."""
+    from armtempo.optimise import ALGORITHMS
+
+    names = [name.strip().lower() for name in value.split(",")]
+    for name in names:
+        if name not in ALGORITHMS:
+            raise click.BadParameter(f"{name!r} is not one of {', '.join(sorted(ALGORITHMS))}")
+    return names
+
+
+def _sizes(ctx: click.Context, parameter: click.Parameter, value: str) -> list[int]:
+    """Populations, separated by commas."""
+    try:
+        sizes = [int(size) for size in value.split(",")]
+    except ValueError:
+        raise click.BadParameter(f"{value!r} must be whole numbers separated by commas") from None
+    if min(sizes) < 4:
+        raise click.BadParameter("a population is at least 4")
+    return sizes
+
+
+@click.command()
+@options.job
+@options.arm
+@click.option("--joint", type=click.IntRange(1), default=1, show_default=True, help="Driven joint to time.")
+@click.option(
+    "--algorithms", default="ga,iaga,pso,hpso,cs,acs", show_default=True, metavar="LIST", callback=_names
+)
+@click.option("--populations", default="10,50,100,500", show_default=True, metavar="LIST", callback=_sizes)
+@click.option(
+    "--seeds", type=click.IntRange(1), default=10, show_default=True, help="Runs of each, seeds 1 to N."
+)
+@click.option("--iterations", type=click.IntRange(1), default=500, show_default=True)
+@click.option(
+    "--fitness",
+    type=click.Choice(["stretched", "penalised"]),
+    default="stretched",
+    show_default=True,
+    help="'stretched' as the planner uses it, 'penalised' as in Eq. (21).",
+)
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=Path("bench"),
+    show_default=True,
+    metavar="FOLDER",
+    help="Where the results go; runs that are there already are not repeated.",
+)
+@click.option("--workers", type=click.IntRange(1), help="Processes; without it one for each core.")
+@click.option("--scheduler", metavar="ADDRESS", help="Use the workers of this Dask scheduler instead.")
+@click.option("--plot/--no-plot", default=True, help="Draw convergence.png (needs matplotlib), or do not.")
+@click.pass_context
+def command(
+    ctx: click.Context, /, out: Path, workers: int | None, scheduler: str | None, plot: bool, **chosen: Any
+) -> None:
+    """Compare the search algorithms as Table 4 and Fig. 6 of the paper do."""
+    from armtempo import bench, bench_table, bench_workers
+    from armtempo import job as jobs
+    from armtempo.bench_store import Store
+
+    arm_path, job_path = chosen["arm_path"], chosen["job_path"]
+    arm = options.load_arm(arm_path)
+    job = jobs.load_job(job_path or jobs.default_path(), arm)
+    problem = bench.problem_of(arm, job, chosen["joint"], chosen["fitness"], chosen["iterations"])
+    wanted = bench.cases(chosen["algorithms"], chosen["populations"], range(1, chosen["seeds"] + 1))
+    store = Store(out, problem)
+    place = bench_workers.cluster(scheduler) if scheduler else bench_workers.local(workers)
+    try:
+        _run(problem, wanted, store, place)
+    except KeyboardInterrupt:
+        done = sum(case in store.runs for case in wanted)
+        click.echo(
+            f"armtempo: interrupted; {done} of {len(wanted)} runs are kept in {store.path}, "
+            "and the same command goes on from there",
+            err=True,
+        )
+        ctx.exit(INTERRUPTED)
+    with_paper = chosen["joint"] == 1 and arm_path is None and job_path is None
+    found = bench_table.rows((store.runs[case] for case in wanted), problem.iterations)
+    _write(out, found, with_paper, plot)
+
+
+def _run(
+    problem: Problem, wanted: Sequence[Case], store: Store, place: AbstractContextManager[Executor]
+) -> None:
+    """The runs that are still missing."""
+    from armtempo import bench
+
+    todo = [case for case in wanted if case not in store.runs]
+    if not todo:
+        return
+    with Progress("searching") as progress, place as executor:
+        for number, run in enumerate(bench.execute(problem, todo, executor), 1):
+            store.add(run)
+            progress(number, len(todo))
+
+
+def _write(out: Path, found: Sequence[Row], with_paper: bool, plot: bool) -> None:
+    """Table and curves to the terminal and to files."""
+    from armtempo import bench_table
+    from armtempo.record import replace_text
+
+    for line in bench_table.text(found, with_paper):
+        click.echo(line)
+    replace_text(out / "table.csv", bench_table.table_csv(found, with_paper))
+    replace_text(out / "convergence.csv", bench_table.curves_csv(found))
+    written = ["table.csv", "convergence.csv"]
+    if plot:
+        written += _plot(out / "convergence.png", found)
+    click.echo(f"written to {out}: {', '.join(written)}")
+
+
+def _plot(path: Path, found: Sequence[Row]) -> list[str]:
+    """Draws the curves; without matplotlib it says so, and the tables stand."""
+    from armtempo import bench_plot, plots
+
+    try:
+        plots.save(bench_plot.convergence(found), path)
+    except ArmtempoError as error:
+        click.echo(f"no plot: {error}", err=True)
+        return []
+    return [path.name]
