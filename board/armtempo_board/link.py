@@ -11,7 +11,7 @@ from armtempo_shared.messages import MAX_PAYLOAD, OVERHEAD, SYNC
 from micropython import const
 
 from armtempo_board.frames import FrameReader
-from armtempo_board.octets import TABLE, copy, places, seal
+from armtempo_board.octets import TABLE, copy, places, same, seal
 
 PAYLOAD = const(5)  # index of the payload in a frame
 _OUT_SIZE = const(1200)
@@ -127,14 +127,7 @@ class Link:
             return False
         data = self.reader.data
         check = PAYLOAD + self.reader.length()
-        request = self._request
-        for i in range(2):
-            if data[3 + i] != request[i]:
-                return False
-        for i in range(4):
-            if data[check + i] != request[2 + i]:
-                return False
-        return True
+        return same(self._request, data, places(0, 3), 2) and same(self._request, data, places(2, check), 4)
 
     def _watch_escape(self, byte, now_ms):
         """Tell a Ctrl-C (of mpremote, or typed twice) from noise: nothing but CR and Ctrl-C, after quiet."""

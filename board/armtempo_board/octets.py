@@ -78,6 +78,19 @@ def copy(target: ptr8, source: ptr8, places: int, count: int):
 
 
 @micropython.viper
+def same(one: ptr8, other: ptr8, places: int, count: int) -> int:
+    """1 where ``count`` bytes are equal, else 0; ``places`` = index in one | index in other << 15."""
+    at = places & 0x7FFF
+    gap = (places >> 15) - at
+    end = at + count
+    while at < end:
+        if one[at] != other[at + gap]:
+            return 0
+        at += 1
+    return 1
+
+
+@micropython.viper
 def spread(target: ptr8, raw: ptr8, places: int, joints: int):
     """From the engine's (ticks low, high, commanded[], counts[]) to the order of the wire.
 

@@ -214,8 +214,8 @@ class Host:
     def _answer(self, name, kind, fields, rest):
         assert fields[0] == wire.COMMAND[name][1]
         if kind == "error":
-            return ("error", wire.ERRORS[fields[1]][0], *fields[2:])
-        return ("ok", *wire.decode(wire.ANSWER[name], rest))
+            return ("error", wire.ERRORS[fields[1]][0]) + fields[2:]  # noqa: RUF005
+        return ("ok",) + wire.decode(wire.ANSWER[name], rest)  # noqa: RUF005
 
     def hello(self, session=1):
         return self.ask("hello", (wire.PROTOCOL_VERSION, session))
