@@ -49,7 +49,8 @@ def configure(board: Board, arm: Arm, replace: bool) -> None:
         return
     if board.info.arm_crc and not replace:
         raise LinkError(
-            f"the board is set up for another arm than {arm.name!r} ({arm.source}); name its arm file with --arm"
+            f"the board is set up for another arm than {arm.name!r} ({arm.source}); "
+            "name its arm file with --arm"
         )
     board.upload(wire.ARM_RECORD_NAME, data)
     board.hello()

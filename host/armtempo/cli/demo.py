@@ -16,7 +16,10 @@ from armtempo.cli.run import replay
 @options.port
 @options.log_traffic
 def command(out: Path, port: str, log_traffic: Path | None) -> None:
-    """Plan the paper's feeding motion, replay it on a board (a virtual one without --port), report."""
+    """Plan, replay and report the paper's feeding motion.
+
+    Without --port a virtual board replays it, faster than in real time.
+    """
     from armtempo import arm as arms
     from armtempo import job as jobs
     from armtempo import operate, pipeline, planner, report, summary

@@ -10,7 +10,7 @@ from armtempo.cli import options, posture
 from armtempo.cli.progress import Progress
 
 
-@click.command()
+@click.command(context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
 @click.argument("where")
 @options.job
 @options.arm
@@ -19,9 +19,9 @@ from armtempo.cli.progress import Progress
 def command(
     where: str, job_path: Path | None, arm_path: Path | None, port: str, log_traffic: Path | None
 ) -> None:
-    """Move to WHERE: angles such as '0,-60,40', a via point such as P0, or a trajectory file's start.
+    """Move straight to a posture.
 
-    All joints move together, within their limits. The arm must be homed. Ctrl-C brakes.
+    WHERE: angles such as '0,-60,40', a via point such as P0, or a trajectory file for its start. All joints move together, within their limits. The arm must be homed. Ctrl-C brakes.
     """
     from armtempo import operate
     from armtempo.interrupt import StopRequest

@@ -9,7 +9,7 @@ import click
 from armtempo.cli import options, posture
 
 
-@click.command()
+@click.command(context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
 @click.argument("where", required=False)
 @options.job
 @options.arm
@@ -18,9 +18,10 @@ from armtempo.cli import options, posture
 def command(
     where: str | None, job_path: Path | None, arm_path: Path | None, port: str, log_traffic: Path | None
 ) -> None:
-    """Declare that the arm stands at WHERE: angles such as '0,-60,40', or a via point such as P0.
+    """Declare where the arm stands.
 
-    Without WHERE: at the home posture of the arm file. Nothing moves; afterwards motions may start.
+    WHERE: angles such as '0,-60,40', a via point such as P0, or a trajectory file for its start. Without
+    WHERE: at the home posture of the arm file. Nothing moves; afterwards motions may start.
     """
     from armtempo import operate
 

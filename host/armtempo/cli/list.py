@@ -17,7 +17,10 @@ if TYPE_CHECKING:
 @options.port
 @options.log_traffic
 def command(port: str, log_traffic: Path | None) -> None:
-    """List the motions stored on the board; the one marked * is what its button starts."""
+    """List the motions on the board.
+
+    The one marked * is what the board's button starts.
+    """
     with options.board(port, log_traffic) as board:
         found = board.stored()
     click.echo(f"{'name':<26}{'bytes':>8}{'joints':>8}{'seconds':>10}  checksum")

@@ -16,9 +16,9 @@ _EVERY_S = 1.0
 @options.port
 @options.log_traffic
 def command(file: Path | None, port: str, log_traffic: Path | None) -> None:
-    """Show the recorded traffic in FILE; without FILE, ask the board once a second and show what is said.
+    """Show decoded traffic.
 
-    Ctrl-C ends it; a motion under way goes on.
+    With FILE, what '--log-traffic FILE' recorded; without, the board is asked once a second. Ctrl-C ends it; a motion under way goes on.
     """
     if file is not None:
         _show_file(file)

@@ -7,7 +7,7 @@ import click
 
 @click.command()
 def command() -> None:
-    """List the serial ports; those that look like a board first."""
+    """List the serial ports, likely boards first."""
     from armtempo.link.ports import SIM, find_ports
 
     found = find_ports()

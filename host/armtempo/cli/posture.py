@@ -30,8 +30,8 @@ def parse(text: str, arm: Arm, job_path: Path | None) -> Array:
         return np.array([float(cell) for cell in text.split(",")])
     except ValueError:
         raise InputError(
-            f"{text!r} is no posture: give angles in degrees ('0,-60,40'), a via point of the job ('P0'), or a "
-            "trajectory file"
+            f"{text!r} is no posture: give angles in degrees ('0,-60,40'), a via point of the job ('P0') "
+            "or a trajectory file"
         ) from None
 
 
@@ -48,4 +48,4 @@ def _via(index: int, arm: Arm, job_path: Path | None) -> Array:
     via_deg = planner.via_angles(arm, job)
     if index >= len(via_deg):
         raise InputError(f"job {job.name!r} has the via points P0 to P{len(via_deg) - 1}, not P{index}")
-    return via_deg[index]
+    return np.asarray(via_deg[index])

@@ -13,6 +13,7 @@ from armtempo.cli.progress import Progress
 if TYPE_CHECKING:
     from armtempo.link import Board
     from armtempo.pipeline import Motion
+    from armtempo.record import Repetition
 
 
 @click.command()
@@ -25,8 +26,9 @@ if TYPE_CHECKING:
 def command(
     what: str, repeat: int, out: Path, arm_path: Path | None, port: str, log_traffic: Path | None
 ) -> None:
-    """Replay WHAT, a trajectory file or the name of a motion on the board, into a new run folder.
+    """Replay a motion and record it.
 
+    WHAT is a trajectory file or the name of a motion on the board; the samples go into a new run folder.
     The arm must be homed ('armtempo home') and stand where the motion begins ('armtempo goto'); a virtual
     board sees to that itself. Between repetitions the arm returns along the same path. Ctrl-C brakes.
     """
@@ -48,6 +50,12 @@ def _motion(board: Board, what: str, arm_path: Path | None) -> Motion:
     return pipeline.from_board(board, what, arm)
 
 
+def _told(done: Repetition) -> str:
+    lost = sum(count for _, count in done.lost)
+    missing = f", {lost} lost" if lost else ""
+    return f"{done.file}: {done.state}, {done.duration_s:.3f} s, {done.samples} samples{missing}"
+
+
 def replay(board: Board, port: str, motion: Motion, repeat: int, out: Path) -> Path:
     """Bring the arm to the start, replay, record, tell; gives the run folder."""
     from armtempo import pipeline
@@ -59,11 +67,7 @@ def replay(board: Board, port: str, motion: Motion, repeat: int, out: Path) -> P
         click.echo(f"{motion.name}: {motion.trajectory.duration_s:.3f} s, into {folder.path}")
         with Progress("moving") as progress:
             for done in pipeline.repeat(board, motion, folder, repeat, stop, progress):
-                lost = sum(count for _, count in done.lost)
-                missing = f", {lost} lost" if lost else ""
-                click.echo(
-                    f"{done.file}: {done.state}, {done.duration_s:.3f} s, {done.samples} samples{missing}"
-                )
+                click.echo(_told(done))
     if stop.wanted:
         raise KeyboardInterrupt
     for line in pipeline.results(motion, folder.repetitions[-1]):

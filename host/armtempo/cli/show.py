@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @options.port
 @options.log_traffic
 def command(name: str, arm_path: Path | None, port: str, log_traffic: Path | None) -> None:
-    """Show the stored motion NAME, read back from the board, in the arm's degrees."""
+    """Show the stored motion NAME, read back."""
     from armtempo import pipeline
 
     arm = options.load_arm(arm_path)

@@ -15,7 +15,7 @@ from armtempo.cli.status import lines
 @options.port
 @options.log_traffic
 def command(now: bool, port: str, log_traffic: Path | None) -> None:
-    """Brake the motion under way along its path, or freeze it, and say where the arm stands."""
+    """Brake or freeze, and say where the arm stands."""
     from armtempo import operate
 
     with options.board(port, log_traffic) as board:

@@ -20,7 +20,7 @@ from armtempo.cli.progress import Progress
 def command(
     file: Path, name: str | None, as_default: bool, arm_path: Path | None, port: str, log_traffic: Path | None
 ) -> None:
-    """Store the motion of trajectory file FILE on the board, and its arm's data."""
+    """Store a trajectory file on the board."""
     from armtempo import operate, pipeline
 
     arm = options.load_arm(arm_path) if arm_path else None
