@@ -11,7 +11,7 @@ import numpy as np
 from armtempo_shared.limits import MAX_SEGMENTS, MAX_STEP_RATE, MAX_STEP_RATE_SUM
 
 import armtempo
-from armtempo import extremes, optimise, spline, timeaxis, timing
+from armtempo import extremes, optimise, spline, timeaxis, timing, vias
 from armtempo.arm import Arm, Joint, Limits
 from armtempo.errors import InputError, PlanError
 from armtempo.extremes import Extremes
@@ -68,10 +68,11 @@ def versions() -> dict[str, str]:
 
 
 def via_angles(arm: Arm, job: Job) -> Array:
-    """Angles of the driven joints at the via points, degrees: (n + 1, J)."""
+    """Angles of the driven joints at the via points, poses resolved, degrees: (n + 1, J)."""
     if any(isinstance(via, Pose) for via in job.via):
-        raise InputError(f"job {job.name!r}: poses must be turned into angles before planning")
-    via = np.array(job.via, dtype=float)
+        via = vias.resolve(arm, job).via_deg
+    else:
+        via = np.array(job.via, dtype=float)
     if via.ndim != 2 or len(via) < 2 or via.shape[1] != len(arm.driven):
         raise InputError(
             f"job {job.name!r}: needs at least 2 via points with {len(arm.driven)} angles each, "

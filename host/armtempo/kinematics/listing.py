@@ -70,9 +70,8 @@ def lines(choice: Choice) -> Iterator[str]:
     yield f"  no  {'branch':<19}{heads}  "
     for candidate in choice.candidates:
         mark = "*" if candidate is choice.chosen else " "
-        row = "".join(
-            f"{angle:12.4f}" if np.isfinite(angle) else f"{'-':>12}" for angle in _degrees(candidate)
-        )
+        angles = np.round(_degrees(candidate), 4) + 0.0
+        row = "".join(f"{angle:12.4f}" if np.isfinite(angle) else f"{'-':>12}" for angle in angles)
         yield f"{mark} {candidate.number:2d}  {candidate.branch!s:<19}{row}  {_verdict(choice, candidate)}"
 
 
