@@ -27,9 +27,10 @@ def decode(genes: Bits, bounds: Array) -> Array:
 
 def fitness(values: Array) -> Array:
     """What selection maximises, >= 0: how far each value (N,) lies below the worst finite one."""
+    merit = np.zeros(len(values))
     finite = np.isfinite(values)
-    worst = values[finite].max(initial=-np.inf)
-    return np.where(finite, worst - np.where(finite, values, worst), 0.0)
+    merit[finite] = values[finite].max(initial=-np.inf) - values[finite]
+    return merit
 
 
 def roulette(merit: Array, rng: np.random.Generator) -> NDArray[np.intp]:

@@ -1,0 +1,194 @@
+"""What every search must do, whatever it is: keep bounds and budget, never get worse, repeat with a seed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from armtempo import optimise
+from armtempo.errors import InputError
+from armtempo.optimise import genes, iaga, levy, swarm
+from armtempo.optimise.tracker import Array, Tracker
+
+BOUNDS = np.array([[-1.0, 2.0], [0.5, 3.0], [-4.0, -1.0]])
+CENTRE = np.array([0.3, 1.7, -1.2])
+EVERY = sorted(optimise.ALGORITHMS)
+PER_ITERATION = {"ga": 1, "iaga": 1, "pso": 2, "hpso": 2, "cs": 2, "acs": 2}
+"""Evaluations an iteration as multiples of the population (section 3.2); cuckoos: at most."""
+AT_MOST = ("cs", "acs")
+
+
+class Bowl:
+    """A function with its least value 1 at CENTRE, which remembers what it was asked."""
+
+    def __init__(self) -> None:
+        self.asked: list[Array] = []
+
+    def __call__(self, points: Array) -> Array:
+        self.asked.append(points.copy())
+        return 1.0 + np.square(points - CENTRE).sum(axis=1)
+
+
+def _search(algorithm: str, function: optimise.Function, seed: int = 7, **more: int) -> optimise.Result:
+    sizes = {"population": 11, "iterations": 40, **more}
+    return optimise.minimise(function, BOUNDS, np.random.default_rng(seed), algorithm=algorithm, **sizes)
+
+
+@pytest.mark.parametrize("algorithm", EVERY)
+def test_keeps_bounds_and_evaluates_whole_populations(algorithm: str) -> None:
+    bowl = Bowl()
+    found = _search(algorithm, bowl)
+    asked = np.concatenate(bowl.asked)
+    assert np.all((asked >= BOUNDS[:, 0]) & (asked <= BOUNDS[:, 1]))
+    assert len(asked) == found.evaluations
+    assert len(bowl.asked) <= 1 + 2 * 40, "one call for a whole population"
+
+
+@pytest.mark.parametrize("algorithm", EVERY)
+@pytest.mark.parametrize("population", [4, 10, 25])
+def test_keeps_the_budget_of_the_paper(algorithm: str, population: int) -> None:
+    found = _search(algorithm, Bowl(), population=population, iterations=30)
+    most = population * (1 + PER_ITERATION[algorithm] * 30)
+    assert found.evaluations <= most
+    if algorithm not in AT_MOST:
+        assert found.evaluations == most
+
+
+@pytest.mark.parametrize("algorithm", EVERY)
+def test_result_is_the_best_point_asked_and_never_gets_worse(algorithm: str) -> None:
+    bowl = Bowl()
+    found = _search(algorithm, bowl)
+    values = 1.0 + np.square(np.concatenate(bowl.asked) - CENTRE).sum(axis=1)
+    assert found.value == values.min() == found.history[-1]
+    assert 1.0 + np.square(found.x - CENTRE).sum() == pytest.approx(found.value, rel=1e-15)
+    assert found.history.shape == (41,)
+    assert np.all(np.diff(found.history) <= 0)
+
+
+@pytest.mark.parametrize("algorithm", EVERY)
+def test_a_seed_repeats_and_another_differs(algorithm: str) -> None:
+    first, again, other = (_search(algorithm, Bowl(), seed) for seed in (3, 3, 4))
+    assert np.array_equal(first.x, again.x)
+    assert np.array_equal(first.history, again.history)
+    assert not np.array_equal(first.x, other.x)
+
+
+@pytest.mark.parametrize("algorithm", EVERY)
+def test_progress_is_told_after_each_iteration(algorithm: str) -> None:
+    told: list[tuple[int, int]] = []
+    optimise.minimise(
+        Bowl(), BOUNDS, np.random.default_rng(1), 6, 5, algorithm, lambda done, of: told.append((done, of))
+    )
+    assert told == [(n, 5) for n in range(1, 6)]
+
+
+@pytest.mark.parametrize("algorithm", EVERY)
+def test_gets_near_the_least_value(algorithm: str) -> None:
+    found = _search(algorithm, Bowl(), population=20, iterations=200)
+    assert found.value < 1.05
+
+
+@pytest.mark.parametrize("algorithm", EVERY)
+def test_survives_values_that_are_infinite_or_no_numbers(algorithm: str) -> None:
+    def cliff(points: Array) -> Array:
+        values = 1.0 + np.square(points - CENTRE).sum(axis=1)
+        values[points[:, 0] < 0.0] = np.nan
+        values[points[:, 0] > 1.0] = np.inf
+        return values
+
+    found = _search(algorithm, cliff)
+    assert math.isfinite(found.value)
+    assert 0.0 <= found.x[0] <= 1.0
+
+
+@pytest.mark.parametrize("algorithm", EVERY)
+def test_bears_with_nothing_but_infinity(algorithm: str) -> None:
+    found = _search(algorithm, lambda points: np.full(len(points), np.inf))
+    assert np.isinf(found.value)
+    assert np.all((found.x >= BOUNDS[:, 0]) & (found.x <= BOUNDS[:, 1]))
+
+
+@pytest.mark.parametrize("algorithm", EVERY)
+def test_a_variable_without_room_stays(algorithm: str) -> None:
+    bounds = np.array([[0.0, 1.0], [0.7, 0.7]])
+    found = optimise.minimise(
+        lambda points: points.sum(axis=1), bounds, np.random.default_rng(1), 8, 20, algorithm
+    )
+    assert found.x[1] == 0.7
+
+
+@pytest.mark.parametrize("algorithm", EVERY)
+def test_unknown_and_unfit_parameters_are_refused(algorithm: str) -> None:
+    run = (Bowl(), BOUNDS, np.random.default_rng(1), 8, 2, algorithm)
+    with pytest.raises(InputError, match="wingspan"):
+        optimise.minimise(*run, wingspan=3.0)
+    name = next(iter(optimise.defaults(algorithm)))
+    with pytest.raises(InputError, match=name):
+        optimise.minimise(*run, **{name: [1]})  # type: ignore[arg-type]
+
+
+def test_decoding_spreads_over_the_bounds() -> None:
+    zeros, ones = np.zeros((1, 3, 12), dtype=bool), np.ones((1, 3, 12), dtype=bool)
+    assert np.array_equal(genes.decode(zeros, BOUNDS), BOUNDS[None, :, 0])
+    assert genes.decode(ones, BOUNDS) == pytest.approx(BOUNDS[None, :, 1], rel=1e-15)
+    first_bit = zeros.copy()
+    first_bit[0, 1, 0] = True
+    point = genes.decode(first_bit, BOUNDS)[0]
+    assert point[1] == pytest.approx(0.5 + 2.5 * 2048 / 4095)
+    assert point[0] == -1.0
+
+
+def test_crossover_swaps_tails_of_pairs_only() -> None:
+    rng = np.random.default_rng(5)
+    parents = genes.random_bits(rng, 5, 2, 8)
+    assert np.array_equal(genes.crossover(parents, rng, 0.0), parents)
+    children = genes.crossover(parents, rng, 1.0).reshape(5, -1)
+    flat = parents.reshape(5, -1)
+    assert np.array_equal(children[4], flat[4]), "the odd one has no partner"
+    for one in (0, 2):
+        both = flat[one : one + 2]
+        cuts = [
+            cut
+            for cut in range(1, 16)
+            if np.array_equal(children[one], np.r_[both[0, :cut], both[1, cut:]])
+            and np.array_equal(children[one + 1], np.r_[both[1, :cut], both[0, cut:]])
+        ]
+        assert cuts
+
+
+def test_roulette_favours_merit() -> None:
+    rng = np.random.default_rng(6)
+    chosen = genes.roulette(np.repeat([0.0, 1.0, 3.0], 4000), rng) // 4000
+    counts = np.bincount(chosen, minlength=3) / 12000
+    assert counts[0] == 0.0
+    assert counts[2] == pytest.approx(0.75, abs=0.02)
+
+
+def test_fitness_measures_from_the_worst_finite_value() -> None:
+    assert genes.fitness(np.array([2.0, np.inf, 5.0])).tolist() == [3.0, 0.0, 0.0]
+
+
+def test_adaptive_rate_protects_the_best() -> None:
+    everybody = np.array([0.0, 2.0, 4.0, 6.0])
+    rates = iaga.adaptive_rate(everybody, everybody, 1.0, 0.5)
+    assert rates == pytest.approx([0.5, 0.5, 2 / 3, 0.0])
+    assert iaga.adaptive_rate(np.ones(3), np.ones(3), 1.0, 0.5).tolist() == [0.5, 0.5, 0.5]
+
+
+def test_selection_keeps_the_better_half_and_the_memories() -> None:
+    bowl = Bowl()
+    moved = swarm.Swarm(Tracker(bowl, 1, None), BOUNDS, np.random.default_rng(2), 8, 0.2)
+    before = moved.values.copy()
+    places = moved.positions[before.argmin()].copy()
+    moved.select(rivals=2000)  # with that many rivals the score is the rank
+    order = np.sort(before)
+    assert np.array_equal(np.sort(moved.values), np.repeat(order[:4], 2))
+    assert any(np.array_equal(places, place) for place in moved.positions)
+
+
+def test_levy_steps_have_the_tail_of_their_index() -> None:
+    assert levy.levy_scale(1.5) == pytest.approx(0.6965745, rel=1e-6)  # the value usually printed for 1.5
+    steps = np.abs(levy.levy_steps(np.random.default_rng(8), (400_000,), 1.5))
+    far, farther = np.mean(steps > 10.0), np.mean(steps > 40.0)
+    assert math.log(far / farther) / math.log(4.0) == pytest.approx(1.5, abs=0.15)
