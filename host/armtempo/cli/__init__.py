@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
+from keyword import iskeyword
 from typing import Any
 
 import click
@@ -19,6 +20,8 @@ COMMANDS = (
     "upload",
     "run",
     "report",
+    "export",
+    "import",
     "goto",
     "home",
     "stop",
@@ -32,7 +35,7 @@ COMMANDS = (
     "monitor",
     "report",
 )
-"""In the order of the help page. Each is ``command`` in the module of its name ('-' written as '_')."""
+"""In the order of the help page. Each is ``command`` in the module of its name ('-' as '_'; a keyword has '_' behind it)."""
 
 INTERRUPTED = 130
 
@@ -48,7 +51,7 @@ class LazyGroup(click.Group):
         """The command of that name."""
         if name not in COMMANDS:
             return None
-        module = import_module(f"{__name__}.{name.replace('-', '_')}")
+        module = import_module(f"{__name__}.{name.replace('-', '_')}{'_' * iskeyword(name)}")
         command: click.Command = module.command
         return command
 

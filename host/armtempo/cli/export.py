@@ -1,0 +1,40 @@
+"""``armtempo export``: a trajectory for other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.argument("trajectory", type=click.Path(dir_okay=False, path_type=Path))
+@click.option(
+    "--format",
+    "kind",
+    type=click.Choice(["csv", "ros"]),
+    default="csv",
+    show_default=True,
+    help="csv: degrees, a line a time; ros: trajectory_msgs/JointTrajectory in YAML, radians.",
+)
+@click.option("--rate", type=float, default=100.0, show_default=True, metavar="HZ", help="Points a second.")
+@click.option("--frame-id", default="", help="header.frame_id of the ROS message.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="File to write; without it standard output.",
+)
+def command(trajectory: Path, kind: str, rate: float, frame_id: str, output: Path | None) -> None:
+    """Write the trajectory file TRAJECTORY as CSV or as a ROS JointTrajectory, sampled at any rate."""
+    from armtempo import exchange, trajectory_file
+    from armtempo.record import replace_text
+
+    plan = trajectory_file.load(trajectory)
+    text = exchange.to_csv(plan, rate) if kind == "csv" else exchange.to_ros(plan, rate, frame_id)
+    if output is None:
+        click.echo(text, nl=False)
+    else:
+        replace_text(output, text)
+        click.echo(f"written: {output}")

@@ -1,0 +1,44 @@
+"""``armtempo import``: a job file from a table of via points."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from armtempo.cli import options
+
+
+@click.command("import")
+@click.argument("table", type=click.Path(dir_okay=False, path_type=Path))
+@options.arm
+@click.option("--name", help="Name of the job; without it the table's file name.")
+@click.option("--radians", is_flag=True, help="The angles are in radians.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Job file to write; without it the job's name with .toml. An existing file is not overwritten.",
+)
+def command(table: Path, arm_path: Path | None, name: str | None, radians: bool, output: Path | None) -> None:
+    """Make a job file from the CSV file TABLE: a line a via point, a column a driven joint."""
+    import tempfile
+
+    from armtempo import exchange
+    from armtempo.errors import InputError
+    from armtempo.job import load_job
+    from armtempo.record import replace_text
+
+    arm = options.load_arm(arm_path)
+    title = name or table.stem
+    target = output or Path(f"{title}.toml")
+    if target.exists():
+        raise InputError(f"{target} exists; choose another place with --output")
+    text = exchange.job_text(title, exchange.via_from_csv(table, arm, radians))
+    with tempfile.TemporaryDirectory() as folder:
+        trial = Path(folder) / target.name
+        trial.write_text(text, encoding="utf-8")
+        load_job(trial, arm)
+    replace_text(target, text)
+    click.echo(f"written: {target}; plan it with: armtempo plan --job {target}")
