@@ -33,7 +33,6 @@ COMMANDS = (
     "rename",
     "ports",
     "monitor",
-    "report",
 )
 """In the order of the help page. Each is ``command`` in the module of its name ('-' as '_'; a keyword has '_' behind it)."""
 

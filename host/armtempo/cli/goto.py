@@ -21,7 +21,8 @@ def command(
 ) -> None:
     """Move straight to a posture.
 
-    WHERE: angles such as '0,-60,40', a via point such as P0, or a trajectory file for its start. All joints move together, within their limits. The arm must be homed. Ctrl-C brakes.
+    WHERE: angles such as '0,-60,40', a via point such as P0, or a trajectory file for its start. All
+    joints move together, within their limits. The arm must be homed. Ctrl-C brakes.
     """
     from armtempo import operate
     from armtempo.interrupt import StopRequest

@@ -21,7 +21,7 @@ def command(
     """Declare where the arm stands.
 
     WHERE: angles such as '0,-60,40', a via point such as P0, or a trajectory file for its start. Without
-    WHERE: at the home posture of the arm file. Nothing moves; afterwards motions may start.
+    it: the home posture of the arm file. Nothing moves; afterwards motions may start.
     """
     from armtempo import operate
 

@@ -18,7 +18,8 @@ _EVERY_S = 1.0
 def command(file: Path | None, port: str, log_traffic: Path | None) -> None:
     """Show decoded traffic.
 
-    With FILE, what '--log-traffic FILE' recorded; without, the board is asked once a second. Ctrl-C ends it; a motion under way goes on.
+    With FILE, what '--log-traffic FILE' recorded; without, the board is asked once a second. Ctrl-C ends
+    it; a motion under way goes on.
     """
     if file is not None:
         _show_file(file)
