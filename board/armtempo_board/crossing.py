@@ -1,0 +1,102 @@
+"""Where a cell crosses a threshold: Newton on the local polynomials.
+
+A cell is array('i') of 20: what ``cell.powers`` wrote for the angle, then for the time.
+A node is array('i'): w in 2**-30 of the cell, time in local units, and the two derivatives there (fifths).
+"""
+
+import micropython
+from micropython import const
+
+W = 0
+TIME = 1
+ANGLE_RATE = 2
+TIME_RATE = 3
+MANTISSA = 4  # ticks per step = MANTISSA / 2**EXPONENT; MANTISSA has 30 bits
+EXPONENT = 5
+NODE_SIZE = 6
+_ONE = const(1 << 15)
+_LOW = const((1 << 15) - 1)
+
+
+@micropython.viper
+def solve(cell: ptr32, node: ptr32, target: int):
+    """Set ``node`` to where the (rising) angle equals ``target``; Newton starts at the node's own w.
+
+    Each step leaves at most the square of the relative error; the last one starts below 2**-14.
+    Products are made of 15-bit halves: nothing exceeds 31 bits.
+    """
+    bias = 1 << 29
+    bias += bias
+    w = node[0]
+    last = 0
+    rounds = 0
+    while True:
+        wh = w >> 15
+        wl = w & _LOW
+        angle = cell[4] - bias
+        rate = cell[9] - bias
+        i = 3
+        while i >= 0:
+            h = angle >> 15
+            angle = h * wh + (((angle & _LOW) * wh + (1 << 14)) >> 15) + ((h * wl) >> 15) + cell[i] - bias
+            h = rate >> 15
+            rate = h * wh + (((rate & _LOW) * wh) >> 15) + ((h * wl) >> 15) + cell[i + 5] - bias
+            i -= 1
+        if last:
+            break
+        h = angle >> 15
+        angle = h * wh + (((angle & _LOW) * wh + (1 << 14)) >> 15) + ((h * wl) >> 15)
+        rest = target - angle
+        slope = rate * 5
+        while slope < (1 << 27):
+            slope <<= 1
+            rest <<= 1
+        h = slope >> 14
+        rounds += 1
+        if (rest < h and rest > 0 - h) or rounds == 12:
+            last = 1
+            w += ((rest << 12) // (slope >> 15)) << 3
+        else:
+            w += (rest // (slope >> 15)) << 15
+        if w < 0:
+            w = 0
+        if w > bias:
+            w = bias
+    time = cell[14] - bias
+    h = cell[19] - bias
+    i = 13
+    while i >= 10:
+        angle = time >> 15
+        time = angle * wh + (((time & _LOW) * wh + (1 << 14)) >> 15) + ((angle * wl) >> 15) + cell[i] - bias
+        angle = h >> 15
+        h = angle * wh + (((h & _LOW) * wh) >> 15) + ((angle * wl) >> 15) + cell[i + 5] - bias
+        i -= 1
+    angle = time >> 15
+    node[0] = w
+    node[1] = angle * wh + (((time & _LOW) * wh + (1 << 14)) >> 15) + ((angle * wl) >> 15)
+    node[2] = rate
+    node[3] = h
+
+
+@micropython.viper
+def slope(node: ptr32, exponent: int):
+    """Ticks per step at a node, MANTISSA / 2**EXPONENT; ``exponent``: of one time unit per angle unit.
+
+    Long division with 15-bit digits: relative error below 2**-28.
+    """
+    time = node[3]
+    angle = node[2]
+    while angle < (1 << 29):
+        angle <<= 1
+        exponent -= 1
+    while time < (1 << 29):
+        time <<= 1
+        exponent += 1
+    if time >= angle:
+        time >>= 1
+        exponent -= 1
+    digit = angle >> 15
+    first = time // digit
+    rest = ((time - first * digit) << 15) - first * (angle & _LOW)
+    node[4] = (first << 15) + rest // digit
+    node[5] = exponent + 30

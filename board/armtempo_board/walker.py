@@ -1,0 +1,296 @@
+"""One joint's motion as a stream of step times: a step wherever the angle passes a half step."""
+
+from array import array
+
+from micropython import const
+
+from armtempo_board import cell, cells, crossing, points, stretch
+
+_BUDGET = const(4)  # parts looked at in one call: bounds its time
+_LARGEST_POWER = const(10)
+_SMALLEST_POWER = const(2)
+_DEVIATION = const(4)  # half ticks: the Hermite cubic over two stretches may miss the middle node by 2 ticks,
+# so that each half is 16 times better by the h**4 law, with a factor of four to spare
+_FAR = const(1000)  # in 4096 ticks
+
+
+class Walker:
+    """Walks one joint through a motion; every buffer is made once.
+
+    ``direction`` (1 or -1) is that of the steps which ``fill`` writes now. ``at_turn``: the next step goes the
+    other way, ``turn`` lets it come. ``ended``: no step is left.
+    """
+
+    def __init__(self):
+        self._cells = cells.Cells()
+        self._cell = array("i", bytes(80))
+        self._state = array("i", bytes(4 * stretch.STATE_SIZE))
+        self._a = array("i", bytes(4 * crossing.NODE_SIZE))
+        self._middle = array("i", bytes(4 * crossing.NODE_SIZE))
+        self._b = array("i", bytes(4 * crossing.NODE_SIZE))
+        self.direction = 1
+        self.at_turn = False
+        self.ended = True
+
+    def load(self, motion, joint, position_steps, pulse_ticks, gap_ticks):
+        """Stand at the start of a motion with the joint at ``position_steps``.
+
+        ``pulse_ticks``: STEP high time; ``gap_ticks``: least time between steps in opposite directions. Two that
+        would be closer are both left out.
+        """
+        self._cells.load(motion, joint, gap_ticks >> 3)
+        self._state[stretch.PULSE] = pulse_ticks
+        self._gap_ticks = gap_ticks
+        self._position = position_steps + points.BIAS
+        self.direction = 1
+        self.at_turn = self.ended = False
+        self._held = False  # the last step of a cell waits for what comes after it
+        self._left = 0  # steps of the prepared stretch not written yet
+        self._count = self._index = 0  # steps of the cell; the next of them
+        self._power = 4
+        while not self._left and not self.ended:
+            if not self._prepare() and self.at_turn:
+                self.turn()
+
+    def fill(self, ring, mask, head, room):
+        """Write up to ``room`` edge times (rise, fall, ...; ticks modulo 2**32) to ``ring`` from ``head`` on.
+
+        ``ring``: array('I') of ``mask`` + 1 entries, ``head`` even. Returns how many were written; 0: no room, at
+        a turn, ended, or the search for the next step goes on with the next call.
+        """
+        written = 0
+        while written + 2 <= room:
+            if not self._left and not self._prepare():
+                break
+            at = (head + written) & mask
+            count = min(self._left, (room - written) >> 1, (mask + 1 - at) >> 1)
+            stretch.emit(ring, self._state, at, count)
+            self._left -= count
+            written += 2 * count
+        return written
+
+    def turn(self):
+        """Let the steps in the other direction come."""
+        self.direction = -self.direction
+        self.at_turn = False
+
+    def last_1024(self):
+        """Time of the step written last, in 1024 ticks."""
+        return self._base_1024() + stretch.elapsed(self._state, 0)
+
+    def next_1024(self):
+        """Time of the next step to be written, or one before it while it is not known; in 1024 ticks."""
+        if self._left:
+            return self._base_1024() + stretch.elapsed(self._state, 1)
+        if self._held:
+            return _in_1024(self._held_high, self._held_ticks)
+        if self.at_turn:
+            return _in_1024(self._cells.time[0], self._ticks(self._a))
+        return _in_1024(self._cells.time[0], 0)
+
+    def _base_1024(self):
+        return _in_1024(self._base_high, self._base_ticks)
+
+    def _prepare(self):
+        """Make the next stretch ready. False: at a turn, at the end, or not found yet."""
+        for _ in range(_BUDGET):
+            if self.at_turn or self.ended:
+                return False
+            if self._index < self._count:
+                self._in_cell()
+            else:
+                self._next_cell()
+            if self._left:
+                return True
+        return False
+
+    def _next_cell(self):
+        found = self._cells.next(self._position)
+        if found == cells.END:
+            if self._held:
+                self._release()
+            else:
+                self.ended = True
+            return
+        if self._held and self._since_held(self._cells.time[0], self._cells.time[6] >> 16) > self._gap_ticks:
+            self._release()
+        if found != cells.NOTHING:
+            self._open(found == cells.AT_ONCE)
+
+    def _open(self, at_once):
+        """Take up the steps of the cell that was found."""
+        steps = self._cells.end() - self._position
+        heading = self._cells.heading
+        if at_once:
+            heading = 1 if steps > 0 else -1
+        if steps * heading <= 0:
+            return
+        self._heading = heading
+        self._count = steps * heading
+        self._index = 0
+        self._at_once = at_once
+        self._known = False
+        self._halves = 0
+        scale = self._cells.time_local[cell.SCALE] - 12
+        self._state[stretch.TIME_SCALE] = scale
+        self._offset = self._cells.time[6] >> (16 - scale)
+        if not at_once:
+            self._straighten(heading)
+        self._position += steps
+
+    def _straighten(self, heading):
+        """The cell's local polynomials, and its first threshold."""
+        walk = self._cells
+        cell.powers(walk.angle_local, self._cell, 0, heading < 0)
+        cell.powers(walk.time_local, self._cell, 10, False)
+        scale = walk.angle_local[cell.SCALE]
+        self._scale = scale
+        twice = 2 * (self._position - walk.angle[0]) + heading
+        self._target = heading * ((twice << (scale - 1)) - (walk.angle[6] >> (28 - scale)))
+        total = -5 * cell.DIFFERENCE_BIAS
+        for i in range(1, 6):
+            total += walk.angle_local[i]
+        self._range = total * heading
+        self._a[crossing.W] = 0
+
+    def _solve(self, node, index, guess):
+        """Set a node to the cell's step ``index``, its time in ticks * 2**TIME_SCALE from the high word on."""
+        target = 0 if self._at_once else self._target + (index << self._scale)
+        if target <= 0:
+            node[crossing.W] = node[crossing.TIME] = 0
+        else:
+            node[crossing.W] = guess
+            crossing.solve(self._cell, node, min(target, self._range))
+        node[crossing.TIME] += self._offset
+
+    def _in_cell(self):
+        """Prepare the next step or steps of the cell."""
+        if self._index == 0:
+            self._first()
+            return
+        remaining = self._count - 1 - self._index
+        if self._halves:
+            self._second_half()
+        elif remaining == 0:
+            self._step()
+            self._hold()
+        elif remaining < 2 << _SMALLEST_POWER or self._at_once or not self._block(remaining):
+            self._step()
+            self._single()
+
+    def _step(self):
+        """Solve the next step by itself."""
+        self._solve(self._a, self._index, self._a[crossing.W])
+        self._index += 1
+        self._known = False
+
+    def _first(self):
+        """The first step of a cell, against the one that was held back before it."""
+        if not self._known:
+            self._solve(self._a, 0, 0)
+            self._known = True
+        if self._held:
+            opposite = self._heading != self.direction
+            if opposite and self._since_held(self._cells.time[0], self._ticks(self._a)) <= self._gap_ticks:
+                self._held = False  # a graze: neither comes
+                self._index = 1
+                self._known = False
+            else:
+                self._release()
+        elif self._heading != self.direction:
+            self.at_turn = True
+        else:
+            self._index = 1
+            self._known = False
+            if self._count == 1:
+                self._hold()
+            else:
+                self._single()
+
+    def _hold(self):
+        self._held = True
+        self._held_high = self._cells.time[0]
+        self._held_ticks = self._ticks(self._a)
+
+    def _since_held(self, high, ticks):
+        """Ticks from the step held back to a time; any large number where it is far."""
+        high -= self._held_high
+        if high > _FAR:
+            high = _FAR
+        return (high << 12) + ticks - self._held_ticks
+
+    def _ticks(self, node):
+        scale = self._state[stretch.TIME_SCALE]
+        return (node[crossing.TIME] + (1 << (scale - 1))) >> scale
+
+    def _release(self):
+        self._held = False
+        self._write(self._held_high, self._held_ticks)
+
+    def _single(self):
+        self._write(self._cells.time[0], self._ticks(self._a))
+
+    def _write(self, high, ticks):
+        stretch.single(self._state, high, ticks)
+        self._base_high = high
+        self._base_ticks = ticks
+        self._left = 1
+
+    def _block(self, remaining):
+        """Find two stretches from node a on that keep the error bound; False where steps are better solved singly."""
+        power = self._power
+        while 2 << power > remaining:
+            power -= 1
+        self._slope(self._a)
+        here = self._index - 1
+        self._solve(self._b, here + (2 << power), self._a[crossing.W])
+        self._slope(self._b)
+        while power >= _SMALLEST_POWER:
+            self._solve(self._middle, here + (1 << power), self._a[crossing.W])
+            self._slope(self._middle)
+            if self._accept(power):
+                self._halves = 2
+                self._block_power = power
+                self._second_half()
+                return True
+            power -= 1
+            self._power = power
+            self._b, self._middle = self._middle, self._b
+        self._power = _SMALLEST_POWER
+        return False
+
+    def _slope(self, node):
+        exponent = self._state[stretch.TIME_SCALE] - self._scale
+        crossing.slope(node, exponent)
+
+    def _accept(self, power):
+        """Whether the stretches a-middle and middle-b of 2**power steps keep the error bound."""
+        state = self._state
+        nearest = crossing.EXPONENT
+        exponent = min(self._a[nearest], self._middle[nearest], self._b[nearest])
+        if exponent < power + 3 or exponent + 5 < 3 * power:
+            return False
+        state[stretch.POWER] = power
+        state[stretch.EXPONENT] = exponent
+        limit = _DEVIATION << state[stretch.TIME_SCALE]
+        off = stretch.deviation(state, self._a, self._middle, self._b)
+        if off <= limit >> 6 and power == self._power < _LARGEST_POWER:
+            self._power = power + 1
+        return off <= limit
+
+    def _second_half(self):
+        """Prepare the stretch from node a to the middle; the middle is the next node a."""
+        state = self._state
+        state[stretch.BASE_HIGH] = self._cells.time[0]
+        state[stretch.POWER] = self._block_power
+        stretch.differences(state, self._a, self._middle)
+        self._base_high = self._cells.time[0]
+        self._base_ticks = self._a[crossing.TIME] >> state[stretch.TIME_SCALE]
+        self._left = 1 << self._block_power
+        self._index += self._left
+        self._halves -= 1
+        self._a, self._middle, self._b = self._middle, self._b, self._a
+
+
+def _in_1024(high, ticks):
+    return ((high - points.BIAS) << 2) + (ticks >> 10)

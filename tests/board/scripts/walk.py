@@ -1,0 +1,52 @@
+"""Walk every joint of a motion record and write the steps to a file; runs on all interpreters.
+
+Arguments: record, output, pulse ticks, gap ticks, room. Output, little endian int32 per step: joint, direction,
+time of the step in 1024 ticks (room 2 only: of the last step of its batch), rising edge, falling edge.
+"""
+
+import struct
+import sys
+from array import array
+
+from armtempo_board.walker import Walker
+from armtempo_shared.motion import Motion
+
+MASK = 1023
+
+
+def walk(motion, joint, walker, out, pulse, gap, room):
+    """All steps of one joint; returns their number."""
+    ring = array("I", bytes(4 * (MASK + 1)))
+    start = struct.unpack_from("<6q", motion.data, motion.angle_offset(joint))
+    weights = (1, 26, 66, 26, 1) if motion.degree == 5 else (20, 80, 20)
+    total = 0
+    for value, weight in zip(start, weights):
+        total += value * weight
+    position = (total // 60 + (1 << 28)) >> 29
+    walker.load(motion, joint, position, pulse, gap)
+    head = 0
+    steps = 0
+    while not walker.ended:
+        if walker.at_turn:
+            walker.turn()
+        count = walker.fill(ring, MASK, head, room)
+        for i in range(0, count, 2):
+            rise = ring[(head + i) & MASK]
+            fall = ring[(head + i + 1) & MASK]
+            out.write(struct.pack("<iiiII", joint, walker.direction, walker.last_1024(), rise, fall))
+        head = (head + count) & MASK
+        steps += count // 2
+    return steps
+
+
+def main(record, output, pulse, gap, room):
+    """Walk all joints with one walker, as the board reuses them."""
+    with open(record, "rb") as file:
+        motion = Motion(file.read())
+    walker = Walker()
+    with open(output, "wb") as out:
+        for joint in range(motion.joints):
+            print(joint, walk(motion, joint, walker, out, int(pulse), int(gap), int(room)))
+
+
+main(*sys.argv[1:])
