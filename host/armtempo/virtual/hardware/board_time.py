@@ -1,0 +1,62 @@
+"""The board program's ``time``: MicroPython's functions, on virtual time."""
+
+from simulator import the
+
+_PERIOD = 1 << 30
+_EPOCH_S = 820454400  # 2026-01-01, in seconds since 2000
+
+
+def ticks_ms():
+    """Milliseconds, modulo 2**30."""
+    return the.pace.milliseconds()
+
+
+def ticks_us():
+    """Microseconds, modulo 2**30."""
+    return the.pace.microseconds()
+
+
+ticks_cpu = ticks_us
+
+
+def ticks_diff(end, start):
+    """``end - start``, from -2**29 to 2**29 - 1."""
+    return (end - start + _PERIOD // 2) % _PERIOD - _PERIOD // 2
+
+
+def ticks_add(ticks, delta):
+    """``ticks + delta``, modulo 2**30."""
+    return (ticks + delta) % _PERIOD
+
+
+def sleep_us(us):
+    """Wait."""
+    the.pace.sleep_us(us)
+
+
+def sleep_ms(ms):
+    """Wait."""
+    the.pace.sleep_us(1000 * ms)
+
+
+def sleep(seconds):
+    """Wait."""
+    the.pace.sleep_us(int(seconds * 1000000))
+
+
+def time():
+    """Seconds since 2000, from an unset clock."""
+    return _EPOCH_S + the.pace.milliseconds() // 1000
+
+
+def time_ns():
+    """Nanoseconds, to the microsecond."""
+    return _EPOCH_S * 1000000000 + the.pace.microseconds() * 1000
+
+
+def localtime(seconds=None):
+    """Not kept: the first second of 2026."""
+    return (2026, 1, 1, 0, 0, 0, 3, 1)
+
+
+gmtime = localtime

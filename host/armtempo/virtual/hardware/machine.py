@@ -1,0 +1,77 @@
+"""MicroPython's ``machine`` of the STM32 port, as far as the board program uses it."""
+
+from simulator import memory, the
+from simulator import reset as _reset
+from simulator.board import CALL_TICKS
+from simulator.gpio_api import Pin  # noqa: F401
+from simulator.watchdog import WDT  # noqa: F401
+
+PWRON_RESET, HARD_RESET, WDT_RESET, DEEPSLEEP_RESET, SOFT_RESET = 1, 2, 3, 4, 0
+
+
+class _Memory:
+    """``mem32`` and its narrower siblings. Reads are signed beyond 31 bits, as on the chip."""
+
+    def __init__(self, size):
+        self._mask = (1 << 8 * size) - 1
+
+    def __getitem__(self, where):
+        the.board.spend(CALL_TICKS)
+        shift = 8 * (where & 3)
+        value = memory.words[memory.word_at(where)] >> shift & self._mask
+        return value - (1 << 32) if value >> 31 else value
+
+    def __setitem__(self, where, value):
+        at = memory.word_at(where)
+        shift = 8 * (where & 3)
+        kept = memory.words[at] & ~(self._mask << shift)
+        memory.words[at] = (kept | (value & self._mask) << shift) & memory.MASK
+        the.board.spend(CALL_TICKS)
+
+
+mem8 = _Memory(1)
+mem16 = _Memory(2)
+mem32 = _Memory(4)
+
+
+def idle():
+    """Sleep until the next interrupt; SysTick comes every millisecond."""
+    the.pace.idle()
+
+
+def freq():
+    """(core, AHB, APB1, APB2) clocks in Hz."""
+    return 168_000_000, 168_000_000, 42_000_000, 84_000_000
+
+
+def unique_id():
+    """Twelve bytes that differ between boards."""
+    return the.settings["unique_id"]
+
+
+def reset_cause():
+    """Why the program was started."""
+    return the.settings["reset_cause"]
+
+
+def disable_irq():
+    """Hold interrupts back; returns the state before for ``enable_irq``."""
+    before = not the.board.masked
+    the.board.masked = True
+    return before
+
+
+def enable_irq(state=True):
+    """Let interrupts through again."""
+    the.board.masked = not state
+    the.board.spend(CALL_TICKS)
+
+
+def soft_reset():
+    """Start MicroPython again; the hardware keeps its registers."""
+    raise _reset.Reset(SOFT_RESET)
+
+
+def reset():
+    """As the reset button."""
+    raise _reset.Reset(HARD_RESET)

@@ -1,0 +1,178 @@
+"""The board's flash: a folder of the host, seen as ``/flash``, with the chip's size, slowness and dangers.
+
+Each change (a file opened for writing, a piece written, a close, a rename, a removal, a new folder) is one
+flash operation. A power cut can be injected at the n-th of them: it leaves that operation half done (a
+piece of the data written; a rename over an existing file stopped after the old one is gone, as FAT does it),
+files still open for writing empty, and the board starts again.
+"""
+
+import os
+
+from simulator.reset import Reset
+
+BLOCK = 512
+_BLOCKS = 190
+_WRITE_MS = 1
+_CLOSE_MS = 60
+_POWER_ON = 1
+_DIRECTORY = 0x4000
+_ENOENT, _EEXIST, _EISDIR, _ENOSPC = 2, 17, 21, 28
+
+
+class Flash:
+    """The folder ``root``; ``stall(ms)`` lets time pass while the flash is busy.
+
+    ``programs``: folders of the host that hold a program which is not deployed to the flash; read only.
+    """
+
+    def __init__(self, root, programs, stall, cut_at=0):
+        self.root = root
+        self._programs = programs
+        self.cwd = "/flash"
+        self.operations = 0
+        self._stall = stall
+        self._cut_at = cut_at
+        self._writing = []
+
+    def real(self, path):
+        """Where a path of the board is on the host; OSError where it is outside ``/flash``."""
+        for program in self._programs:
+            if path.startswith(program):
+                return path
+        path = self.absolute(path)
+        if path != "/flash" and not path.startswith("/flash/"):
+            raise OSError(_ENOENT)
+        return self.root + path[6:]
+
+    def absolute(self, path):
+        """A path of the board, without dots, from its root."""
+        parts = []
+        if path.startswith(self.root + "/"):  # a module's __file__
+            path = "/flash" + path[len(self.root) :]
+        whole = path if path.startswith("/") else self.cwd + "/" + path
+        for part in whole.split("/"):
+            if part == "..":
+                parts = parts[:-1]
+            elif part not in ("", "."):
+                parts.append(part)
+        return "/" + "/".join(parts)
+
+    def operation(self, ms=_WRITE_MS):
+        """Count a change; True where the power fails during it."""
+        self.operations += 1
+        self._stall(ms)
+        return self.operations == self._cut_at
+
+    def power_fails(self):
+        """Files that were being written are left empty; the board starts again."""
+        for file in self._writing:
+            file.cut()
+        self._writing = []
+        raise Reset(_POWER_ON)
+
+    def blocks(self, path):
+        """Blocks that a file or folder takes."""
+        if is_folder(path):
+            return 1 + sum([self.blocks(path + "/" + name) for name in os.listdir(path)])
+        return -(-os.stat(path)[6] // BLOCK)
+
+    def free_blocks(self):
+        """Blocks that are free."""
+        return max(0, _BLOCKS + 1 - self.blocks(self.root))
+
+    def open(self, path, mode="r", **options):
+        """As the built-in ``open``."""
+        real = path if isinstance(path, int) else self.real(path)
+        if not ("w" in mode or "a" in mode or "+" in mode):
+            return real_open(real, mode)
+        if self.operation():
+            self.power_fails()
+        file = Written(self, real_open(real, mode), real)
+        self._writing.append(file)
+        return file
+
+    def closed(self, file):
+        """A written file is whole."""
+        if file in self._writing:
+            if self.operation(_CLOSE_MS):
+                self.power_fails()
+            self._writing.remove(file)
+
+    def rename(self, old, new):
+        """As FAT does it: an existing file of the new name is removed first."""
+        old, new = self.real(old), self.real(new)
+        os.stat(old)
+        if exists(new) and old != new:
+            if is_folder(new):
+                raise OSError(_EEXIST)
+            if self.operation():
+                self.power_fails()
+            os.remove(new)
+        if self.operation():
+            self.power_fails()
+        os.rename(old, new)
+
+    def change(self, function, path):
+        """A change of one path by ``function``."""
+        real = self.real(path)
+        if function is not os.mkdir:
+            os.stat(real)
+        if self.operation():
+            self.power_fails()
+        function(real)
+
+
+class Written:
+    """A file open for writing."""
+
+    def __init__(self, flash, file, path):
+        self._flash = flash
+        self._file = file
+        self._path = path
+
+    def write(self, data):
+        """Write; OSError(ENOSPC) where the flash is full."""
+        if self._flash.operation():
+            self._file.write(data[: len(data) // 2])
+            self._flash.power_fails()
+        self._file.flush()
+        size = os.stat(self._path)[6]
+        if -(-(size + len(data)) // BLOCK) - -(-size // BLOCK) > self._flash.free_blocks():
+            raise OSError(_ENOSPC)
+        return self._file.write(data)
+
+    def cut(self):
+        """The power failed: the directory still has the length 0."""
+        self._file.close()
+        real_open(self._path, "wb").close()
+
+    def close(self):
+        """Finish the file."""
+        self._flash.closed(self)
+        self._file.close()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.close()
+
+    def __getattr__(self, name):
+        return getattr(self._file, name)
+
+
+real_open = open
+
+
+def is_folder(path):
+    """Whether a path of the host is a folder."""
+    return bool(os.stat(path)[0] & _DIRECTORY)
+
+
+def exists(path):
+    """Whether a path of the host is there."""
+    try:
+        os.stat(path)
+    except OSError:
+        return False
+    return True

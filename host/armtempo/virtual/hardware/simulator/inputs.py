@@ -1,0 +1,65 @@
+"""External interrupts (``pyb.ExtInt``) and the levels that the world puts on input pins."""
+
+from simulator import the
+from simulator.board import CALL_TICKS
+from simulator.gpio_api import Pin
+
+_RISING, _FALLING = 1, 2
+
+
+class ExtInt:
+    """Calls ``callback(line)`` at an edge of a pin; one object a line number."""
+
+    IRQ_RISING, IRQ_FALLING, IRQ_RISING_FALLING = 0x10110000, 0x10210000, 0x10310000
+    EVT_RISING, EVT_FALLING, EVT_RISING_FALLING = 0x10120000, 0x10220000, 0x10320000
+
+    def __init__(self, pin, mode, pull, callback):
+        if not isinstance(pin, Pin):
+            pin = Pin(pin)
+        pin.init(Pin.IN, pull)
+        self._line = pin.line.number
+        self._edges = (mode >> 20) & 3
+        known = the.board.extints.get(self._line)
+        if known is not None and callback is not None and known.wired is not pin.line:
+            raise ValueError("ExtInt vector %d is already in use" % self._line)
+        self.wired = pin.line
+        self.enabled = callback is not None
+        the.board.extints[self._line] = self
+        the.board.callbacks[("exti", self._line)] = (callback, self._line)
+        the.board.spend(CALL_TICKS)
+
+    def line(self):
+        """The line number."""
+        return self._line
+
+    def enable(self):
+        """Let the interrupt through."""
+        self.enabled = True
+
+    def disable(self):
+        """Hold the interrupt back."""
+        self.enabled = False
+
+    def swint(self):
+        """Trigger the callback by software."""
+        the.board.pend("exti", self._line)
+        the.board.spend(CALL_TICKS)
+
+    def edge(self, rising):
+        """The pin changed."""
+        if self.enabled and self._edges & (_RISING if rising else _FALLING):
+            the.board.pend("exti", self._line)
+
+
+def set_level(name, level):
+    """The world drives an input pin to 0 or 1, or lets go of it (None)."""
+    line = the.board.pins.line(name)
+    before = line.read()
+    line.external = level
+    after = line.read()
+    line.port.refresh()
+    if before != after:
+        the.board.input_changed(line, after)
+        extint = the.board.extints.get(line.number)
+        if extint is not None and extint.wired is line:
+            extint.edge(after == 1)

@@ -1,0 +1,102 @@
+"""The peripheral registers: one piece of real memory, so that viper code reaches it as on the chip.
+
+``words`` is what the program sees. ``seen`` is what the models last saw or wrote: where the two differ, the
+program has written a register since.
+"""
+
+import sys
+
+import uctypes
+
+BLOCKS = (
+    "TIM1", "TIM2", "TIM3", "TIM4", "TIM5", "TIM6", "TIM7", "TIM8",
+    "GPIOA", "GPIOB", "GPIOC", "GPIOD", "GPIOE",
+    "DMA1", "DMA2", "RCC", "EXTI", "SYSCFG", "DBGMCU", "PWR", "IWDG", "FLASH",
+)  # fmt: skip
+# where the chip has them (RM0090 table 1), for programs that name addresses themselves
+_ON_CHIP = (
+    0x40010000, 0x40000000, 0x40000400, 0x40000800, 0x40000C00, 0x40001000, 0x40001400, 0x40010400,
+    0x40020000, 0x40020400, 0x40020800, 0x40020C00, 0x40021000,
+    0x40026000, 0x40026400, 0x40023800, 0x40013C00, 0x40013800, 0xE0042000, 0x40007000, 0x40003000, 0x40023C00,
+)  # fmt: skip
+BLOCK_WORDS = 64
+BLOCK_BYTES = 4 * BLOCK_WORDS
+SIZE = BLOCK_BYTES * len(BLOCKS)
+MASK = 0xFFFFFFFF
+
+
+def _memory():
+    """(bytearray, the same memory as 32-bit words)."""
+    if sys.implementation.name == "micropython":
+        from array import array
+
+        cells = array("I", [0] * (SIZE // 4))
+        return uctypes.bytearray_at(uctypes.addressof(cells), SIZE), cells
+    raw = bytearray(SIZE)
+    return raw, memoryview(raw).cast("I")
+
+
+raw, words = _memory()
+raw_seen, seen = _memory()
+base = uctypes.addressof(words)
+
+objects = {}
+"""Buffers whose address the program has asked for, by the low 32 bits of it: what a DMA stream can reach."""
+
+
+def index(name):
+    """Word index of a register block."""
+    return BLOCKS.index(name) * BLOCK_WORDS
+
+
+def address(name):
+    """Address of a register block."""
+    return base + 4 * index(name)
+
+
+def word_at(where):
+    """Word index behind an address; ValueError where the virtual board has no register."""
+    offset = where - base
+    if 0 <= offset < SIZE:
+        return offset >> 2
+    for block, start in enumerate(_ON_CHIP):
+        if 0 <= where - start < BLOCK_BYTES:
+            return block * BLOCK_WORDS + (where - start >> 2)
+    raise ValueError("the virtual board has no register at 0x%x" % where)
+
+
+def word_at_low(where):
+    """As ``word_at``, from the low 32 bits of an address (what fits a register)."""
+    return word_at(base + ((where - base) & MASK))
+
+
+def poke(at, value):
+    """A model writes a register."""
+    words[at] = value
+    seen[at] = value
+
+
+def changed_blocks():
+    """Indices of the blocks that the program has written since; marks them as seen."""
+    if raw == raw_seen:
+        return ()
+    blocks = []
+    for block in range(len(BLOCKS)):
+        start = block * BLOCK_BYTES
+        if raw[start : start + BLOCK_BYTES] != raw_seen[start : start + BLOCK_BYTES]:
+            blocks.append(block)
+    return blocks
+
+
+def accept(block):
+    """What the program wrote to this block has been looked at."""
+    start = block * BLOCK_BYTES
+    raw_seen[start : start + BLOCK_BYTES] = raw[start : start + BLOCK_BYTES]
+
+
+def clear():
+    """Power-up: all registers zero."""
+    for at in range(SIZE // 4):
+        words[at] = 0
+        seen[at] = 0
+    objects.clear()

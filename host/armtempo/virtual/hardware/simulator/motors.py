@@ -1,0 +1,73 @@
+"""Ideal motors: each step counts, and the encoder follows at once."""
+
+from simulator import gpio
+
+
+class Motor:
+    """One joint's motor and encoder.
+
+    ``direction``: the line of its DIR; ``encoder``: the timer that counts it, or None; ``joint``:
+    ``dir_inverted``, ``encoder_inverted``, ``counts_num``, ``counts_den`` as in the arm record.
+    """
+
+    def __init__(self, direction, enable, encoder, joint):
+        self._dir = direction
+        self._enable = enable
+        self._inverted = joint["dir_inverted"]
+        self._encoder = encoder
+        self._num = -joint["counts_num"] if joint["encoder_inverted"] else joint["counts_num"]
+        self._den = joint["counts_den"]
+        self._moved = False
+        self._counts = self._at(0)
+        self.position = 0
+
+    def _at(self, position):
+        return (2 * position * self._num + self._den) // (2 * self._den)
+
+    def edges(self, line, before, count, times, origin):
+        """STEP toggled; rising edges step."""
+        if self._enable.on():
+            steps = (count + 1 - before) // 2
+            forward = self._dir.level ^ self._inverted
+            self.position += steps if forward else -steps
+            self._moved = True
+
+    def follow(self):
+        """Turn the encoder to where the motor stands."""
+        if self._moved:
+            self._moved = False
+            counts = self._at(self.position)
+            if self._encoder and counts != self._counts:
+                self._encoder.turn(counts - self._counts)
+            self._counts = counts
+
+
+class Enable:
+    """The drivers' common ENABLE signal."""
+
+    def __init__(self, board, pin, active_high):
+        self._line = board.pins.line(pin)
+        self._active = 1 if active_high else 0
+
+    def on(self):
+        """Whether the drivers hold their motors."""
+        return self._line.level == self._active and self._line.mode() == gpio.OUTPUT
+
+
+class Arm:
+    """All motors; a world for the board."""
+
+    def __init__(self, board, motors):
+        self.motors = motors
+        board.worlds.append(self)
+
+    def passed(self, now):
+        """Time has passed."""
+        for motor in self.motors:
+            motor.follow()
+
+    def counting(self, timer, now):
+        """A timer started or stopped: nothing to do."""
+
+    def input_changed(self, line, level, now):
+        """An input changed: nothing to do."""

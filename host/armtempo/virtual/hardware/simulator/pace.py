@@ -1,0 +1,84 @@
+"""How virtual time goes beside real time, and the calls that wait.
+
+While a timer has something to do soon, virtual time runs as fast as this process can, or, with ``speed``, at
+that multiple of real time. While nothing moves it keeps to real time, asleep until input comes.
+"""
+
+import time
+
+from simulator.board import TICKS_PER_MS, TICKS_PER_US
+from simulator.reset import PowerOff
+
+_HORIZON_TICKS = 500 * TICKS_PER_MS
+_NAP_MS = 5
+
+
+class Pace:
+    """Ties the board's time to the world's."""
+
+    def __init__(self, board, serial, speed):
+        self._board = board
+        self._serial = serial
+        self._speed = speed
+        self._ticks_us = time.ticks_us
+        self._ticks_diff = time.ticks_diff
+        self._last_us = self._ticks_us()
+        self._lead_us = 0
+        board.millisecond = self._millisecond
+
+    def idle(self):
+        """Until the next interrupt or the next millisecond; in real time where nothing moves."""
+        board = self._board
+        board.run_until(board.next_ms, wake=True)
+
+    def _millisecond(self):
+        self._serial.pump()
+        if self._serial.ended:
+            raise PowerOff
+        if self._board.interrupted:
+            self._board.interrupted = False
+            raise KeyboardInterrupt
+        if not self._board.moving(_HORIZON_TICKS):
+            self._nap()
+        elif self._speed:
+            self._keep_pace()
+
+    def _elapsed_us(self):
+        now = self._ticks_us()
+        elapsed = self._ticks_diff(now, self._last_us)
+        self._last_us = now
+        return elapsed
+
+    def _nap(self):
+        """Nothing moves: sleep until input comes, and let as much virtual time pass as that took."""
+        if not self._serial.received and not self._serial.sending:
+            self._serial.wait(_NAP_MS)
+            self._serial.pump()
+        slept_ms = min(self._elapsed_us() // 1000, 10 * _NAP_MS)
+        board = self._board
+        if slept_ms > 1:
+            board.next_ms = board.now + 10 * _NAP_MS * TICKS_PER_MS
+            board.run_until(board.now + (slept_ms - 1) * TICKS_PER_MS)
+            board.next_ms = (board.now // TICKS_PER_MS + 1) * TICKS_PER_MS
+
+    def _keep_pace(self):
+        """Moving in real time: sleep while virtual time is ahead."""
+        self._lead_us = max(self._lead_us + 1000 / self._speed - self._elapsed_us(), -20000)
+        if self._lead_us > 1000:
+            self._serial.wait(int(self._lead_us) // 1000)
+
+    def sleep_us(self, us):
+        """The program waits."""
+        target = self._board.now + us * TICKS_PER_US
+        while self._board.now < target:
+            self._board.run_until(min(target, self._board.next_ms))
+
+    def milliseconds(self):
+        """Milliseconds since power-up, modulo 2**30."""
+        self._board.spend(2 * TICKS_PER_US)
+        return self._board.now // TICKS_PER_MS & 0x3FFFFFFF
+
+    def microseconds(self):
+        """Microseconds since power-up, modulo 2**30."""
+        self._board.spend(2 * TICKS_PER_US)
+        return self._board.now // TICKS_PER_US & 0x3FFFFFFF

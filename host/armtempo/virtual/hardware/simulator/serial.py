@@ -1,0 +1,176 @@
+"""The USB serial port: ``pyb.USB_VCP`` with the firmware's buffers, on this process's stdin and stdout.
+
+The launcher makes both the master end of a pseudo terminal. Buffers and their habits are the firmware's
+(usbd_cdc_interface.c): 1024 bytes each way, input beyond that lost unless RTS flow control holds the host back.
+"""
+
+import select
+
+from simulator import the
+from simulator.board import CALL_TICKS
+
+BUFFER = 1024
+_POLLIN = 1
+_POLLHUP = 16
+_CTRL_C = 3
+
+
+class Serial:
+    """The line behind the port. ``attached``: the REPL has it, Ctrl-C interrupts."""
+
+    def __init__(self):
+        self._in = open(0, "rb", buffering=0)
+        self._out = open(1, "wb", buffering=0)
+        self._poll = select.poll()
+        self._poll.register(self._in, _POLLIN)
+        self._chunk = bytearray(512)
+        self.received = bytearray()
+        self.sending = bytearray()
+        self.rts = False
+        self.cts = False
+        self.attached = True
+        self.interrupt_char = _CTRL_C
+        self.lost = 0
+        self.ended = False
+
+    def reset(self):
+        """The board was reset: what was under way is lost."""
+        self.received = bytearray()
+        self.sending = bytearray()
+        self.rts = self.cts = False
+        self.attached = True
+        self.interrupt_char = _CTRL_C
+
+    def wait(self, ms):
+        """Wait in real time for input, at most so long; True where there is some."""
+        return bool(self._poll.poll(ms))
+
+    def pump(self):
+        """Move bytes between the buffers and the host."""
+        if self.sending:
+            written = self._out.write(self.sending)
+            if written:
+                self.sending = self.sending[written:]
+        while not self.ended:
+            room = BUFFER - 1 - len(self.received)
+            if self.rts and room < 65:
+                return
+            try:
+                count = self._in.readinto(self._chunk)
+            except OSError:  # the other end of the pseudo terminal has gone
+                count = 0
+            if not count:
+                self.ended = count == 0
+                return
+            self._take(self._chunk[:count], room)
+            if count < len(self._chunk):
+                return
+
+    def _take(self, data, room):
+        if self.attached and self.interrupt_char >= 0:
+            found = data.find(bytes((self.interrupt_char,)))
+            if found >= 0:
+                data = data[:found] + data[found + 1 :]
+                the.board.interrupted = True
+        if self.rts:
+            self.received.extend(data)
+            return
+        self.received.extend(data[:room])
+        self.lost += max(0, len(data) - room)
+
+    def put(self, data):
+        """Queue bytes for the host; how many there was room for."""
+        count = min(len(data), BUFFER - len(self.sending))
+        self.sending.extend(memoryview(data)[:count])
+        return count
+
+    def take(self, count):
+        """Up to so many received bytes."""
+        data = bytes(self.received[:count])
+        self.received = self.received[count:]
+        return data
+
+
+class USB_VCP:
+    """The firmware's virtual serial port object."""
+
+    RTS, CTS, IRQ_RX = 1, 2, 1
+
+    def __init__(self, id=0):
+        self._line = the.serial
+
+    def init(self, flow=-1):
+        """Set flow control: RTS holds the host back, CTS makes ``write`` write only what fits."""
+        if flow >= 0:
+            self._line.rts = bool(flow & self.RTS)
+            self._line.cts = bool(flow & self.CTS)
+
+    def setinterrupt(self, char):
+        """Which byte interrupts the program while the REPL has the port; -1 none."""
+        self._line.interrupt_char = char
+
+    def isconnected(self):
+        """Whether a host has opened the port."""
+        the.board.spend(CALL_TICKS)
+        return not the.settings.get("cable_out", False)
+
+    def any(self):
+        """Whether bytes wait."""
+        the.board.spend(CALL_TICKS)
+        return bool(self._line.received)
+
+    def recv(self, data, timeout=5000):
+        """Receive into a buffer, or so many bytes; the time-out is per byte, in ms."""
+        wanted = data if isinstance(data, int) else len(data)
+        waited = 0
+        while len(self._line.received) < wanted and waited < timeout:
+            before = len(self._line.received)
+            the.pace.idle()
+            waited = waited + 1 if len(self._line.received) == before else 0
+        the.board.spend(CALL_TICKS)
+        got = self._line.take(wanted)
+        if isinstance(data, int):
+            return got
+        data[: len(got)] = got
+        return len(got)
+
+    def send(self, data, timeout=5000):
+        """Send a buffer (or one byte); how many bytes went. The time-out is per byte, in ms."""
+        if isinstance(data, int):
+            data = bytes((data,))
+        sent = self._line.put(data)
+        waited = 0
+        while sent < len(data) and waited < timeout:
+            the.pace.idle()
+            more = self._line.put(memoryview(data)[sent:])
+            sent += more
+            waited = 0 if more else waited + 1
+        the.board.spend(CALL_TICKS)
+        return sent
+
+    def read(self, size=-1):
+        """What is there, up to ``size``; None where nothing is."""
+        if not self._line.received:
+            the.board.spend(CALL_TICKS)
+            return None
+        return self.recv(len(self._line.received) if size < 0 else min(size, len(self._line.received)), timeout=0)
+
+    def readinto(self, buffer, size=None):
+        """What is there, into a buffer; None where nothing is."""
+        got = self.read(len(buffer) if size is None else size)
+        if got is None:
+            return None
+        buffer[: len(got)] = got
+        return len(got)
+
+    def write(self, data, start=0, size=None):
+        """With CTS flow control: what fits at once, None where nothing does. Without: waits, then drops."""
+        if size is not None:
+            data = memoryview(data)[start : start + size]
+        if self._line.cts:
+            return self.send(data, timeout=0) or None
+        self.send(data, timeout=500)
+        return len(data)
+
+    def close(self):
+        """Nothing to do."""
