@@ -34,7 +34,7 @@ COMMANDS = (
     "ports",
     "monitor",
 )
-"""In the order of the help page. Each is ``command`` in the module of its name ('-' as '_'; a keyword has '_' behind it)."""
+"""In the order of the help page. Each is ``command`` in its module: '-' as '_', a keyword with '_' behind."""
 
 INTERRUPTED = 130
 
