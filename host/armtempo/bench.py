@@ -110,9 +110,5 @@ def solve(problem: Problem, case: Case) -> Run:
 def execute(problem: Problem, todo: Iterable[Case], executor: Executor) -> Iterator[Run]:
     """Runs the cases on the executor's workers, and yields each run as it comes."""
     futures = [executor.submit(solve, problem, case) for case in todo]
-    try:
-        for future in as_completed(futures):
-            yield future.result()
-    finally:
-        for future in futures:
-            future.cancel()
+    for future in as_completed(futures):
+        yield future.result()

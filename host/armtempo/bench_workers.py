@@ -29,7 +29,6 @@ def local(workers: int | None = None) -> Iterator[Executor]:
         with _one_thread_each():
             yield executor
     except BaseException:
-        executor.shutdown(wait=False, cancel_futures=True)
         for process in set(multiprocessing.active_children()) - before:
             process.terminate()
         raise
