@@ -32,6 +32,7 @@ COMMANDS = (
     "remove",
     "rename",
     "ports",
+    "virtual-board",
     "monitor",
 )
 """In the order of the help page. Each is ``command`` in its module: '-' as '_', a keyword with '_' behind."""

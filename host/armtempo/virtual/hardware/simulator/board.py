@@ -48,6 +48,8 @@ class Board:
         self.api = {}
         self.extints = {}
         self.worlds = []
+        self.lost_ticks = 0
+        self.crash = False
         self.watchdog_ticks = 0
         self.watchdog_deadline = None
         self.millisecond = None
@@ -114,6 +116,23 @@ class Board:
 
     def run_until(self, target, wake=False):
         """Let time pass to ``target``; with ``wake``, at most until an interrupt has been served."""
+        self._pass(target, wake)
+        if not self.serving:
+            self._between()
+
+    def _between(self):
+        """What comes to the main program between two of its steps: faults, the millisecond."""
+        if self.lost_ticks:
+            lost, self.lost_ticks = self.lost_ticks, 0
+            self._pass(self.now + lost, False)
+        if self.crash:
+            self.crash = False
+            raise RuntimeError("injected crash")
+        if self.now >= self.next_ms and self.millisecond:
+            self.next_ms = (self.now // TICKS_PER_MS + 1) * TICKS_PER_MS
+            self.millisecond()
+
+    def _pass(self, target, wake):
         self.sync()
         self.woken = False
         self._serve()
@@ -125,9 +144,6 @@ class Board:
             self._serve()
         if target > self.now and not (wake and self.woken):
             self._run(target)
-        if self.now >= self.next_ms and self.millisecond and not self.serving:
-            self.next_ms = (self.now // TICKS_PER_MS + 1) * TICKS_PER_MS
-            self.millisecond()
 
     def stand_still(self, ticks):
         """The processor cannot do anything for so long, not even serve interrupts."""

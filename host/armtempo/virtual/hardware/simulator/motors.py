@@ -6,11 +6,12 @@ from simulator import gpio
 class Motor:
     """One joint's motor and encoder.
 
-    ``direction``: the line of its DIR; ``encoder``: the timer that counts it, or None; ``joint``:
+    ``step``, ``direction``: its lines; ``encoder``: the timer that counts it, or None; ``joint``:
     ``dir_inverted``, ``encoder_inverted``, ``counts_num``, ``counts_den`` as in the arm record.
     """
 
-    def __init__(self, direction, enable, encoder, joint):
+    def __init__(self, step, direction, enable, encoder, joint):
+        self._step = step
         self._dir = direction
         self._enable = enable
         self._inverted = joint["dir_inverted"]
@@ -20,17 +21,28 @@ class Motor:
         self._moved = False
         self._counts = self._at(0)
         self.position = 0
+        self.blocked = False
+        step.sinks.append(self)
+
+    def disconnect(self):
+        """Take it off the pins."""
+        self._step.sinks.remove(self)
 
     def _at(self, position):
         return (2 * position * self._num + self._den) // (2 * self._den)
 
     def edges(self, line, before, count, times, origin):
         """STEP toggled; rising edges step."""
-        if self._enable.on():
+        if self._enable.on() and not self.blocked:
             steps = (count + 1 - before) // 2
             forward = self._dir.level ^ self._inverted
             self.position += steps if forward else -steps
             self._moved = True
+
+    def slip(self, counts):
+        """The encoder's coupling slips by so many counts."""
+        self._counts -= counts
+        self._moved = True
 
     def follow(self):
         """Turn the encoder to where the motor stands."""
@@ -55,11 +67,36 @@ class Enable:
 
 
 class Arm:
-    """All motors; a world for the board."""
+    """All motors, as the arm record in the flash has them; a world for the board."""
 
-    def __init__(self, board, motors):
-        self.motors = motors
+    def __init__(self, board, pins, record):
+        self._board = board
+        self._pins = pins
+        self._record = record
+        self._known = None
+        self.motors = []
         board.worlds.append(self)
+        self._connect()
+
+    def _connect(self):
+        """Put motors on the pins if the record has changed."""
+        found = self._record()
+        if found == self._known:
+            return
+        self._known = found
+        for motor in self.motors:
+            motor.disconnect()
+        enable_high, joints = found or (False, ())
+        enable = Enable(self._board, self._pins.ENABLE, enable_high)
+        self.motors = [self._motor(joint, enable) for joint in joints]
+
+    def _motor(self, joint, enable):
+        lines, pins = self._board.pins, self._pins
+        step, direction = pins.STEP[joint["channel"]][0], pins.STEP[joint["channel"]][6]
+        encoder = None
+        if joint["encoder"] < len(pins.ENCODER):
+            encoder = self._board.timers[pins.ENCODER[joint["encoder"]][0]]
+        return Motor(lines.line(step), lines.line(direction), enable, encoder, joint)
 
     def passed(self, now):
         """Time has passed."""
@@ -67,7 +104,9 @@ class Arm:
             motor.follow()
 
     def counting(self, timer, now):
-        """A timer started or stopped: nothing to do."""
+        """A motion may begin."""
+        if timer.running:
+            self._connect()
 
     def input_changed(self, line, level, now):
         """An input changed: nothing to do."""

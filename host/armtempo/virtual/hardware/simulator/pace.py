@@ -6,6 +6,7 @@ that multiple of real time. While nothing moves it keeps to real time, asleep un
 
 import time
 
+from simulator import the
 from simulator.board import TICKS_PER_MS, TICKS_PER_US
 from simulator.reset import PowerOff
 
@@ -55,6 +56,8 @@ class Pace:
             self._serial.wait(_NAP_MS)
             self._serial.pump()
         slept_ms = min(self._elapsed_us() // 1000, 10 * _NAP_MS)
+        if the.edges:
+            the.edges.flush()
         board = self._board
         if slept_ms > 1:
             board.next_ms = board.now + 10 * _NAP_MS * TICKS_PER_MS

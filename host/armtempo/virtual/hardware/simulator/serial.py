@@ -35,6 +35,7 @@ class Serial:
 
     def reset(self):
         """The board was reset: what was under way is lost."""
+        self.silent = False
         self.received = bytearray()
         self.sending = bytearray()
         self.rts = self.cts = False
@@ -47,6 +48,8 @@ class Serial:
 
     def pump(self):
         """Move bytes between the buffers and the host."""
+        if self.silent:
+            return
         if self.sending:
             written = self._out.write(self.sending)
             if written:

@@ -12,6 +12,8 @@ _POWER_ON = 1
 
 def run(options):
     """Run the board until the launcher goes."""
+    if options["up"]:
+        open(options["up"], "w").close()
     before = list(sys.modules)
     cause = _POWER_ON
     while True:
@@ -31,10 +33,12 @@ def run(options):
 
 
 def _program(options):
-    if options["arm"]:
+    try:
         from armtempo_board import pins
 
         setup.connect(pins)
+    except ImportError:  # nothing deployed yet
+        pass
     for name in ("boot.py", "main.py"):
         try:
             _execute(options, name)

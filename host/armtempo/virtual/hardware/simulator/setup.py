@@ -2,10 +2,11 @@
 
 from binascii import unhexlify
 
-from simulator import edgelog, flash, motors, pace, serial, the
+from simulator import edgelog, faults, flash, motors, pace, serial, the
 from simulator.board import TICKS_PER_MS, Board
 
 _POWER_ON = 1
+_ARM_RECORD = "/armtempo/arm.ata"
 
 
 def power_up(options, cause):
@@ -21,6 +22,7 @@ def power_up(options, cause):
     the.port = serial.USB_VCP()
     cut_at = options["power_cut_at"] if cause == _POWER_ON else 0
     the.flash = flash.Flash(options["flash"], options["program"], _stall, cut_at)
+    faults.Faults(board, options["faults"])
     if options["edge_log"]:
         if the.edges is None:
             the.edges = edgelog.EdgeLog(options["edge_log"])
@@ -29,20 +31,22 @@ def power_up(options, cause):
 
 def connect(pins):
     """Put motors and encoders on the pins; ``pins`` is the board program's own table."""
+    the.arm = motors.Arm(the.board, pins, _arm_record)
+
+
+def _arm_record():
+    """(ENABLE active high, joints) of the arm that the options or the record in the flash describe, or None."""
     arm = the.options["arm"]
-    if not arm:
-        return
-    board = the.board
-    enable = motors.Enable(board, pins.ENABLE, arm["enable_high"])
-    joints = []
-    for joint in arm["joints"]:
-        step, direction = pins.STEP[joint["channel"]][0], pins.STEP[joint["channel"]][6]
-        timer = pins.ENCODER[joint["encoder"]][0] if joint["encoder"] < len(pins.ENCODER) else None
-        encoder = board.timers[timer] if timer else None
-        motor = motors.Motor(board.pins.line(direction), enable, encoder, joint)
-        board.pins.line(step).sinks.append(motor)
-        joints.append(motor)
-    the.arm = motors.Arm(board, joints)
+    if arm:
+        return arm["enable_high"], arm["joints"]
+    from armtempo_shared import armrecord
+
+    try:
+        with flash.real_open(the.options["flash"] + _ARM_RECORD, "rb") as file:
+            head, joints, _ = armrecord.unpack(file.read())
+    except (OSError, ValueError):
+        return None
+    return bool(head["flags"] & armrecord.FLAG_ENABLE_HIGH), joints
 
 
 def _stall(ms):

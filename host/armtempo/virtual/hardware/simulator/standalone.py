@@ -21,6 +21,7 @@ DEFAULTS = {
     "power_cut_at": 0,
     "turn_us": 500,
     "arm": None,
+    "faults": [],
 }
 
 

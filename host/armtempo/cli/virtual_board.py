@@ -1,0 +1,42 @@
+"""``armtempo virtual-board``: a virtual board for other programs to open."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import click
+
+from armtempo.errors import LinkError
+
+_LOOK_S = 0.5
+
+
+@click.command()
+@click.option("--flash", type=click.Path(file_okay=False, path_type=Path),
+              help="Folder that is the board's flash; made if missing. Default: one that goes with the board.")  # fmt: skip
+@click.option("--real-time", is_flag=True, help="Run motions in real time instead of as fast as possible.")
+@click.option("--edge-log", type=click.Path(dir_okay=False, path_type=Path),
+              help="Write every pin edge with its time to this file.")  # fmt: skip
+@click.option("--interpreter", help="MicroPython or Python to run it.  [default: micropython where there is one]")
+@click.option("--deployed", is_flag=True,
+              help="Run what is in the flash ('armtempo deploy' puts it there), not the installed program.")  # fmt: skip
+@click.option("--seed", default=0, show_default=True, help="Tells one board from another.")
+def command(
+    flash: Path | None, real_time: bool, edge_log: Path | None, interpreter: str | None, deployed: bool, seed: int
+) -> None:
+    """Start a virtual board, print its port, and run it until Ctrl-C.
+
+    The port can be opened like a serial device, by armtempo (--port) and by any other program.
+    """
+    from armtempo.virtual import launch
+
+    with launch(
+        flash, virtual_time=not real_time, edge_log=edge_log, interpreter=interpreter, seed=seed,
+        deployed=deployed,
+    ) as board:  # fmt: skip
+        click.echo(board.port)
+        while board.running():
+            time.sleep(_LOOK_S)
+        tail = board.log().strip().splitlines()[-1:]
+        raise LinkError(f"the virtual board ended: {' '.join(tail) or 'it says nothing'}")

@@ -1,0 +1,80 @@
+"""Things that go wrong at a given time of a motion, as the options ask for."""
+
+from simulator import inputs, the
+from simulator.board import TICKS_PER_MS
+
+_TICK_HZ = 84_000_000
+_HALF = 1 << 31
+
+
+class Faults:
+    """A world that waits for motions (TIM2 starting) and plants each fault at its time."""
+
+    def __init__(self, board, faults):
+        self._board = board
+        self._faults = faults
+        self._run = 0
+        board.worlds.append(self)
+
+    def counting(self, timer, now):
+        """A timer started or stopped."""
+        if timer.number != 2 or not timer.running or timer.count(0) < _HALF:
+            return  # motions are started a little before the counter comes round to 0
+        self._run += 1
+        zero = now + timer.modulus - timer.count(0)
+        for fault in self._faults:
+            if fault["run"] == self._run:
+                self._plant(zero + int(fault["at_s"] * _TICK_HZ), fault)
+
+    def _plant(self, tick, fault):
+        self._board.at(tick, lambda: _KINDS[fault["kind"]](self._board, fault))
+
+    def passed(self, now):
+        """Nothing to do as time passes."""
+
+    def input_changed(self, line, level, now):
+        """Nothing to do."""
+
+
+def _stall(board, fault):
+    board.lost_ticks += int(fault["ms"] * TICKS_PER_MS)
+
+
+def _input(board, fault):
+    inputs.set_level(fault["name"], fault["level"])
+
+
+def _block(board, fault):
+    the.arm.motors[fault["joint"]].blocked = True
+
+
+def _slip(board, fault):
+    the.arm.motors[fault["joint"]].slip(fault["counts"])
+
+
+def _silence(board, fault):
+    the.serial.silent = True
+    board.at(board.now + int(fault["ms"] * TICKS_PER_MS), _speak)
+
+
+def _speak():
+    the.serial.silent = False
+
+
+def _hang(board, fault):
+    board.lost_ticks = 1 << 50
+
+
+def _crash(board, fault):
+    board.crash = True
+
+
+_KINDS = {
+    "stall": _stall,
+    "input": _input,
+    "block": _block,
+    "slip": _slip,
+    "silence": _silence,
+    "hang": _hang,
+    "crash": _crash,
+}

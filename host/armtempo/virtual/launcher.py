@@ -1,0 +1,187 @@
+"""Starts a virtual board as a process of its own and gives it a serial port."""
+
+from __future__ import annotations
+
+import os
+import pty
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import tty
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+
+from armtempo.arm import Arm
+from armtempo.errors import LinkError
+from armtempo.virtual.options import Fault, Options, unique_id
+
+INTERPRETER_VARIABLE = "ARMTEMPO_MICROPYTHON"
+_MAIN = Path(__file__).with_name("main.py")
+_HEAP = "4M"
+_START_S = 60.0
+_STOP_S = 1.0
+
+
+class VirtualBoard:
+    """A running virtual board; ends with its context, or by ``stop``.
+
+    ``port`` can be opened like a serial device, again and again, until then.
+    """
+
+    def __init__(self, command: list[str], folder: Path, flash: Path) -> None:
+        self.flash_dir = flash
+        self.log_path = folder / "board.log"
+        self._folder = folder
+        master, self._slave = pty.openpty()
+        try:
+            tty.setraw(self._slave)
+            os.set_blocking(master, False)
+            self.port = os.ttyname(self._slave)
+            with self.log_path.open("wb") as log:
+                # in a session of its own: a Ctrl-C in the terminal is the launcher's to act on
+                self._process = subprocess.Popen(
+                    command, stdin=master, stdout=master, stderr=log, cwd=flash, start_new_session=True
+                )
+        except OSError as error:
+            os.close(self._slave)
+            raise LinkError(f"the virtual board's interpreter {command[0]} does not start: {error}") from None
+        finally:
+            os.close(master)
+
+    @property
+    def pid(self) -> int:
+        """Process id."""
+        return self._process.pid
+
+    def running(self) -> bool:
+        """Whether the process lives."""
+        return self._process.poll() is None
+
+    def log(self) -> str:
+        """What the board program wrote to its error output."""
+        return self.log_path.read_text(errors="replace")
+
+    def wait_until_up(self) -> None:
+        """Wait until the board program is about to start; LinkError where the process ends instead."""
+        limit = time.monotonic() + _START_S
+        while not (self._folder / "up").exists():
+            if not self.running() or time.monotonic() > limit:
+                tail = self.log().strip().splitlines()[-1:] or ["it says nothing"]
+                raise LinkError(f"the virtual board did not start: {tail[0]}")
+            time.sleep(0.005)
+
+    def stop(self) -> None:
+        """End it as by pulling the plug, gently: the edge log is complete. Nothing happens the second time."""
+        if self._slave < 0:
+            return
+        os.close(self._slave)
+        self._slave = -1
+        for end in (None, self._process.terminate, self._process.kill):  # it ends when the port's last user goes
+            if end:
+                end()
+            try:
+                self._process.wait(_STOP_S)
+                return
+            except subprocess.TimeoutExpired:
+                continue
+
+    def kill(self) -> None:
+        """End it at once."""
+        self._process.kill()
+        self.stop()
+
+    def __enter__(self) -> VirtualBoard:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+
+def launch(
+    flash_dir: Path | str | None = None,
+    virtual_time: bool = True,
+    edge_log: Path | str | None = None,
+    interpreter: Path | str | None = None,
+    arm: Arm | None = None,
+    seed: int = 0,
+    faults: Sequence[Fault] = (),
+    power_cut_at: int = 0,
+    deployed: bool = False,
+) -> VirtualBoard:
+    """Start a virtual board; use it as a context manager.
+
+    ``flash_dir``: the folder that is its flash and lasts; None: a new one that goes with the board.
+    ``virtual_time``: motions run as fast as they can; else in real time. ``edge_log``: file for every pin
+    edge. ``interpreter``: MicroPython or CPython; None: $ARMTEMPO_MICROPYTHON, ``micropython`` on PATH, or
+    this Python. ``arm``: gets motors with its ``model``; None: ideal motors for whatever arm the board is set
+    up for. ``deployed``: run the program in the flash (``armtempo deploy`` puts it there) instead of the
+    installed one. Raises LinkError where it does not start.
+    """
+    folder = Path(tempfile.mkdtemp(prefix="armtempo-virtual-"))
+    flash = Path(flash_dir).resolve() if flash_dir else folder / "flash"
+    try:
+        flash.mkdir(parents=True, exist_ok=True)
+        options = Options(
+            flash=str(flash),
+            program=[] if deployed else program_folders(),
+            speed=0.0 if virtual_time else 1.0,
+            edge_log=str(Path(edge_log).resolve()) if edge_log else None,
+            unique_id=unique_id(seed),
+            power_cut_at=power_cut_at,
+            seed=seed,
+            faults=list(faults),
+            up=str(folder / "up"),
+        )
+        options.write(folder / "options.json")
+        board = VirtualBoard(_command(interpreter, folder / "options.json"), folder, flash)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    try:
+        board.wait_until_up()
+    except BaseException:
+        board.__exit__(None, None, None)
+        raise
+    return board
+
+
+def program_folders() -> list[str]:
+    """The folders that hold the installed packages ``armtempo_board`` and ``armtempo_shared``."""
+    import armtempo_shared
+
+    shared = Path(armtempo_shared.__file__).resolve().parent.parent
+    beside = shared.parent / "board"  # in a checkout; in site-packages all stand together
+    board = beside if (beside / "armtempo_board").is_dir() else shared
+    return [str(folder) for folder in dict.fromkeys((board, shared))]
+
+
+def find_interpreter() -> str:
+    """$ARMTEMPO_MICROPYTHON, ``micropython`` on PATH, or this Python."""
+    return os.environ.get(INTERPRETER_VARIABLE) or shutil.which("micropython") or sys.executable
+
+
+def _command(interpreter: Path | str | None, options: Path) -> list[str]:
+    chosen = str(interpreter or find_interpreter())
+    if chosen == sys.executable or not is_micropython(chosen):
+        flags = ["-I", "-B"]
+    else:
+        flags = ["-X", f"heapsize={_HEAP}"]
+    return [chosen, *flags, str(_MAIN), str(options)]
+
+
+def is_micropython(interpreter: str) -> bool:
+    """Whether the interpreter is MicroPython; LinkError where it does not run."""
+    question = "import sys; print(sys.implementation.name)"
+    try:
+        answer = subprocess.run([interpreter, "-c", question], capture_output=True, text=True, timeout=_START_S)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise LinkError(f"the virtual board's interpreter {interpreter} does not run: {error}") from None
+    if answer.returncode:
+        raise LinkError(f"the virtual board's interpreter {interpreter} does not run: {answer.stderr.strip()}")
+    return answer.stdout.strip() == "micropython"
