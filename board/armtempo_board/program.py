@@ -71,7 +71,7 @@ def _replay_default():
 def _detach(port):
     os.dupterm(None, 1)
     micropython.kbd_intr(-1)
-    port.init(flow=pyb.USB_VCP.RTS)
+    port.init(flow=pyb.USB_VCP.RTS | pyb.USB_VCP.CTS)  # without CTS a write waits for the host
 
 
 def _attach(port):

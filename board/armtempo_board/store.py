@@ -124,15 +124,11 @@ class Store:
         name = self._target
         try:
             self._close()
-            data = self._read(name + _NEW)
-            if int.from_bytes(data[-4:], "little") != crc or crc32(memoryview(data)[:-4]) != crc:
-                raise Refused(codes.BAD_CHECKSUM)
-            if not _whole(name, data):
-                raise Refused(codes.BAD_RECORD)
-            self._replace(name)
+            self._check(name, crc)
         except Refused:
             self._discard(name + _NEW)
             raise
+        self._replace(name)
         return name
 
     def abandon(self):
@@ -251,8 +247,19 @@ class Store:
         self._guard(file.close)
         self._guard(_sync)
 
+    def _check(self, name, crc):
+        data = self._read(name + _NEW)
+        if int.from_bytes(data[-4:], "little") != crc or crc32(memoryview(data)[:-4]) != crc:
+            raise Refused(codes.BAD_CHECKSUM)
+        if not _whole(name, data):
+            raise Refused(codes.BAD_RECORD)
+
     def _replace(self, name):
-        self._guard(os.rename, self._path(name + _NEW), self._path(name))
+        try:
+            self._guard(os.rename, self._path(name + _NEW), self._path(name))
+        except Refused:
+            self._recover(name)  # FAT may have removed the old one already
+            raise
         self._guard(_sync)
 
     def _discard(self, file_name):
@@ -262,16 +269,17 @@ class Store:
             pass
 
     def _recover(self, name):
-        if name in self._files():
-            self._discard(name + _NEW)
-            return
         try:
-            if _whole(name, self._read(name + _NEW)):
-                self._replace(name)
-                return
+            whole = name not in self._files() and _whole(name, self._read(name + _NEW))
         except Refused:
-            pass
-        self._discard(name + _NEW)
+            whole = False
+        if not whole:
+            return self._discard(name + _NEW)
+        try:
+            os.rename(self._path(name + _NEW), self._path(name))
+            return _sync()
+        except OSError:
+            return None  # the next start tries again
 
     def _guard(self, function, *arguments):
         try:

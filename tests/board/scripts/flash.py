@@ -1,0 +1,108 @@
+"""A flash in memory that loses power, fails or is full at the n-th change, to put under the store.
+
+Like FAT: a file that was open when the power went is empty afterwards; renaming over an existing file first
+removes that one. A cut leaves the change it hits undone.
+"""
+
+ENOENT, EIO, ENOSPC = 2, 5, 28
+
+
+class PowerCut(BaseException):
+    """The power fails now."""
+
+
+class Flash:
+    """Takes the place of ``os`` and ``open`` in the store module; ``error`` None cuts the power at ``fail_at``."""
+
+    def __init__(self):
+        self.files = {}
+        self.opened = []
+        self.changes = 0
+        self.fail_at = 0
+        self.error = None
+        self.free = 1 << 20
+
+    def change(self):
+        """Count a change; fail where the test wants it."""
+        self.changes += 1
+        if self.changes == self.fail_at:
+            if self.error is None:
+                raise PowerCut
+            raise OSError(self.error)
+
+    def power_up(self):
+        """After a cut: what was being written is empty."""
+        for name in self.opened:
+            self.files[name] = b""
+        self.opened = []
+        self.fail_at = 0
+
+    # os
+
+    def mkdir(self, path):
+        pass
+
+    def listdir(self, path):
+        return [name[len(path) + 1 :] for name in self.files]
+
+    def stat(self, path):
+        if path not in self.files:
+            raise OSError(ENOENT)
+        return (0, 0, 0, 0, 0, 0, len(self.files[path]))
+
+    def statvfs(self, path):
+        return (1, 1, self.free, self.free, 0)
+
+    def remove(self, path):
+        self.stat(path)
+        self.change()
+        del self.files[path]
+
+    def rename(self, old, new):
+        self.stat(old)
+        if new in self.files:
+            self.remove(new)
+        self.change()
+        self.files[new] = self.files.pop(old)
+
+    def sync(self):
+        self.change()
+
+    # open
+
+    def open(self, path, mode):
+        if "w" in mode:
+            self.change()
+            self.files[path] = b""
+            self.opened.append(path)
+        elif path not in self.files:
+            raise OSError(ENOENT)
+        return File(self, path, "w" in mode)
+
+
+class File:
+    def __init__(self, flash, path, writing):
+        self.flash = flash
+        self.path = path
+        self.writing = writing
+        self.at = 0
+
+    def write(self, data):
+        self.flash.change()
+        self.flash.files[self.path] += bytes(data)
+        return len(data)
+
+    def read(self, count=-1):
+        data = self.flash.files[self.path][self.at :]
+        data = data if count < 0 else data[:count]
+        self.at += len(data)
+        return data
+
+    def seek(self, at):
+        self.at = at
+
+    def close(self):
+        if self.writing and self.path in self.flash.opened:
+            self.flash.change()
+            self.flash.opened.remove(self.path)
+            self.writing = False

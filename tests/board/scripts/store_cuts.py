@@ -1,0 +1,132 @@
+"""Cuts the power, fails or fills the flash at every single change of every operation of the store.
+
+Prints per operation how many changes it makes and what is stored after a cut at each: o the old, n the new.
+"""
+
+import flash
+import stand_in
+
+stand_in.install()
+
+from armtempo_board import store  # noqa: E402
+from armtempo_board.refusal import Refused  # noqa: E402
+from armtempo_shared import codes, wire  # noqa: E402
+
+ARM = stand_in.arm()
+OLD = stand_in.record(ARM, segments=3)
+NEW = stand_in.record(ARM, segments=4)
+NEW_ARM = stand_in.arm(joints=3)
+
+
+def put(place, file_name, data):
+    place.begin(file_name, len(data))
+    for at in range(0, len(data), 100):
+        place.write(at, data[at : at + 100])
+    place.commit(wire.record_crc(data))
+
+
+OPERATIONS = (
+    ("put a new one", lambda place: put(place, "other.atm", NEW)),
+    ("put over an old one", lambda place: put(place, "feed.atm", NEW)),
+    ("put the arm record", lambda place: put(place, "arm.ata", NEW_ARM)),
+    ("remove", lambda place: place.remove("feed")),
+    ("rename the default", lambda place: place.rename("feed", "food")),
+    ("rename another", lambda place: place.rename("spare", "food")),
+    ("set the default", lambda place: place.set_default("spare")),
+    ("no default", lambda place: place.set_default("")),
+)
+
+
+def fresh():
+    chip = flash.Flash()
+    store.os = chip
+    store.open = chip.open
+    place = store.Store("/flash/armtempo")
+    put(place, "feed.atm", OLD)
+    put(place, "spare.atm", OLD)
+    put(place, "arm.ata", ARM)
+    place.set_default("feed")
+    chip.changes = 0
+    return chip, place
+
+
+def content(place):
+    """All that the store holds; every record must be whole."""
+    found = [place.default(), wire.record_crc(place.read(store.ARM))]
+    for name in place.names():
+        data = place.read(name + store.MOTION)
+        assert data in (OLD, NEW), name
+        found.append((name, data == NEW))
+    return found
+
+
+def letter(found, before, after):
+    if found == after:
+        return "n"
+    assert found == before, (found, before, after)
+    return "o"
+
+
+def run(title, operation):
+    chip, place = fresh()
+    before = content(place)
+    operation(place)
+    changes = chip.changes
+    after = content(place)
+    assert before != after
+    for error, word in ((None, "cut"), (flash.EIO, "error"), (flash.ENOSPC, "full")):
+        letters = ""
+        for fail_at in range(1, changes + 1):
+            place = after_failure(operation, fail_at, error)
+            letters += letter(content(place), before, after)
+            again(operation, place, after)
+        print(title, word, letters)
+
+
+def after_failure(operation, fail_at, error):
+    """The store when the operation failed at that change; after a power cut, started again."""
+    chip, place = fresh()
+    chip.fail_at = fail_at
+    chip.error = error
+    refused = attempt(operation, place, error)
+    if error is None:
+        return restarted(chip)
+    assert refused == (codes.FLASH_FULL if error == flash.ENOSPC else codes.FLASH_ERROR), refused
+    return place
+
+
+def restarted(chip):
+    """A store on the flash as a cut left it, whose start was itself cut short at every change there is."""
+    for fail_at in range(1, 10):
+        chip.power_up()
+        chip.changes = 0
+        chip.fail_at = fail_at
+        try:
+            place = store.Store("/flash/armtempo")
+            break
+        except flash.PowerCut:
+            pass
+    chip.fail_at = 0
+    assert not [name for name in chip.files if name.endswith(".new")], chip.files
+    return place
+
+
+def attempt(operation, place, error):
+    try:
+        operation(place)
+    except flash.PowerCut:
+        assert error is None
+    except Refused as refusal:
+        return refusal.code
+    return 0
+
+
+def again(operation, place, after):
+    """What was cut short can be done again."""
+    if content(place) != after:
+        operation(place)
+    assert content(place) == after
+
+
+for title, operation in OPERATIONS:
+    run(title, operation)
