@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armtempo import analyse, page, plots, reach, runs, trajectory_file
-from armtempo.arm import Limits
+from armtempo.arm import Arm, Limits
 from armtempo.encode import counts_per_deg
 from armtempo.errors import RunFolderError
 from armtempo.plan import Plan
@@ -58,6 +58,11 @@ def evaluate(folder: Path) -> Evaluation:
     if not usable:
         raise RunFolderError(f"{folder}: holds no sample; run it again")
     return Evaluation(run, plan, analyse.curves(usable, plan.trajectory), tuple(complaints(run)))
+
+
+def resolutions_deg(arm: Arm) -> list[float]:
+    """Degrees per encoder count of the driven joints; NaN for one without an encoder."""
+    return [1.0 / counts_per_deg(joint) if joint.encoder else np.nan for joint in arm.driven]
 
 
 def complaints(run: runs.Run) -> list[str]:
@@ -111,11 +116,12 @@ def figures(found: Evaluation) -> dict[str, tuple[Figure, str]]:
             plots.motion(plan.trajectory, limits, names),
             "The planned motion and its limits (dashed).",
         ),
-        "convergence": (
-            plots.convergence({_serves(names, search.joints): search.history_s for search in plan.searches}),
-            "Best motion time with penalties after each iteration of the search.",
-        ),
     }
+    if plan.searches:
+        drawn["convergence"] = (
+            plots.convergence({_serves(names, search.joints): search.history_s for search in plan.searches}),
+            "Best fitness after each iteration of the search.",
+        )
     if len(plan.arm.joints) > 1:
         drawn["postures"] = (
             plots.postures(
@@ -183,7 +189,7 @@ def _result_tables(sheet: page.Page, found: Evaluation) -> None:
 
 def _limit_table(sheet: page.Page, found: Evaluation) -> None:
     arm = found.plan.arm
-    resolutions = [1.0 / counts_per_deg(joint) if joint.encoder else np.nan for joint in arm.driven]
+    resolutions = resolutions_deg(arm)
     rows: list[Sequence[object]] = []
     for name, checks in zip(
         found.names, analyse.limit_checks(found.curves, found.limits, resolutions), strict=True

@@ -17,6 +17,7 @@ COMMANDS = (
     "plan",
     "ik",
     "bench",
+    "paper",
     "upload",
     "run",
     "report",

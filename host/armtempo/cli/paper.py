@@ -1,0 +1,54 @@
+"""``armtempo paper``: the paper's tables and figures, repeated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from armtempo.cli.progress import Progress
+
+if TYPE_CHECKING:
+    from armtempo.paper.claims import Claim
+
+
+@click.command()
+@click.option("--quick", is_flag=True, help="Small populations, few seeds, two replays: under a minute.")
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=Path("paper"),
+    show_default=True,
+    metavar="FOLDER",
+    help="Where page, searches and run folders go; finished searches are not repeated.",
+)
+def command(quick: bool, out: Path) -> None:
+    """Repeat the paper: every number beside the printed one, on one page.
+
+    The replays run on the virtual board.
+    """
+    from armtempo.paper import experiment, motions, postures, searches, sheet
+    from armtempo.record import replace_text
+
+    made = motions.plans()
+    with Progress("searching") as progress:
+        searched = searches.run(made.arm, made.job, out / "searches", quick, progress)
+    with Progress("replaying") as progress:
+        series = experiment.run(made, out / "runs", quick, progress)
+    claims = [
+        *postures.claims(made.arm),
+        *motions.claims(made),
+        *searches.claims(searched),
+        *experiment.claims(series),
+    ]
+    for claim in claims:
+        click.echo(_line(claim))
+    target = out / "paper.html"
+    replace_text(target, sheet.render(claims, made, searched, series))
+    click.echo(f"written: {target}")
+
+
+def _line(claim: Claim) -> str:
+    line = f"{claim.where:<12} {claim.what:<62} {claim.printed:>14} {claim.found:>24}  {claim.verdict}"
+    return f"{line}: {claim.because}" if claim.because else line
