@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from armtempo import bench_plot, page, plots, reach, report
 from armtempo.bench_table import Row
 from armtempo.paper import motions
@@ -72,6 +74,6 @@ def _figures(
 
 def _postures(made: motions.Plans) -> Figure:
     plan = made.quintic
-    times = plots.np.linspace(0.0, plan.trajectory.duration_s, 300)
+    times = np.linspace(0.0, plan.trajectory.duration_s, 300)
     path = reach.tool_path_mm(made.arm, plan.trajectory, times)
     return plots.postures(reach.chains_mm(made.arm, plan.via_deg), path)
