@@ -14,7 +14,7 @@ from armtempo.arm import Arm
 from armtempo.errors import BoardError, LinkError
 from armtempo.interrupt import StopRequest
 from armtempo.link import Board
-from armtempo.link.board import Progress, record_crc
+from armtempo.link.board import Progress
 from armtempo.link.follow import CHECK_S, Follower, RunEnd
 from armtempo.link.messages import Sample
 from armtempo.link.session import refusal
@@ -45,7 +45,7 @@ def configure(board: Board, arm: Arm, replace: bool) -> None:
     """
     data = encode.arm_record(arm)
     assert board.info is not None  # greeted
-    if board.info.arm_crc == record_crc(data):
+    if board.info.arm_crc == wire.record_crc(data):
         return
     if board.info.arm_crc and not replace:
         raise LinkError(
@@ -58,7 +58,7 @@ def configure(board: Board, arm: Arm, replace: bool) -> None:
 
 def store(board: Board, name: str, data: bytes, progress: Progress | None = None) -> Stored:
     """Upload a motion record under ``name``, unless the board has just this one already."""
-    stored = Stored(name, record_crc(data))
+    stored = Stored(name, wire.record_crc(data))
     found = board.find(name)
     if found is None or found.crc != stored.crc:
         board.upload(name, data, progress)

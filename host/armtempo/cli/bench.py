@@ -92,7 +92,7 @@ def command(
     try:
         _run(problem, wanted, store, place)
     except KeyboardInterrupt:
-        done = sum(case in store.runs for case in wanted)
+        done = sum(case in Store(out, problem).runs for case in wanted)
         click.echo(
             f"armtempo: interrupted; {done} of {len(wanted)} runs are kept in {store.path}, "
             "and the same command goes on from there",

@@ -4,6 +4,6 @@
 """
 
 from armtempo.link.board import Board
-from armtempo.link.connect import open_board
+from armtempo.link.connect import greet, open_board
 
-__all__ = ["Board", "open_board"]
+__all__ = ["Board", "greet", "open_board"]

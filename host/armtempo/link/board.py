@@ -24,11 +24,6 @@ Progress = Callable[[float, float], None]
 """Called with what is done and the whole."""
 
 
-def record_crc(data: bytes) -> int:
-    """The checksum by which a record is known: its last four bytes."""
-    return int.from_bytes(data[-4:], "little")
-
-
 class Board:
     """A board at the other end of a session; methods raise BoardError where it refuses, LinkError where
     it is gone."""

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+
+from armtempo_shared.messages import SYNC
 
 from armtempo.errors import InputError
 from armtempo.link import diagnose, traffic
@@ -12,6 +15,9 @@ from armtempo.link.board import Board
 from armtempo.link.ports import SIM
 from armtempo.link.session import NoAnswer, Session
 from armtempo.link.transport import SerialTransport, Transport
+
+_NOISY_TRIES = 10
+"""Where something arrives that may be pieces of frames, ``hello`` is tried so often."""
 
 
 @contextmanager
@@ -30,14 +36,19 @@ def open_board(
         yield greet(transport)
 
 
-def greet(transport: Transport) -> Board:
+def greet(
+    transport: Transport, session_number: int | None = None, clock: Callable[[], float] = time.monotonic
+) -> Board:
     """A board that has answered ``hello``; LinkError, saying what is there instead, where none has."""
-    board = Board(Session(transport))
-    try:
-        board.hello()
-    except NoAnswer:
-        raise diagnose.explain(transport, bytes(board.session.recent)) from None
-    return board
+    board = Board(Session(transport, clock), session_number)
+    for _ in range(_NOISY_TRIES):
+        try:
+            board.hello()
+            return board
+        except NoAnswer:
+            if SYNC not in board.session.recent:
+                break
+    raise diagnose.explain(transport, bytes(board.session.recent))
 
 
 def _virtual_port(stack: ExitStack) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from armtempo_shared.messages import SYNC
+
 from armtempo.errors import LinkError
 from armtempo.link.transport import Transport
 
@@ -19,6 +21,11 @@ def explain(transport: Transport, heard: bytes) -> LinkError:
     if any(sign in heard for sign in _REPL_SIGNS):
         return LinkError(
             f"{where} runs MicroPython but not the armtempo program; install it with 'armtempo deploy'"
+        )
+    if SYNC in heard:
+        return LinkError(
+            f"{where} is hardly to be understood: pieces of armtempo's messages arrive, too few of them "
+            "whole; check cable and plugs"
         )
     if heard:
         return LinkError(

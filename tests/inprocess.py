@@ -1,0 +1,174 @@
+"""A board in the same process: the real link, store and commands of the board program, a stand-in engine.
+
+Host and board share one clock that only waiting moves on, so time-outs cost no time.
+"""
+
+from __future__ import annotations
+
+import random
+import sys
+from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+from armtempo.errors import LinkError
+from armtempo.link import Board, greet
+
+from tests.board.scripts import stand_in
+
+SHIMS = Path(__file__).parents[1] / "host" / "armtempo" / "virtual" / "cpython"
+FAULTS = ("lose", "double", "flip", "delay", "cut")
+_DELAY_S = 0.03
+_SAMPLE_S = 0.1
+_TURNS = 3
+_USB_BUFFER = 1024
+_STEP_S = 0.01
+
+
+@contextmanager
+def board_modules() -> Iterator[None]:
+    """Within it the board program imports stand-ins for hardware and engine; nothing of it stays."""
+    with patch.dict(sys.modules), patch.object(sys, "path", [str(SHIMS), *sys.path]):
+        stand_in.install()
+        yield
+
+
+class Noise:
+    """Damages a stream of bytes: each with probability ``rate`` by one of ``kinds``."""
+
+    def __init__(self, seed: str, rate: float, kinds: tuple[str, ...] = FAULTS) -> None:
+        self._random = random.Random(seed)
+        self._rate = rate
+        self._kinds = kinds
+        self._cut = 0
+        self.hits = 0
+
+    def __call__(self, data: bytes) -> tuple[bytes, float]:
+        """What arrives, and by how many seconds late."""
+        result = bytearray()
+        delay_s = 0.0
+        for byte in data:
+            if self._cut:
+                self._cut -= 1
+                continue
+            kind = self._random.choice(self._kinds) if self._random.random() < self._rate else ""
+            self.hits += bool(kind)
+            if kind == "cut":
+                self._cut = self._random.randrange(1, 40)
+            elif kind == "delay":
+                delay_s = _DELAY_S
+            elif kind == "flip":
+                byte ^= 1 << self._random.randrange(8)
+            result += bytes((byte,)) * {"lose": 0, "cut": 0, "double": 2}.get(kind, 1)
+        return bytes(result), delay_s
+
+
+def clean(data: bytes) -> tuple[bytes, float]:
+    """No damage."""
+    return data, 0.0
+
+
+class Pipe:
+    """A transport whose other end is a board program; ``run_samples`` is the length of every motion."""
+
+    name = "pipe"
+
+    def __init__(self, root: Path, to_board: Any = clean, from_board: Any = clean) -> None:
+        self._root = root
+        self._ways = (to_board, from_board)
+        self._queues: tuple[deque[tuple[float, bytes]], ...] = (deque(), deque())
+        self._sample_s = 0.0
+        self.connected = True
+        self.round_trips = 0
+        self.bytes_sent = 0
+        self.run_samples = 70
+        self.start_board()
+
+    def start_board(self) -> None:
+        """Power up: a new program on the same flash."""
+        with board_modules():
+            from armtempo_board.app import App
+
+            self.port = stand_in.Port()
+            self.app: Any = App(self.port, str(self._root))
+
+    def clock(self) -> float:
+        """Seconds."""
+        return stand_in.Clock.now_ms / 1000.0
+
+    def write(self, data: bytes) -> None:
+        """See Transport."""
+        self._check()
+        self.round_trips += 1
+        self.bytes_sent += len(data)
+        self._send(0, data)
+
+    def read(self, timeout_s: float) -> bytes:
+        """See Transport."""
+        self._check()
+        end_s = self.clock() + timeout_s
+        while True:
+            self._turn()
+            data = self._arrived(1)
+            if data or self.clock() >= end_s:
+                return data
+            self.wait(_STEP_S)
+
+    def close(self) -> None:
+        """See Transport."""
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass on the board without the host."""
+        stand_in.Clock.now_ms += max(1, round(1000 * seconds))
+        self._turn()
+
+    def wait_away(self, seconds: float) -> None:
+        """Let time pass while the host reads nothing: the board's port takes no more than its buffer."""
+        self.port.room = _USB_BUFFER
+        for _ in range(round(seconds / _SAMPLE_S)):
+            self.wait(_SAMPLE_S)
+        self.port.room = 1 << 30
+
+    def _check(self) -> None:
+        if not self.connected:
+            raise LinkError("the connection to pipe broke: unplugged")
+
+    def _send(self, way: int, data: bytes) -> None:
+        if self.connected:
+            arrives, delay_s = self._ways[way](data)
+            self._queues[way].append((self.clock() + delay_s, arrives))
+
+    def _arrived(self, way: int) -> bytes:
+        data = b""
+        while self._queues[way] and self._queues[way][0][0] <= self.clock():
+            data += self._queues[way].popleft()[1]
+        return data
+
+    def _turn(self) -> None:
+        self._move()
+        self.port.inbox.extend(self._arrived(0))
+        turns = _TURNS
+        while turns:
+            self.app.turn()
+            turns = _TURNS if self.port.inbox or self.port.outbox else turns - 1
+            if self.port.outbox:
+                self._send(1, bytes(self.port.outbox))
+                self.port.outbox = bytearray()
+
+    def _move(self) -> None:
+        engine = self.app.engine
+        if engine is None or not engine.moving:
+            self._sample_s = self.clock()
+        elif self.clock() >= self._sample_s + _SAMPLE_S:
+            self._sample_s += _SAMPLE_S
+            engine.advance(1)
+            if engine.ticks >= 8_400_000 * (self.run_samples - 1):
+                engine.finish()
+
+
+def connect(pipe: Pipe) -> Board:
+    """A greeted board."""
+    return greet(pipe, 1, pipe.clock)
