@@ -36,9 +36,9 @@ def test_forward_of_inverse_is_the_pose(name: str) -> None:
     assert worst_error(geometry, solutions.angles_rad, poses) < ACCURACY
     # The posture that made the pose is one of the eight: none is forgotten.
     nearest = np.nanmin(
-        np.where(
-            np.isnan(solutions.angles_rad), 9.0, turned(solutions.angles_rad - angles[:, None])
-        ).max(axis=2),
+        np.where(np.isnan(solutions.angles_rad), 9.0, turned(solutions.angles_rad - angles[:, None])).max(
+            axis=2
+        ),
         axis=1,
     )
     assert nearest.max() < 1e-5, f"pose {nearest.argmax()} of seed 3"
@@ -126,7 +126,10 @@ def changed(row: int, **lengths: float) -> Geometry:
         (changed(2, alpha=0.0), "axis 4 is not square to axis 3"),
         (changed(3, alpha=1.0), "axis 5 is not square to axis 4"),
         (changed(4, alpha=1.0), "axis 6 is not square to axis 5"),
-        (changed(3, a=5.0), "the wrist is not spherical: axes 4, 5 and 6 do not meet in one point (a4 is 5, not 0)"),
+        (
+            changed(3, a=5.0),
+            "the wrist is not spherical: axes 4, 5 and 6 do not meet in one point (a4 is 5, not 0)",
+        ),
         (changed(4, a=5.0), "(a5 is 5, not 0)"),
         (changed(4, d=5.0), "(d5 is 5, not 0)"),
         (changed(1, a=0.0), "the upper arm has no length"),

@@ -53,7 +53,7 @@ def _base(shape: Shape, x: Array, y: Array, measured: Radii, previous: Array) ->
     sideways = -shape.sign1 * shape.offset
     forward = np.stack((measured.forward, -measured.forward))
     theta1: Array = np.arctan2(y, x) - np.arctan2(sideways, forward)
-    on_axis = measured.axis & (abs(shape.offset) <= shape.near)
+    on_axis = measured.axis & (shape.offset == 0.0)
     if on_axis.any():
         theta1[:, on_axis] = np.broadcast_to(previous, x.shape)[on_axis] + np.array([[0.0], [np.pi]])
     return theta1
@@ -90,7 +90,7 @@ def duplicates(shape: Shape, measured: Radii) -> Mask:
     """
     same = np.zeros((2, 2, measured.forward.size), dtype=bool)
     same[:, 1] = on_border(shape, measured)
-    if abs(shape.offset) > shape.near:
+    if shape.offset:
         same[1] |= measured.axis
     return same
 

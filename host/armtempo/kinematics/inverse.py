@@ -114,7 +114,7 @@ def _outcome_into(out: NDArray[np.uint8], shape: Shape, arm: ArmPart) -> None:
 
 
 def _singular_into(out: NDArray[np.uint8], shape: Shape, arm: ArmPart, wrist: WristPart) -> None:
-    if abs(shape.offset) <= shape.near:
+    if not shape.offset:
         out |= arm.radii.axis * np.uint8(ON_AXIS_1)
     out |= (on_border(shape, arm.radii) * np.uint8(ELBOW_STRETCHED))[:, None, None]
     out |= (wrist.singular * np.uint8(WRIST_STRAIGHT))[:, :, None]

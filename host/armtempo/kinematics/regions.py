@@ -66,16 +66,14 @@ def classify(shape: Shape, wrist: ArrayLike) -> Regions:
     state = np.sign(measured.shoulder - shape.farthest) + np.sign(measured.shoulder - shape.nearest)
     state = np.where(np.isnan(state), -2, state).astype(np.int64)
     postures = (2 - np.abs(state)).clip(0)
-    if shape.offset != 0.0:
+    if shape.offset:
         postures[1, measured.axis] = 0
     names = tuple(_name(int(front), int(rear)) for front, rear in state.T)
-    return Regions(names, postures.sum(axis=0), measured.axis & (abs(shape.offset) <= shape.near))
+    return Regions(names, postures.sum(axis=0), measured.axis & (shape.offset == 0.0))
 
 
 def _name(front: int, rear: int) -> str:
-    within = _region(front, rear, 1)
-    beyond = _region(front, rear, 0)
-    return within if within == beyond else f"{within}-{beyond}"
+    return "-".join(sorted({_region(front, rear, 1), _region(front, rear, 0)}))
 
 
 def _region(front: int, rear: int, border_is_inside: int) -> str:

@@ -56,7 +56,7 @@ def _in_offset(shape: Shape, planar: float, unit: str) -> Rejection:
     missing = abs(shape.offset) - planar
     text = (
         f"out of reach by {missing:.6g} {unit}: wrist centre {planar:.6g} {unit} from axis 1, "
-        f"at least the shoulder offset |d2 + d3| = {abs(shape.offset):.6g} {unit} needed"
+        f"at least the shoulder offset of d2 and d3, {abs(shape.offset):.6g} {unit}, needed"
     )
     return Rejection("unreachable", text, missing)
 

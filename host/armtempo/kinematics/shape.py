@@ -30,7 +30,7 @@ class Shape:
     shoulder: float
     """a1, of the shoulder axis from the base axis."""
     offset: float
-    """Of the arm's plane from the base axis: d2 and d3 together."""
+    """Of the arm's plane from the base axis: d2 and d3 together; exactly 0 where they cancel out."""
     upper: float
     """L2 of Eq. (4)."""
     fore: float
@@ -73,11 +73,13 @@ class Shape:
             )
         cosines, sines = zip(*map(twist, geometry.alpha), strict=True)
         sign2 = cosines[1]
+        near = TOLERANCE * geometry.reach
+        offset = geometry.d[1] + sign2 * geometry.d[2]
         backwards = geometry.a[1] < 0.0
         return cls(
             height=geometry.d[0],
             shoulder=geometry.a[0],
-            offset=geometry.d[1] + sign2 * geometry.d[2],
+            offset=offset if abs(offset) > near else 0.0,
             upper=abs(geometry.a[1]),
             fore=math.hypot(geometry.a[2], geometry.d[3]),
             bend=math.atan2(-sign2 * sines[2] * geometry.d[3], geometry.a[2]) - backwards * math.pi,
@@ -90,7 +92,7 @@ class Shape:
             flange=(geometry.d[5], geometry.a[5]),
             flange_twist=(cosines[5], sines[5]),
             joint_offset=geometry.offset,
-            near=TOLERANCE * geometry.reach,
+            near=near,
         )
 
 
