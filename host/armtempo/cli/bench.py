@@ -92,7 +92,8 @@ def command(
     try:
         _run(problem, wanted, store, place)
     except KeyboardInterrupt:
-        done = sum(case in Store(out, problem).runs for case in wanted)
+        kept = Store(out, problem).runs
+        done = sum(case in kept for case in wanted)
         click.echo(
             f"armtempo: interrupted; {done} of {len(wanted)} runs are kept in {store.path}, "
             "and the same command goes on from there",
