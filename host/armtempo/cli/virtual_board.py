@@ -13,17 +13,33 @@ _LOOK_S = 0.5
 
 
 @click.command()
-@click.option("--flash", type=click.Path(file_okay=False, path_type=Path),
-              help="Folder that is the board's flash; made if missing. Default: one that goes with the board.")  # fmt: skip
+@click.option(
+    "--flash",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder that is the board's flash; made if missing. Default: one that goes with the board.",
+)
 @click.option("--real-time", is_flag=True, help="Run motions in real time instead of as fast as possible.")
-@click.option("--edge-log", type=click.Path(dir_okay=False, path_type=Path),
-              help="Write every pin edge with its time to this file.")  # fmt: skip
-@click.option("--interpreter", help="MicroPython or Python to run it.  [default: micropython where there is one]")
-@click.option("--deployed", is_flag=True,
-              help="Run what is in the flash ('armtempo deploy' puts it there), not the installed program.")  # fmt: skip
+@click.option(
+    "--edge-log",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Write every pin edge with its time to this file.",
+)
+@click.option(
+    "--interpreter", help="MicroPython or Python to run it. Default: micropython where there is one."
+)
+@click.option(
+    "--deployed",
+    is_flag=True,
+    help="Run what is in the flash ('armtempo deploy' puts it there), not the installed program.",
+)
 @click.option("--seed", default=0, show_default=True, help="Tells one board from another.")
 def command(
-    flash: Path | None, real_time: bool, edge_log: Path | None, interpreter: str | None, deployed: bool, seed: int
+    flash: Path | None,
+    real_time: bool,
+    edge_log: Path | None,
+    interpreter: str | None,
+    deployed: bool,
+    seed: int,
 ) -> None:
     """Start a virtual board, print its port, and run it until Ctrl-C.
 

@@ -11,9 +11,14 @@ import tempfile
 import time
 import tty
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
+from armtempo_shared import armrecord
+
+from armtempo import encode
 from armtempo.arm import Arm
 from armtempo.errors import LinkError
 from armtempo.virtual.options import Fault, Options, unique_id
@@ -74,14 +79,14 @@ class VirtualBoard:
             time.sleep(0.005)
 
     def stop(self) -> None:
-        """End it as by pulling the plug, gently: the edge log is complete. Nothing happens the second time."""
+        """Pull the plug. The edge log is complete then. Nothing happens the second time."""
         if self._slave < 0:
             return
         os.close(self._slave)
         self._slave = -1
-        for end in (None, self._process.terminate, self._process.kill):  # it ends when the port's last user goes
-            if end:
-                end()
+        # it ends by itself when the port's last user has gone
+        for end in (self._process.poll, self._process.terminate, self._process.kill):
+            end()
             try:
                 self._process.wait(_STOP_S)
                 return
@@ -133,6 +138,7 @@ def launch(
             speed=0.0 if virtual_time else 1.0,
             edge_log=str(Path(edge_log).resolve()) if edge_log else None,
             unique_id=unique_id(seed),
+            arm=describe(arm) if arm else None,
             power_cut_at=power_cut_at,
             seed=seed,
             faults=list(faults),
@@ -149,6 +155,23 @@ def launch(
         board.__exit__(None, None, None)
         raise
     return board
+
+
+def describe(arm: Arm) -> dict[str, Any]:
+    """What the board's process must know of the arm: its record's fields, and each joint's model."""
+    head, joints, _ = armrecord.unpack(encode.arm_record(arm))
+    models = [
+        {
+            **asdict(joint.model),
+            "gear_ratio": joint.motor.gear_ratio if joint.motor else 1.0,
+            "home_deg": joint.home_deg,
+        }
+        for joint in arm.driven
+    ]
+    return {
+        "head": head,
+        "joints": [{**row, "model": model} for row, model in zip(joints, models, strict=True)],
+    }
 
 
 def program_folders() -> list[str]:
@@ -179,9 +202,11 @@ def is_micropython(interpreter: str) -> bool:
     """Whether the interpreter is MicroPython; LinkError where it does not run."""
     question = "import sys; print(sys.implementation.name)"
     try:
-        answer = subprocess.run([interpreter, "-c", question], capture_output=True, text=True, timeout=_START_S)
+        command = [interpreter, "-c", question]
+        answer = subprocess.run(command, capture_output=True, text=True, timeout=_START_S)
     except (OSError, subprocess.TimeoutExpired) as error:
         raise LinkError(f"the virtual board's interpreter {interpreter} does not run: {error}") from None
     if answer.returncode:
-        raise LinkError(f"the virtual board's interpreter {interpreter} does not run: {answer.stderr.strip()}")
+        reason = answer.stderr.strip()
+        raise LinkError(f"the virtual board's interpreter {interpreter} does not run: {reason}")
     return answer.stdout.strip() == "micropython"

@@ -1,4 +1,4 @@
-"""What MicroPython's ``time``, ``gc`` and ``sys`` have and CPython's have not; put there before the board starts."""
+"""Adds to CPython's ``time``, ``gc`` and ``sys`` what MicroPython's have beyond them."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ from machine import reset as hard_reset  # noqa: F401
 from simulator import the
 from simulator.gpio_api import Pin
 from simulator.inputs import ExtInt
-from simulator.serial import USB_VCP  # noqa: F401
+from simulator.serial import USB_VCP
 from simulator.timer_api import Timer, TimerChannel  # noqa: F401
 
 _LED_PINS = ("PD14", "PD12", "PD13", "PD15")
@@ -46,7 +46,8 @@ class Switch:
 
     def callback(self, function):
         """Call ``function()`` when it is pressed."""
-        self._extint = ExtInt(self._pin, ExtInt.IRQ_RISING, Pin.PULL_NONE, function and (lambda line: function()))
+        callback = function and (lambda line: function())
+        self._extint = ExtInt(self._pin, ExtInt.IRQ_RISING, Pin.PULL_NONE, callback)
 
 
 def usb_mode(mode=None, *args, **kwargs):

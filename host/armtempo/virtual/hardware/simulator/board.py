@@ -29,7 +29,7 @@ class Board:
         self.now = 0
         self.dma_preload = dma_preload
         self.dma = dma.Controller()
-        self.pins = gpio.Pins(self)
+        self.pins = gpio.Pins()
         self.timers = {}
         for number, bits, rate in ((2, 32, 1), (5, 32, 1), (1, 16, 2), (8, 16, 2), (3, 16, 1), (4, 16, 1),
                                    (6, 16, 1), (7, 16, 1)):  # fmt: skip
@@ -86,9 +86,7 @@ class Board:
             if memory.BLOCKS[memory.index("GPIOA") // memory.BLOCK_WORDS + port.index] in names:
                 routed = port.sync(self.now) or routed
         if routed:
-            for number in (2, 5):
-                for channel in self.timers[number].channels:
-                    channel.sink = self.pins.of_timer(number, channel.number)
+            self.pins.route((self.timers[2], self.timers[5]))
 
     def counting_changed(self, timer, now):
         """A timer was started or stopped."""
@@ -161,10 +159,7 @@ class Board:
     def moving(self, horizon_ticks):
         """Whether a timer will do something within so many ticks."""
         limit = self.now + horizon_ticks
-        for timer in self.counting:
-            if timer.next_match() < limit:
-                return True
-        return False
+        return any([timer.next_match() < limit for timer in self.counting])
 
     def input_changed(self, line, level):
         """The world changed the level of an input pin."""

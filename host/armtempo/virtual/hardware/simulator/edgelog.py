@@ -39,9 +39,7 @@ class EdgeLog:
 
     def counting(self, timer, now):
         """A timer started or stopped."""
-        self._buffer.extend(
-            struct.pack(RECORD, COUNTER, timer.number, timer.running, 0, timer.count(0), now)
-        )
+        self._buffer.extend(struct.pack(RECORD, COUNTER, timer.number, timer.running, 0, timer.count(0), now))
         if not timer.running:
             self._write()
 

@@ -33,6 +33,7 @@ class Flash:
         self._stall = stall
         self._cut_at = cut_at
         self._writing = []
+        self.renamed = None
 
     def real(self, path):
         """Where a path of the board is on the host; OSError where it is outside ``/flash``."""
@@ -111,6 +112,8 @@ class Flash:
         if self.operation():
             self.power_fails()
         os.rename(old, new)
+        if self.renamed:
+            self.renamed()
 
     def change(self, function, path):
         """A change of one path by ``function``."""

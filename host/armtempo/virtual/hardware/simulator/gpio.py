@@ -27,6 +27,7 @@ class Line:
         self.number = number
         self.name = PORTS[port.index] + str(number)
         self.external = None
+        self.driven = False  # by a timer channel
         self.level = 0
         self.sinks = []
 
@@ -47,8 +48,8 @@ class Line:
 
     def read(self):
         """Level that the program reads: from outside, or the pull resistor, or its own output."""
-        if self.mode() == OUTPUT:
-            return (memory.words[self.port.at + ODR] >> self.number) & 1
+        if self.mode() == OUTPUT or self.driven:
+            return self.level
         if self.external is not None:
             return self.external
         return 1 if (memory.words[self.port.at + PUPDR] >> (2 * self.number)) & 3 == 1 else 0
@@ -56,6 +57,8 @@ class Line:
     def edges(self, before, count, times, origin):
         """The pin toggled ``count`` times from level ``before``, at ``origin`` + each of ``times`` ticks."""
         self.level = before ^ (count & 1)
+        at = self.port.at + IDR
+        memory.poke(at, memory.words[at] & ~(1 << self.number) | self.level << self.number)
         for sink in self.sinks:
             sink.edges(self, before, count, times, origin)
 
@@ -63,8 +66,7 @@ class Line:
 class Port:
     """One GPIO port."""
 
-    def __init__(self, board, index):
-        self.board = board
+    def __init__(self, index):
         self.index = index
         self.at = memory.index("GPIO" + PORTS[index])
         self.lines = [Line(self, number) for number in range(16)]
@@ -104,8 +106,8 @@ class Port:
 class Pins:
     """All ports, and which timer channel leads to which pin."""
 
-    def __init__(self, board):
-        self.ports = [Port(board, index) for index in range(len(PORTS))]
+    def __init__(self):
+        self.ports = [Port(index) for index in range(len(PORTS))]
 
     def line(self, name):
         """The line of a pin by its name, with or without the leading P: ``PA15``."""
@@ -113,10 +115,16 @@ class Pins:
             name = name[1:]
         return self.ports[PORTS.index(name[0])].lines[int(name[1:])]
 
-    def of_timer(self, timer, channel):
-        """The line that is this timer channel's now, or None."""
+    def route(self, timers):
+        """Lead each timer's channels to the pins that have been given to them."""
+        for timer in timers:
+            for channel in timer.channels:
+                channel.sink = None
         for port in self.ports:
             for line in port.lines:
-                if line.mode() == ALTERNATE and line.timer() == (timer, channel):
-                    return line
-        return None
+                line.driven = False
+                target = line.timer()
+                for timer in timers:
+                    if target and target[0] == timer.number:
+                        timer.channels[target[1] - 1].sink = line
+                        line.driven = True

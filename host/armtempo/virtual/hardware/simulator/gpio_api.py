@@ -7,7 +7,7 @@ _PULL_NONE, _PULL_UP, _PULL_DOWN = 0, 1, 2
 
 
 class Pin:
-    """One pin. ``mode`` and ``pull`` as in MicroPython; ``alt`` (or ``af``) selects the alternate function."""
+    """One pin. ``mode`` and ``pull`` as in MicroPython; ``alt`` or ``af`` is its alternate function."""
 
     IN, OUT_PP, OUT_OD, AF_PP, AF_OD, ANALOG = 0, 1, 0x11, 2, 0x12, 3
     OUT, ALT, OPEN_DRAIN, ALT_OPEN_DRAIN = OUT_PP, AF_PP, OUT_OD, AF_OD

@@ -4,7 +4,7 @@ import sys
 
 
 def replace():
-    """From here on ``import os`` and its like get the board's; what was imported before keeps the real ones."""
+    """From here on ``import os`` and its like get the board's; earlier imports keep the real ones."""
     import board_micropython
     import board_os
     import board_time

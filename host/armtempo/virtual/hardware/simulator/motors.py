@@ -1,6 +1,9 @@
 """Ideal motors: each step counts, and the encoder follows at once."""
 
+from armtempo_shared import armrecord
+
 from simulator import gpio
+from simulator.inputs import set_level
 
 
 class Motor:
@@ -76,9 +79,9 @@ class Arm:
         self._known = None
         self.motors = []
         board.worlds.append(self)
-        self._connect()
+        self.connect()
 
-    def _connect(self):
+    def connect(self):
         """Put motors on the pins if the record has changed."""
         found = self._record()
         if found == self._known:
@@ -86,9 +89,19 @@ class Arm:
         self._known = found
         for motor in self.motors:
             motor.disconnect()
-        enable_high, joints = found or (False, ())
-        enable = Enable(self._board, self._pins.ENABLE, enable_high)
+        head, joints = found or ({"flags": 0}, ())
+        enable = Enable(self._board, self._pins.ENABLE, head["flags"] & armrecord.FLAG_ENABLE_HIGH)
         self.motors = [self._motor(joint, enable) for joint in joints]
+        self._release_switches(head, joints)
+
+    def _release_switches(self, head, joints):
+        """Drive the inputs that are fitted to where they have not tripped."""
+        if head["flags"] & armrecord.FLAG_ESTOP_FITTED:
+            set_level(self._pins.ESTOP, 0 if head["flags"] & armrecord.FLAG_ESTOP_ACTIVE_HIGH else 1)
+        for joint in joints:
+            for switch in (joint["limit_low"], joint["limit_high"]):
+                if switch != armrecord.NONE:
+                    set_level(self._pins.LIMIT[switch], 1 - joint["limit_active_high"])
 
     def _motor(self, joint, enable):
         lines, pins = self._board.pins, self._pins
@@ -104,9 +117,7 @@ class Arm:
             motor.follow()
 
     def counting(self, timer, now):
-        """A motion may begin."""
-        if timer.running:
-            self._connect()
+        """A timer started or stopped: nothing to do."""
 
     def input_changed(self, line, level, now):
         """An input changed: nothing to do."""

@@ -1,7 +1,8 @@
 """The USB serial port: ``pyb.USB_VCP`` with the firmware's buffers, on this process's stdin and stdout.
 
 The launcher makes both the master end of a pseudo terminal. Buffers and their habits are the firmware's
-(usbd_cdc_interface.c): 1024 bytes each way, input beyond that lost unless RTS flow control holds the host back.
+(usbd_cdc_interface.c): 1024 bytes each way; input beyond that is lost unless RTS flow control holds the host
+back.
 """
 
 import select
@@ -19,8 +20,8 @@ class Serial:
     """The line behind the port. ``attached``: the REPL has it, Ctrl-C interrupts."""
 
     def __init__(self):
-        self._in = open(0, "rb", buffering=0)
-        self._out = open(1, "wb", buffering=0)
+        self._in = open(0, "rb", buffering=0)  # noqa: SIM115
+        self._out = open(1, "wb", buffering=0)  # noqa: SIM115
         self._poll = select.poll()
         self._poll.register(self._in, _POLLIN)
         self._chunk = bytearray(512)
@@ -156,7 +157,8 @@ class USB_VCP:
         if not self._line.received:
             the.board.spend(CALL_TICKS)
             return None
-        return self.recv(len(self._line.received) if size < 0 else min(size, len(self._line.received)), timeout=0)
+        there = len(self._line.received)
+        return self.recv(there if size < 0 else min(size, there), timeout=0)
 
     def readinto(self, buffer, size=None):
         """What is there, into a buffer; None where nothing is."""

@@ -2,7 +2,7 @@
 
 from binascii import unhexlify
 
-from simulator import edgelog, faults, flash, motors, pace, serial, the
+from simulator import edgelog, faults, flash, pace, serial, the
 from simulator.board import TICKS_PER_MS, Board
 
 _POWER_ON = 1
@@ -31,14 +31,17 @@ def power_up(options, cause):
 
 def connect(pins):
     """Put motors and encoders on the pins; ``pins`` is the board program's own table."""
+    from simulator import motors
+
     the.arm = motors.Arm(the.board, pins, _arm_record)
+    the.flash.renamed = the.arm.connect
 
 
 def _arm_record():
-    """(ENABLE active high, joints) of the arm that the options or the record in the flash describe, or None."""
+    """(head, joints) of the arm that the options or the record in the flash describe, or None."""
     arm = the.options["arm"]
     if arm:
-        return arm["enable_high"], arm["joints"]
+        return arm["head"], arm["joints"]
     from armtempo_shared import armrecord
 
     try:
@@ -46,7 +49,7 @@ def _arm_record():
             head, joints, _ = armrecord.unpack(file.read())
     except (OSError, ValueError):
         return None
-    return bool(head["flags"] & armrecord.FLAG_ENABLE_HIGH), joints
+    return head, joints
 
 
 def _stall(ms):

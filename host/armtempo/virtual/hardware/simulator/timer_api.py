@@ -40,7 +40,7 @@ class Timer:
         if args or kwargs:
             self.init(*args, **kwargs)
 
-    def init(self, freq=None, prescaler=None, period=None, tick_hz=None, mode=0, div=1, callback=None, deadtime=0):
+    def init(self, freq=None, prescaler=None, period=None, mode=0, div=1, callback=None):
         """Clock the timer, set prescaler and period (from ``freq`` where given) and start it."""
         if mode != self.UP or div != 1:
             raise ValueError("the virtual board's timers count up, undivided")
@@ -169,7 +169,8 @@ class TimerChannel:
         """Output compare; as in the firmware this starts the counter."""
         number = self._number - 1
         _change(self._at + timers.CCER, 3 << 4 * number, polarity << 4 * number)
-        _change(self._at + timers.CCMR1 + (number >> 1), 0xFF << 8 * (number & 1), mode << 4 + 8 * (number & 1))
+        shift = 8 * (number & 1)
+        _change(self._at + timers.CCMR1 + (number >> 1), 0xFF << shift, mode << 4 + shift)
         memory.words[self._at + timers.CCR1 + number] = compare & memory.MASK
         _change(self._at + timers.CCER, 0, 1 << 4 * number)
         if self._timer._number in (1, 8):

@@ -81,10 +81,7 @@ class Channel:
     def match(self, total):
         """All matches up to the timer's ``total``."""
         times = []
-        if self.stream:
-            count = self._match_fed(total, times)
-        else:
-            count = self._match_alone(total, times)
+        count = self._match_fed(total, times) if self.stream else self._match_alone(total, times)
         memory.poke(self.timer.at + SR, memory.words[self.timer.at + SR] | 1 << self.number)
         if self.interrupt:
             self.timer.board.pend(self.timer.number, self.number)

@@ -1,0 +1,108 @@
+"""Reads a virtual board's edge log: every change of every pin, with its time in timer ticks.
+
+The file: ``b"ATE1"``, then records of 16 bytes, little endian, ``<BBBBIq``::
+
+    kind  1 edges   pin (16 * port + number), level before, 0, count n, base tick; then n offsets (I):
+                    the pin toggles at base + each offset
+          2 counter timer number, 1 started or 0 stopped, 0, its counter, tick
+          3 input   as kind 1, with n = 1: the world changed an input pin
+          4 reset   the board was powered up or reset; ticks count from 0 again
+
+Ticks are of 84 MHz, since the last reset.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armtempo.errors import RunFolderError
+
+_RECORD = struct.Struct("<BBBBIq")
+_EDGES, _COUNTER, _INPUT, _RESET = 1, 2, 3, 4
+_PORTS = "ABCDEFGHI"
+_MOTION_TIMER = 2
+
+Edges = tuple[NDArray[np.int64], NDArray[np.int8]]
+"""Ticks of a pin's changes, ascending, and the level after each."""
+
+
+@dataclass
+class Session:
+    """What happened between two resets: per pin (``"A15"``) its edges, and the motion clock's starts."""
+
+    pins: dict[str, Edges] = field(default_factory=dict)
+    starts: list[int] = field(default_factory=list)
+    """Tick of motion time 0 of each motion."""
+    ends: list[int] = field(default_factory=list)
+    """Tick at which the motion clock was stopped, where it was."""
+
+    def motion(self, number: int = -1) -> dict[str, Edges]:
+        """Per pin its edges in the ``number``-th motion, in ticks of the motion clock.
+
+        A motion lasts until the next is started. Raises RunFolderError where there was none.
+        """
+        if not -len(self.starts) <= number < len(self.starts):
+            raise RunFolderError(f"the edge log has {len(self.starts)} motions, not one number {number}")
+        number %= len(self.starts)
+        zero = self.starts[number]
+        end = self.starts[number + 1] if number + 1 < len(self.starts) else np.iinfo(np.int64).max
+        cut = {}
+        for pin, (ticks, levels) in self.pins.items():
+            inside = (ticks >= zero - _LEAD_TICKS) & (ticks < end - _LEAD_TICKS)
+            cut[pin] = (ticks[inside] - zero, levels[inside])
+        return cut
+
+
+_LEAD_TICKS = 8_400_000
+
+
+def read(path: Path) -> list[Session]:
+    """All sessions of a log, oldest first. Raises RunFolderError where the file is none."""
+    data = path.read_bytes()
+    if data[:4] != b"ATE1":
+        raise RunFolderError(f"{path} is no edge log of a virtual board")
+    sessions: list[_Collector] = []
+    at = 4
+    while at + _RECORD.size <= len(data):
+        kind, pin, before, _, count, base = _RECORD.unpack_from(data, at)
+        at += _RECORD.size
+        if kind == _RESET or not sessions:
+            sessions.append(_Collector())
+        if kind in (_EDGES, _INPUT):
+            offsets = np.frombuffer(data, "<u4", count, at)
+            at += 4 * count
+            sessions[-1].edges(pin, before, base + offsets.astype(np.int64))
+        elif kind == _COUNTER and pin == _MOTION_TIMER:
+            sessions[-1].counter(bool(before), count, base)
+    return [collector.session() for collector in sessions]
+
+
+class _Collector:
+    """Gathers the pieces of one session."""
+
+    def __init__(self) -> None:
+        self._ticks: dict[int, list[NDArray[np.int64]]] = {}
+        self._levels: dict[int, list[NDArray[np.int8]]] = {}
+        self._session = Session()
+
+    def edges(self, pin: int, before: int, ticks: NDArray[np.int64]) -> None:
+        self._ticks.setdefault(pin, []).append(ticks)
+        levels = (np.arange(1, len(ticks) + 1) + before) % 2
+        self._levels.setdefault(pin, []).append(levels.astype(np.int8))
+
+    def counter(self, started: bool, count: int, tick: int) -> None:
+        if not started:
+            self._session.ends.append(tick)
+        elif count >= 1 << 31:  # a motion's clock is started a little before it comes round to 0
+            self._session.starts.append(tick + (1 << 32) - count)
+
+    def session(self) -> Session:
+        for pin, pieces in self._ticks.items():
+            name = f"{_PORTS[pin >> 4]}{pin & 15}"
+            self._session.pins[name] = (np.concatenate(pieces), np.concatenate(self._levels[pin]))
+        return self._session
