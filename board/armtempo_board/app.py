@@ -77,6 +77,7 @@ class App:
     def enter(self):
         """The program begins, perhaps again after it was left."""
         self._leaving = False
+        self.commands.greeted = False
         self.link.forget()
 
     def left(self):
@@ -98,7 +99,8 @@ class App:
             self.engine.service()
             self._collect()
             self._watch()
-        self.events.push()
+        if self.commands.greeted:
+            self.events.push()
         self.link.flush()
         self._watch_escape()
 

@@ -35,7 +35,7 @@ class Commands:
     def __init__(self, app):
         self._app = app
         self._link = app.link
-        self._greeted = False
+        self.greeted = False  # a host has said hello
         self._session = 0
         self._table = {}
         answers = {}
@@ -66,7 +66,7 @@ class Commands:
         length = self._link.reader.length()
         if length < row[2] or (length > row[2] and not row[3]):
             return self._refuse(number, codes.MALFORMED)
-        if not self._greeted and number != self._hello_number:
+        if not self.greeted and number != self._hello_number:
             return self._refuse(number, codes.NO_SESSION)
         if self._app.moving() and not row[5]:
             return self._refuse(number, codes.BUSY)
@@ -104,7 +104,7 @@ class Commands:
         protocol, session = self._fields(row)
         if protocol != PROTOCOL_VERSION:
             raise Refused(codes.PROTOCOL, value=PROTOCOL_VERSION)
-        if not self._greeted or session != self._session:
+        if not self.greeted or session != self._session:
             self._begin_session(session)
         app = self._app
         app.look_around()
@@ -126,7 +126,7 @@ class Commands:
         return self._reply_tail(size, app.board_id)
 
     def _begin_session(self, session):
-        self._greeted = True
+        self.greeted = True
         self._session = session
         self._link.forget()
         self._app.samples.skip()

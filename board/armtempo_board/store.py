@@ -244,6 +244,7 @@ class Store:
     def _close(self):
         file = self._file
         self._file = None
+        self._received = 0
         self._guard(file.close)
         self._guard(_sync)
 

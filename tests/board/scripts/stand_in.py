@@ -110,8 +110,9 @@ class Engine:
                 self.steps[joint] = steps[joint]
 
     def snapshot(self, raw):
-        raw[0] = self.ticks & 0x7FFFFFFF
-        raw[1] = 0
+        low = self.ticks & 0xFFFFFFFF
+        raw[0] = low - (1 << 32) if low >> 31 else low
+        raw[1] = self.ticks >> 32
         for joint in range(self.joints):
             raw[2 + joint] = self.steps[joint]
             raw[2 + self.joints + joint] = 10 * self.steps[joint]
@@ -185,7 +186,7 @@ class Host:
         return sequence
 
     def turn(self, turns=50):
-        """Let the board's loop run; (sequence, id, payload) of all frames that came."""
+        """Let the board's loop run; (sequence, id, payload) of all frames that came; keeps events."""
         frames = []
         for _ in range(turns):
             Clock.now_ms += 1
@@ -195,21 +196,24 @@ class Host:
         frame = self.parser.next()
         while frame:
             frames.append(frame)
+            self._note(frame)
             frame = self.parser.next()
         return frames
 
     def ask(self, name, values=(), tail=b""):
-        """("ok", fields, tail) or ("error", code name, joint, value) of the answer; keeps events."""
+        """("ok", fields, tail) or ("error", code name, joint, value) of the answer."""
         sequence = self.send(name, values, tail)
         answer = None
         for got, number, payload in self.turn():
             entry = wire.EVENT_BY_ID[number]
-            fields, rest = wire.decode(entry, payload)
-            if entry[0] not in ("ok", "error"):
-                self.events.append((entry[0], fields, rest))
-            elif got == sequence:
-                answer = self._answer(name, entry[0], fields, rest)
+            if entry[0] in ("ok", "error") and got == sequence:
+                answer = self._answer(name, entry[0], *wire.decode(entry, payload))
         return answer
+
+    def _note(self, frame):
+        entry = wire.EVENT_BY_ID[frame[1]]
+        if entry[0] not in ("ok", "error"):
+            self.events.append((entry[0],) + wire.decode(entry, frame[2]))  # noqa: RUF005
 
     def _answer(self, name, kind, fields, rest):
         assert fields[0] == wire.COMMAND[name][1]
