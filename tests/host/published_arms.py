@@ -36,7 +36,7 @@ def read(path: Path) -> tuple[Geometry, Ranges]:
 
 
 def drawn(rng: np.random.Generator) -> Geometry:
-    """Any arm of the class: all signs, all lengths, shoulder offsets, offsets of the joints, a tool on row 6."""
+    """Any arm of the class: signs, lengths, shoulder offsets, offsets of the joints, a tool on row 6."""
     signs = rng.choice([-1.0, 1.0], 4)
     alpha = [signs[0] * 90, rng.choice([0.0, 180.0, -180.0]), *(signs[1:] * 90), rng.uniform(-180, 180)]
     d = [*rng.uniform(-1, 1, 4), 0.0, rng.uniform(-1, 1)]

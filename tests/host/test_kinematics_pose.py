@@ -97,7 +97,7 @@ def test_file_of_poses_in_every_form(tmp_path: Path) -> None:
     [
         (b"1 2 3 0 0 0\n1 2 3\n", "line 2: 3 numbers are no pose; give 6 (x y z roll pitch yaw)"),
         (b"1 2 three 0 0 0\n", "line 1: 'three' is not a number"),
-        (b"\n1 2 nan 0 0 0\n", "line 2: every number"),
+        (b"\n1 2 nan 0 0 0\n", "line 2: 'nan' is not a finite number"),
         (b"# nothing\n", "no pose in it"),
         (b"\xff\xfe\x00", "cannot be read as text"),
     ],

@@ -25,7 +25,7 @@ def at(shape: Shape, planar: float, up: float, turn: float = 0.7) -> tuple[str, 
     return found.names[0], int(found.postures[0])
 
 
-# The shoulder stands 100 behind the base axis (a1 = -100), so from the front it is at -100, from the rear at 100.
+# The shoulder is 100 behind the base axis (a1 = -100): from the front at -100, from the rear at 100.
 @pytest.mark.parametrize(
     ("planar", "up", "expected"),
     [

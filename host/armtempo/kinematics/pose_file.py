@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -56,4 +57,6 @@ def numbers(text: str, what: str) -> list[float]:
             found.append(float(word))
         except ValueError:
             raise InputError(f"{what}: {word!r} is not a number") from None
+        if not math.isfinite(found[-1]):
+            raise InputError(f"{what}: {word!r} is not a finite number")
     return found

@@ -1,0 +1,171 @@
+"""``armtempo ik`` from the command line: forms of a pose, table, JSON, exit codes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from armtempo.arm import default_path
+from armtempo.cli import main
+from armtempo.kinematics import forward
+from click.testing import CliRunner, Result
+
+from tests.host.published_arms import PAPER
+
+EQ_16_AT_1_TO_5 = "0 0 -1 -536.404 0 1 0 0 1 0 0 434.698"
+POSITION = ("--position", "-536.404", "0", "434.698")
+
+
+def run(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(main, ["ik", *map(str, arguments)])
+
+
+def solutions(*arguments: str | Path) -> list[dict[str, Any]]:
+    result = run(*arguments, "--json")
+    assert result.exit_code == 0, result.output
+    poses: list[dict[str, Any]] = json.loads(result.stdout)["poses"]
+    return poses
+
+
+def test_table_shows_all_eight_with_reasons_and_the_choice() -> None:
+    result = run("--matrix", EQ_16_AT_1_TO_5)
+    assert result.exit_code == 0
+    head, columns, *rows = result.stdout.splitlines()
+    assert head == "pose 1: region II of Fig. 3: 4 arm postures"
+    assert columns.split()[:4] == ["no", "branch", "theta1", "deg"]
+    assert len(rows) == 8
+    assert [row[0] for row in rows] == ["*"] + [" "] * 7
+    assert rows[0].split()[5:8] == ["180.0000", "-37.9997", "-52.0005"]
+    assert "rejected: joint 2 at -191.7 deg is 21.66 deg below its range -170 to 10" in rows[6]
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        ("--matrix", EQ_16_AT_1_TO_5 + " 0 0 0 1"),
+        (*POSITION, "--rpy", "0", "-90", "0"),
+        (*POSITION, "--quaternion", "0.70710678", "0", "-0.70710678", "0"),
+    ],
+)
+def test_every_form_of_a_pose_means_the_same(form: tuple[str, ...]) -> None:
+    (by_matrix,), (by_form,) = solutions("--matrix", EQ_16_AT_1_TO_5), solutions(*form)
+    assert by_form["chosen"] == by_matrix["chosen"] == 1
+    for one, other in zip(by_form["solutions"], by_matrix["solutions"], strict=True):
+        np.testing.assert_allclose(
+            np.exp(1j * np.radians(one["angles_deg"])),
+            np.exp(1j * np.radians(other["angles_deg"])),
+            atol=1e-7,
+        )
+
+
+def test_json_names_branch_reasons_and_region() -> None:
+    (answer,) = solutions("--matrix", EQ_16_AT_1_TO_5)
+    assert (answer["region"], answer["postures"], answer["on_axis_1"]) == ("II", 4, False)
+    seventh = answer["solutions"][6]
+    assert seventh["branch"] == {"base": "rear", "elbow": "down", "wrist": "plain"}
+    assert not seventh["usable"]
+    (reason,) = seventh["rejections"]
+    assert (reason["kind"], reason["joint"]) == ("range", 2)
+    assert reason["amount"] == pytest.approx(-21.662, abs=1e-3)
+
+
+def test_a_file_of_poses_is_followed_from_posture_to_posture(tmp_path: Path) -> None:
+    path = np.radians([[0, -60, 40, 10, 20, 100], [10, -65, 45, 20, 30, 170], [20, -70, 50, 30, 40, 240]])
+    file = tmp_path / "poses.txt"
+    file.write_text(
+        "".join(" ".join(map(repr, pose.ravel().tolist())) + "\n" for pose in forward(PAPER, path))
+    )
+    answers = solutions("--poses", file)
+    chosen = [answer["solutions"][answer["chosen"] - 1]["angles_deg"] for answer in answers]
+    # Joint 6 goes on past half a turn, because each pose follows the one before.
+    np.testing.assert_allclose(chosen, np.degrees(path), atol=1e-6)
+
+
+def test_previous_posture_chooses_the_branch() -> None:
+    (answer,) = solutions("--matrix", EQ_16_AT_1_TO_5, "--previous", "0, -90, -150, 0, -20, 180")
+    assert answer["chosen"] == 6
+
+
+def test_out_of_reach_ends_with_1_and_the_inequality() -> None:
+    result = run("--position", "900", "0", "300", "--rpy", "0", "0", "0")
+    assert result.exit_code == 1
+    assert "region IV of Fig. 3: 0 arm postures" in result.stdout
+    assert result.stdout.count("(Eq. (3), line 1)") == 8
+    assert result.stderr == "armtempo: no solution for pose 1; the reasons are listed with it\n"
+    unreachable = run("--position", "900", "0", "300", "--rpy", "0", "0", "0", "--json")
+    assert unreachable.exit_code == 1
+    (answer,) = json.loads(unreachable.stdout)["poses"]
+    assert answer["chosen"] is None
+    assert {solution["angles_deg"] for solution in answer["solutions"]} == {None}
+
+
+def test_singular_poses_say_so() -> None:
+    straight = forward(PAPER, np.radians([20, -60, 40, 0, 0, 25])).ravel().tolist()
+    result = run("--matrix", " ".join(map(repr, straight)), "--previous", "0 0 0 12 0 0")
+    assert "theta5 = 0: joint 4 kept as before, joint 6 makes up the sum" in result.stdout
+    result = run("--position", "0", "0", "600", "--rpy", "0", "0", "0", "--previous", "33 0 0 0 0 0")
+    assert "any angle of joint 1, and 4 arm postures" in result.stdout
+    assert "     33.0000" in result.stdout
+
+
+def test_an_arm_outside_the_class_is_searched_numerically(tmp_path: Path) -> None:
+    arm = tmp_path / "arm.toml"
+    arm.write_text(
+        default_path().read_text().replace("d_mm = 360.0\na_mm = 0.0", "d_mm = 360.0\na_mm = 10.0")
+    )
+    form = ("--arm", arm, "--position", "300", "200", "300", "--rpy", "10", "20", "30")
+    result = run(*form)
+    assert result.exit_code == 0, result.output
+    assert "no closed form for this arm: the wrist is not spherical" in result.stdout
+    assert "one solution, in degrees, found numerically: theta1" in result.stdout
+    (answer,) = solutions(*form)
+    assert answer["numerical"]["found"]
+    assert answer["numerical"]["position_error_mm"] < 1e-6
+
+
+def test_numerical_agrees_with_one_of_the_eight() -> None:
+    form = ("--position", "300", "200", "300", "--rpy", "10", "20", "30")
+    (closed,), (searched,) = solutions(*form), solutions(*form, "--numerical")
+    apart = [
+        np.abs(np.subtract(one["angles_deg"], searched["numerical"]["angles_deg"])).max()
+        for one in closed["solutions"]
+    ]
+    assert min(apart) < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ((), "give one of --matrix, --position or --poses"),
+        (("--matrix", EQ_16_AT_1_TO_5, *POSITION, "--rpy", "0", "0", "0"), "give one of"),
+        (POSITION, "--position goes with one of --rpy and --quaternion"),
+        (("--matrix", EQ_16_AT_1_TO_5, "--rpy", "0", "0", "0"), "--position goes with one of"),
+        (
+            (*POSITION, "--rpy", "0", "0", "0", "--quaternion", "1", "0", "0", "0"),
+            "--position goes with one of",
+        ),
+        (("--matrix", "1 2 3"), "--matrix: 3 numbers are no pose; give 12 (3 rows of a matrix), 16"),
+        (("--matrix", "1 0 0 0 0 1 0 0 0 0 x 0"), "--matrix: 'x' is not a number"),
+        (("--matrix", "2 0 0 0 0 1 0 0 0 0 1 0"), "--matrix: the 3 x 3 part is not a rotation"),
+        ((*POSITION, "--quaternion", "1", "1", "0", "0"), "length 1 is needed; this one has length 1.41421"),
+        ((*POSITION, "--rpy", "nan", "0", "0"), "must be finite"),
+        ((*POSITION, "--rpy", "one", "0", "0"), "'one' is not a valid float"),
+        (("--poses", "no-such-file.txt"), "no-such-file.txt: cannot be read"),
+        (
+            ("--matrix", EQ_16_AT_1_TO_5, "--previous", "1 2 3"),
+            "--previous: 3 angles given, the arm has 6 joints",
+        ),
+        (("--matrix", EQ_16_AT_1_TO_5, "--previous", "1 2 3 4 5 b"), "--previous: 'b' is not a number"),
+        (("--matrix", EQ_16_AT_1_TO_5, "--previous", "0 0 nan 0 0 0"), "--previous: 'nan' is not a finite"),
+        (("--arm", "no-such-arm.toml", "--matrix", EQ_16_AT_1_TO_5), "no-such-arm.toml"),
+    ],
+)
+def test_wrong_input_ends_with_2_and_one_clear_message(arguments: tuple[str, ...], words: str) -> None:
+    result = run(*arguments)
+    assert result.exit_code == 2, result.output
+    assert words in result.stderr
+    assert "Traceback" not in result.stderr
+    assert result.stdout == ""

@@ -1,0 +1,150 @@
+"""Jobs that give poses: resolved to via angles, with notes on what the user must know."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from armtempo import job as jobs
+from armtempo import planner, vias
+from armtempo.arm import Arm, default_path, load_arm
+from armtempo.errors import InputError, PlanError
+from armtempo.job import Job, Pose
+from armtempo.kinematics import Geometry, forward
+
+ARM = load_arm(default_path())
+GEOMETRY = Geometry.of(ARM)
+JOB = jobs.load_job(jobs.default_path(), ARM)
+ALL_DRIVEN = replace(
+    ARM,
+    joints=tuple(
+        joint if joint.motor else replace(joint, motor=ARM.joints[0].motor, limits=ARM.joints[0].limits)
+        for joint in ARM.joints
+    ),
+)
+
+
+def pose(*angles_deg: float, arm: Arm = ARM, posture_deg: tuple[float, ...] | None = None) -> Pose:
+    """The pose of these joint angles; the wrist at home if only three are given."""
+    angles = np.radians([*angles_deg, 0.0, 0.0, 0.0][:6])
+    return Pose(tuple(map(tuple, forward(Geometry.of(arm), angles))), posture_deg)
+
+
+def job(*via: tuple[float, ...] | Pose) -> Job:
+    return replace(JOB, via=via)
+
+
+def test_the_paper_s_motion_given_as_poses_comes_out_as_its_angles() -> None:
+    poses = job(*(pose(*angles) for angles in JOB.via))
+    resolved = vias.resolve(ARM, poses)
+    np.testing.assert_allclose(resolved.via_deg, JOB.via, atol=1e-9)
+    assert resolved.notes == ()
+    np.testing.assert_array_equal(planner.via_angles(ARM, poses), resolved.via_deg)
+
+
+def test_angles_and_poses_may_be_mixed() -> None:
+    mixed = job(*(pose(*angles) if number % 2 else angles for number, angles in enumerate(JOB.via)))
+    resolved = vias.resolve(ARM, mixed)
+    np.testing.assert_allclose(resolved.via_deg, JOB.via, atol=1e-9)
+    assert resolved.notes == ()
+
+
+def test_angles_alone_stay_to_the_last_bit() -> None:
+    np.testing.assert_allclose(vias.resolve(ARM, JOB).via_deg, JOB.via, rtol=1e-15)
+
+
+def test_all_six_joints_driven() -> None:
+    angles = ((10.0, -60.0, 40.0, 20.0, 30.0, 40.0), (60.0, -80.0, 50.0, 60.0, 20.0, 300.0))
+    resolved = vias.resolve(ALL_DRIVEN, job(angles[0], pose(*angles[1], arm=ALL_DRIVEN)))
+    # Joint 6 is at -60, the turn nearer to where it was.
+    np.testing.assert_allclose(
+        resolved.via_deg, [angles[0], (60.0, -80.0, 50.0, 60.0, 20.0, -60.0)], atol=1e-9
+    )
+    assert resolved.notes == ()
+
+
+def test_a_pose_that_needs_undriven_joints_is_reported_with_the_miss() -> None:
+    resolved = vias.resolve(ARM, job(JOB.via[0], pose(20.0, -75.0, 50.0, 0.0, 30.0, 0.0)))
+    np.testing.assert_allclose(resolved.via_deg[1], [20.0, -75.0, 50.0], atol=1e-9)
+    (note,) = resolved.notes
+    assert (note.kind, note.via) == ("undriven", 2)
+    # d6 = 40 mm turned by 30 degrees: 2 * 40 * sin(15) = 20.71.
+    assert note.text == (
+        "via 2: the pose needs joints that have no motor: joint 5 at 30 deg (stays at 0); "
+        "the tool misses the pose by 20.71 mm and 30 deg"
+    )
+
+
+def test_a_solution_with_the_undriven_joints_at_home_comes_before_a_nearer_one() -> None:
+    """Rear, elbow up reaches it with the wrist at home; front would be nearer to where the arm stands."""
+    target = pose(0.0, -93.0, -140.0)
+    assert vias.resolve(ARM, job((5.0, -93.0, -140.0), target)).notes == ()
+    far = vias.resolve(ARM, job((180.0, -38.0, -52.0), target))
+    np.testing.assert_allclose(far.via_deg[1], [0.0, -93.0, -140.0], atol=1e-9)
+    assert "undriven" not in {note.kind for note in far.notes}
+
+
+def test_posture_deg_decides() -> None:
+    wished = (0.0, -93.0, -157.0, 0.0, -19.0, 180.0)  # row 5 of Table 2
+    target = pose(180.0, -38.0, -52.0, posture_deg=wished)
+    resolved = vias.resolve(ARM, job(JOB.via[0], target))
+    np.testing.assert_allclose(resolved.via_deg[1], [0.0, -93.242, -157.541], atol=1e-3)
+    assert {note.kind for note in resolved.notes} == {"undriven", "branch"}
+
+
+def test_a_branch_change_is_reported_with_the_reason() -> None:
+    resolved = vias.resolve(ARM, job((40.0, -110.0, 70.0), pose(150.0, -93.0, -140.0), (40.0, -110.0, 70.0)))
+    first, second = resolved.notes
+    assert (first.kind, first.via, second.kind, second.via) == ("branch", 2, "branch", 3)
+    assert "between via 1 and via 2 the arm changes its branch (base): from front up to rear up" in first.text
+    assert "Staying in front up plain is not possible: out of reach by 33.1682 mm" in first.text
+    assert "between via 2 and via 3" in second.text
+
+
+def test_a_branch_change_between_angles_the_user_gave_is_his_own() -> None:
+    assert vias.resolve(ARM, job((40.0, -110.0, 70.0), (150.0, -93.0, -140.0))).notes == ()
+
+
+def test_a_pose_out_of_reach_is_refused_with_every_reason() -> None:
+    far = Pose(((1.0, 0.0, 0.0, 3000.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0)))
+    with pytest.raises(
+        PlanError, match=r"via 2: no posture reaches this pose: out of reach by .*; out of reach by"
+    ):
+        vias.resolve(ARM, job(JOB.via[0], far))
+
+
+def test_a_pose_out_of_the_driven_ranges_is_refused_with_the_joint() -> None:
+    with pytest.raises(PlanError, match=r"joint 1 at -60 deg is 50 deg below its range -10 to 190"):
+        vias.resolve(ARM, job(JOB.via[0], pose(-60.0, 0.0, 0.0)))
+
+
+@pytest.mark.parametrize(
+    ("via", "words"),
+    [
+        ((1.0, 2.0), "via 2: 2 angles, but 3 joints have a motor"),
+        (
+            Pose(((2.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))),
+            "not a rot",
+        ),
+        (pose(0.0, -60.0, 40.0, posture_deg=(1.0, 2.0)), "posture_deg has 2 angles, not 6"),
+    ],
+)
+def test_wrong_via_points_are_named(via: tuple[float, ...] | Pose, words: str) -> None:
+    with pytest.raises(InputError, match="via 2") as caught:
+        vias.resolve(ARM, job(pose(0.0, -60.0, 40.0), via))
+    assert words in str(caught.value)
+
+
+def test_an_arm_outside_the_class_is_served_numerically() -> None:
+    bent = tuple(
+        replace(joint, a_mm=10.0) if number == 3 else joint for number, joint in enumerate(ARM.joints)
+    )
+    arm = replace(ARM, joints=bent)
+    angles = JOB.via[0]
+    assert not isinstance(angles, Pose)
+    resolved = vias.resolve(arm, job(angles, pose(10.0, -70.0, 45.0, arm=arm)))
+    np.testing.assert_allclose(resolved.via_deg[1], [10.0, -70.0, 45.0], atol=1e-5)
+    far = Pose(((1.0, 0.0, 0.0, 3000.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0)))
+    with pytest.raises(PlanError, match="no posture found from 20 starts"):
+        vias.resolve(arm, job(angles, far))
