@@ -91,8 +91,8 @@ def test_thousand_uploads_over_a_bad_line_arrive_identical(tmp_path: Path) -> No
         data = random_motion(numbers, segments=numbers.randrange(1, 4))
         board.upload("feed", data)
         assert (tmp_path / "flash" / "feed.atm").read_bytes() == data, f"upload {number}"
-    assert to_board.hits > 5_000
-    assert from_board.hits > 1000
+    assert to_board.hits > 5000
+    assert from_board.hits > 500
 
 
 @pytest.mark.parametrize("seed", range(8))
