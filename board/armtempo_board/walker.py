@@ -69,7 +69,7 @@ class Walker:
                 break
             at = (head + written) & mask
             count = min(self._left, (room - written) >> 1, (mask + 1 - at) >> 1)
-            stretch.emit(ring, self._state, at, count)
+            stretch.emit(at, ring, self._state, count)
             self._left -= count
             written += 2 * count
         return written
