@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import FrameType, TracebackType
 from typing import Self
 
@@ -34,10 +36,15 @@ class StopRequest:
         self.wanted = True
 
 
-def terminate_as_interrupt() -> None:
+@contextmanager
+def terminate_as_interrupt() -> Iterator[None]:
     """Let SIGTERM end the program the way Ctrl-C does: with everything closed and put away."""
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         raise KeyboardInterrupt
 
-    signal.signal(signal.SIGTERM, interrupt)
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

@@ -58,9 +58,9 @@ class LazyGroup(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; what the user can mend is said in one message, without a traceback."""
-        terminate_as_interrupt()
         try:
-            return super().invoke(ctx)
+            with terminate_as_interrupt():
+                return super().invoke(ctx)
         except ArmtempoError as error:
             click.echo(f"armtempo: {error}", err=True)
             ctx.exit(error.exit_code)

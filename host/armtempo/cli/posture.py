@@ -20,6 +20,8 @@ def parse(text: str, arm: Arm, job_path: Path | None) -> Array:
 
     Raises InputError where the text is none of these.
     """
+    from armtempo import moves
+
     if re.fullmatch(r"[Pp]\d+", text):
         return _via(int(text[1:]), arm, job_path)
     if text.endswith(".json"):
@@ -27,17 +29,18 @@ def parse(text: str, arm: Arm, job_path: Path | None) -> Array:
 
         return trajectory_file.load(text).trajectory(0.0)
     try:
-        return np.array([float(cell) for cell in text.split(",")])
+        angles_deg = [float(cell) for cell in text.split(",")]
     except ValueError:
         raise InputError(
             f"{text!r} is no posture: give angles in degrees ('0,-60,40'), a via point of the job ('P0') "
             "or a trajectory file"
         ) from None
+    return moves.posture(angles_deg, arm)
 
 
 def words(angles_deg: Array) -> str:
     """The posture for people."""
-    return ", ".join(f"{angle:.2f}" for angle in angles_deg) + " degrees"
+    return ", ".join(f"{round(angle, 2) + 0.0:.2f}" for angle in angles_deg) + " degrees"
 
 
 def _via(index: int, arm: Arm, job_path: Path | None) -> Array:

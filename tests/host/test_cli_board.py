@@ -1,0 +1,193 @@
+"""The board commands on a board in the same process, by what they print and the codes they end with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from armtempo import arm, link, moves, runs
+from armtempo.cli import COMMANDS, main
+from armtempo.interrupt import StopRequest
+from armtempo.job import Job
+from armtempo.link import Board, greet
+from armtempo.plan import Plan
+from click.testing import CliRunner, Result
+
+from tests.inprocess import Pipe
+
+ARM = arm.load_arm(arm.default_path())
+START, END = [0.0, -60.0, 40.0], [10.0, -50.0, 45.0]
+Run = Callable[..., Result]
+
+
+@pytest.fixture
+def pipe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pipe:
+    """The board that every command finds on its port."""
+    found = Pipe(tmp_path / "flash")
+    found.run_samples = 12
+
+    @contextmanager
+    def open_board(port: str, log_traffic: Path | None = None, sink: Any = None) -> Iterator[Board]:
+        yield greet(found, None, found.clock)
+
+    monkeypatch.setattr(link, "open_board", open_board)
+    monkeypatch.chdir(tmp_path)
+    return found
+
+
+@pytest.fixture
+def run(pipe: Pipe) -> Run:
+    """Runs a command on that board, which counts as a real one."""
+
+    def run_command(*arguments: str, code: int = 0) -> Result:
+        result = CliRunner().invoke(main, [*arguments, "--port", "pipe"])
+        assert result.exit_code == code, result.output
+        return result
+
+    return run_command
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> str:
+    """A trajectory file."""
+    from armtempo import trajectory_file
+
+    trajectory = moves.straight("small", START, END, ARM)
+    plan = _plan(trajectory)
+    trajectory_file.save(plan, tmp_path / "small.json")
+    return "small.json"
+
+
+def _plan(trajectory: Any) -> Plan:
+    import numpy as np
+    from armtempo import extremes, planner
+
+    job = Job("small", (tuple(START), tuple(END)))
+    reached = tuple(extremes.of_joint(joint) for joint in trajectory.joints)
+    return Plan(ARM, job, np.array([START, END]), trajectory, (), reached, planner.versions())
+
+
+def test_help_lists_every_command() -> None:
+    output = CliRunner().invoke(main, ["--help"]).output
+    for name in COMMANDS:
+        assert f"  {name} " in output
+        assert CliRunner().invoke(main, [name, "--help"]).exit_code == 0
+
+
+def test_store_commands(run: Run, file: str) -> None:
+    assert "stored" in run("upload", file, "--default").output
+    listing = run("list").output
+    assert "small *" in listing
+    assert "small-2" in run("rename", "small", "small-2").output
+    shown = run("show", "small-2").output
+    assert "from 0.00, -60.00, 40.00 degrees" in shown
+    run("remove", "small-2")
+    assert "small" not in run("list").output
+    assert "no trajectory of this name" in run("remove", "small", code=1).output
+    assert "empty, too long or has other characters" in run("upload", file, "--name", "a b", code=1).output
+
+
+def test_run_writes_a_folder(run: Run, file: str, pipe: Pipe) -> None:
+    assert "armtempo home" in run("run", file, code=1).output
+    assert "0.00, -60.00, 40.00 degrees" in run("home", "P0").output
+    output = run("run", file).output
+    assert "samples-01.csv: complete" in output
+    assert "12 samples" in output
+    found = runs.load(Path("runs/small-001"))
+    assert len(found.repetitions[0].index) == 12
+    assert found.trajectory_path is not None
+    assert (Path("runs/small-001") / "motion.bin").read_bytes()[:4] == b"ATM1"
+
+
+def test_run_refuses_another_start(run: Run, file: str) -> None:
+    run("upload", file)
+    run("home", "5,-60,40")
+    assert "armtempo goto" in run("run", file, code=1).output
+
+
+def test_run_by_stored_name(run: Run, file: str) -> None:
+    run("upload", file)
+    run("home")
+    assert "complete" in run("run", "small").output
+    assert "no trajectory of this name" in run("run", "other", code=1).output
+
+
+def test_fault_during_a_run(run: Run, file: str, pipe: Pipe, monkeypatch: pytest.MonkeyPatch) -> None:
+    run("upload", file)
+    run("home")
+    engine = pipe.app.engine
+
+    def stall(samples: int) -> None:
+        engine.fault, engine.fault_joint = 42, 1
+        engine.finish()
+
+    monkeypatch.setattr(engine, "advance", stall)
+    output = run("run", file, code=1).output
+    assert "stall or slip) (joint 2)" in output
+    assert runs.load(Path("runs/small-001")).repetitions[0].state == "fault"
+    assert "fault     following" in run("status").output
+    assert "a fault is pending" in run("run", file, code=1).output
+    assert "cleared: following" in run("clear").output
+    assert "no fault was pending" in run("clear").output
+
+
+def test_interrupt_brakes_and_keeps_the_samples(
+    run: Run, file: str, pipe: Pipe, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run("upload", file)
+    run("home")
+    engine = pipe.app.engine
+    advance = engine.advance
+
+    def interrupt(samples: int) -> None:
+        advance(samples)
+        monkeypatch.setattr(StopRequest, "wanted", True, raising=False)
+
+    monkeypatch.setattr(StopRequest, "__init__", lambda self: None)
+    monkeypatch.setattr(StopRequest, "wanted", False, raising=False)
+    monkeypatch.setattr(engine, "advance", interrupt)
+    output = run("run", file, code=130).output
+    assert "interrupted" in output
+    assert engine.calls[-1] == "brake"
+    found = runs.load(Path("runs/small-001")).repetitions[0]
+    assert found.state == "interrupted"
+    assert len(found.index)
+
+
+def test_arm_is_not_replaced_silently(run: Run, file: str, tmp_path: Path) -> None:
+    run("upload", file)
+    other = tmp_path / "other.toml"
+    other.write_text(arm.default_path().read_text().replace("pulse_us = 2.0", "pulse_us = 3.0"))
+    run("home", "--arm", str(other))
+    assert "name its arm file with --arm" in run("home", code=1).output
+    assert "planned for another arm" in run("run", file, "--arm", str(other), code=2).output
+
+
+@pytest.mark.parametrize(
+    ("where", "words"),
+    [
+        ("P9", "via points P0 to P6"),
+        ("here", "is no posture"),
+        ("1,2", "3 angles, not 2"),
+        ("-11,0,0", "outside of its range"),
+        ("x.json", "x.json"),
+    ],
+)
+def test_bad_postures(run: Run, where: str, words: str) -> None:
+    run("home")
+    assert words in run("goto", where, code=2).output
+
+
+def test_stop_when_nothing_moves(run: Run) -> None:
+    run("home")
+    assert "state     idle" in run("stop").output
+
+
+def test_ports_and_missing_ports() -> None:
+    assert "sim" in CliRunner().invoke(main, ["ports"]).output
+    result = CliRunner().invoke(main, ["status"], env={"ARMTEMPO_PORT": "/dev/nowhere"})
+    assert result.exit_code == 2
+    assert "there is no port /dev/nowhere" in result.output
