@@ -9,8 +9,6 @@ A piece is array('i') of 12: six high words, then six low words. Cubic pieces ar
 they are loaded; all that follows knows quintics only.
 """
 
-import struct
-
 import micropython
 from micropython import const
 
@@ -48,17 +46,6 @@ def _weights(degree):
 
 
 WEIGHTS = {3: _weights(3), 5: _weights(5)}
-
-
-def last_value(motion, offset):
-    """Value at the end of the segment whose control points begin at byte ``offset``; a whole, big number."""
-    weights = WEIGHTS[motion.degree]
-    count = weights[0]
-    control = struct.unpack_from("<%dq" % count, motion.data, offset)
-    total = 60
-    for i in range(count):
-        total += weights[1 + 5 * count + i] * control[i]
-    return total // 120
 
 
 @micropython.viper

@@ -104,6 +104,19 @@ def elapsed(state: ptr32, ahead: int) -> int:
 
 
 @micropython.viper
+def within(state: ptr32, span: int) -> int:
+    """About how many of the next steps come before ``span`` (1024 ticks, at most 2**12) after the base."""
+    step = state[10]
+    if state[8] == 0:
+        step = state[1] >> state[4]
+    shift = state[5]
+    span = (span << 10) - ((state[0] + step) >> shift)
+    if span < 0:
+        return 0
+    return span // ((step >> shift) + 1) + 1
+
+
+@micropython.viper
 def deviation(state: ptr32, a: ptr32, middle: ptr32, b: ptr32) -> int:
     """How far the node ``middle`` lies off the Hermite cubic through ``a`` and ``b``: 2**-TIME_SCALE / 2 ticks.
 

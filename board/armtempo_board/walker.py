@@ -11,7 +11,8 @@ _LARGEST_POWER = const(10)
 _SMALLEST_POWER = const(2)
 _DEVIATION = const(4)  # half ticks: the Hermite cubic over two stretches may miss the middle node by 2 ticks,
 # so that each half is 16 times better by the h**4 law, with a factor of four to spare
-_FAR = const(1000)  # in 4096 ticks
+_FAR = const(1000)  # 1 or 4 million ticks
+_NEVER = const((1 << 30) - 1)
 _NEVER = const(1 << 28)  # in 1024 ticks: 54 minutes
 
 
@@ -81,20 +82,17 @@ class Walker:
 
     def last_1024(self):
         """Time of the step written last, in 1024 ticks."""
-        return self._base_1024() + stretch.elapsed(self._state, 0)
+        return self._base_1024 + stretch.elapsed(self._state, 0)
 
     def next_1024(self):
         """Time of the next step to be written, or one before it while it is not known; in 1024 ticks."""
         if self._left:
-            return self._base_1024() + stretch.elapsed(self._state, 1)
+            return self._base_1024 + stretch.elapsed(self._state, 1)
         if self._held:
             return _in_1024(self._held_high, self._held_ticks)
         if self.at_turn:
             return _in_1024(self._cells.time[0], self._ticks(self._a))
         return _in_1024(self._cells.time[0], 0)
-
-    def _base_1024(self):
-        return _in_1024(self._base_high, self._base_ticks)
 
     def _prepare(self):
         """Make the next stretch ready. False: at a turn, at the end, or not found yet."""
@@ -237,8 +235,7 @@ class Walker:
 
     def _write(self, high, ticks):
         stretch.single(self._state, high, ticks)
-        self._base_high = high
-        self._base_ticks = ticks
+        self._base_1024 = _in_1024(high, ticks)
         self._left = 1
 
     def _block(self, remaining):
@@ -289,8 +286,7 @@ class Walker:
         state[stretch.BASE_HIGH] = self._cells.time[0]
         state[stretch.POWER] = self._block_power
         stretch.differences(state, self._a, self._middle)
-        self._base_high = self._cells.time[0]
-        self._base_ticks = self._a[crossing.TIME] >> state[stretch.TIME_SCALE]
+        self._base_1024 = _in_1024(self._cells.time[0], self._a[crossing.TIME] >> state[stretch.TIME_SCALE])
         self._left = 1 << self._block_power
         self._index += self._left
         self._halves -= 1
