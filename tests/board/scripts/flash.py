@@ -12,7 +12,7 @@ class PowerCut(BaseException):
 
 
 class Flash:
-    """Takes the place of ``os`` and ``open`` in the store module; ``error`` None cuts the power at ``fail_at``."""
+    """Takes the place of ``os`` and ``open`` in the store; ``error`` None cuts the power at ``fail_at``."""
 
     def __init__(self):
         self.files = {}
