@@ -80,5 +80,4 @@ def _attach(port):
 
 
 def _folders():
-    here = __file__.rsplit("/", 1)[0]
-    return (here, here.rsplit("/", 1)[0] + "/armtempo_shared")
+    return [path.rsplit("/", 1)[0] for path in (__file__, codes.__file__)]
