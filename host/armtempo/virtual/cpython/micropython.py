@@ -2,8 +2,8 @@
 
 Pointer annotations of ``@viper`` functions, and casts such as ``ptr32(address)`` inside them, get views that
 behave like the chip's memory: 8, 16 or 32 bit wide, stores wrap, loads of ``ptr8`` and ``ptr16`` are
-unsigned, loads of ``ptr32`` signed. Everything else
-in a viper function is left as it is: board code keeps its words within 31 bits (or lets only a store wrap).
+unsigned, loads of ``ptr32`` signed. Everything else in a viper function is left as it is: board code keeps its
+words within 31 bits (or lets only a store wrap).
 """
 
 from __future__ import annotations
@@ -11,52 +11,37 @@ from __future__ import annotations
 import builtins
 import ctypes
 import functools
+from array import array
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+_REACH = 4096  # bytes that can be reached from an address
+_MOST_KEPT = 4096
 
 
 class _Pointer:
-    """Memory of an array or a buffer, or at an address, seen in words of ``width`` bytes, little endian."""
+    """Memory seen in words of one width, little endian."""
 
-    width = 1
-    signed = False
-    reach = 4096  # bytes that can be reached from an address
+    __slots__ = ("_words",)
 
-    def __init__(self, target: Any, offset: int = 0) -> None:
-        if isinstance(target, int):
-            target = (ctypes.c_ubyte * self.reach).from_address(target)
-        self._bytes = memoryview(target).cast("B")
-        self._offset = offset
+    def __init__(self, words: memoryview) -> None:
+        self._words = words
 
     def __int__(self) -> int:
-        return ctypes.addressof(ctypes.c_char.from_buffer(self._bytes)) + self._offset
+        return ctypes.addressof(ctypes.c_char.from_buffer(self._words.cast("B")))
 
     def __getitem__(self, index: int) -> int:
-        at = self._offset + index * self.width
-        return int.from_bytes(self._bytes[at : at + self.width], "little", signed=self.signed)
+        return int(self._words[index])
 
     def __setitem__(self, index: int, value: int) -> None:
-        at = self._offset + index * self.width
-        masked = value & ((1 << 8 * self.width) - 1)
-        self._bytes[at : at + self.width] = masked.to_bytes(self.width, "little")
-
-
-class _Pointer16(_Pointer):
-    width = 2
+        self._words[index] = value & ((1 << 8 * self._words.itemsize) - 1)
 
 
 class _Pointer32(_Pointer):
     """The one that loops run on: as quick as it gets."""
 
-    width = 4
-    signed = True
-
-    def __init__(self, target: Any, offset: int = 0) -> None:
-        super().__init__(target, offset)
-        whole = (len(self._bytes) - offset) & ~3
-        self._words = self._bytes[offset : offset + whole].cast("i")
+    __slots__ = ()
 
     def __getitem__(self, index: int) -> int:
         return self._words[index]
@@ -67,7 +52,32 @@ class _Pointer32(_Pointer):
         self._words[index] = value
 
 
-_POINTERS: dict[str, type[_Pointer]] = {"ptr8": _Pointer, "ptr16": _Pointer16, "ptr32": _Pointer32}
+def _caster(kind: type[_Pointer], cell: Literal["B", "H", "i"], width: int) -> Callable[[Any], _Pointer]:
+    """A cast to a pointer. Pointers to addresses and arrays are kept: most calls come with the same ones."""
+    kept: dict[int, _Pointer] = {}
+
+    def cast(target: Any) -> _Pointer:
+        key = ~target if target.__class__ is int else id(target)
+        known = kept.get(key)
+        if known is not None:
+            return known
+        memory = (ctypes.c_ubyte * _REACH).from_address(target) if key < 0 else target
+        view = memoryview(memory).cast("B")
+        pointer = kind(view[: len(view) // width * width].cast(cell))
+        if key < 0 or isinstance(target, (array, memoryview)):  # a bytearray may want to grow
+            if len(kept) >= _MOST_KEPT:
+                kept.clear()
+            kept[key] = pointer
+        return pointer
+
+    return cast
+
+
+_CASTS = {
+    "ptr8": _caster(_Pointer, "B", 1),
+    "ptr16": _caster(_Pointer, "H", 2),
+    "ptr32": _caster(_Pointer32, "i", 4),
+}
 
 
 def const(value: Any) -> Any:
@@ -83,28 +93,28 @@ def native(function: Function) -> Function:
 def viper(function: Callable[..., Any]) -> Callable[..., Any]:
     """The function with its pointer arguments turned into views of memory."""
     names = function.__code__.co_varnames[: function.__code__.co_argcount]
-    kinds = [_pointer_type(function.__annotations__.get(name)) for name in names]
+    kinds = [_cast_of(function.__annotations__.get(name)) for name in names]
     places = [(place, kind) for place, kind in enumerate(kinds) if kind is not None]
 
     @functools.wraps(function)
     def call(*arguments: Any) -> Any:
         values = list(arguments)
-        for place, kind in places:
-            values[place] = kind(values[place])
+        for place, cast in places:
+            values[place] = cast(values[place])
         return function(*values)
 
     return call
 
 
-def _pointer_type(annotation: Any) -> type[_Pointer] | None:
-    return _POINTERS.get(getattr(annotation, "__name__", annotation))
+def _cast_of(annotation: Any) -> Callable[[Any], _Pointer] | None:
+    return _CASTS.get(getattr(annotation, "__name__", annotation))
 
 
 def _uint(value: Any) -> int:
     return int(value) & 0xFFFFFFFF
 
 
-for _name, _kind in _POINTERS.items():
-    _kind.__name__ = _name  # as annotations name them
-    setattr(builtins, _name, _kind)
+for _name, _cast in _CASTS.items():
+    _cast.__name__ = _name  # as annotations name them
+    setattr(builtins, _name, _cast)
 builtins.uint = _uint  # type: ignore[attr-defined]
