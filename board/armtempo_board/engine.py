@@ -1,0 +1,297 @@
+"""The hardware side of a motion: from its splines to the pins, and back to samples.
+
+``load`` checks a motion and fills the rings, ``start`` lets the counters run, ``service`` keeps the rings filled
+(call it every few hundred microseconds), until ``moving`` is False. Then ``fault`` says why it ended.
+After any stop ``commanded`` is exact for every joint whose bit in ``known`` is set:
+
+=====================  =============================================================
+end, brake, freeze     known: each pulse begun is finished, and all are counted
+limit switch           the same
+underrun               the same: the ring stalls, nothing wrong is stepped
+E-stop                 known, but unknown where the arm record releases the drivers
+following error        unknown for the joint that was lost
+DIR turned too late    unknown for all joints
+=====================  =============================================================
+"""
+
+import gc
+import time
+
+import stm
+from armtempo_shared import armrecord, codes
+from armtempo_shared.limits import TICK_HZ
+from machine import mem32
+from micropython import const
+
+from armtempo_board import access, evaluator, registers
+from armtempo_board.encoders import Encoder, NoEncoder
+from armtempo_board.following import Following
+from armtempo_board.inputs import Inputs
+from armtempo_board.joint import Joint
+from armtempo_board.readings import Readings
+from armtempo_board.sampler import Sampler
+
+LEAD_TICKS = const(1680000)
+"""Time from the start of the counters to time 0: 20 ms, in which drivers switch on and DIR settles."""
+
+NO_JOINT = const(255)
+_PREFILLS = const(32)
+_PULSE_SPARE_US = const(5)
+
+
+class Engine:
+    """``head`` and ``joints`` as ``armrecord.unpack`` gives them. Nothing moves, drivers are off."""
+
+    def __init__(self, head, joints):
+        rows = [row for row in joints if row["encoder"] != armrecord.NONE]
+        fitted = [Encoder(row["encoder"], row["encoder_inverted"]) for row in rows]
+        self._sampler = Sampler(len(joints), tuple([encoder.address for encoder in fitted]))
+        self._block = self._sampler.block
+        self._sampler.connect()
+        registers.apply(registers.CLOCKS)
+        registers.apply(registers.TIMERS)
+        self._joints = [Joint(n, head, row, self._sampler) for n, row in enumerate(joints)]
+        self._encoders = [fitted[rows.index(row)] if row in rows else NoEncoder() for row in joints]
+        slots = [7 + rows.index(row) if row in rows else 0 for row in joints]
+        self._readings = Readings(self._sampler, self._joints, self._encoders, slots)
+        self._following = [Following(row) for row in joints]
+        self._inputs = Inputs(head, joints, self._sampler)
+        self._arm = joints
+        self._pulse_us = head["pulse_ticks"] // (TICK_HZ // 1000000) + _PULSE_SPARE_US
+        self._epoch = 0
+        self._low = 0
+        self._watched = 0
+        self._homing = False
+        self._end_ticks = 0
+        self.moving = False
+        self.finished = False
+        self.fault = 0
+        self.fault_joint = NO_JOINT
+        self.known = 0
+        self.duration_ticks = 0
+
+    # before a motion
+
+    def home(self, mask, steps):
+        """The joints of ``mask`` stand at ``steps`` (one number for every joint)."""
+        for number, joint in enumerate(self._joints):
+            if mask >> number & 1:
+                joint.declare(steps[number])
+                self._encoders[number].declare(self._following[number].expected(steps[number]))
+        self.known |= mask
+
+    def load(self, motion):
+        """Check a motion and fill the rings; None, or (code, joint, value) where it is refused."""
+        refused = self._refusal(motion)
+        if refused:
+            return refused
+        self._inputs.enable(True)
+        self._set_clock(-LEAD_TICKS)
+        self._sampler.plan(self.duration_ticks)
+        self._readings.clear()
+        for number, joint in enumerate(self._joints):
+            joint.load(motion, number)
+            self._inputs.watch(number, 1)
+            self._prefill(joint)
+        self.finished = False
+        return None
+
+    def _refusal(self, motion):
+        if self.moving:
+            return codes.BUSY, NO_JOINT, 0
+        self._look()
+        if self.fault:
+            return codes.FAULT_PENDING, self.fault_joint, self.fault
+        refused = evaluator.check(motion, self._arm)
+        if refused:
+            return refused
+        self.duration_ticks = evaluator.duration_ticks(motion)
+        for number, joint in enumerate(self._joints):
+            if not self.known >> number & 1:
+                return codes.UNHOMED, number, 0
+            off = evaluator.start_offset(motion, number, joint.position())
+            if off:
+                return codes.WRONG_START, number, off
+        return None
+
+    def _prefill(self, joint):
+        now_k = self._clock()
+        for _ in range(_PREFILLS):
+            joint.serve(now_k)
+
+    def start(self, homing=False):
+        """Let the counters run. ``homing``: a limit switch ends the motion without a fault."""
+        gc.collect()
+        self._homing = homing
+        self.moving = True
+        before_k = access.clock_k(stm.TIM2)
+        mem32[stm.TIM2 + 4 * access.CR1] = 1
+        time.sleep_us(50)
+        for _ in range(5):
+            if access.in_step(stm.TIM2, stm.TIM5) and access.clock_k(stm.TIM2) != before_k:
+                return
+        self._fail(codes.START_FAILED, NO_JOINT)
+
+    # while it moves
+
+    def service(self):
+        """Refill the rings, convert samples, look for faults."""
+        if not self.moving:
+            self._look()
+            return
+        if self._block[access.FROZEN]:
+            self._stopped()
+            return
+        now_k = self._clock()
+        self._readings.convert(self._epoch, self._low)
+        for number in range(len(self._joints)):
+            fault = self._joints[number].serve(now_k)
+            if fault:
+                self._fail(fault, number)
+                return
+        self._inputs.poll()
+        self._follow()
+        if self._block[access.LATE]:
+            self._fail(codes.INTERNAL, NO_JOINT)
+        elif self._over():
+            self._finish()
+
+    def _over(self):
+        for joint in self._joints:
+            if not joint.over:
+                return False
+        return self._sampler.done()
+
+    def _follow(self):
+        """Compare one joint with its encoder; the next joint comes with the next call."""
+        number = self._watched
+        self._watched = (number + 1) % len(self._joints)
+        joint = self._joints[number]
+        if not self._following[number].limit or joint.ring.left() < 0:
+            return
+        encoder = self._encoders[number]
+        encoder.update()
+        if self._following[number].lost(joint.position(), encoder.counts):
+            self.known &= ~(1 << number)
+            self._fail(codes.FOLLOWING, number)
+
+    def _look(self):
+        """While nothing moves: follow the encoders; the E-stop counts here too."""
+        for encoder in self._encoders:
+            encoder.update()
+        if self._inputs.estop_active():
+            self._inputs.trip_estop()
+        if self._block[access.FAULT] and not self.fault:
+            self._note_fault()
+
+    def freeze(self):
+        """Stop all outputs now; not a fault."""
+        self._inputs.freeze()
+        if self.moving:
+            self._stopped()
+
+    def brake(self):
+        """Come to rest along the path."""
+
+    def _fail(self, code, joint):
+        self._inputs.freeze()
+        access.trip(self._block, code, joint)
+        self._stopped()
+
+    # after it
+
+    def _stopped(self):
+        """The outputs were frozen: let begun pulses end, then count."""
+        time.sleep_us(self._pulse_us)
+        self._stop_counters()
+        self._clock()
+        self._readings.convert(self._epoch, self._low)
+        high = self._block[access.HIGH]
+        for number, joint in enumerate(self._joints):
+            joint.ring.left()
+            joint.settle(high >> number & 1)
+        self._sampler.take_now()
+        self._readings.convert(self._epoch, self._low)
+        if self._block[access.LATE]:
+            self.known = 0
+        if self._block[access.FAULT] == codes.LIMIT_SWITCH and self._homing:
+            self._block[access.FAULT] = 0
+        if self._block[access.FAULT]:
+            self._note_fault()
+        self._finish()
+
+    def _note_fault(self):
+        self.fault = self._block[access.FAULT]
+        self.fault_joint = self._block[access.FAULT_JOINT]
+        if self.fault == codes.ESTOP and self._inputs.releases:
+            self.known = 0
+
+    def _finish(self):
+        self._stop_counters()
+        for number, joint in enumerate(self._joints):
+            joint.rest()
+            self._inputs.watch(number, 0)
+        self.moving = False
+        self.finished = True
+
+    def _stop_counters(self):
+        mem32[stm.TIM2 + 4 * access.DIER] = 0
+        mem32[stm.TIM2 + 4 * access.CR1] = 0
+        mem32[stm.TIM5 + 4 * access.CR1] = 0
+
+    def clear(self):
+        """Clear the fault, unless its cause is still there; True where it is cleared."""
+        if self.moving or self._inputs.estop_active():
+            return False
+        self._block[access.FAULT] = 0
+        self.fault = 0
+        self.fault_joint = NO_JOINT
+        return True
+
+    def close(self):
+        """Let go of the hardware; the rings may be forgotten after it."""
+        self.freeze()
+        self._inputs.close()
+
+    # what it knows
+
+    def commanded(self, joint):
+        """Steps issued so far, as a position."""
+        while self._joints[joint].ring.left() < 0:
+            self._readings.convert(self._epoch, self._low)
+        return self._joints[joint].position()
+
+    def next_sample(self, buffer):
+        """Copy the oldest sample to ``buffer``: ticks (low, high word), commanded[], counts[]; False: none."""
+        return self._readings.next(buffer)
+
+    def snapshot(self, buffer):
+        """The same as a sample, of this moment."""
+        ticks = max(self.motion_ticks(), 0)
+        low = ticks & 0xFFFFFFFF
+        buffer[0] = low - (1 << 32) if low >> 31 else low
+        buffer[1] = ticks >> 32
+        count = len(self._joints)
+        for number in range(count):
+            buffer[2 + number] = self.commanded(number)
+            self._encoders[number].update()
+            buffer[2 + count + number] = self._encoders[number].counts
+
+    def motion_ticks(self):
+        """The motion clock, 64 bits; negative before time 0."""
+        counter = mem32[stm.TIM2 + 4 * access.CNT] & 0xFFFFFFFF
+        epoch = self._epoch + (1 if counter >> 10 < self._low else 0)
+        return (epoch << 32) + counter
+
+    def _set_clock(self, ticks):
+        registers.set_counters(ticks & 0xFFFFFFFF)
+        self._epoch = ticks >> 32
+        self._low = access.clock_k(stm.TIM2)
+
+    def _clock(self):
+        """The motion clock in units of 1024 ticks: a small integer."""
+        low = access.clock_k(stm.TIM2)
+        if low < self._low:
+            self._epoch += 1
+        self._low = low
+        return (self._epoch << 22) + low

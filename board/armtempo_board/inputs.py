@@ -1,0 +1,120 @@
+"""E-stop and limit switches: hard interrupts that freeze the outputs; and the ENABLE output.
+
+From the edge to frozen outputs it takes at most 20 us (see docs/hardware.md). The pull resistors draw towards
+the tripped level, so a switch that opens when it trips also trips when its wire breaks.
+"""
+
+from array import array
+
+import micropython
+import stm
+from armtempo_shared import armrecord, codes
+from machine import disable_irq, enable_irq
+from micropython import const
+from pyb import ExtInt, Pin
+
+from armtempo_board import access, pins
+
+_NOBODY = const(255)
+
+
+class Inputs:
+    """``sampler`` lends its block; ``head`` and ``joints`` are the arm record's."""
+
+    def __init__(self, head, joints, sampler):
+        flags = head["flags"]
+        self._block = sampler.block
+        self._timer2, self._timer5, self._port = stm.TIM2, stm.TIM5, stm.GPIOE
+        self._step_ports = (stm.GPIOA, stm.GPIOB)
+        self._on = 1 if flags & armrecord.FLAG_ENABLE_HIGH else 0
+        self.enable_pin = Pin(pins.ENABLE, Pin.OUT_PP, value=1 - self._on)
+        self.releases = bool(flags & armrecord.FLAG_ESTOP_RELEASES)
+        self._estop = None
+        self._limits = []  # (pin, level when tripped, line)
+        self._joints = joints
+        self._pairs = array("I", bytearray(4 * access.PAIR_WORDS * 2 * len(joints)))
+        self._count = 0
+        if flags & armrecord.FLAG_ESTOP_FITTED:
+            self._estop_level = 1 if flags & armrecord.FLAG_ESTOP_ACTIVE_HIGH else 0
+            self._estop = self._hook(pins.ESTOP, self._estop_level, self._on_estop)
+        self._add_limits()
+
+    def _hook(self, name, level, callback):
+        mode = ExtInt.IRQ_RISING if level else ExtInt.IRQ_FALLING
+        pull = Pin.PULL_UP if level else Pin.PULL_DOWN
+        pin = Pin(name, Pin.IN, pull=pull)
+        ExtInt(pin, mode, pull, None)  # an earlier engine's hook would be refused its successor
+        ExtInt(pin, mode, pull, callback)
+        return pin
+
+    def _add_limits(self):
+        fitted = {}
+        for number, joint in enumerate(self._joints):
+            for side, positive in (("limit_low", 0), ("limit_high", 1)):
+                switch = joint[side]
+                if switch == armrecord.NONE:
+                    continue
+                fitted[switch] = joint["limit_active_high"]
+                self._add_pair(number, joint, int(pins.LIMIT[switch][1:]), positive)
+        for switch, level in fitted.items():
+            pin = self._hook(pins.LIMIT[switch], level, self._on_limit)
+            self._limits.append((pin, level, int(pins.LIMIT[switch][1:])))
+
+    def _add_pair(self, number, joint, line, positive):
+        at = access.PAIR_WORDS * self._count
+        direction = int(pins.STEP[joint["channel"]][6][1:])
+        for word, value in enumerate((line, direction, positive ^ joint["dir_inverted"], number, 0)):
+            self._pairs[at + word] = value
+        self._count += 1
+
+    @micropython.viper
+    def _on_estop(self, line):
+        access.freeze(self._block, self._timer2, self._timer5, self._step_ports)
+        access.trip(self._block, codes.ESTOP, _NOBODY)
+        if self.releases:
+            self.enable_pin.value(1 - int(self._on))
+
+    @micropython.viper
+    def _on_limit(self, line):
+        joint = int(access.towards(self._pairs, self._count, line, access.directions(self._port)))
+        if joint:
+            access.freeze(self._block, self._timer2, self._timer5, self._step_ports)
+            access.trip(self._block, codes.LIMIT_SWITCH, joint - 1)
+
+    def trip_estop(self):
+        """As the E-stop's interrupt does."""
+        self._on_estop(None)
+
+    def freeze(self):
+        """Stop all outputs now."""
+        before = disable_irq()
+        access.freeze(self._block, self._timer2, self._timer5, self._step_ports)
+        enable_irq(before)
+
+    def poll(self):
+        """What the interrupts would have missed: a switch that was tripped before the joint turned to it."""
+        for pin, level, line in self._limits:
+            if pin.value() == level:
+                self._on_limit(line)
+
+    def watch(self, joint, moves):
+        """Whether the joint moves: a switch stops it only then."""
+        for pair in range(self._count):
+            if self._pairs[access.PAIR_WORDS * pair + 3] == joint:
+                self._pairs[access.PAIR_WORDS * pair + 4] = moves
+
+    def estop_active(self):
+        """Whether the E-stop is tripped at this moment."""
+        return self._estop is not None and self._estop.value() == self._estop_level
+
+    def enable(self, on):
+        """Drivers on or off."""
+        self.enable_pin.value(self._on if on else 1 - self._on)
+
+    def close(self):
+        """Let go of the interrupts; drivers off."""
+        self.enable(False)
+        for pin, _, _ in self._limits:
+            ExtInt(pin, ExtInt.IRQ_RISING, Pin.PULL_NONE, None)
+        if self._estop:
+            ExtInt(self._estop, ExtInt.IRQ_RISING, Pin.PULL_NONE, None)

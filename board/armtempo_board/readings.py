@@ -1,0 +1,67 @@
+"""From raw samples to samples: ticks, commanded steps and encoder counts, kept until they are fetched."""
+
+from array import array
+
+from micropython import const
+
+from armtempo_board import access
+
+_ROOM = const(16)
+
+
+class Readings:
+    """``joints`` and ``encoders``: one of each a joint; ``slots``: place of its encoder in a raw sample."""
+
+    def __init__(self, sampler, joints, encoders, slots):
+        self._sampler = sampler
+        self._joints = joints
+        self._encoders = encoders
+        self._slots = slots
+        self._size = 2 + 2 * len(joints)
+        self._words = array("i", bytearray(4 * _ROOM * self._size))
+        self._in = self._out = 0
+        self.lost = 0
+
+    def clear(self):
+        """Forget what was not fetched."""
+        self._in = self._out = 0
+        self.lost = 0
+
+    def convert(self, epoch, now_k):
+        """Convert all raw samples; the counter is at ``epoch`` * 2**32 + ``now_k`` * 1024."""
+        sampler = self._sampler
+        at = sampler.next_raw()
+        while at >= 0:
+            if self._in - self._out >= _ROOM:
+                self._out += 1
+                self.lost += 1
+            self._convert(at, (self._in & (_ROOM - 1)) * self._size, epoch, now_k)
+            self._in += 1
+            sampler.drop()
+            at = sampler.next_raw()
+
+    def _convert(self, at, to, epoch, now_k):
+        raw, words = self._sampler.raw, self._words
+        if access.word_k(raw, at) > now_k:
+            epoch -= 1
+        words[to] = 0
+        words[to + 1] = max(epoch, 0)
+        if epoch >= 0:
+            access.copy_word(raw, at, words, to)
+        for number in range(len(self._joints)):
+            joint = self._joints[number]
+            joint.ring.left_at(raw[at + 1 + number])
+            encoder = self._encoders[number]
+            encoder.take(raw[at + self._slots[number]])
+            words[to + 2 + number] = joint.position()
+            words[to + 2 + len(self._joints) + number] = encoder.counts
+
+    def next(self, buffer):
+        """Copy the oldest sample to ``buffer`` and forget it; False where there is none."""
+        if self._in == self._out:
+            return False
+        at = (self._out & (_ROOM - 1)) * self._size
+        for word in range(self._size):
+            buffer[word] = self._words[at + word]
+        self._out += 1
+        return True

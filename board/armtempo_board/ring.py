@@ -1,0 +1,117 @@
+"""One STEP output: its pin, its ring of edge times and the DMA stream that feeds its compare register.
+
+The stream fetches one word ahead of the match that asks for it (RM0090 10.3.12), so what stands in the
+compare register and the word behind it are settled; only later words may still be written. Therefore new entries
+are added while the last rising edge is still well ahead, and an output that has run dry is started afresh.
+"""
+
+from array import array
+
+import stm
+import uctypes
+from machine import disable_irq, enable_irq, mem32
+from micropython import const
+from pyb import Pin
+
+from armtempo_board import access, pins, registers
+
+_SPARE = const(8)  # entries behind the matched one that stay readable, and the far-away entry
+_RESET_NDTR = access.RING
+
+
+class Ring:
+    """``channel`` indexes ``pins.STEP``; ``block`` and ``at`` are the interrupt's memory and the place in it."""
+
+    def __init__(self, channel, block, at):
+        pin, timer, compare, alternate, stream, dma_channel, _ = pins.STEP[channel]
+        self.words = array("I", bytearray(4 * access.RING + 4))
+        self.state = array("I", bytearray(4 * access.STATE_WORDS))
+        self._fed = memoryview(self.words)[1:]  # what the stream runs over
+        self._block = block
+        self._at = at
+        self._stream = stream
+        self._mode = registers.stream_mode(dma_channel)
+        self.timer = getattr(stm, "TIM%d" % timer)
+        self._compare = access.CCR1 + compare - 1
+        self._registers = registers.stream_address(stream)
+        address = registers.compare_address(timer, compare)
+        registers.apply(registers.stream_rows(stream, dma_channel, address, uctypes.addressof(self._fed)))
+        self._describe(pin, timer, compare)
+        Pin(pin, Pin.AF_PP, alt=alternate)
+
+    def _describe(self, pin, timer, compare):
+        block, at = self._block, self._at
+        block[at + access.NDTR_AT] = 4 + 6 * self._stream + access.STREAM_NDTR
+        block[at + access.ON_TIM5] = timer == 5
+        block[at + access.CCR_AT] = self._compare
+        block[at + access.CCMR_AT] = access.CCMR1 + (compare - 1) // 2
+        block[at + access.MODE_SHIFT] = 12 if compare % 2 == 0 else 4
+        block[at + access.ON_PORT_B] = pin[0] == "B"
+        block[at + access.PIN_BIT] = int(pin[1:])
+
+    def left(self):
+        """Entries that have not matched yet; -1 while a raw sample waits to be converted."""
+        ndtr = access.read_ndtr(self._registers, self._block)
+        return ndtr if ndtr < 0 else access.advance(self.state, ndtr)
+
+    def left_at(self, ndtr):
+        """Entries that had not matched yet when NDTR was read; readings come in their order."""
+        return access.advance(self.state, ndtr)
+
+    def room(self, left):
+        """Entries that may be added."""
+        return access.RING - _SPARE - left
+
+    def made(self):
+        """Entries written since the stream was started."""
+        return self.state[access.MADE]
+
+    def steps(self):
+        """Rising edges that have matched since the stream was started."""
+        return (self.state[access.LOADS] + 1) >> 1
+
+    def settled_low(self):
+        """Whether STEP is low after the matches that were counted."""
+        return self.state[access.LOADS] & 1 == 0
+
+    def last_k(self):
+        """Units of 1024 ticks from now to the last entry."""
+        return access.until_k(self.timer, self.state, access.LAST)
+
+    def seal(self, count):
+        """Take ``count`` entries in that were written behind the last."""
+        access.seal(self.state, self.words, count)
+
+    def stop(self):
+        """Switch the stream off, ready to be filled from entry 0."""
+        mem32[self._registers] = self._mode
+        registers.clear_flags(self._stream)
+        mem32[self._registers + 4 * access.STREAM_NDTR] = _RESET_NDTR
+        self.state[access.MADE] = 0
+        self.state[access.LOADS] = 0
+        self.state[access.FIRST] = _RESET_NDTR
+
+    def run(self):
+        """Switch the stream on and let the output toggle; False where its first entry came too late."""
+        mem32[self._registers] = self._mode | registers.STREAM_ON
+        self.state[access.FIRST] = mem32[self._registers + 4 * access.STREAM_NDTR] & 0xFFFF
+        before = disable_irq()
+        in_time = access.arm_channel(self._block, self.timer, self.words, self._at)
+        enable_irq(before)
+        return in_time
+
+    def release(self):
+        """Hold the output low."""
+        before = disable_irq()
+        access.release_channel(self._block, self.timer, self._at)
+        enable_irq(before)
+
+    def push_away(self):
+        """Keep the compare value of a dry output far from the counter."""
+        if access.until_k(self.timer, self.state, access.FAR) < 1 << 20:
+            self.mark_now()
+            access.push_away(self.timer, self._compare, self.state)
+
+    def mark_now(self):
+        """Count the last entry as being now: the output is dry, only turns of DIR are measured from it."""
+        access.mark(self.timer, self.state)

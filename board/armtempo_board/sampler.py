@@ -1,0 +1,106 @@
+"""The compare interrupt of TIM2 channel 4: samples on the motion's clock, and turns of the DIR pins.
+
+The interrupt stores raw readings; ``next_raw`` hands them to the main loop in their order.
+"""
+
+from array import array
+
+import micropython
+import stm
+from armtempo_shared.limits import MAX_JOINTS, SAMPLE_TICKS
+from machine import mem32
+from micropython import const
+from pyb import Timer
+
+from armtempo_board import access
+
+_LOW32 = 0xFFFFFFFF
+_QUIET_K = const(80)  # 1 ms
+
+
+class Sampler:
+    """Owner of the memory shared with the interrupts. ``counters``: addresses of the encoder timers in use."""
+
+    def __init__(self, joints, counters):
+        words = access.BLOCK_HEAD + MAX_JOINTS * access.JOINT_WORDS
+        self.block = array("I", bytearray(4 * words))
+        self.raw = array("I", bytearray(4 * access.RAW_WORDS * access.RAW_ROOM))
+        self.block[access.JOINTS] = joints
+        self.block[access.ENCODERS] = len(counters)
+        self.block[access.DONE] = 1
+        self._counters = counters
+        self._timer2 = stm.TIM2
+        self._directions = stm.GPIOE
+        self._dma = stm.DMA1
+        self._hook = self._interrupt  # bound once: making a bound method allocates
+
+    def connect(self):
+        """Hook the interrupt. Starts TIM2, so set the timers up after it."""
+        timer = Timer(2, prescaler=0, period=0x3FFFFFFF)
+        timer.channel(4, Timer.OC_TIMING, callback=self._hook)
+
+    @micropython.viper
+    def _interrupt(self, timer):
+        # 9 us before the first pin turns (see docs/hardware.md)
+        while int(access.serve(self.block, self._timer2, self._directions)):
+            access.take(self.raw, self.block, self._dma, self._counters)
+
+    def joint_at(self, joint):
+        """Place of a joint's words in the block."""
+        return access.BLOCK_HEAD + joint * access.JOINT_WORDS
+
+    def plan(self, duration_ticks):
+        """Samples at 0, then every SAMPLE_TICKS, and one at the end."""
+        block = self.block
+        for joint in range(block[access.JOINTS]):
+            at = self.joint_at(joint)
+            block[at + access.TURNS_OUT] = block[at + access.TURNS_IN]
+        for word in (access.TAKEN, access.READ, access.LOST, access.FROZEN, access.HIGH, access.LATE):
+            block[word] = 0
+        block[access.NEXT] = 0
+        block[access.LEFT] = -(-duration_ticks // SAMPLE_TICKS)
+        block[access.END] = duration_ticks & _LOW32
+        block[access.DONE] = 0
+        mem32[self._timer2 + 4 * access.CCR4] = 0
+        mem32[self._timer2 + 4 * access.SR] = 0
+        mem32[self._timer2 + 4 * access.DIER] = 1 << 4
+
+    def end_at(self, ticks, begun):
+        """The motion ends at another time than planned; ``begun`` samples of the grid have been taken.
+
+        Call it while no sample is due.
+        """
+        left = -(-ticks // SAMPLE_TICKS) - begun
+        self.block[access.END] = ticks & _LOW32
+        self.block[access.LEFT] = max(left, 0)
+        if left <= 0:
+            self.block[access.NEXT] = ticks & _LOW32
+
+    def quiet(self):
+        """Whether all raw samples are converted and the next is at least 1 ms away."""
+        block = self.block
+        if block[access.TAKEN] != block[access.READ]:
+            return False
+        return block[access.DONE] or access.until_k(self._timer2, block, access.NEXT) >= _QUIET_K
+
+    def done(self):
+        """Whether the last sample has been taken and converted."""
+        return self.block[access.DONE] and self.block[access.TAKEN] == self.block[access.READ]
+
+    def next_raw(self):
+        """Place of the oldest raw sample in ``raw``, or -1; ``drop`` it when it has been converted."""
+        read = self.block[access.READ]
+        if read == self.block[access.TAKEN]:
+            return -1
+        return (read & (access.RAW_ROOM - 1)) * access.RAW_WORDS
+
+    def drop(self):
+        """The oldest raw sample has been converted."""
+        self.block[access.READ] = (self.block[access.READ] + 1) & 0xFF
+
+    def take_now(self):
+        """Store a raw sample of this moment, the last; the interrupt must be off."""
+        block = self.block
+        block[access.NOW] = mem32[self._timer2 + 4 * access.CNT] & _LOW32
+        block[access.LEFT] = 0
+        access.take(self.raw, block, self._dma, self._counters)
