@@ -22,7 +22,7 @@ from armtempo.arm import Arm
 from armtempo.errors import InputError, PlanError
 from armtempo.job import Job, Pose
 from armtempo.kinematics import numerical
-from armtempo.kinematics.branches import branch_of
+from armtempo.kinematics.branches import Branch, branch_of
 from armtempo.kinematics.choice import Choice, choose
 from armtempo.kinematics.forward import forward
 from armtempo.kinematics.geometry import Array, Geometry
@@ -104,21 +104,26 @@ def resolve(arm: Arm, job: Job) -> Resolved:
     reasons for a pose that no solution reaches.
     """
     setup = _Setup.of(arm)
-    postures, notes = [setup.home], []
+    postures: list[Array] = []
+    notes: list[Note] = []
+    posture = setup.home
+    branch: Branch | None = None
     for number, via in enumerate(job.via, 1):
         where = f"job {job.name!r}, via {number}"
         choice = None
         if isinstance(via, Pose):
             target = checked(via.matrix, where)
-            needed, choice = _solve(setup, target, via, postures[-1], where)
+            needed, choice = _solve(setup, target, via, posture, where)
             notes += _undriven_note(setup, target, needed, number)
         else:
             needed = _spread(setup, via, where)
         posture = setup.moved(needed)
-        if number > 1 and Pose in (type(via), type(job.via[number - 2])):
-            notes += _branch_note(setup, postures[-1], posture, choice, number)
         postures.append(posture)
-    return Resolved(np.degrees(np.array(postures[1:])[:, setup.driven]), tuple(notes))
+        if setup.closed_form:
+            before, branch = branch, _branch(setup, posture, branch)
+            if before and Pose in (type(via), type(job.via[number - 2])):
+                notes += _branch_note(before, branch, choice, number)
+    return Resolved(np.degrees(np.array(postures)[:, setup.driven]), tuple(notes))
 
 
 def _spread(setup: _Setup, via: tuple[float, ...], where: str) -> Array:
@@ -170,12 +175,13 @@ def _undriven_note(setup: _Setup, target: Array, needed: Array, number: int) -> 
     return [Note("undriven", number, text)]
 
 
-def _branch_note(
-    setup: _Setup, before: Array, after: Array, choice: Choice | None, number: int
-) -> list[Note]:
-    if not setup.closed_form:
-        return []
-    old, new = branch_of(setup.geometry, before), branch_of(setup.geometry, after)
+def _branch(setup: _Setup, posture: Array, before: Branch | None) -> Branch:
+    """The branch at a via point; where the arm stands between two, it still counts as on the one before."""
+    here = branch_of(setup.geometry, posture)
+    return here.after(before) if before else here
+
+
+def _branch_note(old: Branch, new: Branch, choice: Choice | None, number: int) -> list[Note]:
     changed = old.differs(new)
     if not changed:
         return []

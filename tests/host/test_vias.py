@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from armtempo import job as jobs
-from armtempo import planner, vias
+from armtempo import planner, trajectory_file, vias
 from armtempo.arm import Arm, default_path, load_arm
+from armtempo.cli import main
 from armtempo.errors import InputError, PlanError
 from armtempo.job import Job, Pose
 from armtempo.kinematics import Geometry, forward
+from click.testing import CliRunner
 
 ARM = load_arm(default_path())
 GEOMETRY = Geometry.of(ARM)
@@ -102,6 +105,18 @@ def test_a_branch_change_is_reported_with_the_reason() -> None:
     assert "between via 2 and via 3" in second.text
 
 
+def test_a_branch_change_by_way_of_a_straight_wrist_is_reported() -> None:
+    bends = (20.0, 0.0, -20.0)
+    poses = (pose(0.0, -60.0, 40.0, 10.0, bend, 30.0, arm=ALL_DRIVEN) for bend in bends)
+    postures = ((0.0, -60.0, 40.0, 10.0, bend, 30.0) for bend in bends)
+    vias_given = [replace(each, posture_deg=posture) for each, posture in zip(poses, postures, strict=True)]
+    resolved = vias.resolve(ALL_DRIVEN, job(*vias_given))
+    np.testing.assert_allclose(resolved.via_deg[:, 4], bends, atol=1e-9)
+    (note,) = resolved.notes
+    assert (note.kind, note.via) == ("branch", 3)
+    assert "(wrist): from front up plain to front up flipped" in note.text
+
+
 def test_a_branch_change_between_angles_the_user_gave_is_his_own() -> None:
     assert vias.resolve(ARM, job((40.0, -110.0, 70.0), (150.0, -93.0, -140.0))).notes == ()
 
@@ -134,6 +149,22 @@ def test_wrong_via_points_are_named(via: tuple[float, ...] | Pose, words: str) -
     with pytest.raises(InputError, match="via 2") as caught:
         vias.resolve(ARM, job(pose(0.0, -60.0, 40.0), via))
     assert words in str(caught.value)
+
+
+def test_plan_prints_the_notes(tmp_path: Path) -> None:
+    rows = pose(20.0, -75.0, 50.0, 0.0, 30.0, 0.0).matrix
+    file = tmp_path / "job.toml"
+    file.write_text(
+        'name = "posed"\npopulation = 4\niterations = 5\n'
+        "[[via]]\nangles_deg = [0.0, -60.0, 40.0]\n"
+        f"[[via]]\nmatrix = {[list(map(float, row)) for row in rows]}\n"
+    )
+    output = tmp_path / "posed.json"
+    result = CliRunner().invoke(main, ["plan", "--job", str(file), "-o", str(output)])
+    assert result.exit_code == 0, result.output
+    assert "note: via 2: the pose needs joints that have no motor: joint 5 at 30 deg" in result.output
+    plan = trajectory_file.load(output)
+    np.testing.assert_allclose(plan.via_deg, [[0.0, -60.0, 40.0], [20.0, -75.0, 50.0]], atol=1e-9)
 
 
 def test_an_arm_outside_the_class_is_served_numerically() -> None:

@@ -27,6 +27,10 @@ class Branch(NamedTuple):
     def __str__(self) -> str:
         return " ".join(filter(None, self)) or "on the border of all branches"
 
+    def after(self, before: Branch) -> Branch:
+        """This branch, with what it leaves open taken from the one before."""
+        return Branch(*(mine or theirs for mine, theirs in zip(self, before, strict=True)))
+
     def differs(self, other: Branch) -> tuple[str, ...]:
         """Which of the three changes from this branch to ``other`` without doubt."""
         return tuple(
