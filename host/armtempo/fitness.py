@@ -14,8 +14,9 @@ from armtempo import spline, timeaxis
 from armtempo.arm import Limits
 from armtempo.spline import Array
 
-SAMPLES = 24
-"""Grid points in a path segment that the search looks at; the finished plan is checked without a grid."""
+SAMPLES = 16
+"""Parts of a path segment between the grid points that the search looks at; the finished plan is checked
+without a grid."""
 
 _PENALTY = 30.0
 """Seconds that the penalty of Eq. (21) charges where a limit is exceeded by as much again."""
@@ -63,14 +64,22 @@ class Fitness:
         result *= (1 / self.limits).T[:, None, :, None]
         return result
 
+    def peaks(self, intervals_s: Array) -> Array:
+        """Largest ratios in each segment, (3, N, J, m): of the grid, and of parabolas through its points."""
+        ratios = self.ratios(intervals_s)
+        ratios = ratios.reshape(*ratios.shape[:3], self.intervals, self._grid)
+        left, middle, right = ratios[..., :-2], ratios[..., 1:-1], ratios[..., 2:]
+        slope = np.abs(left - right)
+        bend = 2 * middle - left - right
+        tops = np.divide(slope * slope, 8 * bend, out=np.zeros_like(bend), where=slope < 2 * bend) + middle
+        return np.asarray(np.maximum(tops.max(axis=4), np.maximum(ratios[..., 0], ratios[..., -1])))
+
     def penalised(self, intervals_s: Array) -> Array:
         """Eq. (21): sum of X and weighted excess of each segment's extremes, (N,) for X (N, m).
 
         The paper leaves its weights open; here each excess counts relative to its limit.
         """
-        peaks = self.ratios(intervals_s)
-        peaks = peaks.reshape(*peaks.shape[:3], self.intervals, self._grid).max(axis=4)
-        excess = np.maximum(peaks - 1.0, 0.0).sum(axis=(0, 2, 3))
+        excess = np.maximum(self.peaks(intervals_s) - 1.0, 0.0).sum(axis=(0, 2, 3))
         return np.asarray(intervals_s.sum(axis=1) + _PENALTY * excess)
 
     def stretched(self, intervals_s: Array) -> Array:
@@ -79,7 +88,7 @@ class Fitness:
 
     def stretch(self, intervals_s: Array) -> Array:
         """The factor on X that brings it just within the limits, as far as the grid sees: (N,)."""
-        return stretch_of(self.ratios(intervals_s).max(axis=(2, 3)))
+        return stretch_of(self.peaks(intervals_s).max(axis=(2, 3)))
 
 
 def stretch_of(ratios: Array) -> Array:

@@ -1,14 +1,36 @@
-"""Adaptive cuckoo search, Eqs. (22) to (25) of the paper; first form, see ``search``."""
+"""Adaptive cuckoo search, section 3.2 of the paper, Eqs. (22) to (25), and a form of it that adapts more.
+
+Choices that the paper leaves open, measured in host/docs/acs.md:
+
+===================  ==================================  ===================================================
+choice               ``variant = "paper"``               ``variant = "differences"`` (default)
+===================  ==================================  ===================================================
+length of a flight   alpha_A of Eq. (25), each variable  ``a`` times one Lévy number for the whole nest
+its scale            the variables' own unit             difference of two other nests, so that it shrinks,
+                                                         and turns, with the population; F_m has no part
+abandoned            the worst ``pa`` of the nests,      each variable of each nest with probability ``pa``,
+                     for a flight from where they were   for a move along the difference of two nests
+evaluations          at most (1 + pa) N an iteration     at most 2 N an iteration
+===================  ==================================  ===================================================
+"""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
+from armtempo.errors import InputError
 from armtempo.optimise.tracker import Array, Function, Progress, Result, Tracker
 
-PARAMETERS: dict[str, float | str | bool] = {"a": 0.7, "b": 0.5, "pa": 0.25, "beta": 1.5}
+PARAMETERS: dict[str, float | str | bool] = {
+    "a": 0.7,
+    "b": 0.5,
+    "pa": 0.25,
+    "beta": 1.5,
+    "variant": "differences",
+}
 
 
 def search(
@@ -23,36 +45,95 @@ def search(
     b: float = 0.5,
     pa: float = 0.25,
     beta: float = 1.5,
+    variant: str = "differences",
 ) -> Result:
-    """Minimises ``function`` by at most 2 N evaluations an iteration (section 3.2)."""
-    low, high = bounds.T
-    tracker = Tracker(function, iterations, progress)
-    nests = rng.uniform(low, high, (population, len(low)))
-    values = tracker.evaluate(nests)
-    tracker.iteration_done()
-    scale = levy_scale(beta)
-    for t in range(1, iterations + 1):
-        alpha = 0.01 * a * population**b * math.exp(-t * min(values.mean(), 50.0) / iterations)
-        steps = (
-            rng.standard_normal(nests.shape) * scale / np.abs(rng.standard_normal(nests.shape)) ** (1 / beta)
+    """Minimises ``function`` in at most 2 * population * iterations evaluations.
+
+    ``a``, ``b`` of Eq. (25), ``pa`` the part abandoned, ``beta`` of Eq. (23). Raises InputError for an
+    unknown ``variant``.
+    """
+    if variant not in _VARIANTS:
+        raise InputError(f"optimiser 'acs': variant {variant!r} must be one of {', '.join(_VARIANTS)}")
+    if not (0 < pa <= 1 and 1 <= beta < 2):
+        raise InputError(
+            f"optimiser 'acs': needs 0 < pa <= 1 and 1 <= beta < 2, not pa = {pa}, beta = {beta}"
         )
-        trial = np.clip(nests + alpha * steps * (nests - tracker.x), low, high)
-        trial_values = tracker.evaluate(trial)
-        better = trial_values < values
-        nests[better], values[better] = trial[better], trial_values[better]
-        first, second = rng.permutation(population), rng.permutation(population)
-        moved = rng.random(nests.shape) < pa
-        trial = np.clip(
-            nests + moved * rng.random((population, 1)) * (nests[first] - nests[second]), low, high
-        )
-        trial_values = tracker.evaluate(trial)
-        better = trial_values < values
-        nests[better], values[better] = trial[better], trial_values[better]
+    nests = _VARIANTS[variant](
+        Tracker(function, iterations, progress), bounds, rng, population, (a, b, pa, beta)
+    )
+    for iteration in range(1, iterations + 1):
+        nests.iterate(iteration / iterations)
+    return nests.tracker.result()
+
+
+class _Nests:
+    """Points and their values; a new point replaces its nest where it is better."""
+
+    def __init__(
+        self,
+        tracker: Tracker,
+        bounds: Array,
+        rng: np.random.Generator,
+        population: int,
+        parameters: tuple[float, float, float, float],
+    ) -> None:
+        self.tracker = tracker
+        self.low, self.high = bounds.T
+        self.rng = rng
+        self.a, self.b, self.pa, self.beta = parameters
+        self.size = population
+        self.gamma = levy_scale(self.beta)
+        self.x = rng.uniform(self.low, self.high, (population, len(self.low)))
+        self.values = tracker.evaluate(self.x)
         tracker.iteration_done()
-    return tracker.result()
+
+    def iterate(self, part: float) -> None:
+        """One iteration (steps 2 and 3 of the paper); ``part`` of all of them is then done."""
+        raise NotImplementedError
+
+    def levy(self, shape: tuple[int, ...]) -> Array:
+        """Lévy numbers, Eq. (23)."""
+        tail = np.abs(self.rng.standard_normal(shape)) ** (1 / self.beta)
+        return np.asarray(self.rng.standard_normal(shape) * self.gamma / tail)
+
+    def settle(self, trial: Array, which: NDArray[np.intp] | slice = slice(None)) -> None:
+        """Evaluates ``trial`` for the nests ``which``, inside the bounds, and keeps what is better."""
+        trial = np.minimum(np.maximum(trial, self.low), self.high)
+        values = self.tracker.evaluate(trial)
+        better = values < self.values[which]
+        self.x[which] = np.where(better[:, None], trial, self.x[which])
+        self.values[which] = np.where(better, values, self.values[which])
+
+
+class _Paper(_Nests):
+    def iterate(self, part: float) -> None:
+        alpha = self.a * self.size**self.b * math.exp(-part * min(float(self.values.mean()), 700.0))
+        self.settle(self.x + alpha * self.levy(self.x.shape))
+        worst = np.argsort(self.values)[self.size - math.floor(self.pa * self.size) :]
+        if worst.size:
+            self.settle(self.x[worst] + alpha * self.levy((worst.size, len(self.low))), worst)
+        self.tracker.iteration_done()
+
+
+class _Differences(_Nests):
+    def iterate(self, part: float) -> None:
+        self.settle(self.x + self.a * self.levy((self.size, 1)) * self._difference())
+        abandoned = self.rng.random(self.x.shape) < self.pa
+        moved = self.x + abandoned * self.rng.random((self.size, 1)) * self._difference()
+        if part < 1:  # the evaluations left out here pay for the first population
+            self.settle(moved)
+        self.tracker.iteration_done()
+
+    def _difference(self) -> Array:
+        """For each nest the difference of two nests drawn at random."""
+        permutation = self.rng.permutation
+        return np.asarray(self.x[permutation(self.size)] - self.x[permutation(self.size)])
+
+
+_VARIANTS: dict[str, type[_Nests]] = {"differences": _Differences, "paper": _Paper}
 
 
 def levy_scale(beta: float) -> float:
-    """The factor of Gamma functions in the Lévy step of Eq. (23)."""
+    """The factor of Gamma functions in Eq. (23), with its brackets set as in its source (Mantegna)."""
     top = math.gamma(1 + beta) * math.sin(math.pi * beta / 2)
     return float((top / (math.gamma((1 + beta) / 2) * beta * 2 ** ((beta - 1) / 2))) ** (1 / beta))
