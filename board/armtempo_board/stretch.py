@@ -105,7 +105,7 @@ def elapsed(state: ptr32, ahead: int) -> int:
 
 @micropython.viper
 def within(state: ptr32, span: int) -> int:
-    """About how many of the next steps come before ``span`` (1024 ticks, at most 2**12) after the base."""
+    """About how many of the next steps come before ``span`` (1024 ticks, below 2**20) after the base."""
     step = state[10]
     if state[8] == 0:
         step = state[1] >> state[4]

@@ -11,8 +11,8 @@ _LARGEST_POWER = const(10)
 _SMALLEST_POWER = const(2)
 _DEVIATION = const(4)  # half ticks: the Hermite cubic over two stretches may miss the middle node by 2 ticks,
 # so that each half is 16 times better by the h**4 law, with a factor of four to spare
-_FAR = const(1000)  # 1 or 4 million ticks
-_NEVER = const((1 << 30) - 1)
+_FAR = const(1000)  # 4096 ticks: longer than any gap
+_LONG = const(1 << 19)  # 1024 ticks: longer than any stretch
 _NEVER = const(1 << 28)  # in 1024 ticks: 54 minutes
 
 
@@ -57,19 +57,19 @@ class Walker:
     def fill(self, ring, mask, head, room, until_1024=_NEVER):
         """Write up to ``room`` edge times (rise, fall, ...; ticks modulo 2**32) to ``ring`` from ``head`` on.
 
-        ``ring``: array('I') of ``mask`` + 1 entries, ``head`` even. Cells (50 ms at most) that begin later than
-        ``until_1024`` wait for a later call. Returns how many were written; 0: no room, at a turn, ended,
-        nothing until then, or the search for the next step goes on with the next call.
+        ``ring``: array('I') of ``mask`` + 1 entries, ``head`` even. Steps after ``until_1024`` (1024 ticks) wait for a
+        later call, but for a few. Returns how many were written; 0: no room, none until then, at a turn,
+        ended, or the search for the next step goes on with the next call.
         """
         written = 0
-        until = (until_1024 >> 2) + points.BIAS
         while written + 2 <= room:
             if not self._left and not self._prepare():
                 break
-            if self._cells.time[0] > until:
+            count = stretch.within(self._state, min(until_1024 - self._base_1024, _LONG))
+            if not count:
                 break
             at = (head + written) & mask
-            count = min(self._left, (room - written) >> 1, (mask + 1 - at) >> 1)
+            count = min(count, self._left, (room - written) >> 1, (mask + 1 - at) >> 1)
             stretch.emit(at, ring, self._state, count)
             self._left -= count
             written += 2 * count
