@@ -69,7 +69,7 @@ def own(geometry: Geometry, poses: np.ndarray, repeat: int) -> list[Row]:
         "armtempo, all 8, batch", len(poses), len(poses) / seconds, error(geometry, found, poses), count
     )
     some = poses[:SINGLE_POSES]
-    seconds, _ = timed(lambda: [inverse(geometry, pose) for pose in some], 1)
+    seconds, _ = timed(lambda: [inverse(geometry, pose) for pose in some], 3)
     single = Row("armtempo, all 8, one by one", len(some), len(some) / seconds, batch.error, count)
     return [batch, single]
 
@@ -89,7 +89,7 @@ def eaik(geometry: Geometry, poses: np.ndarray, repeat: int) -> list[Row]:
         ("EAIK, all, batch, 1 thread", poses, lambda: robot.IK_batched(poses, 1)),
         ("EAIK, all, one by one", some, lambda: [robot.IK(pose) for pose in some]),
     ):
-        seconds, answers = timed(call, repeat if part is poses else 1)
+        seconds, answers = timed(call, repeat if part is poses else 3)
         found = padded(answers) - offset
         count = float(np.isfinite(found[..., 5]).sum(axis=1).mean())
         rows.append(Row(solver, len(part), len(part) / seconds, error(geometry, found, part), count))
