@@ -156,6 +156,8 @@ class App:
             return
         if crc == self.arm_crc:
             return
+        if self.engine:
+            self.engine.close()
         self.engine = Engine(head, joints)
         self._head = head
         self._arm_joints = joints
@@ -223,8 +225,8 @@ class App:
 
     def clear(self):
         """Clear what is pending; the cause must be gone."""
-        if self.engine:
-            self.engine.clear()
+        if self.engine and not self.engine.clear():
+            raise Refused(codes.FAULT_PENDING, self.fault_joint(), self.fault())
         self._fault = 0
 
     def leave(self):

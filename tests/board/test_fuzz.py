@@ -1,4 +1,4 @@
-"""A million random and mutated frames through the parser and every handler, a share of them on MicroPython."""
+"""A million random and mutated frames through parser and handlers, a share of them on MicroPython."""
 
 from __future__ import annotations
 

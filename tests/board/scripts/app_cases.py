@@ -302,7 +302,7 @@ def case_exception_becomes_a_fault():
     assert state(host) == "fault"
     kinds = [kind for kind, _ in ends_of(host)]
     assert sorted(kinds) == ["fault", "notice"]
-    assert "deliberate" in [rest for kind, _, rest in host.events if kind == "notice"][0]
+    assert "deliberate" in next(rest for kind, _, rest in host.events if kind == "notice")
     assert host.ask("status")[1][1] == 44
     assert app.engine.calls[-1] == "freeze"
 
@@ -354,7 +354,7 @@ def case_lost_host_leaves_the_motion_otherwise():
 
 
 def case_samples_of_a_run_without_host_are_kept():
-    app, host = connected()
+    _, host = connected()
     host.ask("set_default", (), "feed")
     again = App(host.port, ROOT + str(COUNT[0]))
     again.engine.home(3, [0, 0])

@@ -101,6 +101,10 @@ class Engine:
     def clear(self):
         self.calls.append("clear")
         self.fault = 0
+        return True
+
+    def close(self):
+        self.calls.append("close")
 
     def home(self, mask, steps):
         self.calls.append("home")
