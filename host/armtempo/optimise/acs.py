@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armtempo.errors import InputError
+from armtempo.optimise.levy import levy_scale
 from armtempo.optimise.tracker import Array, Function, Progress, Result, Tracker
 
 PARAMETERS: dict[str, float | str | bool] = {
@@ -131,9 +132,3 @@ class _Differences(_Nests):
 
 
 _VARIANTS: dict[str, type[_Nests]] = {"differences": _Differences, "paper": _Paper}
-
-
-def levy_scale(beta: float) -> float:
-    """The factor of Gamma functions in Eq. (23), with its brackets set as in its source (Mantegna)."""
-    top = math.gamma(1 + beta) * math.sin(math.pi * beta / 2)
-    return float((top / (math.gamma((1 + beta) / 2) * beta * 2 ** ((beta - 1) / 2))) ** (1 / beta))

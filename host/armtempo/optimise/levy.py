@@ -17,7 +17,7 @@ def levy_steps(rng: np.random.Generator, shape: tuple[int, ...], beta: float) ->
 
 
 def levy_scale(beta: float) -> float:
-    """The factor of Gamma functions in Eq. (23)."""
+    """The factor of Gamma functions in Eq. (23), with its brackets set as in its source (Mantegna)."""
     top = math.gamma(1.0 + beta) * math.sin(math.pi * beta / 2.0)
     bottom = math.gamma((1.0 + beta) / 2.0) * beta * 2.0 ** ((beta - 1.0) / 2.0)
     return float((top / bottom) ** (1.0 / beta))
