@@ -25,6 +25,10 @@ from armtempo.trajectory import Trajectory
 Take = Callable[[Sample, float], None]
 """Gets each sample and the length of the motion in seconds."""
 
+BRAKE_S = 5.0
+"""Braking takes no longer than this; then the board is told to freeze."""
+FREEZE_S = 2.0
+"""Freezing takes no longer than this."""
 TEMPORARY = "tmp-"
 """Names of motions that are removed after use begin so."""
 
@@ -84,17 +88,29 @@ def replay(board: Board, motion: Stored, stop: StopRequest, take: Take = lambda 
 
 
 class _Brake:
-    """Called between two messages: passes a stop request on to the board, once."""
+    """Called between two messages: passes a stop request on; freezes a board that does not come to rest."""
 
     def __init__(self, board: Board, stop: StopRequest) -> None:
         self._board = board
         self._stop = stop
-        self._told = False
+        self._steps: list[tuple[float, Callable[[], None]]] = [
+            (0.0, lambda: stop_moving(board)),
+            (BRAKE_S, lambda: stop_moving(board, now=True)),
+            (BRAKE_S + FREEZE_S, _does_not_stop),
+        ]
+        self._told_s = 0.0
 
     def __call__(self) -> None:
-        if self._stop.wanted and not self._told:
-            self._told = True
-            stop_moving(self._board)
+        if not self._stop.wanted:
+            return
+        now_s = self._board.session.clock()
+        self._told_s = self._told_s or now_s
+        if self._steps and now_s - self._told_s >= self._steps[0][0]:
+            self._steps.pop(0)[1]()
+
+
+def _does_not_stop() -> None:
+    raise LinkError("the board was told to stop and does not; switch off the motors' power")
 
 
 def stop_moving(board: Board, now: bool = False) -> None:

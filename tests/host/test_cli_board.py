@@ -134,9 +134,11 @@ def test_fault_during_a_run(run: Run, file: str, pipe: Pipe, monkeypatch: pytest
     assert "no fault was pending" in run("clear").output
 
 
-def test_interrupt_brakes_and_keeps_the_samples(
-    run: Run, file: str, pipe: Pipe, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("samples", "calls"), [(12, ["brake"]), (120, ["brake", "freeze"])])
+def test_interrupt_brakes_then_freezes_and_keeps_the_samples(
+    run: Run, file: str, pipe: Pipe, monkeypatch: pytest.MonkeyPatch, samples: int, calls: list[str]
 ) -> None:
+    pipe.run_samples = samples
     run("upload", file)
     run("home")
     engine = pipe.app.engine
@@ -151,7 +153,7 @@ def test_interrupt_brakes_and_keeps_the_samples(
     monkeypatch.setattr(engine, "advance", interrupt)
     output = run("run", file, code=130).output
     assert "interrupted" in output
-    assert engine.calls[-1] == "brake"
+    assert engine.calls[-len(calls) :] == calls
     found = runs.load(Path("runs/small-001")).repetitions[0]
     assert found.state == "interrupted"
     assert len(found.index)
