@@ -1,5 +1,7 @@
 """What an encoder should show, and how far it is off."""
 
+from armtempo_shared import armrecord
+
 
 class Following:
     """``row``: the joint's part of the arm record."""
@@ -9,7 +11,7 @@ class Following:
         common = _common_divisor(abs(numerator), denominator) or 1
         self._numerator = numerator // common
         self._denominator = (denominator // common) or 1
-        self.limit = row["following_counts"]
+        self.limit = 0 if row["encoder"] == armrecord.NONE else row["following_counts"]
 
     def expected(self, steps):
         """Counts that belong to a commanded position; small parts, so that nothing is allocated."""
