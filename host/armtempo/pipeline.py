@@ -25,7 +25,7 @@ from armtempo.errors import InputError, LinkError
 from armtempo.interrupt import StopRequest
 from armtempo.link import Board
 from armtempo.link.board import Progress
-from armtempo.link.ports import SIM
+from armtempo.link.ports import is_sim
 from armtempo.plan import Plan
 from armtempo.record import Repetition, RunFolder
 from armtempo.spline import Array
@@ -75,7 +75,7 @@ def bring_to_start(board: Board, port: str, motion: Motion, stop: StopRequest) -
 
     Raises LinkError, with what to do, where it does not.
     """
-    if port == SIM:
+    if is_sim(port):
         operate.home(board, motion.arm)
         operate.go_to(board, motion.arm, motion.start_deg, stop)
     elif not operate.stands_at(board, motion.arm, motion.start_deg):

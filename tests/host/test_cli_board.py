@@ -30,7 +30,7 @@ def pipe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pipe:
     found.run_samples = 12
 
     @contextmanager
-    def open_board(port: str, log_traffic: Path | None = None, sink: Any = None) -> Iterator[Board]:
+    def open_board(port: str, *arguments: Any, **options: Any) -> Iterator[Board]:
         yield greet(found, None, found.clock)
 
     monkeypatch.setattr(link, "open_board", open_board)

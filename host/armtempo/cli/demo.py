@@ -30,7 +30,7 @@ def command(out: Path, port: str, log_traffic: Path | None) -> None:
     for line in summary.lines(plan):
         click.echo(line)
     motion = pipeline.planned(plan)
-    with options.board(port, log_traffic) as board:
+    with options.board(port, log_traffic, arm) as board:
         operate.configure(board, arm, replace=True)
         folder = replay(board, port, motion, 1, out)
     click.echo(f"report: {report.write(folder)}")

@@ -26,13 +26,17 @@ def command(
     """
     from armtempo import operate
     from armtempo.interrupt import StopRequest
-    from armtempo.link.ports import SIM
+    from armtempo.link.ports import is_sim
 
     arm = options.load_arm(arm_path)
     target_deg = posture.parse(where, arm, job_path)
-    with options.board(port, log_traffic) as board, StopRequest() as stop, Progress("moving") as progress:
+    with (
+        options.board(port, log_traffic, arm) as board,
+        StopRequest() as stop,
+        Progress("moving") as progress,
+    ):
         operate.configure(board, arm, replace=arm_path is not None)
-        if port == SIM:
+        if is_sim(port):
             operate.home(board, arm)
         operate.go_to(board, arm, target_deg, stop, progress)
         stands_deg = operate.posture_deg(board, arm)

@@ -20,7 +20,8 @@ port = click.option(
     show_default=True,
     show_envvar=True,
     metavar="PORT",
-    help="Serial device or URL of the board; 'sim' starts a virtual board for this command.",
+    help="Serial device or URL of the board; 'sim' starts a virtual board for this command, 'sim:FOLDER' one "
+    "that keeps its flash in FOLDER.",
 )
 log_traffic = click.option(
     "--log-traffic",
@@ -62,9 +63,11 @@ def load_arm(path: Path | None) -> Arm:
 
 
 @contextmanager
-def board(port: str, log_traffic: Path | None = None) -> Iterator[Board]:
-    """The board of ``--port``, greeted."""
+def board(
+    port: str, log_traffic: Path | None = None, arm: Arm | None = None, any_program: bool = False
+) -> Iterator[Board]:
+    """The board of ``--port``, greeted; a virtual one moves ``arm``."""
     from armtempo.link import open_board
 
-    with open_board(port, log_traffic) as found:
+    with open_board(port, log_traffic, arm=arm, any_program=any_program) as found:
         yield found

@@ -32,22 +32,19 @@ def command(
     The arm must be homed ('armtempo home') and stand where the motion begins ('armtempo goto'); a virtual
     board sees to that itself. Between repetitions the arm returns along the same path. Ctrl-C brakes.
     """
-    with options.board(port, log_traffic) as board:
-        motion = _motion(board, what, arm_path)
-        replay(board, port, motion, repeat, out)
-
-
-def _motion(board: Board, what: str, arm_path: Path | None) -> Motion:
     from armtempo import operate, pipeline
 
+    file = _file(what)
+    motion = pipeline.from_file(file, options.load_arm(arm_path) if arm_path else None) if file else None
+    arm = motion.arm if motion else options.load_arm(arm_path)
+    with options.board(port, log_traffic, arm) as board:
+        operate.configure(board, arm, replace=motion is not None or arm_path is not None)
+        replay(board, port, motion or pipeline.from_board(board, what, arm), repeat, out)
+
+
+def _file(what: str) -> Path | None:
     path = Path(what)
-    if path.suffix == ".json" or path.exists():
-        motion = pipeline.from_file(path, options.load_arm(arm_path) if arm_path else None)
-        operate.configure(board, motion.arm, replace=True)
-        return motion
-    arm = options.load_arm(arm_path)
-    operate.configure(board, arm, replace=arm_path is not None)
-    return pipeline.from_board(board, what, arm)
+    return path if path.suffix == ".json" or path.exists() else None
 
 
 def _told(done: Repetition) -> str:

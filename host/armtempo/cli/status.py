@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 @options.log_traffic
 def command(port: str, log_traffic: Path | None) -> None:
     """Show the board, its state, and where the joints stand."""
-    with options.board(port, log_traffic) as board:
+    with options.board(port, log_traffic, any_program=True) as board:
         assert board.info is not None  # greeted
         for line in [*_identity(board.info), *lines(board.status())]:
             click.echo(line)
@@ -27,11 +27,17 @@ def command(port: str, log_traffic: Path | None) -> None:
 def _identity(info: Hello) -> list[str]:
     return [
         f"board     {info.board_id}",
-        f"program   {info.program_crc:08x}, protocol {info.protocol}",
+        f"program   {info.program_crc:08x}, protocol {info.protocol}{_other(info)}",
         f"arm       {f'{info.joints} joints, record {info.arm_crc:08x}' if info.joints else 'none yet'}",
         f"free      {info.free_flash} bytes of flash, {info.free_heap} of heap",
         f"fastest   {info.max_rate} steps/s one joint, {info.max_rate_sum} all together",
     ]
+
+
+def _other(info: Hello) -> str:
+    from armtempo.boardfiles import own_crc
+
+    return "" if info.program_crc == own_crc() else "; another than the one installed here: 'armtempo deploy'"
 
 
 def lines(status: Status) -> list[str]:

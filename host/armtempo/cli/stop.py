@@ -18,7 +18,7 @@ def command(now: bool, port: str, log_traffic: Path | None) -> None:
     """Brake or freeze, and say where the arm stands."""
     from armtempo import operate
 
-    with options.board(port, log_traffic) as board:
+    with options.board(port, log_traffic, any_program=True) as board:
         operate.stop(board, now)
         for line in lines(board.status()):
             click.echo(line)

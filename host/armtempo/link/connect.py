@@ -9,10 +9,11 @@ from pathlib import Path
 
 from armtempo_shared.messages import SYNC
 
-from armtempo.errors import InputError
-from armtempo.link import diagnose, traffic
+from armtempo.arm import Arm
+from armtempo.boardfiles import own_crc
+from armtempo.errors import InputError, LinkError
+from armtempo.link import diagnose, ports, traffic
 from armtempo.link.board import Board
-from armtempo.link.ports import SIM
 from armtempo.link.session import NoAnswer, Session
 from armtempo.link.transport import SerialTransport, Transport
 
@@ -22,18 +23,36 @@ _NOISY_TRIES = 10
 
 @contextmanager
 def open_board(
-    port: str, log_traffic: Path | None = None, sink: traffic.Sink | None = None
+    port: str,
+    log_traffic: Path | None = None,
+    sink: traffic.Sink | None = None,
+    arm: Arm | None = None,
+    any_program: bool = False,
 ) -> Iterator[Board]:
-    """The board on ``port``, greeted; ``"sim"`` starts a virtual one that lives as long as the context.
+    """The board on ``port``, greeted; a sim port starts a virtual one that lives as long as the context.
 
-    ``log_traffic``: file for the traffic log; ``sink`` takes the traffic as well. Raises InputError where
-    there is no such port, LinkError where it is in use, silent or runs something else.
+    ``log_traffic``: file for the traffic log; ``sink`` takes the traffic as well; ``arm``: what a virtual
+    board's motors move; ``any_program``: also talk to a board whose program is not the one installed here.
+    Raises InputError where there is no such port, LinkError where it is in use, silent or runs something
+    else.
     """
     with ExitStack() as stack:
-        device = _virtual_port(stack) if port == SIM else port
+        device = _virtual_port(stack, port, arm) if ports.is_sim(port) else port
         transport = _logged(stack, SerialTransport(device), log_traffic, sink)
         stack.callback(transport.close)
-        yield greet(transport)
+        board = greet(transport)
+        if not any_program:
+            _check_program(board)
+        yield board
+
+
+def _check_program(board: Board) -> None:
+    assert board.info is not None  # greeted
+    if board.info.program_crc != own_crc():
+        raise LinkError(
+            f"the board on {board.session.transport.name} runs another version of the board program than the "
+            "one installed here; bring it up to date with 'armtempo deploy'"
+        )
 
 
 def greet(
@@ -51,10 +70,10 @@ def greet(
     raise diagnose.explain(transport, bytes(board.session.recent))
 
 
-def _virtual_port(stack: ExitStack) -> str:
+def _virtual_port(stack: ExitStack, port: str, arm: Arm | None) -> str:
     from armtempo import virtual
 
-    return str(stack.enter_context(virtual.launch()).port)
+    return stack.enter_context(virtual.launch(ports.sim_flash(port), arm=arm)).port
 
 
 def _logged(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from serial.tools import list_ports
 from serial.tools.list_ports_common import ListPortInfo
 
 SIM = "sim"
-"""The port name that stands for a virtual board."""
+"""The port name that stands for a virtual board; ``sim:FOLDER`` for one whose flash is that folder."""
 _VENDOR = 0xF055
 _PRODUCTS = range(0x9800, 0x980B)
 """USB ids of MicroPython on an STM32 (its ports/stm32/mpconfigboard_common.h)."""
@@ -22,6 +23,16 @@ class Port:
     description: str
     board: bool
     """Its USB ids are those of MicroPython on an STM32."""
+
+
+def is_sim(port: str) -> bool:
+    """Whether the port stands for a virtual board."""
+    return port == SIM or port.startswith(SIM + ":")
+
+
+def sim_flash(port: str) -> Path | None:
+    """The folder that is the virtual board's flash; None: a new one that goes with the board."""
+    return Path(port[len(SIM) + 1 :]) if port.startswith(SIM + ":") else None
 
 
 def find_ports() -> list[Port]:

@@ -1,0 +1,26 @@
+"""Where the board's sources stand on this machine, and the hash by which a board is compared with them."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+
+from armtempo_shared.program import sources_crc
+
+PACKAGES = ("armtempo_board", "armtempo_shared")
+
+
+def package_folder(name: str) -> Path:
+    """The folder of one of PACKAGES; found without importing it, as its modules need a board."""
+    spec = find_spec(name)
+    assert spec is not None  # both are installed with this package
+    assert spec.origin is not None
+    return Path(spec.origin).parent
+
+
+@cache
+def own_crc() -> int:
+    """The hash of the program that this armtempo would deploy."""
+    board, shared = (str(package_folder(name)) for name in PACKAGES)
+    return sources_crc(board, shared)
