@@ -47,7 +47,7 @@ class Options:
     """DMA streams fetch one word ahead, as the chip's do in direct mode (RM0090 10.3.12)."""
     power_cut_at: int = 0
     """The power fails during this flash operation, counted from 1; 0: never."""
-    turn_us: int = 500
+    turn_us: int = 1000
     """What a turn of the program's main loop takes on the chip beyond its simulated calls."""
     arm: dict[str, Any] | None = None
     """Motors and encoders on the pins; None: ideal ones for the arm record in the flash."""

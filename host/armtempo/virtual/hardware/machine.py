@@ -16,7 +16,7 @@ class _Memory:
         self._mask = (1 << 8 * size) - 1
 
     def __getitem__(self, where):
-        the.board.spend(CALL_TICKS)
+        the.board.call()
         shift = 8 * (where & 3)
         value = memory.words[memory.word_at(where)] >> shift & self._mask
         return value - (1 << 32) if value >> 31 else value
@@ -26,7 +26,7 @@ class _Memory:
         shift = 8 * (where & 3)
         kept = memory.words[at] & ~(self._mask << shift)
         memory.words[at] = (kept | (value & self._mask) << shift) & memory.MASK
-        the.board.spend(CALL_TICKS)
+        the.board.wrote()
 
 
 mem8 = _Memory(1)
@@ -64,7 +64,8 @@ def disable_irq():
 def enable_irq(state=True):
     """Let interrupts through again."""
     the.board.masked = not state
-    the.board.spend(CALL_TICKS)
+    if state:
+        the.board.spend(CALL_TICKS)
 
 
 def soft_reset():

@@ -13,6 +13,7 @@ TICKS_PER_MS = 84_000
 TICKS_PER_US = 84
 CALL_TICKS = 84
 """A simulated function or register access: 1 us, about 130 instructions of the interpreter."""
+_MOST_OWED = 40 * CALL_TICKS
 INTERRUPT_TICKS = 160
 """From an event to the first line of its callback: 1.9 us (an empty callback's instructions)."""
 CALLBACK_TICKS = 250
@@ -22,7 +23,11 @@ _RCC_TIMERS = {1: (17, 0), 8: (17, 1), 2: (16, 0), 3: (16, 1), 4: (16, 2), 5: (1
 
 
 class Board:
-    """Everything between the program and the world. ``world`` gets ``passed(now)`` after each stretch."""
+    """Everything between the program and the world.
+
+    ``worlds`` are told of timers that start or stop and of inputs that change; ``follow()`` is called after each
+    stretch of time.
+    """
 
     def __init__(self, dma_preload=True):
         memory.clear()
@@ -48,6 +53,8 @@ class Board:
         self.api = {}
         self.extints = {}
         self.worlds = []
+        self.follow = None
+        self.owed = 0
         self.lost_ticks = 0
         self.crash = False
         self.watchdog_ticks = 0
@@ -108,8 +115,21 @@ class Board:
             due = min(due, timer.next_interrupt())
         self.next_happening = due
 
+    def call(self):
+        """The program made a cheap call. Their time is kept and spent together; each looks at its own effects."""
+        self.owed += CALL_TICKS
+        if self.owed > _MOST_OWED:
+            self.spend(0)
+
+    def wrote(self):
+        """The program wrote a register: it acts at once."""
+        self.sync()
+        self.call()
+
     def spend(self, ticks):
         """The program takes so long."""
+        ticks += self.owed
+        self.owed = 0
         self.run_until(self.now + ticks)
 
     def run_until(self, target, wake=False):
@@ -153,8 +173,8 @@ class Board:
         for timer in self.counting:
             timer.run(target)
         self.now = target
-        for world in self.worlds:
-            world.passed(target)
+        if self.follow:
+            self.follow()
 
     def moving(self, horizon_ticks):
         """Whether a timer will do something within so many ticks."""

@@ -52,9 +52,6 @@ class EdgeLog:
         pin = line.port.index * 16 + line.number
         self._buffer.extend(struct.pack(RECORD, kind, pin, before, 0, count, base))
 
-    def passed(self, now):
-        """Nothing to do as time passes."""
-
     def _write(self):
         self._file.write(self._buffer)
         self._file.flush()

@@ -29,9 +29,6 @@ class Faults:
     def _plant(self, tick, fault):
         self._board.at(tick, lambda: _KINDS[fault["kind"]](self._board, fault))
 
-    def passed(self, now):
-        """Nothing to do as time passes."""
-
     def input_changed(self, line, level, now):
         """Nothing to do."""
 

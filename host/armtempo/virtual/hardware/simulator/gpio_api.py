@@ -1,7 +1,6 @@
 """``pyb.Pin`` (which is also ``machine.Pin``) on the simulated ports."""
 
 from simulator import gpio, memory, the
-from simulator.board import CALL_TICKS
 
 _PULL_NONE, _PULL_UP, _PULL_DOWN = 0, 1, 2
 
@@ -37,15 +36,15 @@ class Pin:
         _field(at + gpio.PUPDR, 2, number, pull or 0)
         _field(at + gpio.OTYPER, 1, number, mode >> 4)
         _field(at + gpio.MODER, 2, number, mode & 3)
-        the.board.spend(CALL_TICKS)
+        the.board.wrote()
 
     def value(self, level=None):
         """Read the pin, or drive it."""
         if level is None:
-            the.board.spend(CALL_TICKS)
+            the.board.call()
             return self.line.read()
         _field(self.line.port.at + gpio.ODR, 1, self.line.number, 1 if level else 0)
-        the.board.spend(CALL_TICKS)
+        the.board.wrote()
         return None
 
     __call__ = value

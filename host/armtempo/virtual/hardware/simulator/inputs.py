@@ -26,7 +26,7 @@ class ExtInt:
         self.enabled = callback is not None
         the.board.extints[self._line] = self
         the.board.callbacks[("exti", self._line)] = (callback, self._line)
-        the.board.spend(CALL_TICKS)
+        the.board.call()
 
     def line(self):
         """The line number."""

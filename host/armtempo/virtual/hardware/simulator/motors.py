@@ -21,7 +21,7 @@ class Motor:
         self._encoder = encoder
         self._num = -joint["counts_num"] if joint["encoder_inverted"] else joint["counts_num"]
         self._den = joint["counts_den"]
-        self._moved = False
+        self.moved = False
         self._counts = self._at(0)
         self.position = 0
         self.blocked = False
@@ -40,21 +40,20 @@ class Motor:
             steps = (count + 1 - before) // 2
             forward = self._dir.level ^ self._inverted
             self.position += steps if forward else -steps
-            self._moved = True
+            self.moved = True
 
     def slip(self, counts):
         """The encoder's coupling slips by so many counts."""
         self._counts -= counts
-        self._moved = True
+        self.moved = True
 
     def follow(self):
         """Turn the encoder to where the motor stands."""
-        if self._moved:
-            self._moved = False
-            counts = self._at(self.position)
-            if self._encoder and counts != self._counts:
-                self._encoder.turn(counts - self._counts)
-            self._counts = counts
+        self.moved = False
+        counts = self._at(self.position)
+        if self._encoder and counts != self._counts:
+            self._encoder.turn(counts - self._counts)
+        self._counts = counts
 
 
 class Enable:
@@ -70,7 +69,7 @@ class Enable:
 
 
 class Arm:
-    """All motors, as the arm record in the flash has them; a world for the board."""
+    """All motors, as the arm record in the flash has them."""
 
     def __init__(self, board, pins, record):
         self._board = board
@@ -78,7 +77,7 @@ class Arm:
         self._record = record
         self._known = None
         self.motors = []
-        board.worlds.append(self)
+        board.follow = self.follow
         self.connect()
 
     def connect(self):
@@ -111,13 +110,8 @@ class Arm:
             encoder = self._board.timers[pins.ENCODER[joint["encoder"]][0]]
         return Motor(lines.line(step), lines.line(direction), enable, encoder, joint)
 
-    def passed(self, now):
+    def follow(self):
         """Time has passed."""
         for motor in self.motors:
-            motor.follow()
-
-    def counting(self, timer, now):
-        """A timer started or stopped: nothing to do."""
-
-    def input_changed(self, line, level, now):
-        """An input changed: nothing to do."""
+            if motor.moved:
+                motor.follow()

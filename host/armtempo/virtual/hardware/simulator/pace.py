@@ -78,10 +78,10 @@ class Pace:
 
     def milliseconds(self):
         """Milliseconds since power-up, modulo 2**30."""
-        self._board.spend(2 * TICKS_PER_US)
+        self._board.call()
         return self._board.now // TICKS_PER_MS & 0x3FFFFFFF
 
     def microseconds(self):
         """Microseconds since power-up, modulo 2**30."""
-        self._board.spend(2 * TICKS_PER_US)
+        self._board.call()
         return self._board.now // TICKS_PER_US & 0x3FFFFFFF

@@ -8,7 +8,6 @@ back.
 import select
 
 from simulator import the
-from simulator.board import CALL_TICKS
 
 BUFFER = 1024
 _POLLIN = 1
@@ -115,12 +114,12 @@ class USB_VCP:
 
     def isconnected(self):
         """Whether a host has opened the port."""
-        the.board.spend(CALL_TICKS)
+        the.board.call()
         return not the.settings.get("cable_out", False)
 
     def any(self):
         """Whether bytes wait."""
-        the.board.spend(CALL_TICKS)
+        the.board.call()
         return bool(self._line.received)
 
     def recv(self, data, timeout=5000):
@@ -131,7 +130,7 @@ class USB_VCP:
             before = len(self._line.received)
             the.pace.idle()
             waited = waited + 1 if len(self._line.received) == before else 0
-        the.board.spend(CALL_TICKS)
+        the.board.call()
         got = self._line.take(wanted)
         if isinstance(data, int):
             return got
@@ -149,13 +148,13 @@ class USB_VCP:
             more = self._line.put(memoryview(data)[sent:])
             sent += more
             waited = 0 if more else waited + 1
-        the.board.spend(CALL_TICKS)
+        the.board.call()
         return sent
 
     def read(self, size=-1):
         """What is there, up to ``size``; None where nothing is."""
         if not self._line.received:
-            the.board.spend(CALL_TICKS)
+            the.board.call()
             return None
         there = len(self._line.received)
         return self.recv(there if size < 0 else min(size, there), timeout=0)

@@ -19,7 +19,7 @@ DEFAULTS = {
     "unique_id": "000102030405060708090a0b",
     "dma_preload": True,
     "power_cut_at": 0,
-    "turn_us": 500,
+    "turn_us": 1000,
     "arm": None,
     "faults": [],
 }

@@ -75,7 +75,7 @@ class Timer:
         self._channels.clear()
         memory.words[self._model.at + timers.CCER] = 0
         memory.words[self._model.at + timers.CR1] = 0
-        the.board.spend(CALL_TICKS)
+        the.board.wrote()
 
     def source_freq(self):
         """Clock of the timer before its prescaler, in Hz."""
@@ -94,17 +94,17 @@ class Timer:
             the.board.callbacks[(self._number, flag)] = (function, self)
             _change(self._model.at + timers.SR, 1 << flag, 0)
             _change(self._model.at + timers.DIER, 0, 1 << flag)
-        the.board.spend(CALL_TICKS)
+        the.board.wrote()
 
     def register(self, at, value=None):
         """Read a register (signed, as the firmware does) or write it."""
         where = self._model.at + at
         if value is None:
-            the.board.spend(CALL_TICKS)
+            the.board.call()
             value = memory.words[where]
             return value - (1 << 32) if value >> 31 else value
         memory.words[where] = value & memory.MASK
-        the.board.spend(CALL_TICKS)
+        the.board.wrote()
         return None
 
     def counter(self, value=None):

@@ -151,6 +151,7 @@ class Timer:
         self.modulus = self.full
         self.rate = rate
         self.scale = 1
+        self.plain = rate == 1  # one count a tick
         self.origin = 0
         self.total = 0
         self.base = 0
@@ -211,6 +212,7 @@ class Timer:
     def _update(self, now):
         """An update event (UG): prescaler and period take effect, the counter starts from 0."""
         self.scale = (memory.words[self.at + PSC] & 0xFFFF) + 1
+        self.plain = self.rate == 1 and self.scale == 1
         self._reload(memory.words[self.at + ARR] & (self.full - 1))
         memory.poke(self.at + CNT, 0)
         memory.poke(self.at + SR, memory.words[self.at + SR] | 1)
@@ -262,12 +264,17 @@ class Timer:
 
     def run(self, now):
         """Time has come to ``now``."""
-        total = (now - self.origin) * self.rate // self.scale
+        total = now - self.origin
+        if not self.plain:
+            total = total * self.rate // self.scale
         if total >= self.next:
             self._matches(total)
         self.total = total
-        memory.poke(self.at + CNT, (self.base + total) % self.modulus)
-        if total > _REBASE and self.scale == 1 and self.rate == 1:
+        count = self.base + total
+        if count >= self.modulus:
+            count %= self.modulus
+        memory.words[self.at + CNT] = memory.seen[self.at + CNT] = count
+        if total > _REBASE and self.plain:
             self._rebase(total)
 
     def _matches(self, total):
