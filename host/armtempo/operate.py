@@ -131,15 +131,14 @@ def stop(board: Board, now: bool) -> None:
 
 
 def replay_recorded(
-    board: Board, motion: Stored, folder: RunFolder, stop: StopRequest, progress: Progress | None = None
+    board: Board, motion: Stored, folder: RunFolder, stop: StopRequest, watch: Take = lambda *_: None
 ) -> RunEnd:
-    """One repetition into the run folder, however it ends."""
-    show = _shown(progress)
+    """One repetition into the run folder, however it ends; ``watch`` sees each sample too."""
     with folder.begin_repetition() as file:
 
         def take(sample: Sample, duration_s: float) -> None:
             file.append(sample)
-            show(sample, duration_s)
+            watch(sample, duration_s)
 
         end = replay(board, motion, stop, take)
         state = FAULT if end.fault else INTERRUPTED if stop.wanted else COMPLETE
@@ -204,13 +203,15 @@ def move_once(
     """Run a motion that is not kept on the board; BoardError where a fault ends it."""
     motion = store(board, trajectory.name, encode.motion_record(trajectory, arm))
     try:
-        raise_fault(replay(board, motion, stop, _shown(progress)))
+        raise_fault(replay(board, motion, stop, shown(progress)))
     finally:
         with suppress(LinkError):  # an earlier error says more
             board.remove(motion.name)
 
 
-def _shown(progress: Progress | None) -> Take:
+def shown(progress: Progress | None) -> Take:
+    """A watcher that shows how far the motion is."""
+
     def show(sample: Sample, duration_s: float) -> None:
         if progress is not None:
             progress(sample.ticks / limits.TICK_HZ, duration_s)

@@ -24,7 +24,6 @@ from armtempo.arm import Arm
 from armtempo.errors import InputError, LinkError
 from armtempo.interrupt import StopRequest
 from armtempo.link import Board
-from armtempo.link.board import Progress
 from armtempo.link.ports import is_sim
 from armtempo.plan import Plan
 from armtempo.record import Repetition, RunFolder
@@ -102,11 +101,16 @@ def new_run(parent: Path, motion: Motion, port: str, board: Board) -> RunFolder:
 
 
 def repeat(
-    board: Board, motion: Motion, folder: RunFolder, times: int, stop: StopRequest, progress: Progress | None
+    board: Board,
+    motion: Motion,
+    folder: RunFolder,
+    times: int,
+    stop: StopRequest,
+    watch: operate.Take = lambda *_: None,
 ) -> Iterator[Repetition]:
     """Upload the motion and replay it ``times`` times, with the motion backwards in between.
 
-    Gives each repetition when it has ended; a fault or a stop request ends the series.
+    ``watch`` sees each sample. Gives each repetition when it has ended; a fault or a stop request ends the series.
     """
     stored = operate.store(board, motion.name, motion.data)
     back = moves.backwards(motion.trajectory, operate.TEMPORARY + "back")
@@ -115,7 +119,7 @@ def repeat(
             operate.move_once(board, motion.arm, back, stop)
         if stop.wanted:
             return
-        end = operate.replay_recorded(board, motion=stored, folder=folder, stop=stop, progress=progress)
+        end = operate.replay_recorded(board, motion=stored, folder=folder, stop=stop, watch=watch)
         yield folder.repetitions[-1]
         operate.raise_fault(end)
 

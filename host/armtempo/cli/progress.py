@@ -23,13 +23,14 @@ class Progress:
         self._bar: Any = None
         self._shown = 0
 
-    def __call__(self, done: float, whole: float) -> None:
-        """Show how far the work is."""
+    def __call__(self, done: float, whole: float, note: str = "") -> None:
+        """Show how far the work is, with a note before the bar."""
         if self._bar is None and done < whole and self._wanted():
             self._bar = self._stack.enter_context(
                 click.progressbar(length=1000, label=self._label, file=sys.stderr)
             )
         if self._bar is not None:
+            self._bar.label = f"{self._label} {note}".rstrip()
             now = int(1000 * done / whole)
             self._bar.update(now - self._shown)
             self._shown = now

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import click
 
 from armtempo.cli import options
-from armtempo.cli.progress import Progress
 
 if TYPE_CHECKING:
     from armtempo.link import Board
@@ -19,12 +18,13 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("what")
 @click.option("--repeat", type=click.IntRange(1, 99), default=1, show_default=True, help="Repetitions.")
+@click.option("--live", is_flag=True, help="Open a window that follows the run (matplotlib and a display).")
 @options.out
 @options.arm
 @options.port
 @options.log_traffic
 def command(
-    what: str, repeat: int, out: Path, arm_path: Path | None, port: str, log_traffic: Path | None
+    what: str, repeat: int, live: bool, out: Path, arm_path: Path | None, port: str, log_traffic: Path | None
 ) -> None:
     """Replay a motion and record it.
 
@@ -53,17 +53,18 @@ def _told(done: Repetition) -> str:
     return f"{done.file}: {done.state}, {done.duration_s:.3f} s, {done.samples} samples{missing}"
 
 
-def replay(board: Board, port: str, motion: Motion, repeat: int, out: Path) -> Path:
+def replay(board: Board, port: str, motion: Motion, repeat: int, out: Path, live: bool = False) -> Path:
     """Bring the arm to the start, replay, record, tell; gives the run folder."""
     from armtempo import pipeline
+    from armtempo.cli.live import Live
     from armtempo.interrupt import StopRequest
 
     with StopRequest() as stop:
         pipeline.bring_to_start(board, port, motion, stop)
         folder = pipeline.new_run(out, motion, port, board)
         click.echo(f"{motion.name}: {motion.trajectory.duration_s:.3f} s, into {folder.path}")
-        with Progress("moving") as progress:
-            for done in pipeline.repeat(board, motion, folder, repeat, stop, progress):
+        with Live(motion, window=live) as watch:
+            for done in pipeline.repeat(board, motion, folder, repeat, stop, watch):
                 click.echo(_told(done))
     if stop.wanted:
         raise KeyboardInterrupt

@@ -67,7 +67,7 @@ def _replayed(
         operate.configure(board, motion.arm, replace=True)
         pipeline.bring_to_start(board, SIM, motion, stop)
         run_folder = pipeline.new_run(folder, motion, SIM, board)
-        for _ in pipeline.repeat(board, motion, run_folder, times, stop, progress):
+        for _ in pipeline.repeat(board, motion, run_folder, times, stop, operate.shown(progress)):
             pass
     return report.evaluate(run_folder.path)
 

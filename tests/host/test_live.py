@@ -1,0 +1,72 @@
+"""What a run under way shows: the bar's text, and the window where there is a display."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+from armtempo import record
+from armtempo.cli.live import Live
+from armtempo.link.messages import Sample, Stand
+from armtempo.liveplot import LivePlot
+from armtempo.pipeline import planned
+
+from tests.host.made_runs import shipped_plan
+
+
+def sample(time_s: float, off_deg: float) -> Sample:
+    """All joints on the plan but for ``off_deg``."""
+    plan = shipped_plan()
+    scales = record.scales(plan.arm)
+    angles = plan.trajectory(time_s)
+    steps = tuple(round(a * s.steps_per_deg) for a, s in zip(angles, scales, strict=True))
+    counts = tuple(round((a + off_deg) * s.counts_per_deg) for a, s in zip(angles, scales, strict=True))
+    return Sample(1, round(time_s * 10), round(time_s * 84e6), 0, Stand(steps, counts))
+
+
+def test_angles_and_errors_stand_beside_the_bar(monkeypatch: pytest.MonkeyPatch) -> None:
+    notes: list[Any] = []
+    with Live(planned(shipped_plan()), window=False) as live:
+        monkeypatch.setattr(live, "_progress", lambda *shown: notes.append(shown))
+        live(sample(3.0, 0.9), 6.8)
+        monkeypatch.undo()
+    time_s, whole_s, note = notes[0]
+    assert (time_s, whole_s) == (3.0, 6.8)
+    assert note.count("(+0.") == 3
+    assert all(abs(float(part.split(")")[0]) - 0.9) < 0.1 for part in note.split("(")[1:])
+
+
+def test_without_a_display_the_run_goes_on(capsys: pytest.CaptureFixture[str]) -> None:
+    import matplotlib as mpl
+
+    mpl.use("agg")
+    with Live(planned(shipped_plan()), window=True) as live:
+        live(sample(1.0, 0.0), 6.8)
+    assert "no live plot: there is no display" in capsys.readouterr().err
+
+
+def test_the_window_follows_the_samples(monkeypatch: pytest.MonkeyPatch) -> None:
+    import matplotlib.pyplot as plt
+
+    monkeypatch.setattr(plt, "get_backend", lambda: "tkagg")
+    monkeypatch.setattr("matplotlib.figure.Figure.show", lambda self: None)
+    plan = shipped_plan()
+    plot = LivePlot(plan.trajectory, ["a", "b", "c"])
+    for time in (0.0, 0.1, 0.2):
+        plot.add(time, plan.trajectory(time))
+    assert [len(line.get_xdata()) for line in plot._lines] == [3, 3, 3]
+    np.testing.assert_allclose(plot._lines[1].get_ydata()[-1], plan.trajectory(0.2)[1])
+    plot.add(0.0, plan.trajectory(0.0))
+    assert len(plot._lines[0].get_xdata()) == 1
+    plot.close()
+    assert not plt.get_fignums()
+
+
+def test_the_command_line_loads_no_plotting_by_itself() -> None:
+    code = (
+        "import sys, armtempo.cli.run; assert 'matplotlib' not in sys.modules and 'scipy' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
