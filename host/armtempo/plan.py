@@ -19,19 +19,21 @@ class Search:
     joints: tuple[int, ...]
     """Indices, among the driven joints, of those that the axis serves."""
     intervals_s: Array
-    """Intervals of the time axis as planned, (n * refine,)."""
+    """What was varied: the intervals X (n,), or with refinement all differences of time control points."""
     total_s: float
-    """Their sum: the motion time."""
+    """The motion time."""
     searched_s: float
     """What the search alone reached, without polish or refinement."""
     evaluations: int
     """Fitness evaluations of the search."""
     history_s: Array
     """Best fitness of the first population and after each iteration, (iterations + 1,)."""
+    optimum_s: float
+    """Where polished: bound from below on the local optimum with as many intervals; else 0."""
     floor_s: float
-    """No motion along this path keeps the limits in less."""
+    """No time law along this path keeps the limits in less."""
     floor_kind: str
-    """How the floor was found."""
+    """How the floor was found, see ``floors.floor``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +44,8 @@ class Plan:
     job: Job
     via_deg: Array
     """Angles of the driven joints at the via points, (n + 1, J)."""
+    notes: tuple[str, ...]
+    """What the user must know of how poses became angles."""
     trajectory: Trajectory
     searches: tuple[Search, ...]
     """One for each joint that moves, or one for the shared time axis."""

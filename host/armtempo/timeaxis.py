@@ -34,6 +34,38 @@ def mirrored(count: int, edge: int) -> NDArray[np.intp]:
 
 
 @cache
+def free_map(count: int, degree: int) -> Array:
+    """The linear map from all differences of control points, (count + degree - 1), to control points.
+
+    Gives a refined axis the freedom that the mirrored ends take away; t = 0 at the start still.
+    Shape (count + degree - 1, count + degree).
+    """
+    differences = count + degree - 1
+    points = np.zeros((differences, count + degree))
+    points[:, 1:] = np.cumsum(np.eye(differences), axis=1)
+    start = points[:, : degree + 1] @ spline.basis(degree)[0]
+    matrix = points - start[:, None]
+    matrix.setflags(write=False)
+    return matrix
+
+
+def refined(differences_s: Array, parts: int, degree: int) -> Array:
+    """Differences of the control points of the same axis with each segment cut into ``parts``.
+
+    ``differences_s``: (m + degree - 1,). Returns (m * parts + degree - 1,). They are the coefficients of t',
+    a spline of degree - 1, which a finer knot row takes over by ``degree`` sums over ``parts`` neighbours.
+    """
+    mask = np.ones(1)
+    for _ in range(degree):
+        mask = np.convolve(mask, np.full(parts, 1.0 / parts))
+    spread = np.zeros(len(differences_s) * parts)
+    spread[::parts] = differences_s
+    first = (degree - 1) * (parts - 1)
+    count = (len(differences_s) - degree + 1) * parts + degree - 1
+    return np.asarray(np.convolve(spread, mask)[first : first + count])
+
+
+@cache
 def step_map(count: int, degree: int) -> Array:
     """The linear map from intervals to control points: (count, count + degree)."""
     matrix = control_points(np.eye(count), degree)
@@ -56,7 +88,7 @@ def parameter(coefficients: Array, time_s: Array) -> tuple[NDArray[np.intp], Arr
         low, high = np.where(error <= 0, u, low), np.where(error >= 0, u, high)
         step = u - error / spline.evaluate(slope, segment, u)
         step = np.where((step >= low) & (step <= high), step, 0.5 * (low + high))
-        done = np.max(np.abs(step - u), initial=0.0) < 1e-16
+        done = np.max(np.abs(step - u), initial=0.0) < 1e-15
         u = step
         if done:
             break

@@ -1,4 +1,4 @@
-"""From a path to its time axes: search, then exact stretch to the limits."""
+"""From a path to its time axis: search, stretch to the limits, polish, refine."""
 
 from __future__ import annotations
 
@@ -7,16 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from armtempo import extremes, optimise, spline, timeaxis
+from armtempo import checks, optimise, polish, timeaxis
 from armtempo.arm import Limits
-from armtempo.fitness import Fitness, stretch_of
+from armtempo.constraints import Path
+from armtempo.fitness import Fitness
 from armtempo.job import Job
 from armtempo.spline import Array
-
-FITNESS = ("stretched", "penalised")
-"""Values of the job's parameter ``fitness``: ``stretched`` scales each candidate until it just keeps its
-limits,
-``penalised`` is Eq. (21) as the paper has it."""
 
 MIN_DURATION_S = 0.01
 """No motion is planned shorter: a tenth of the time between two samples."""
@@ -27,11 +23,17 @@ Progress = Callable[[float, float], None]
 
 @dataclass(frozen=True, eq=False)
 class Timed:
-    """A time axis: intervals (m,) that keep all limits, and the search that led to them."""
+    """A time axis, (m + degree,) control points, that keeps all limits, and how it was found."""
 
+    time_points_s: Array
     intervals_s: Array
-    found: optimise.Result
+    """What was varied: the intervals X (n,), or with refinement the differences of all control points."""
+    total_s: float
     searched_s: float
+    """Motion time by the search alone."""
+    optimum_s: float
+    """Bound on the local optimum from below, where polished; else 0."""
+    found: optimise.Result
 
 
 def axis(
@@ -42,10 +44,28 @@ def axis(
     progress: Progress | None = None,
 ) -> Timed:
     """The time axis of the joints whose control points are given, (n + degree, J), one of ``limits`` each."""
+    found = _search(Fitness(angle_points_deg, job.degree, limits), job, rng, progress)
+    count = len(angle_points_deg) - job.degree
+    path = Path(angle_points_deg, job.degree, limits, timeaxis.step_map(count, job.degree))
+    y = path.stretched(found.x)
+    searched, optimum = path.duration_s(y), 0.0
+    if job.polish or job.refine > 1:
+        polished = polish.polish(path, y)
+        y, optimum = polished.y, polished.bound_s
+    if job.refine > 1:
+        path, polished = _refined(angle_points_deg, limits, job, y)
+        y, optimum = polished.y, polished.bound_s
+    y = path.stretched(y)  # takes out the rounding of a large first factor
+    y = y * max(1.0, MIN_DURATION_S / path.duration_s(y))
+    return Timed(y @ path.axis, y, path.duration_s(y), searched, optimum, found)
+
+
+def _search(
+    fitness: Fitness, job: Job, rng: np.random.Generator, progress: Progress | None
+) -> optimise.Result:
     parameters = dict(job.parameters)
-    fitness = Fitness(angle_points_deg, job.degree, limits)
-    function = getattr(fitness, str(parameters.pop("fitness", FITNESS[0])))
-    found = optimise.minimise(
+    function = getattr(fitness, str(parameters.pop("fitness", checks.FITNESS[0])))
+    return optimise.minimise(
         function,
         [job.bounds_s] * fitness.intervals,
         rng,
@@ -55,28 +75,30 @@ def axis(
         progress,
         **parameters,
     )
-    intervals = within_limits(angle_points_deg, found.x, limits, job.degree)
-    searched = float(intervals.sum())
-    if job.refine > 1:
-        intervals = within_limits(
-            angle_points_deg, np.repeat(intervals / job.refine, job.refine), limits, job.degree
-        )
-    return Timed(intervals, found, searched)
 
 
-def within_limits(
-    angle_points_deg: Array, intervals_s: Array, limits: Sequence[Limits], degree: int
-) -> Array:
-    """The intervals stretched or shrunk until the motion just keeps every limit: (m,), proven.
+def _refined(
+    angle_points_deg: Array, limits: Sequence[Limits], job: Job, intervals_s: Array
+) -> tuple[Path, polish.Polished]:
+    """The best axis of job.refine times as many segments, through ever finer ones.
 
-    Scaling time by s scales speed by 1/s, acceleration by 1/s², jerk by 1/s³.
+    Each starts from the same time law as the one before it, cut finer, so that none is slower.
     """
-    segments = len(angle_points_deg) - degree
-    pieces = spline.subdivide(spline.polynomials(angle_points_deg, degree), len(intervals_s) // segments)
-    angle = np.ascontiguousarray(np.moveaxis(pieces, 2, 0))
-    allowed = np.array([limit.values for limit in limits])
-    for _ in range(2):  # the second round takes out the rounding of a large first factor
-        time = spline.polynomials(timeaxis.control_points(intervals_s, degree), degree)
-        factor = float(stretch_of((extremes.magnitudes(angle, time) / allowed).T).max())
-        intervals_s = intervals_s * max(factor, MIN_DURATION_S / intervals_s.sum())
-    return intervals_s
+    edge, count = (job.degree - 1) // 2, len(intervals_s)
+    y = intervals_s[timeaxis.mirrored(count, edge)]
+    for factor in _factors(job.refine):
+        y, count = timeaxis.refined(y, factor, job.degree), count * factor
+        path = Path(angle_points_deg, job.degree, limits, timeaxis.free_map(count, job.degree))
+        y = polish.improve(path, y)
+    return path, polish.polish(path, y)
+
+
+def _factors(number: int) -> list[int]:
+    """Prime factors, smallest first."""
+    factors, divisor = [], 2
+    while number > 1:
+        while number % divisor == 0:
+            factors.append(divisor)
+            number //= divisor
+        divisor += 1
+    return factors
