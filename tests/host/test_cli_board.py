@@ -8,18 +8,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from armtempo import arm, link, moves, runs
+from armtempo import arm, link, planner, runs, trajectory_file
 from armtempo.cli import COMMANDS, main
 from armtempo.interrupt import StopRequest
 from armtempo.job import Job
 from armtempo.link import Board, greet
-from armtempo.plan import Plan
 from click.testing import CliRunner, Result
 
 from tests.inprocess import Pipe
 
 ARM = arm.load_arm(arm.default_path())
-START, END = [0.0, -60.0, 40.0], [10.0, -50.0, 45.0]
+START, END = (0.0, -60.0, 40.0), (10.0, -50.0, 45.0)
 Run = Callable[..., Result]
 
 
@@ -53,21 +52,9 @@ def run(pipe: Pipe) -> Run:
 @pytest.fixture
 def file(tmp_path: Path) -> str:
     """A trajectory file."""
-    from armtempo import trajectory_file
-
-    trajectory = moves.straight("small", START, END, ARM)
-    plan = _plan(trajectory)
-    trajectory_file.save(plan, tmp_path / "small.json")
+    job = Job("small", (START, END), population=5, iterations=20)
+    trajectory_file.save(planner.plan(ARM, job), tmp_path / "small.json")
     return "small.json"
-
-
-def _plan(trajectory: Any) -> Plan:
-    import numpy as np
-    from armtempo import extremes, planner
-
-    job = Job("small", (tuple(START), tuple(END)))
-    reached = tuple(extremes.of_joint(joint) for joint in trajectory.joints)
-    return Plan(ARM, job, np.array([START, END]), trajectory, (), reached, planner.versions())
 
 
 def test_help_lists_every_command() -> None:

@@ -48,7 +48,7 @@ def _via(index: int, arm: Arm, job_path: Path | None) -> Array:
     from armtempo import planner
 
     job = jobs.load_job(job_path or jobs.default_path(), arm)
-    via_deg = planner.via_angles(arm, job)
+    via_deg, _ = planner.via_angles(arm, job)
     if index >= len(via_deg):
         raise InputError(f"job {job.name!r} has the via points P0 to P{len(via_deg) - 1}, not P{index}")
     return np.asarray(via_deg[index])
