@@ -34,7 +34,7 @@ from armtempo_board.octets import places, spread
 from armtempo_board.refusal import Refused
 from armtempo_board.samples import Samples
 
-SAMPLE_MEMORY = const(10240)
+SAMPLE_MEMORY = const(4096)
 _UNCONFIGURED, _UNHOMED, _IDLE, _MOVING, _BRAKING, _FAULT = range(len(STATES))
 _MOST_FAILURES = const(10)  # failing turns of the loop one after the other, then the program gives up
 
@@ -46,6 +46,8 @@ class App:
     """
 
     def __init__(self, stream, root, program_crc=0, fault=0):
+        from armtempo_shared.table import rows  # here, so that it can be forgotten
+
         self.store = store.Store(root)
         self.link = Link(stream)
         self.engine = None
@@ -68,8 +70,8 @@ class App:
         self._braking = False
         self._by_host = False  # the run was started by a command
         self._failures = 0
-        self.commands = Commands(self)
-        self.events = Events(self)
+        self.commands = Commands(self, rows)
+        self.events = Events(self, rows)
         self.configure()
 
     # the loop

@@ -7,15 +7,7 @@ allocate nothing.
 from struct import calcsize, pack_into, unpack_from
 
 from armtempo_shared import codes, limits
-from armtempo_shared.messages import (
-    ANSWERS,
-    ARM_RECORD_NAME,
-    COMMANDS,
-    MAX_PAYLOAD,
-    PROTOCOL_VERSION,
-    REPLIES,
-    layout,
-)
+from armtempo_shared.messages import ARM_RECORD_NAME, MAX_PAYLOAD, PROTOCOL_VERSION
 from armtempo_shared.motion import Motion, MotionError
 from micropython import const
 
@@ -25,31 +17,28 @@ from armtempo_board.octets import u32
 from armtempo_board.refusal import Refused
 
 _ANSWER = const(6)  # index in the reply frame of what follows the command's number
+_HELLO = const(0x01)
+_WHILE_MOVING = b"\x01\x02\x22\x30"  # hello, status, stop, samples
 _TICKS = const(8)  # index of the ticks in the answer to status
-_WHILE_MOVING = ("hello", "status", "samples", "stop")
 
 
 class Commands:
     """Acts on the frame in ``link.reader`` and leaves the reply with the link."""
 
-    def __init__(self, app):
+    def __init__(self, app, rows):
+        """``rows`` of the message table."""
         self._app = app
         self._link = app.link
         self.greeted = False  # a host has said hello
         self._session = 0
         self._table = {}
-        answers = {}
-        for _, number, fields, _ in ANSWERS:
-            answers[number] = layout(fields)
-        for name, number, fields, tail in COMMANDS:
-            form = layout(fields)
-            moving = name in _WHILE_MOVING
-            row = (getattr(self, "_" + name), form, calcsize(form), tail, answers[number], moving)
-            self._table[number] = row
-        self._hello_number = COMMANDS[0][1]
-        self._ok = REPLIES[0][1]
-        self._error = REPLIES[1][1]
-        self._error_form = layout(REPLIES[1][2])
+        answers = rows("A")
+        for place, (name, number, form, _, tail) in enumerate(rows("C")):
+            self._table[number] = (getattr(self, "_" + name), form, answers[place][2], tail)
+        ok, error = rows("R")
+        self._ok = ok[1]
+        self._error = error[1]
+        self._error_form = error[2]
 
     def act(self):
         """Act on one command."""
@@ -64,11 +53,12 @@ class Commands:
         if row is None:
             return self._refuse(number, codes.UNKNOWN_COMMAND)
         length = self._link.reader.length()
-        if length < row[2] or (length > row[2] and not row[3]):
+        fixed = calcsize(row[1])
+        if length < fixed or (length > fixed and not row[3]):
             return self._refuse(number, codes.MALFORMED)
-        if not self.greeted and number != self._hello_number:
+        if not self.greeted and number != _HELLO:
             return self._refuse(number, codes.NO_SESSION)
-        if self._app.moving() and not row[5]:
+        if self._app.moving() and number not in _WHILE_MOVING:
             return self._refuse(number, codes.BUSY)
         self._link.reply[PAYLOAD] = number
         size = row[0](row, length)
@@ -82,7 +72,7 @@ class Commands:
         return unpack_from(row[1], self._link.reader.data, PAYLOAD)
 
     def _bytes(self, row, length):
-        return bytes(self._link.reader.data[PAYLOAD + row[2] : PAYLOAD + length])
+        return bytes(self._link.reader.data[PAYLOAD + calcsize(row[1]) : PAYLOAD + length])
 
     def _text(self, row, length):
         try:
@@ -91,8 +81,8 @@ class Commands:
             raise Refused(codes.MALFORMED)
 
     def _reply(self, row, *values):
-        pack_into(row[4], self._link.reply, _ANSWER, *values)
-        return calcsize(row[4])
+        pack_into(row[2], self._link.reply, _ANSWER, *values)
+        return calcsize(row[2])
 
     def _reply_tail(self, size, tail):
         self._link.reply[_ANSWER + size : _ANSWER + size + len(tail)] = tail
@@ -138,7 +128,7 @@ class Commands:
         reply = self._link.reply
         samples = app.samples
         pack_into(
-            row[4],
+            row[2],
             reply,
             _ANSWER,
             app.state(),
@@ -151,7 +141,7 @@ class Commands:
             samples.lost,
             self._link.reader.bad,
         )
-        size = calcsize(row[4])
+        size = calcsize(row[2])
         return size + app.stand(reply, _ANSWER + _TICKS, _ANSWER + size)
 
     def _leave(self, row, length):
@@ -214,7 +204,7 @@ class Commands:
         else:
             store.check_name(name)
             file_name = name + store.MOTION
-        wanted = min(wanted, MAX_PAYLOAD - 1 - calcsize(row[4]))
+        wanted = min(wanted, MAX_PAYLOAD - 1 - calcsize(row[2]))
         size, data = self._app.store.part(file_name, offset, wanted)
         return self._reply_tail(self._reply(row, size), data)
 
@@ -230,9 +220,9 @@ class Commands:
         (mask,) = self._fields(row)
         joints = self._app.joints
         self._app.check_ready()
-        if length - row[2] != 4 * joints or mask >> joints:
+        if length - calcsize(row[1]) != 4 * joints or mask >> joints:
             raise Refused(codes.MALFORMED)
-        self._app.home(mask, unpack_from("<%di" % joints, self._link.reader.data, PAYLOAD + row[2]))
+        self._app.home(mask, unpack_from("<%di" % joints, self._link.reader.data, PAYLOAD + calcsize(row[1])))
 
     def _start(self, row, length):
         flags, crc = self._fields(row)
@@ -256,5 +246,5 @@ class Commands:
         acknowledged = u32(data, PAYLOAD)
         samples.acknowledge(acknowledged)
         samples.again(acknowledged, data[PAYLOAD + 4] | data[PAYLOAD + 5] << 8)
-        pack_into(row[4], self._link.reply, _ANSWER, samples.first, samples.next - samples.first)
-        return calcsize(row[4])
+        pack_into(row[2], self._link.reply, _ANSWER, samples.first, samples.next - samples.first)
+        return calcsize(row[2])

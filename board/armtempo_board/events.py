@@ -2,10 +2,9 @@
 
 from struct import calcsize, pack_into
 
-from armtempo_shared.messages import EVENTS, MAX_PAYLOAD, layout
+from armtempo_shared.messages import MAX_PAYLOAD
 from micropython import const
 
-_SAMPLE, _DONE, _FAULT, _NOTICE = EVENTS
 _SAMPLE_HEAD = "<II"  # run and index; the rest of the fields stands in the slot
 _SAMPLE_HEAD_SIZE = const(8)
 _DONE_TICKS = const(4)  # index of the ticks in done
@@ -16,10 +15,12 @@ _IN_ONE_TURN = const(4)  # so many samples at most, so that the loop stays short
 class Events:
     """Pushes what is waiting as the link takes it."""
 
-    def __init__(self, app):
+    def __init__(self, app, rows):
+        """``rows`` of the message table."""
         self._app = app
-        self._forms = (layout(_DONE[2]), layout(_FAULT[2]))
-        self._numbers = (_SAMPLE[1], _DONE[1], _FAULT[1], _NOTICE[1])
+        events = rows("E")
+        self._numbers = bytes([row[1] for row in events])  # sample, done, fault, notice
+        self._forms = (events[1][2], events[2][2])  # of done and fault
         self._noted = 0  # the fault that was told last
         self._notice = b""
         self.clear()

@@ -1,4 +1,4 @@
-"""The wire protocol for the host: making and finding frames by the table of ``messages.py``.
+"""The wire protocol for the host: making and finding frames by ``table.py``.
 
 A frame::
 
@@ -23,37 +23,30 @@ except ImportError:  # MicroPython: annotations are not evaluated there
 
 from armtempo_shared.meanings import ERROR_CODES as ERROR_CODES
 from armtempo_shared.meanings import ERRORS as ERRORS
-from armtempo_shared.messages import (
-    ANSWERS,
-    COMMANDS,
-    EVENTS,
-    MAX_PAYLOAD,
-    REPLIES,
-    SYNC,
-    layout,
-)
 from armtempo_shared.messages import ARM_RECORD_NAME as ARM_RECORD_NAME
+from armtempo_shared.messages import MAX_PAYLOAD, SYNC
 from armtempo_shared.messages import OVERHEAD as OVERHEAD
 from armtempo_shared.messages import PROTOCOL_VERSION as PROTOCOL_VERSION
 from armtempo_shared.messages import START_HOMING as START_HOMING
 from armtempo_shared.messages import STATES as STATES
+from armtempo_shared.table import rows
 
 _HEAD = struct.calcsize("<HBB")
 
 
-def _index(rows: "Any") -> "tuple[dict[str, Any], dict[int, Any]]":
+def _index(kinds: str) -> "tuple[dict[str, Any], dict[int, Any]]":
     by_name = {}
     by_id = {}
-    for name, number, fields, tail in rows:
-        entry = (name, number, layout(fields), [n for n, _ in fields], tail)
-        by_name[name] = entry
-        by_id[number] = entry
+    for kind in kinds:
+        for entry in rows(kind):
+            by_name[entry[0]] = entry
+            by_id[entry[1]] = entry
     return by_name, by_id
 
 
-COMMAND, COMMAND_BY_ID = _index(COMMANDS)
-ANSWER, ANSWER_BY_ID = _index(ANSWERS)
-EVENT, EVENT_BY_ID = _index(EVENTS + REPLIES)
+COMMAND, COMMAND_BY_ID = _index("C")
+ANSWER, ANSWER_BY_ID = _index("A")
+EVENT, EVENT_BY_ID = _index("ER")
 
 
 class WireError(ValueError):

@@ -190,7 +190,7 @@ def case_only_a_few_commands_while_moving():
     app, host = connected()
     start(host)
     assert state(host) == "moving"
-    for name, _, fields, _ in messages.COMMANDS:
+    for name, _, _, fields, _ in wire.COMMAND.values():
         if name != "stop":
             answer = host.ask(name, [1] * len(fields), b"")
             busy = name not in ("hello", "status", "samples")

@@ -7,7 +7,7 @@ frames went in, were acted on, and how often each handler got past the length ch
 import random
 import sys
 from binascii import crc32
-from struct import pack_into, unpack_from
+from struct import calcsize, pack_into, unpack_from
 
 import flash
 import stand_in
@@ -16,11 +16,12 @@ stand_in.install()
 
 from armtempo_board import frames, link, store  # noqa: E402
 from armtempo_board.app import App  # noqa: E402
-from armtempo_shared import messages, wire  # noqa: E402
+from armtempo_shared import wire  # noqa: E402
+from armtempo_shared.table import rows  # noqa: E402
 
 FRAMES, SEED = int(sys.argv[1]), int(sys.argv[2])
 BATCH = 200
-IDS = [row[1] for row in messages.COMMANDS]
+IDS = [row[1] for row in rows("C")]
 
 
 def speed_up():
@@ -127,8 +128,8 @@ def board():
 
 
 SIZES = {}
-for _row in messages.COMMANDS:
-    SIZES[_row[1]] = len(wire.encode(wire.COMMAND[_row[0]], [0] * len(_row[2])))
+for _row in rows("C"):
+    SIZES[_row[1]] = calcsize(_row[2])
 app, record = board()
 START = wire.frame(1, 0x21, wire.encode(wire.COMMAND["start"], (0, wire.record_crc(record)), "feed"))
 if sys.implementation.name == "cpython":

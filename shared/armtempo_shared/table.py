@@ -1,0 +1,65 @@
+"""The message table: every command, answer, event and reply with its number and fields. Their only home.
+
+``wire.py`` encodes and decodes by it, ``shared/docs/protocol.md`` is generated from it. It is one text, so
+that the board can read it and forget it again.
+
+A row: kind (C command, A the answer to it, E event, R reply), name, number in hex, fields as ``name:type`` in
+the letters of ``struct``, little endian without padding, then ``text`` (UTF-8) or ``bytes`` where the rest of
+the payload is such a tail. A line that begins with a blank goes on with the row.
+"""
+
+_TABLE = """\
+C hello 01 protocol:B session:I
+C status 02
+C put_begin 10 size:I crc:I text
+C put_data 11 offset:I bytes
+C put_commit 12 crc:I
+C list 13 index:H
+C remove 14 text
+C rename 15 old_length:B text
+C get 16 offset:I length:H text
+C set_default 17 text
+C home 20 joints:B bytes
+C start 21 flags:B crc:I text
+C stop 22 now:B
+C clear 23
+C leave 24
+C samples 30 acknowledged:I wanted:H
+A hello 01 protocol:B joints:B encoders:B state:B tick_hz:I max_rate:I max_rate_sum:I free_flash:I
+ free_heap:I arm_crc:I program_crc:I boot:I text
+A status 02 state:B fault:B fault_joint:B known:B run:I ticks:Q samples_kept:H samples_lost:I frames_bad:I
+ bytes
+A put_begin 10
+A put_data 11 next:I
+A put_commit 12
+A list 13 count:H size:I crc:I duration:Q joints:B default:B text
+A remove 14
+A rename 15
+A get 16 size:I bytes
+A set_default 17
+A home 20
+A start 21 run:I duration:Q
+A stop 22
+A clear 23
+A leave 24
+A samples 30 first:I count:H
+E sample 40 run:I index:I ticks:Q flags:B bytes
+E done 41 run:I ticks:Q samples:I lost:I bytes
+E fault 42 run:I code:B joint:B ticks:Q bytes
+E notice 43 text
+R ok 7e command:B bytes
+R error 7f command:B code:B joint:B value:q
+"""
+
+
+def rows(kind: str) -> "list[tuple[str, int, str, list[str], str]]":
+    """(name, number, struct format, field names, tail) of each row of a kind, in their order."""
+    found = []
+    for line in _TABLE.replace("\n ", " ").split("\n"):
+        if line[:1] == kind:
+            words = line.split()
+            tail = words.pop() if words[-1] in ("text", "bytes") else ""
+            fields = [word.split(":") for word in words[3:]]
+            layout = "<" + "".join([field[1] for field in fields])
+            found.append((words[1], int(words[2], 16), layout, [field[0] for field in fields], tail))
+    return found
