@@ -1,0 +1,42 @@
+"""Planned trajectories and their replays, made once and shared by all whole-system tests."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from tests import interpreters
+from tests.system import replays
+from tests.system.replays import Replay
+
+FASTEST = "micropython" if "micropython" in interpreters.AVAILABLE else "cpython"
+"""For jobs beside the shipped one: each interpreter has shown there that it makes the same pulses."""
+CASES = [("shipped", name) for name in interpreters.AVAILABLE] + [
+    (job, FASTEST) for job in replays.JOBS if job != "shipped"
+]
+
+
+@pytest.fixture(scope="session")
+def plan_file(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Gives the trajectory file of a job of ``replays.JOBS``."""
+    folder = tmp_path_factory.mktemp("plans")
+    return cache(lambda job: replays.plan_file(job, folder))
+
+
+@pytest.fixture(scope="session")
+def replay_of(
+    plan_file: Callable[[str], Path], tmp_path_factory: pytest.TempPathFactory
+) -> Callable[[str, str], Replay]:
+    """Gives the replay of a job under an interpreter."""
+    return cache(
+        lambda job, name: replays.replay(plan_file(job), name, tmp_path_factory.mktemp(f"{job}-{name}"))
+    )
+
+
+@pytest.fixture(params=CASES, ids="-".join)
+def replay(request: pytest.FixtureRequest, replay_of: Callable[[str, str], Replay]) -> Replay:
+    """Each job that is replayed, with its interpreter."""
+    return replay_of(*request.param)

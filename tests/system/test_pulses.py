@@ -1,0 +1,103 @@
+"""The pulses of whole replays, read from the pin log, against the splines in the trajectory file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from tests import interpreters
+from tests.system import pulses
+from tests.system.exact import TICK_HZ
+from tests.system.replays import Replay
+
+JOINTS = range(3)
+EDGE_TICKS = 2.0
+"""How far an edge may be from the exact crossing where the joint is fast."""
+COMPUTED_TICKS = 0.01
+"""What the exact crossing itself may be off by: bisection in doubles over up to 2e9 ticks."""
+FAST_STEPS_S = 50.0
+FROM_SPLINE_STEPS = 0.55
+SETUP_TICKS = 5 * TICK_HZ // 1_000_000
+DIR_APART_TICKS = 200 * TICK_HZ // 1_000_000
+"""DIR is turned by an interrupt, as late as the program's other work makes it: up to 200 us between two
+interpreters. STEP edges come from DMA alone and may not differ at all."""
+
+
+@pytest.fixture(params=JOINTS, ids=lambda joint: f"joint{joint + 1}")
+def joint(request: pytest.FixtureRequest) -> int:
+    """Each driven joint."""
+    return int(request.param)
+
+
+def test_every_step_is_there_none_extra_each_in_its_direction(replay: Replay, joint: int) -> None:
+    made, wanted = pulses.pulses(replay, joint), pulses.exact(replay, joint).crossings()
+    assert len(made.rises) == len(made.falls) == len(wanted.ticks)
+    np.testing.assert_array_equal(made.directions, wanted.directions)
+
+
+def test_edges_are_where_the_spline_crosses_half_a_step(replay: Replay, joint: int) -> None:
+    made, spline = pulses.pulses(replay, joint), pulses.exact(replay, joint)
+    wanted = spline.crossings().ticks
+    rates = spline.rate(wanted)
+    off = np.abs(made.rises - wanted)
+    assert np.max(off[rates > FAST_STEPS_S]) <= EDGE_TICKS + COMPUTED_TICKS
+    # slower ones may be later, but by less than a fiftieth of a step
+    assert np.max(off * rates) / TICK_HZ < 0.02
+
+
+def test_the_commanded_position_keeps_to_the_spline_at_all_times(replay: Replay, joint: int) -> None:
+    made, spline = pulses.pulses(replay, joint), pulses.exact(replay, joint)
+    # between two edges the position rests and the spline is monotone but at its turns: these are the extremes
+    edges = made.rises.astype(float)
+    for ticks in (edges - 1.0, edges, spline.turn_ticks()):
+        off = made.position(spline.start, ticks) - spline.angle(ticks)
+        assert np.max(np.abs(off)) <= FROM_SPLINE_STEPS
+
+
+def test_it_ends_within_half_a_step_of_the_last_via_point(replay: Replay, joint: int) -> None:
+    made, spline = pulses.pulses(replay, joint), pulses.exact(replay, joint)
+    motor = replay.plan.arm.driven[joint].motor
+    assert motor is not None
+    end = spline.start + made.directions.sum()
+    assert abs(end - replay.plan.via_deg[-1, joint] * motor.steps_per_deg) <= 0.5
+    assert replay.repetition["commanded_steps"][joint] == end
+
+
+def test_joint_1_makes_6400_steps(replay: Replay) -> None:
+    assert pulses.pulses(replay, 0).directions.sum() == 6400
+
+
+def test_joints_2_and_3_turn_round(replay: Replay) -> None:
+    for joint in (1, 2):
+        assert set(pulses.pulses(replay, joint).directions) == {-1, 1}
+
+
+def test_dir_changes_well_before_the_next_step_and_after_the_last(replay: Replay, joint: int) -> None:
+    made = pulses.pulses(replay, joint)
+    following = np.searchsorted(made.rises, made.dir_ticks, side="right")
+    before = made.dir_ticks[following < len(made.rises)]
+    after = made.dir_ticks[following > 0]
+    assert np.all(made.rises[following[following < len(made.rises)]] - before >= SETUP_TICKS)
+    assert np.all(after - made.falls[following[following > 0] - 1] >= SETUP_TICKS)
+
+
+def test_pulses_are_as_wide_and_as_far_apart_as_the_arm_file_says(replay: Replay, joint: int) -> None:
+    made, driver = pulses.pulses(replay, joint), replay.plan.arm.driver
+    wide, apart = made.falls - made.rises, made.rises[1:] - made.falls[:-1]
+    assert np.all(wide == round(driver.pulse_us * TICK_HZ / 1e6))
+    assert np.all(apart >= driver.low_us * TICK_HZ / 1e6)
+
+
+@pytest.mark.parametrize("other", [name for name in interpreters.AVAILABLE if name != "cpython"])
+def test_the_pin_log_is_that_of_cpython(replay_of: Callable[[str, str], Replay], other: str) -> None:
+    ours, theirs = replay_of("shipped", "cpython"), replay_of("shipped", other)
+    for joint in JOINTS:
+        one, two = pulses.pulses(ours, joint), pulses.pulses(theirs, joint)
+        np.testing.assert_array_equal(one.rises, two.rises)
+        np.testing.assert_array_equal(one.falls, two.falls)
+        np.testing.assert_array_equal(one.directions, two.directions)
+        turned = [made.dir_ticks[made.dir_ticks > made.rises[0]] for made in (one, two)]
+        assert len(turned[0]) == len(turned[1])
+        assert np.all(np.abs(turned[0] - turned[1]) <= DIR_APART_TICKS)

@@ -1,0 +1,121 @@
+"""The virtual board as a process: its port, its flash, its end."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import serial
+from armtempo.errors import LinkError
+from armtempo.link.connect import open_board
+from armtempo.virtual import launch, launcher
+
+from tests import interpreters
+
+
+def test_answers_on_its_port_again_and_again(interpreter: str) -> None:
+    with launch(interpreter=interpreters.starter(interpreter)) as board:
+        for _ in range(2):
+            with open_board(board.port) as link:
+                assert link.status().state == "unconfigured"
+        assert not board.log()
+    assert not board.running()
+
+
+def test_two_at_a_time_are_told_apart() -> None:
+    with (
+        launch(seed=1) as one,
+        launch(seed=2) as two,
+        open_board(one.port) as first,
+        open_board(two.port) as second,
+    ):
+        assert first.info and second.info
+        assert first.info.board_id != second.info.board_id
+
+
+def test_flash_lasts(tmp_path: Path) -> None:
+    boots = set()
+    for _ in range(2):
+        with launch(tmp_path / "flash") as board, open_board(board.port) as link:
+            assert link.info
+            boots.add(link.info.boot)
+    assert (tmp_path / "flash" / "armtempo").is_dir()
+    assert len(boots) == 2
+
+
+def test_goes_with_its_context() -> None:
+    with launch() as board:
+        folder = board.log_path.parent
+        assert folder.is_dir()
+    assert not board.running()
+    assert not folder.exists()
+    board.stop()
+
+
+def test_goes_with_its_launcher(tmp_path: Path) -> None:
+    """A launcher that is killed leaves no process behind."""
+    script = "import time\nfrom armtempo.virtual import launch\nboard = launch()\nprint(board.pid, flush=True)\ntime.sleep(60)"
+    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as parent:
+        assert parent.stdout
+        pid = int(parent.stdout.readline())
+        parent.kill()
+    limit = time.monotonic() + 10
+    while _alive(pid) and time.monotonic() < limit:
+        time.sleep(0.02)
+    assert not _alive(pid)
+
+
+def _alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def test_no_interpreter(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(launcher.INTERPRETER_VARIABLE, "/no/such/micropython")
+    with pytest.raises(LinkError, match="/no/such/micropython does not run"), launch():
+        pass
+
+
+def test_something_else_than_an_interpreter() -> None:
+    with pytest.raises(LinkError, match="does not run"), launch(interpreter="/bin/false"):
+        pass
+
+
+def test_a_program_that_fails_is_logged(tmp_path: Path) -> None:
+    (tmp_path / "main.py").write_text("raise ValueError('broken')\n")
+    with launch(tmp_path, deployed=True) as board:
+        limit = time.monotonic() + 10
+        while "ValueError: broken" not in board.log() and time.monotonic() < limit:
+            time.sleep(0.02)
+        assert "ValueError: broken" in board.log()
+        assert board.running()
+
+
+def test_command_prints_the_port_and_ends_with_ctrl_c(tmp_path: Path) -> None:
+    command = [
+        sys.executable,
+        "-c",
+        "from armtempo.cli import main; main()",
+        "virtual-board",
+        "--flash",
+        str(tmp_path / "a b"),
+    ]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout
+        port = process.stdout.readline().strip()
+        with open_board(port) as link:
+            assert link.status().state == "unconfigured"
+        process.send_signal(signal.SIGINT)
+        _, error = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert "Traceback" not in error
+    with pytest.raises(serial.SerialException):
+        serial.Serial(port)
