@@ -76,7 +76,8 @@ def problem_of(arm: Arm, job: Job, joint: int, fitness: str, iterations: int) ->
     if not 1 <= joint <= len(arm.driven):
         raise InputError(f"joint {joint}: arm {arm.name!r} has the driven joints 1 to {len(arm.driven)}")
     driven = arm.driven[joint - 1]
-    via = planner.via_angles(arm, job)[:, joint - 1]
+    angles_deg, _ = planner.via_angles(arm, job)
+    via = angles_deg[:, joint - 1]
     if driven.limits is None:
         raise InputError(f"arm {arm.name!r}: {driven.name} has no limits; add a limits table")
     if np.ptp(via) == 0.0:

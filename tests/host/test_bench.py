@@ -111,13 +111,13 @@ def test_goes_on_where_it_was_interrupted(tmp_path: Path) -> None:
         *arguments,
     ]
     command += ["--workers", "2", "--out", str(tmp_path)]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
-    assert process.stderr is not None
     file = tmp_path / bench_store.FILE
-    while process.poll() is None and not (file.exists() and file.read_bytes().count(b"\n") >= 3):
-        time.sleep(0.01)
-    os.killpg(process.pid, signal.SIGINT)
-    said = process.communicate(timeout=60)[1]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
+        while process.poll() is None and not (file.exists() and file.read_bytes().count(b"\n") >= 3):
+            time.sleep(0.01)
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGINT)
+        said = process.communicate(timeout=60)[1]
     assert process.returncode == 130, said
     kept = file.read_bytes()
     count = kept.count(b"\n") - 1
