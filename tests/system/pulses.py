@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from armtempo.virtual.edgelog import Edges
 from numpy.typing import NDArray
 
 from tests.system.exact import ExactJoint

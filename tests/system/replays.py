@@ -50,12 +50,15 @@ def replay(trajectory: Path, interpreter: str, folder: Path) -> Replay:
     motion = pipeline.from_file(trajectory, None)
     log = folder / "edges.bin"
     starter = interpreters.starter(interpreter)
-    with virtual.launch(arm=motion.arm, edge_log=log, interpreter=starter) as board_process:
-        with open_board(board_process.port) as board, StopRequest() as stop:
-            operate.configure(board, motion.arm, replace=True)
-            pipeline.bring_to_start(board, "sim", motion, stop)
-            run = pipeline.new_run(folder, motion, "sim", board)
-            assert len(list(pipeline.repeat(board, motion, run, 1, stop, None))) == 1
+    with (
+        virtual.launch(arm=motion.arm, edge_log=log, interpreter=starter) as process,
+        open_board(process.port) as board,
+        StopRequest() as stop,
+    ):
+        operate.configure(board, motion.arm, replace=True)
+        pipeline.bring_to_start(board, "sim", motion, stop)
+        run = pipeline.new_run(folder, motion, "sim", board)
+        assert len(list(pipeline.repeat(board, motion, run, 1, stop, None))) == 1
     recorded = runs.load(run.path)
     assert recorded.trajectory_path is not None
     (session,) = edgelog.read(log)
