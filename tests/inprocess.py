@@ -81,7 +81,7 @@ class Pipe:
         self._ways = (to_board, from_board)
         self._queues: tuple[deque[tuple[float, bytes]], ...] = (deque(), deque())
         self._sample_s = 0.0
-        self.connected = True
+        self._plugged_s = 0.0
         self.round_trips = 0
         self.bytes_sent = 0
         self.run_samples = 70
@@ -125,6 +125,11 @@ class Pipe:
         stand_in.Clock.now_ms += max(1, round(1000 * seconds))
         self._turn()
 
+    def reopen(self) -> Pipe:
+        """The port opened again; LinkError while the cable is out."""
+        self._check()
+        return self
+
     def wait_away(self, seconds: float) -> None:
         """Let time pass while the host reads nothing: the board's port takes no more than its buffer."""
         self.port.room = _USB_BUFFER
@@ -132,12 +137,20 @@ class Pipe:
             self.wait(_SAMPLE_S)
         self.port.room = 1 << 30
 
+    def connected(self) -> bool:
+        """Whether the cable is in."""
+        return self.clock() >= self._plugged_s
+
+    def unplug_for(self, seconds: float) -> None:
+        """Pull the cable and put it back in later."""
+        self._plugged_s = self.clock() + seconds
+
     def _check(self) -> None:
-        if not self.connected:
+        if not self.connected():
             raise LinkError("the connection to pipe broke: unplugged")
 
     def _send(self, way: int, data: bytes) -> None:
-        if self.connected:
+        if self.connected():
             arrives, delay_s = self._ways[way](data)
             self._queues[way].append((self.clock() + delay_s, arrives))
 
@@ -171,4 +184,7 @@ class Pipe:
 
 def connect(pipe: Pipe) -> Board:
     """A greeted board."""
-    return greet(pipe, 1, pipe.clock)
+    board = greet(pipe, 1, pipe.clock)
+    board.session.reopen = pipe.reopen
+    board.session.sleep = pipe.wait
+    return board

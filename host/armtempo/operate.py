@@ -17,7 +17,7 @@ from armtempo.link import Board
 from armtempo.link.board import Progress
 from armtempo.link.follow import CHECK_S, Follower, RunEnd
 from armtempo.link.messages import Sample
-from armtempo.link.session import refusal
+from armtempo.link.session import RECONNECT_S, NoAnswer, refusal
 from armtempo.record import COMPLETE, FAULT, INTERRUPTED, RunFolder
 from armtempo.spline import Array
 from armtempo.trajectory import Trajectory
@@ -76,15 +76,32 @@ def replay(board: Board, motion: Stored, stop: StopRequest, take: Take = lambda 
     """
     run, duration_s = board.start(motion.name, motion.crc)
     follower = Follower(board, run)
-    try:
-        for sample in follower.samples(_Brake(board, stop)):
-            take(sample, duration_s)
-    except BaseException as error:
-        with suppress(LinkError):  # the first error says more
-            board.stop(now=isinstance(error, KeyboardInterrupt))
-        raise
-    assert follower.end is not None  # set when samples() is exhausted
+    brake = _Brake(board, stop)
+    heard_s = board.session.clock()
+    while follower.end is None:
+        try:
+            for sample in follower.samples(brake):
+                heard_s = board.session.clock()
+                take(sample, duration_s)
+        except NoAnswer as error:  # silent, though its port is there: as if the cable were out
+            if board.session.clock() - heard_s > RECONNECT_S:
+                raise
+            board.session.reconnect(error)
+        except BaseException as error:
+            _stop_after(board, error)
+            raise
     return follower.end
+
+
+def _stop_after(board: Board, error: BaseException) -> None:
+    """Stop what is moving because of ``error``, as far as the board can be reached."""
+    if isinstance(error, BoardError) and error.code == wire.ERROR_CODES["no_session"]:
+        raise LinkError(
+            "the board started anew during the motion: where the arm stands and what came after the last "
+            "sample cannot be known; find the cause, then 'armtempo home'"
+        ) from error
+    with suppress(LinkError):  # the first error says more
+        board.stop(now=isinstance(error, KeyboardInterrupt))
 
 
 class _Brake:

@@ -7,7 +7,9 @@ import random
 from pathlib import Path
 
 import pytest
+from armtempo import operate
 from armtempo.errors import BoardError, InputError, LinkError
+from armtempo.interrupt import StopRequest
 from armtempo.link import Board, diagnose, ports, traffic
 from armtempo.link.follow import Follower, RunEnd
 from armtempo.link.messages import Sample
@@ -143,6 +145,53 @@ def test_fault_ends_the_run(tmp_path: Path) -> None:
             pipe.app.engine.finish()
     assert follower.end is not None
     assert (follower.end.fault, follower.end.fault_joint) == (wire.ERROR_CODES["following"], 1)
+
+
+def test_cable_out_during_a_run_costs_no_sample(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, data = ready(pipe)
+    told: list[str] = []
+    board.session.tell = told.append
+    run, _ = board.start("feed", wire.record_crc(data))
+    indices = []
+    follower = Follower(board, run)
+    for sample in follower.samples():
+        indices.append(sample.index)
+        if sample.index in (20, 40):
+            pipe.unplug_for(1.5)
+    assert indices == list(range(pipe.run_samples))
+    assert [text.split()[0] for text in told] == ["the", "connected"] * 2
+
+
+def test_cable_out_during_an_upload(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, _ = ready(pipe)
+    data = random_motion(random.Random(7), segments=60)
+    board.upload("feed", data, lambda done, whole: pipe.unplug_for(0.7))
+    assert board.fetch("feed") == data
+
+
+def test_cable_that_stays_out(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, _ = ready(pipe)
+    pipe.unplug_for(1000.0)
+    begin_s = pipe.clock()
+    with pytest.raises(LinkError, match="unplugged"):
+        board.status()
+    assert 50 < pipe.clock() - begin_s < 70
+
+
+def test_board_that_started_anew_is_found_out(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, data = ready(pipe)
+
+    def restart(sample: Sample, duration_s: float) -> None:
+        if sample.index == 20:
+            pipe.start_board()
+
+    stored = operate.Stored("feed", wire.record_crc(data))
+    with pytest.raises(LinkError, match="started anew during the motion"):
+        operate.replay(board, stored, StopRequest(), restart)
 
 
 def test_silent_board_is_reported_in_time(tmp_path: Path) -> None:

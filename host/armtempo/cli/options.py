@@ -70,4 +70,5 @@ def board(
     from armtempo.link import open_board
 
     with open_board(port, log_traffic, arm=arm, any_program=any_program) as found:
+        found.session.tell = lambda text: click.echo(text, err=True)
         yield found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
 from armtempo_shared.messages import SYNC
@@ -38,12 +38,27 @@ def open_board(
     """
     with ExitStack() as stack:
         device = _virtual_port(stack, port, arm) if ports.is_sim(port) else port
-        transport = _logged(stack, SerialTransport(device), log_traffic, sink)
-        stack.callback(transport.close)
-        board = greet(transport)
+        sinks = _sinks(stack, log_traffic, sink)
+
+        def open_transport() -> Transport:
+            transport: Transport = SerialTransport(device)
+            for taken_by in sinks:
+                transport = traffic.LoggedTransport(transport, taken_by)
+            return transport
+
+        board = _greeted(stack, open_transport())
         if not any_program:
             _check_program(board)
+        board.session.reopen = open_transport
         yield board
+
+
+def _greeted(stack: ExitStack, transport: Transport) -> Board:
+    """The board behind a transport; the one that is in use at the end is closed with the stack."""
+    first = stack.enter_context(closing(transport))
+    board = greet(first)
+    stack.callback(lambda: board.session.transport.close())
+    return board
 
 
 def _check_program(board: Board) -> None:
@@ -76,14 +91,11 @@ def _virtual_port(stack: ExitStack, port: str, arm: Arm | None) -> str:
     return stack.enter_context(virtual.launch(ports.sim_flash(port), arm=arm)).port
 
 
-def _logged(
-    stack: ExitStack, transport: Transport, path: Path | None, sink: traffic.Sink | None
-) -> Transport:
+def _sinks(stack: ExitStack, path: Path | None, sink: traffic.Sink | None) -> list[traffic.Sink]:
+    found = [] if sink is None else [sink]
     if path is not None:
         try:
-            file = stack.enter_context(path.open("w", encoding="utf-8"))
+            found.append(traffic.writer(stack.enter_context(path.open("w", encoding="utf-8"))))
         except OSError as error:
-            transport.close()
             raise InputError(f"{path}: the traffic log cannot be written: {error.strerror}") from error
-        transport = traffic.LoggedTransport(transport, traffic.writer(file))
-    return transport if sink is None else traffic.LoggedTransport(transport, sink)
+    return found

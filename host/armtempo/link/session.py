@@ -14,7 +14,7 @@ from typing import Any
 
 from armtempo_shared import wire
 
-from armtempo.errors import BoardError, LinkError
+from armtempo.errors import ArmtempoError, BoardError, LinkError
 from armtempo.link import messages
 from armtempo.link.transport import Transport
 
@@ -26,6 +26,10 @@ PATIENCE_S = 20.0
 """Bytes but no answer for so long: the link is too disturbed."""
 QUIET_S = 0.05
 """Half a frame, then nothing for so long: its rest is not coming."""
+RECONNECT_S = 60.0
+"""A port that broke is waited for so long."""
+RETRY_S = 0.2
+"""Between two attempts to open it."""
 RECENT = 512
 """So many of the latest bytes are kept, to tell what sits on a port that does not answer."""
 
@@ -39,14 +43,22 @@ class NoAnswer(LinkError):
 
 
 class Session:
-    """The host's end of the protocol; ``clock`` gives seconds and is replaced in tests."""
+    """The host's end of the protocol; ``clock`` gives seconds and is replaced in tests.
+
+    Where the port breaks, ``reopen`` (if set) is tried until it gives a new transport, and all goes on: the
+    command under way is sent again, and what was lost meanwhile is asked for again by those who need it.
+    """
 
     def __init__(self, transport: Transport, clock: Callable[[], float] = time.monotonic) -> None:
         self.transport = transport
         self.clock = clock
+        self.reopen: Callable[[], Transport] | None = None
+        self.tell: Callable[[str], None] = lambda text: None
+        """Gets what a user should know while it happens."""
         self.events: deque[messages.Event] = deque()
         self.recent = bytearray()
         self.repeats = 0
+        self.sleep = time.sleep
         self._parser = wire.Parser()
         self._sequence = 0
         self._heard_s = clock()
@@ -75,7 +87,7 @@ class Session:
         data = wire.frame(self._sequence, number, wire.encode(wire.COMMAND[name], values, tail))
         begin_s = self._heard_s = self.clock()
         while True:
-            self.transport.write(data)
+            self._write(data)
             reply = self._reply(self.clock() + REPEAT_S, number)
             if reply is not None:
                 return _answer(name, *reply)
@@ -118,7 +130,7 @@ class Session:
         frame = self._next_frame()
         if frame is not None:
             return frame
-        data = self.transport.read(min(timeout_s, QUIET_S))
+        data = self._read(min(timeout_s, QUIET_S))
         if data:
             self._heard_s = self.clock()
             self.recent = (self.recent + data)[-RECENT:]
@@ -126,6 +138,38 @@ class Session:
         elif self._parser.pending() and self.clock() - self._heard_s >= QUIET_S:
             self._parser.drop()
         return self._next_frame()
+
+    def _write(self, data: bytes) -> None:
+        try:
+            self.transport.write(data)
+        except LinkError as error:
+            self.reconnect(error)
+
+    def _read(self, timeout_s: float) -> bytes:
+        try:
+            return self.transport.read(timeout_s)
+        except LinkError as error:
+            self.reconnect(error)
+            return b""
+
+    def reconnect(self, reason: LinkError) -> None:
+        """Close the port and open it again, for up to RECONNECT_S; ``reason`` is raised where that fails."""
+        if self.reopen is None:
+            raise reason
+        self.tell(f"{reason}; waiting for it to come back")
+        self.transport.close()
+        self._parser = wire.Parser()
+        limit_s = self.clock() + RECONNECT_S
+        while True:
+            try:
+                self.transport = self.reopen()
+                break
+            except ArmtempoError:
+                if self.clock() >= limit_s:
+                    raise reason from None
+                self.sleep(RETRY_S)
+        self._heard_s = self.clock()
+        self.tell(f"connected to {self.transport.name} again")
 
     def _next_frame(self) -> messages.Frame | None:
         frame: messages.Frame | None = self._parser.next()
