@@ -1,0 +1,271 @@
+"""Whatever stops a motion, at whatever moment: no wrong pulse, and the position is exact or declared unknown."""
+
+import random
+
+from engine_rig import FEWER, HEAD, TICK_HZ, Evaluator, Motion, Rig, Steps, arm, cases, row
+from simulator import inputs
+
+from armtempo_shared import armrecord, codes
+
+FREEZE_TICKS = 84 * 20
+SEED = 20261
+MOTION = Motion(
+    TICK_HZ // 40,
+    Steps((1000, 300, 5000, 1)),
+    Steps((500, 900, 700, -1), (700_000, 1100, 1000, 1)),
+    Steps((200, 500_000, 4, 1)),
+)
+
+
+def stopped(rig, code=0, joint=255):
+    """The engine stands still, says why, and counts what the pins did."""
+    engine = rig.engine
+    for _ in range(3):
+        rig.turn()
+    assert not engine.moving
+    assert engine.finished
+    assert (engine.fault, engine.fault_joint) == (code, joint), (engine.fault, engine.fault_joint)
+    before = [pulses.rises for pulses in rig.pulses]
+    rig.board.spend(TICK_HZ)
+    assert [pulses.rises for pulses in rig.pulses] == before
+    for pulses in rig.pulses:
+        pulses.check_end(frozen=True)
+    assert rig.commanded() == rig.stepped(), (rig.commanded(), rig.stepped())
+    assert rig.samples[-1][2:5] == rig.stepped()[:3]
+
+
+def again(rig):
+    """After a fault was cleared, the next motion is whole."""
+    assert rig.engine.clear()
+    before = rig.commanded()
+    rig.run(MOTION)
+    assert rig.engine.fault == 0
+    assert rig.commanded() == [a + steps.total() for a, steps in zip(before, MOTION.joints)]
+
+
+def freeze_anywhere():
+    """``freeze`` called at many moments."""
+    random.seed(SEED)
+    for number in range(30 // FEWER):
+        rig = Rig(arm(3))
+        rig.start(MOTION)
+        rig.run_to(random.randrange(-1_000_000, MOTION.duration))
+        rig.board.spend(random.randrange(1000))
+        rig.engine.freeze()
+        stopped(rig)
+        assert rig.engine.known == 7
+        if number % 10 == 0:
+            again(rig)
+
+
+def estop_anywhere():
+    """The E-stop's edge at exact ticks: just before, on and after edges, in pulses and between them."""
+    random.seed(SEED)
+    moments = [
+        1000 + 300 * 700 + offset for offset in (-300, -166, -165, -161, -160, -159, -1, 0, 1, 7, 8, 9, 50)
+    ]
+    moments += [random.randrange(-1_000_000, MOTION.duration) for _ in range(24 // FEWER)]
+    for number, moment in enumerate(moments):
+        releases = number & 1
+        flags = armrecord.FLAG_ESTOP_FITTED | (armrecord.FLAG_ESTOP_RELEASES if releases else 0)
+        rig = Rig(arm(3), flags=flags)
+        rig.start(MOTION)
+        rig.board.at(rig.zero() + moment, press)
+        rig.run_to(moment + 84 * 500)
+        last = max([pulses.last_rise for pulses in rig.pulses])
+        assert last <= rig.zero() + moment + FREEZE_TICKS, (moment, last - rig.zero())
+        if releases:
+            assert rig.board.pins.line("E12").level == 1
+        stopped(rig, codes.ESTOP)
+        assert rig.engine.known == (0 if releases else 7)
+        assert not rig.engine.clear()
+        assert rig.engine.load(MOTION)[0] == codes.FAULT_PENDING
+        inputs.set_level("E15", 1)
+        rig.turn()
+        if not releases:
+            again(rig)
+
+
+def press():
+    inputs.set_level("E15", 0)
+
+
+def estop_at_rest():
+    """Pressed while nothing moves, or before the program ran."""
+    rig = Rig(arm(1), flags=armrecord.FLAG_ESTOP_FITTED | armrecord.FLAG_ESTOP_ACTIVE_HIGH)
+    rig.turn()
+    assert rig.engine.fault == 0
+    inputs.set_level("E15", 1)
+    rig.turn()
+    assert rig.engine.fault == codes.ESTOP
+    assert not rig.engine.clear()
+    inputs.set_level("E15", 0)
+    assert rig.engine.clear()
+    rig.turn()
+    assert rig.engine.fault == 0
+
+
+def underrun_anywhere():
+    """The main loop stalls at many moments, for long enough and for not quite long enough."""
+    random.seed(SEED)
+    dry = 0
+    for _ in range(30 // FEWER):
+        rig = Rig(arm(3))
+        rig.start(MOTION)
+        rig.run_to(random.randrange(-100_000, MOTION.duration))
+        rig.board.spend(random.randrange(84 * 12_000))
+        while rig.engine.moving:
+            rig.turn()
+        if rig.engine.fault:
+            dry += 1
+            stopped(rig, codes.UNDERRUN, rig.engine.fault_joint)
+            assert rig.engine.known == 7
+        else:
+            assert rig.commanded() == [steps.total() for steps in MOTION.joints]
+    assert 0 < dry < 30 // FEWER, dry
+
+
+def long_stall():
+    """The main loop is away for longer than the counter's whole range: the outputs stay where they stalled."""
+    rig = Rig(arm(3))
+    rig.start(MOTION)
+    rig.run_to(800_000)
+    rises = rig.pulses[0].rises
+    rig.board.spend(20 * TICK_HZ)
+    assert rig.pulses[0].rises <= rises + 512
+    for _ in range(3):
+        rig.turn()
+    stopped(rig, codes.UNDERRUN, rig.engine.fault_joint)
+
+
+def limit_switches():
+    """A switch stops a joint that moves towards it, not one that moves away; and ends a homing run."""
+    joints = arm(3)
+    joints[1] = row(channel=1, dir_inverted=1, limit_low=0, limit_high=2, limit_active_high=1)
+    for name, moment, trips in (("D8", 300_000, 1), ("D8", 1_000_000, 0), ("D10", 1_000_000, 1)):
+        for homing in (0, 1):
+            rig = Rig(joints)
+            rig.start(MOTION, homing)
+            rig.board.at(rig.zero() + moment, lambda name=name: inputs.set_level(name, 1))
+            rig.run_to(MOTION.duration + TICK_HZ)
+            if trips:
+                assert rig.pulses[1].last_rise <= rig.zero() + moment + FREEZE_TICKS
+                stopped(rig, *((0, 255) if homing else (codes.LIMIT_SWITCH, 1)))
+                assert rig.engine.known == 7
+            else:
+                assert rig.engine.fault == 0
+                assert rig.commanded() == [steps.total() for steps in MOTION.joints]
+
+
+def limit_tripped_before():
+    """A joint that turns towards a switch that is tripped already is stopped by the main loop."""
+    joints = [row(channel=0, limit_high=1)]
+    rig = Rig(joints)
+    inputs.set_level("D9", 0)
+    rig.start(Motion(TICK_HZ // 10, Steps((1000, 400, 2000, -1), (2_000_000, 400, 2000, 1))))
+    rig.run_to(TICK_HZ)
+    stopped_one(rig, codes.LIMIT_SWITCH)
+    assert -2000 <= rig.commanded()[0] < -1900
+
+
+def stopped_one(rig, code):
+    assert (rig.engine.fault, rig.engine.fault_joint) == (code, 0)
+    assert rig.commanded() == rig.stepped()
+
+
+def following():
+    """A blocked motor and a slipping coupling are noticed, and the joint's position is unknown."""
+    for harm in ("block", "slip"):
+        rig = Rig(arm(3))
+        rig.start(MOTION)
+        rig.run_to(600_000)
+        if harm == "block":
+            rig.arm.motors[0].blocked = True
+        else:
+            rig.arm.motors[0].slip(40)
+        rig.run_to(MOTION.duration + TICK_HZ)
+        assert (rig.engine.fault, rig.engine.fault_joint) == (codes.FOLLOWING, 0), rig.engine.fault
+        assert rig.engine.known == 6
+        stopped(rig, codes.FOLLOWING, 0)
+        assert rig.engine.clear()
+        assert rig.engine.load(MOTION) == (codes.UNHOMED, 0, 0)
+        rig.engine.home(1, [0, 0, 0])
+        assert rig.engine.known == 7
+
+
+def start_failed():
+    """The second counter does not follow the first."""
+    rig = Rig(arm(3))
+    rig.board.timers[2].follower = None
+    rig.start(MOTION)
+    assert rig.engine.fault == codes.START_FAILED
+    assert not rig.engine.moving
+    assert rig.stepped() == [0, 0, 0] == rig.commanded()
+
+
+def refusals():
+    """What a motion is refused for."""
+    rig = Rig(arm(2))
+    motion = Motion(TICK_HZ, Steps((1000, 400, 2000, 1)), Steps())
+    Evaluator.refusal = (codes.TOO_FAST, 1, 400_000)
+    assert rig.engine.load(motion) == (codes.TOO_FAST, 1, 400_000)
+    Evaluator.refusal = None
+    Evaluator.offset = -3
+    assert rig.engine.load(motion) == (codes.WRONG_START, 0, -3)
+    Evaluator.offset = 0
+    rig.start(motion)
+    assert rig.engine.load(motion)[0] == codes.BUSY
+    assert not rig.engine.clear()
+    rig.run_to(motion.duration + TICK_HZ)
+    assert rig.engine.fault == 0
+
+
+def enable():
+    """Drivers are off until the first motion is loaded, then on, then off when the engine is closed."""
+    for flags, on in ((0, 0), (armrecord.FLAG_ENABLE_HIGH, 1)):
+        rig = Rig(arm(1), flags=flags)
+        line = rig.board.pins.line("E12")
+        assert line.level == 1 - on
+        rig.run(Motion(1000, Steps()))
+        assert line.level == on
+        rig.engine.close()
+        assert line.level == 1 - on
+
+
+def close_and_anew():
+    """Another engine takes the hardware over, inputs and all."""
+    flags = armrecord.FLAG_ESTOP_FITTED
+    first = Rig(arm(2), flags=flags)
+    first.start(Motion(TICK_HZ, Steps((1000, 4000, 2000, 1)), Steps((1000, 4000, 2000, 1))))
+    first.run_to(1_000_000)
+    first.engine.close()
+    assert first.commanded() == first.stepped()
+    engine = type(first.engine)(dict(HEAD, flags=flags), arm(2))
+    first.engine = engine
+    engine.home(3, [0, 0])
+    for pulses in first.pulses:
+        pulses.net = 0
+    motion = Motion(1_000_000, Steps((1000, 4000, 200, 1)), Steps((1000, 4000, 200, -1)))
+    first.run(motion)
+    assert first.commanded() == [200, -200] == first.stepped()
+    inputs.set_level("E15", 0)
+    first.turn()
+    assert engine.fault == codes.ESTOP
+
+
+cases(
+    (
+        freeze_anywhere,
+        estop_anywhere,
+        estop_at_rest,
+        underrun_anywhere,
+        long_stall,
+        limit_switches,
+        limit_tripped_before,
+        following,
+        start_failed,
+        refusals,
+        enable,
+        close_and_anew,
+    )
+)
