@@ -27,7 +27,9 @@ class Curves:
     """Angle, speed and acceleration on the common time grid.
 
     ``times_s`` (K,); ``each`` (R, 3, K, J) for every repetition, NaN where samples are missing; ``mean``,
-    ``sem`` (standard error of the mean; NaN with one repetition) and ``theory``, each (3, K, J).
+    ``sem`` (standard error of the mean; NaN with one repetition), ``theory``, and ``shown``, what the same
+    differentiation shows of theory's angles, each (3, K, J). Deviations are taken from ``shown``, so that
+    they speak of the arm and not of the differentiation.
     """
 
     times_s: Array
@@ -35,11 +37,12 @@ class Curves:
     mean: Array
     sem: Array
     theory: Array
+    shown: Array
 
 
 @dataclass(frozen=True)
 class Deviation:
-    """Mean curve against theory, for one joint and one of ORDERS."""
+    """Mean curve against theory as differentiation shows it, for one joint and one of ORDERS."""
 
     rms: float
     largest: float
@@ -71,19 +74,20 @@ def curves(repetitions: Sequence[Samples], trajectory: Trajectory) -> Curves:
     if count == 0:
         raise ValueError("no samples to analyse")
     times = np.arange(count) * SAMPLE_S
-    each = np.stack([_differentiated(_on_grid(repetition, count), repetition) for repetition in repetitions])
+    each = np.stack([_differentiated(_on_grid(one, count), one.state == COMPLETE) for one in repetitions])
     theory = np.stack([trajectory(times, order) for order in range(3)])
+    shown = _differentiated(theory[0], ended=True)
     present = np.sum(~np.isnan(each), axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.nansum(each, axis=0) / present
         spread = np.sqrt(np.nansum((each - mean) ** 2, axis=0) / (present - 1))
         sem = np.where(present > 1, spread / np.sqrt(present), np.nan)
-    return Curves(times, each, mean, sem, theory)
+    return Curves(times, each, mean, sem, theory, shown)
 
 
 def deviations(found: Curves) -> list[list[Deviation]]:
     """``[order][joint]``: how far the mean curve is from theory."""
-    error = found.mean - found.theory
+    error = found.mean - found.shown
     return [[_deviation(error[order, :, joint]) for joint in range(error.shape[2])] for order in range(3)]
 
 
@@ -130,7 +134,7 @@ def lags_s(found: Curves, trajectory: Trajectory) -> Array:
         for row, (low, high) in enumerate(((0.0, EDGE_S), (end - EDGE_S, end))):
             inside = (found.times_s >= low) & (found.times_s <= high) & ~np.isnan(found.mean[1, :, joint])
             slope = found.theory[2, inside, joint]
-            error = found.mean[1, inside, joint] - found.theory[1, inside, joint]
+            error = found.mean[1, inside, joint] - found.shown[1, inside, joint]
             if slope @ slope > 0.0:
                 lags[row, joint] = -(error @ slope) / (slope @ slope)
     return lags
@@ -162,10 +166,10 @@ def _on_grid(repetition: Samples, count: int) -> Array:
     return grid
 
 
-def _differentiated(angles: Array, repetition: Samples) -> Array:
+def _differentiated(angles: Array, ended: bool) -> Array:
     """(3, K, J): angle, speed, acceleration; every stretch without a gap by itself.
 
-    The arm rests before a motion and after a complete one, so at these ends the rest goes into the window.
+    The arm rests before a motion and after one that ``ended``, so there the rest goes into the window.
     """
     result = np.full((3, *angles.shape), np.nan)
     result[0] = angles
@@ -174,7 +178,7 @@ def _differentiated(angles: Array, repetition: Samples) -> Array:
         edges = np.flatnonzero(np.diff(np.concatenate(([False], known, [False]))))
         for start, stop in edges.reshape(-1, 2):
             before = WINDOW // 2 if start == 0 else 0
-            after = WINDOW // 2 if stop == len(angles) and repetition.state == COMPLETE else 0
+            after = WINDOW // 2 if stop == len(angles) and ended else 0
             padded = np.pad(angles[start:stop, joint], (before, after), mode="edge")
             for order in (1, 2):
                 found = derivative(padded, SAMPLE_S, order)

@@ -22,23 +22,8 @@ class Claim:
     """Why it differs, the misprint named; or what to know."""
 
 
-def compared(
-    where: str,
-    what: str,
-    printed: float,
-    found: float,
-    digits: int,
-    because: str = "",
-    smaller_wins: bool = False,
-) -> Claim:
-    """A number printed with ``digits`` decimals: same where ours rounds to it within one unit of the last.
-
-    With ``smaller_wins`` a smaller number is BETTER.
-    """
-    unit = 10.0**-digits
-    if abs(found - printed) <= 1.01 * unit:
-        verdict = SAME
-    else:
-        verdict = BETTER if smaller_wins and found < printed else DIFFERS
+def compared(where: str, what: str, printed: float, found: float, digits: int, because: str = "") -> Claim:
+    """A number printed with ``digits`` decimals: SAME where ours is within one unit of the last."""
+    verdict = SAME if abs(found - printed) <= 1.01 * 10.0**-digits else DIFFERS
     text = f"{found:.{digits + 1}f}"
     return Claim(where, what, f"{printed:.{digits}f}", text, verdict, "" if verdict == SAME else because)

@@ -59,9 +59,7 @@ def _unoptimised(made: motions.Plans) -> Plan:
     )
 
 
-def _replayed(
-    plan: Plan, folder: Path, times: int, progress: Progress | None
-) -> report.Evaluation:
+def _replayed(plan: Plan, folder: Path, times: int, progress: Progress | None) -> report.Evaluation:
     motion = pipeline.planned(plan)
     with open_board(SIM) as board, StopRequest() as stop:
         operate.configure(board, motion.arm, replace=True)
@@ -125,5 +123,5 @@ def _end_roughness(found: report.Evaluation) -> float:
     end = found.plan.trajectory.joints[0].duration_s
     times = found.curves.times_s
     near = (times <= 0.5) | ((times >= end - 0.5) & (times <= end + 0.5))
-    error = (found.curves.mean - found.curves.theory)[2, near, 0]
+    error = (found.curves.mean - found.curves.shown)[2, near, 0]
     return float(np.sqrt(np.nanmean(error**2)))
