@@ -87,7 +87,8 @@ class Engine:
             return refused
         self._inputs.enable(True)
         self._set_clock(-LEAD_TICKS)
-        self._sampler.plan(self.duration_ticks)
+        self._end_ticks = self.duration_ticks
+        self._sampler.plan(self._end_ticks)
         self._readings.clear()
         for number, joint in enumerate(self._joints):
             joint.load(motion, number)
@@ -204,6 +205,7 @@ class Engine:
         """The outputs were frozen: let begun pulses end, then count."""
         time.sleep_us(self._pulse_us)
         self._stop_counters()
+        self._end_ticks = max(self.motion_ticks(), 0)
         self._clock()
         self._readings.convert(self._epoch, self._low)
         high = self._block[access.HIGH]
@@ -266,8 +268,8 @@ class Engine:
         return self._readings.next(buffer)
 
     def snapshot(self, buffer):
-        """The same as a sample, of this moment."""
-        ticks = max(self.motion_ticks(), 0)
+        """The same as a sample, of this moment; after a motion with the time at which it ended."""
+        ticks = self._end_ticks if self.finished else max(self.motion_ticks(), 0)
         low = ticks & 0xFFFFFFFF
         buffer[0] = low - (1 << 32) if low >> 31 else low
         buffer[1] = ticks >> 32
