@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from armtempo_shared import limits, wire
 
-from armtempo import encode, moves
+from armtempo import brake, encode, moves
 from armtempo.arm import Arm
 from armtempo.errors import BoardError, LinkError
 from armtempo.interrupt import StopRequest
@@ -60,6 +60,12 @@ def configure(board: Board, arm: Arm, replace: bool) -> None:
     board.hello()
 
 
+def motion_data(trajectory: Trajectory, arm: Arm) -> bytes:
+    """The record of a motion that the board can brake anywhere."""
+    limits_of = [joint.limits for joint in arm.driven if joint.limits is not None]
+    return encode.motion_record(trajectory, arm, brake.brake_time_s(trajectory, limits_of))
+
+
 def store(board: Board, name: str, data: bytes, progress: Progress | None = None) -> Stored:
     """Upload a motion record under ``name``, unless the board has just this one already."""
     stored = Stored(name, wire.record_crc(data))
@@ -76,11 +82,11 @@ def replay(board: Board, motion: Stored, stop: StopRequest, take: Take = lambda 
     """
     run, duration_s = board.start(motion.name, motion.crc)
     follower = Follower(board, run)
-    brake = _Brake(board, stop)
+    braking = _Brake(board, stop)
     heard_s = board.session.clock()
     while follower.end is None:
         try:
-            for sample in follower.samples(brake):
+            for sample in follower.samples(braking):
                 heard_s = board.session.clock()
                 take(sample, duration_s)
         except NoAnswer as error:  # silent, though its port is there: as if the cable were out
@@ -218,7 +224,7 @@ def move_once(
     board: Board, arm: Arm, trajectory: Trajectory, stop: StopRequest, progress: Progress | None = None
 ) -> None:
     """Run a motion that is not kept on the board; BoardError where a fault ends it."""
-    motion = store(board, trajectory.name, encode.motion_record(trajectory, arm))
+    motion = store(board, trajectory.name, motion_data(trajectory, arm))
     try:
         raise_fault(replay(board, motion, stop, shown(progress)))
     finally:

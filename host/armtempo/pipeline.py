@@ -51,7 +51,7 @@ class Motion:
 def planned(plan: Plan, name: str | None = None) -> Motion:
     """The motion of a plan; ``name`` for the board, else made of the job's."""
     board_name = name or re.sub(r"[^A-Za-z0-9_-]", "-", plan.job.name)[:MAX_NAME]
-    data = encode.motion_record(plan.trajectory, plan.arm)
+    data = operate.motion_data(plan.trajectory, plan.arm)
     return Motion(board_name, plan.arm, plan.trajectory, data, plan)
 
 
