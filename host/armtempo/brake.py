@@ -15,8 +15,8 @@ from armtempo.spline import Array
 from armtempo.trajectory import Trajectory
 
 EXCESS = 1.25
-"""Part of an acceleration or jerk limit that braking may use. A motion at its limits can brake within them only
-all too slowly: where it turns most sharply, braking adds to what is already the limit."""
+"""Part of an acceleration or jerk limit that braking may use. A motion at its limits can brake within them
+only all too slowly: where it turns most sharply, braking adds to what is already the limit."""
 
 _STARTS = 400
 _PHASES = 40

@@ -98,7 +98,8 @@ class Path:
         times = (maps @ y)[:, :, None]
         allowed = self.limits.T[:, None, :] * times[0] ** _POWERS[:, None, None]
         ratio = np.abs(np.stack(_numerators(angles, times))) / allowed
-        return np.moveaxis(1.0 - ratio, 0, 2).reshape(self.segments, parts + 1, self.joints, 3)
+        slack = np.moveaxis(1.0 - ratio, 0, 2)
+        return np.asarray(slack.reshape(self.segments, parts + 1, self.joints, 3))
 
     def grid(self, parts: int) -> tuple[Index, Array]:
         """Segment and u of ``parts`` + 1 points in every segment."""

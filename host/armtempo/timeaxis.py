@@ -44,7 +44,7 @@ def free_map(count: int, degree: int) -> Array:
     points = np.zeros((differences, count + degree))
     points[:, 1:] = np.cumsum(np.eye(differences), axis=1)
     start = points[:, : degree + 1] @ spline.basis(degree)[0]
-    matrix = points - start[:, None]
+    matrix = np.asarray(points - start[:, None])
     matrix.setflags(write=False)
     return matrix
 

@@ -38,7 +38,7 @@ def command(job_path: Path | None, arm_path: Path | None, output: Path | None, *
     from dataclasses import replace
 
     from armtempo import job as jobs
-    from armtempo import planner, summary, trajectory_file, vias
+    from armtempo import planner, summary, trajectory_file
 
     arm = options.load_arm(arm_path)
     job = jobs.load_job(job_path or jobs.default_path(), arm)
@@ -46,8 +46,6 @@ def command(job_path: Path | None, arm_path: Path | None, output: Path | None, *
     if "degree" in given:
         given["degree"] = int(given["degree"])
     job = replace(job, **given)
-    for note in vias.resolve(arm, job).notes:
-        click.echo(f"note: {note.text}")
     with Progress("planning") as progress:
         plan = planner.plan(arm, job, progress)
     target = output or Path(f"{job.name}.json")
