@@ -70,7 +70,7 @@ class VirtualBoard:
         return self.log_path.read_text(errors="replace")
 
     def wait_until_up(self) -> None:
-        """Wait until the board program is about to start; LinkError where the process ends instead."""
+        """Wait until the board program has started; LinkError where the process ends instead."""
         limit = time.monotonic() + _START_S
         while not (self._folder / "up").exists():
             if not self.running() or time.monotonic() > limit:

@@ -52,7 +52,7 @@ class Options:
     arm: dict[str, Any] | None = None
     """Motors and encoders on the pins; None: ideal ones for the arm record in the flash."""
     up: str = ""
-    """File that is made when the board is up."""
+    """File that is made when the program has started."""
     seed: int = 0
     faults: list[Fault] = field(default_factory=list)
 

@@ -192,7 +192,9 @@ def case_compare_interrupt_comes_soon_and_gets_the_timer():
     board = standalone.start()
     seen = []
     timer = pyb.Timer(2, prescaler=0, period=0x3FFFFFFF)
-    channel = timer.channel(4, pyb.Timer.OC_TIMING, compare=50_000, callback=lambda t: seen.append((t, t.counter())))
+    channel = timer.channel(
+        4, pyb.Timer.OC_TIMING, compare=50_000, callback=lambda t: seen.append((t, t.counter()))
+    )
     timer.counter(0)
     board.spend(60_000)
     assert len(seen) == 1 and seen[0][0] is timer

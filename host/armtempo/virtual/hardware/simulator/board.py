@@ -25,8 +25,8 @@ _RCC_TIMERS = {1: (17, 0), 8: (17, 1), 2: (16, 0), 3: (16, 1), 4: (16, 2), 5: (1
 class Board:
     """Everything between the program and the world.
 
-    ``worlds`` are told of timers that start or stop and of inputs that change; ``follow()`` is called after each
-    stretch of time.
+    ``worlds`` are told of timers that start or stop and of inputs that change; ``follow()`` is called after
+    each stretch of time.
     """
 
     def __init__(self, dma_preload=True):
@@ -95,11 +95,9 @@ class Board:
         if routed:
             self.pins.route((self.timers[2], self.timers[5]))
 
-    def counting_changed(self, timer, now):
-        """A timer was started or stopped."""
-        self.counting = [other for other in self.timers.values() if other.counts_by_clock()]
-        for world in self.worlds:
-            world.counting(timer, now)
+    def recount(self):
+        """A timer was started or stopped: find those that time moves."""
+        self.counting = [timer for timer in self.timers.values() if timer.counts_by_clock()]
 
     # -- time ------------------------------------------------------------------------------------
 
@@ -116,7 +114,7 @@ class Board:
         self.next_happening = due
 
     def call(self):
-        """The program made a cheap call. Their time is kept and spent together; each looks at its own effects."""
+        """The program made a cheap call. The time of several is kept and spent together."""
         self.owed += CALL_TICKS
         if self.owed > _MOST_OWED:
             self.spend(0)

@@ -8,6 +8,7 @@ import time
 
 from simulator import the
 from simulator.board import TICKS_PER_MS, TICKS_PER_US
+from simulator.flash import real_open
 from simulator.reset import PowerOff
 
 _HORIZON_TICKS = 500 * TICKS_PER_MS
@@ -25,12 +26,19 @@ class Pace:
         self._ticks_diff = time.ticks_diff
         self._last_us = self._ticks_us()
         self._lead_us = 0
-        board.millisecond = self._millisecond
+        board.millisecond = self._first_millisecond
 
     def idle(self):
         """Until the next interrupt or the next millisecond; in real time where nothing moves."""
         board = self._board
         board.run_until(board.next_ms, wake=True)
+
+    def _first_millisecond(self):
+        """The program has begun to let time pass: whoever waits for the board may know."""
+        self._board.millisecond = self._millisecond
+        if the.options["up"]:
+            real_open(the.options["up"], "w").close()
+        self._millisecond()
 
     def _millisecond(self):
         self._serial.pump()

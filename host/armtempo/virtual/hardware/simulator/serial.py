@@ -10,28 +10,22 @@ import select
 from simulator import the
 
 BUFFER = 1024
+_CHUNK = 512
 _POLLIN = 1
 _POLLHUP = 16
 _CTRL_C = 3
 
 
-class Serial:
-    """The line behind the port. ``attached``: the REPL has it, Ctrl-C interrupts."""
+class Line:
+    """The port's buffers, and a host that neither sends nor reads.
+
+    ``attached``: the REPL has the port, and ``interrupt_char`` interrupts.
+    """
+
+    ended = False
 
     def __init__(self):
-        self._in = open(0, "rb", buffering=0)  # noqa: SIM115
-        self._out = open(1, "wb", buffering=0)  # noqa: SIM115
-        self._poll = select.poll()
-        self._poll.register(self._in, _POLLIN)
-        self._chunk = bytearray(512)
-        self.received = bytearray()
-        self.sending = bytearray()
-        self.rts = False
-        self.cts = False
-        self.attached = True
-        self.interrupt_char = _CTRL_C
-        self.lost = 0
-        self.ended = False
+        self.reset()
 
     def reset(self):
         """The board was reset: what was under way is lost."""
@@ -41,6 +35,37 @@ class Serial:
         self.rts = self.cts = False
         self.attached = True
         self.interrupt_char = _CTRL_C
+
+    def wait(self, ms):
+        """Wait in real time for input, at most so long; True where there is some."""
+        return False
+
+    def pump(self):
+        """Move bytes between the buffers and the host."""
+
+    def put(self, data):
+        """Queue bytes for the host; how many there was room for."""
+        count = min(len(data), BUFFER - len(self.sending))
+        self.sending.extend(memoryview(data)[:count])
+        return count
+
+    def take(self, count):
+        """Up to so many received bytes."""
+        data = bytes(self.received[:count])
+        self.received = self.received[count:]
+        return data
+
+
+class Serial(Line):
+    """The line to the host that has the pseudo terminal open."""
+
+    def __init__(self):
+        super().__init__()
+        self._in = open(0, "rb", buffering=0)  # noqa: SIM115
+        self._out = open(1, "wb", buffering=0)  # noqa: SIM115
+        self._poll = select.poll()
+        self._poll.register(self._in, _POLLIN)
+        self._chunk = memoryview(bytearray(_CHUNK))
 
     def wait(self, ms):
         """Wait in real time for input, at most so long; True where there is some."""
@@ -58,40 +83,25 @@ class Serial:
             room = BUFFER - 1 - len(self.received)
             if self.rts and room < 65:
                 return
+            piece = self._chunk[: min(room, _CHUNK)] if self.rts else self._chunk
             try:
-                count = self._in.readinto(self._chunk)
+                count = self._in.readinto(piece)
             except OSError:  # the other end of the pseudo terminal has gone
                 count = 0
             if not count:
                 self.ended = count == 0
                 return
-            self._take(self._chunk[:count], room)
-            if count < len(self._chunk):
+            self._take_in(bytes(piece[:count]), room)
+            if count < len(piece):
                 return
 
-    def _take(self, data, room):
+    def _take_in(self, data, room):
         if self.attached and self.interrupt_char >= 0:
             found = data.find(bytes((self.interrupt_char,)))
             if found >= 0:
                 data = data[:found] + data[found + 1 :]
                 the.board.interrupted = True
-        if self.rts:
-            self.received.extend(data)
-            return
-        self.received.extend(data[:room])
-        self.lost += max(0, len(data) - room)
-
-    def put(self, data):
-        """Queue bytes for the host; how many there was room for."""
-        count = min(len(data), BUFFER - len(self.sending))
-        self.sending.extend(memoryview(data)[:count])
-        return count
-
-    def take(self, count):
-        """Up to so many received bytes."""
-        data = bytes(self.received[:count])
-        self.received = self.received[count:]
-        return data
+        self.received.extend(data if self.rts else data[:room])
 
 
 class USB_VCP:

@@ -12,8 +12,6 @@ _POWER_ON = 1
 
 def run(options):
     """Run the board until the launcher goes."""
-    if options["up"]:
-        open(options["up"], "w").close()
     before = list(sys.modules)
     cause = _POWER_ON
     while True:

@@ -1,15 +1,18 @@
 """A board without a launcher, for tests of hardware code: import this before the code under test.
 
 ``start(edge_log=…)`` powers a new board up and returns it; its time passes in simulated calls, or by
-``board.spend(ticks)``. Options are those of ``options.py`` on the host.
+``board.spend(ticks)``. Options are those of ``options.py`` on the host; with ``flash`` the built-in ``open`` sees
+that folder as ``/flash``.
 """
 
+import builtins
 import sys
 
 if sys.implementation.name != "micropython":
     import additions  # noqa: F401
 
-from simulator import modules, setup, the
+from simulator import flash, modules, setup, the
+from simulator.serial import Line
 
 DEFAULTS = {
     "flash": ".",
@@ -22,49 +25,17 @@ DEFAULTS = {
     "turn_us": 1000,
     "arm": None,
     "faults": [],
+    "up": "",
 }
 
 
-def start(cause=1, serial=None, **options):
-    """Power up; ``serial`` stands for the host's end of the line (default: a line that nobody uses)."""
-    the.serial = serial or SilentLine()
+def start(cause=1, line=None, **options):
+    """Power up; ``line`` is the serial line, with nobody at the other end by default."""
+    the.serial = line or Line()
     the.edges = None
     setup.power_up(dict(DEFAULTS, **options), cause)
+    builtins.open = the.flash.open if "flash" in options else flash.real_open
     return the.board
-
-
-class SilentLine:
-    """A serial line without a host; ``received`` and ``sending`` are the port's buffers."""
-
-    def __init__(self):
-        self.ended = False
-        self.reset()
-
-    def reset(self):
-        """The board was reset."""
-        self.received = bytearray()
-        self.sending = bytearray()
-        self.rts = self.cts = False
-        self.attached = True
-        self.interrupt_char = 3
-
-    def wait(self, ms):
-        """Nothing will come."""
-        return False
-
-    def pump(self):
-        """Nobody is there."""
-
-    def put(self, data):
-        """Keep what is sent."""
-        self.sending.extend(data)
-        return len(data)
-
-    def take(self, count):
-        """Up to so many received bytes."""
-        data = bytes(self.received[:count])
-        self.received = self.received[count:]
-        return data
 
 
 modules.replace()

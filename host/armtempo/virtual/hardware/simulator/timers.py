@@ -175,7 +175,11 @@ class Timer:
     def sync(self, now):
         """The program may have written the timer's registers."""
         words = memory.words
-        self.encoder = bool(words[self.at + SMCR] & 3) and not words[self.at + SMCR] & 4
+        encoder = words[self.at + SMCR] & 7 in (1, 2, 3)
+        if encoder != self.encoder:
+            self.encoder = encoder
+            self._restart(now, words[self.at + CNT])
+            self.board.recount()
         memory.poke(self.at + SR, words[self.at + SR] & memory.seen[self.at + SR])
         self._sync_count(now)
         if words[self.at + EGR]:
@@ -224,7 +228,9 @@ class Timer:
             return
         self._restart(now, memory.words[self.at + CNT])
         self.running = running
-        self.board.counting_changed(self, now)
+        self.board.recount()
+        for world in self.board.worlds:
+            world.counting(self, now)
         if running and self.follower and (memory.words[self.at + CR2] >> 4) & 7 == 1:
             self.follower.triggered(now)
 
