@@ -34,7 +34,8 @@ def test_two_at_a_time_are_told_apart() -> None:
         open_board(one.port) as first,
         open_board(two.port) as second,
     ):
-        assert first.info and second.info
+        assert first.info
+        assert second.info
         assert first.info.board_id != second.info.board_id
 
 
@@ -59,7 +60,10 @@ def test_goes_with_its_context() -> None:
 
 def test_goes_with_its_launcher(tmp_path: Path) -> None:
     """A launcher that is killed leaves no process behind."""
-    script = "import time\nfrom armtempo.virtual import launch\nboard = launch()\nprint(board.pid, flush=True)\ntime.sleep(60)"
+    script = (
+        "import time\nfrom armtempo.virtual import launch\n"
+        "board = launch()\nprint(board.pid, flush=True)\ntime.sleep(60)"
+    )
     with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as parent:
         assert parent.stdout
         pid = int(parent.stdout.readline())

@@ -1,4 +1,7 @@
-"""The simulated hardware, case by case; each asserts by itself and prints its name. Argument: a scratch folder."""
+"""The simulated hardware, case by case; each asserts by itself and prints its name.
+
+Argument: a scratch folder.
+"""
 
 import sys
 
@@ -54,7 +57,7 @@ def edges(path):
 def counters():
     """TIM2 and TIM5 set up to count all 32 bits, from a little before 0, TIM5 waiting for TIM2."""
     timers = []
-    for number, base in ((2, stm.TIM2), (5, stm.TIM5)):
+    for number in (2, 5):
         timer = pyb.Timer(number, prescaler=0, period=0x3FFFFFFF)
         timers.append(timer)
     channels = (

@@ -1,8 +1,8 @@
 """A board without a launcher, for tests of hardware code: import this before the code under test.
 
 ``start(edge_log=…)`` powers a new board up and returns it; its time passes in simulated calls, or by
-``board.spend(ticks)``. Options are those of ``options.py`` on the host; with ``flash`` the built-in ``open`` sees
-that folder as ``/flash``.
+``board.spend(ticks)``. Options are those of ``options.py`` on the host; with ``flash`` the built-in ``open``
+sees that folder as ``/flash``.
 """
 
 import builtins
