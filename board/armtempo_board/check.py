@@ -1,6 +1,155 @@
-"""Is a motion fit to be run? Judged by the board itself before each start."""
+"""Is a motion fit to be run? Judged by the board itself before each start.
+
+Whole segments are judged by the hulls of their polynomials, and halved where that does not decide: what
+passes is proven, not sampled.
+"""
+
+import struct
+
+from armtempo_board import cell, cells, points, rates
+from armtempo_board.parts import Parts
+from armtempo_shared import codes
+from armtempo_shared.limits import MAX_STEP_RATE, TICK_FRACTION_BITS, TICK_HZ
+from micropython import const
+
+LONGEST_TICKS = 1 << 38
+"""A little under an hour: 1024-tick units stay small integers."""
+
+GAP_TICKS = const(25200)
+"""Least time between opposite steps that is reckoned with where none is given: 0.3 ms."""
+
+_SHORT_TICKS = const(1024)
+_PASS = const(0)
+_SPLIT = const(-1)
 
 
-def check(motion, joints):
-    """None, or (code, joint, value) of the first thing wrong."""
+def check(motion, joints, gap_ticks=GAP_TICKS):
+    """None, or (code, joint, value) of the first thing wrong.
+
+    ``joints``: the joints' rows of the arm record; ``gap_ticks``: see ``Walker.load``. ``value`` is, by code: time_order, the control point;
+    too_long, ticks or steps of 2**28; out_of_range, the position in steps; too_fast, steps/s;
+    too_abrupt, steps/s**2.
+    """
+    parts = Parts()
+    for joint in range(motion.joints):
+        wrong = _numbers(motion, joint)
+        if wrong:
+            return wrong[0], joint, wrong[1]
+        parts.load(motion, joint)
+        judge = Judge(parts, joints[joint], gap_ticks)
+        while parts.bring():
+            code = judge.verdict()
+            if code == _SPLIT:
+                parts.split()
+            elif code:
+                return code, joint, judge.value
+            else:
+                parts.skip()
+    return rates.check_sum(motion, joints, parts)
+
+
+def _numbers(motion, joint):
+    """Increasing time control points, and all numbers within what the evaluator can hold."""
+    count = motion.degree + 1
+    for offset, segments, is_time in (
+        (motion.time_offset(joint), motion.segments * motion.refine, True),
+        (motion.angle_offset(joint), motion.segments, False),
+    ):
+        for segment in range(segments):
+            control = struct.unpack_from("<%dq" % count, motion.data, offset + 8 * segment)
+            if is_time:
+                for i in range(count - 1):
+                    if control[i] >= control[i + 1]:
+                        return codes.TIME_ORDER, segment + i + 1
+            span = max(control) - min(control)
+            most = max(max(control), -min(control))
+            if span >> points.LOW_BITS + 24 or most >> points.LOW_BITS + 27:
+                return codes.TOO_LONG, most
+            if is_time and most >> TICK_FRACTION_BITS >= LONGEST_TICKS:
+                return codes.TOO_LONG, most >> TICK_FRACTION_BITS
     return None
+
+
+class Judge:
+    """Judges the parts of one joint; ``value`` says how much where one fails."""
+
+    def __init__(self, parts, row, gap_ticks):
+        self._parts = parts
+        self._gap_ticks = gap_ticks
+        self._low = row["min_steps"] + points.BIAS
+        self._high = row["max_steps"] + points.BIAS
+        self._limit = min(row["max_rate"], MAX_STEP_RATE + MAX_STEP_RATE // 100)
+        self._mantissa, self._exponent = rates.scaled(self._limit)
+        self.value = 0
+
+    def verdict(self):
+        """A code, _PASS, or _SPLIT where it takes a closer look."""
+        parts = self._parts
+        cell.localise(parts.angle, parts.angle_local)
+        cell.localise(parts.time, parts.time_local)
+        for position in (parts.start(), parts.end()):
+            if not self._low <= position <= self._high:
+                self.value = position - points.BIAS
+                return codes.OUT_OF_RANGE
+        if not parts.angle_local[cell.SCALE] or not parts.time_local[cell.SCALE]:
+            return _SPLIT
+        return self._range() or self._rate() or self._abrupt()
+
+    def _short(self):
+        return self._parts.time[5] - self._parts.time[0] < 2 and self._parts.ticks() <= _SHORT_TICKS
+
+    def _range(self):
+        local = self._parts.angle_local
+        inside = self._low <= local[cell.LOWEST] and local[cell.HIGHEST] <= self._high
+        return _PASS if inside or self._short() else _SPLIT
+
+    def _rate(self):
+        """|angle'| <= rate * time' for all Bezier points of the derivatives proves it for the part."""
+        parts = self._parts
+        shift = 30 - self._exponent + parts.angle_local[cell.SCALE] - parts.time_local[cell.SCALE] + 12
+        found = rates.compare(parts.angle_local, parts.time_local, self._mantissa, shift)
+        if found == rates.SLOWER:
+            return _PASS
+        if found == rates.UNDECIDED and not self._short():
+            return _SPLIT
+        self.value = rates.highest(parts)
+        return codes.TOO_FAST
+
+    def _abrupt(self):
+        """Where the joint may reverse: half a gap of the acceleration must not reach 0.02 steps.
+
+        Two opposite steps closer than the gap are left out; acceleration a carries the joint a gap**2 / 8 past.
+        """
+        parts = self._parts
+        local = parts.angle_local
+        least = local[cell.LEAST] - cell.DIFFERENCE_BIAS
+        most = local[cell.MOST] - cell.DIFFERENCE_BIAS
+        if least >= 0 or most <= 0:
+            return _PASS
+        if cells.heading(parts.time_local) <= 0:
+            return _SPLIT
+        bend, per = _acceleration(local, parts.time_local)
+        if bend * self._gap_ticks**2 * 100 <= per * 16:
+            return _PASS
+        if not self._short():
+            return _SPLIT
+        self.value = bend * TICK_HZ * TICK_HZ // per
+        return codes.TOO_ABRUPT
+
+
+def _acceleration(angle, time):
+    """A bound of |angle'' / time'**2 - angle' time'' / time'**3| as a fraction of big integers, steps/tick**2."""
+    least = time[cell.LEAST] - cell.DIFFERENCE_BIAS
+    most = max(
+        abs(angle[cell.LEAST] - cell.DIFFERENCE_BIAS),
+        abs(angle[cell.MOST] - cell.DIFFERENCE_BIAS),
+    )
+    bend = 4 * (_second(angle) * least + most * _second(time))
+    scale = 2 * (time[cell.SCALE] - 12) - angle[cell.SCALE]
+    per = 5 * least**3
+    return (bend << scale, per) if scale >= 0 else (bend, per << -scale)
+
+
+def _second(local):
+    """Largest second difference of the points."""
+    return max([abs(local[cell.STEPS + i + 1] - local[cell.STEPS + i]) for i in range(4)])

@@ -13,7 +13,9 @@ ANGLE_RATE = 2
 TIME_RATE = 3
 MANTISSA = 4  # ticks per step = MANTISSA / 2**EXPONENT; MANTISSA has 30 bits
 EXPONENT = 5
-NODE_SIZE = 6
+DELAY = 6  # while braking: whole ticks to be added to the time, and the rate of time
+RATE = 7
+NODE_SIZE = 8
 _ONE = const(1 << 15)
 _LOW = const((1 << 15) - 1)
 

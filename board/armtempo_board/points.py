@@ -10,9 +10,8 @@ they are loaded; all that follows knows quintics only.
 """
 
 import micropython
-from micropython import const
-
 from armtempo_shared.basis import BASIS, FACTORIAL
+from micropython import const
 
 BIAS = 1 << 28
 LOW_BITS = 28

@@ -4,7 +4,7 @@ from array import array
 
 from micropython import const
 
-from armtempo_board import cell, cells, crossing, points, stretch
+from armtempo_board import braking, cell, cells, crossing, points, stretch
 
 _BUDGET = const(4)  # parts looked at in one call: bounds its time
 _LARGEST_POWER = const(10)
@@ -25,11 +25,13 @@ class Walker:
 
     def __init__(self):
         self._cells = cells.Cells()
+        self._brake = braking.Brake()
         self._cell = array("i", bytes(80))
         self._state = array("i", bytes(4 * stretch.STATE_SIZE))
         self._a = array("i", bytes(4 * crossing.NODE_SIZE))
         self._middle = array("i", bytes(4 * crossing.NODE_SIZE))
         self._b = array("i", bytes(4 * crossing.NODE_SIZE))
+        self._nodes = (self._a, self._middle, self._b)
         self.direction = 1
         self.at_turn = False
         self.ended = True
@@ -40,7 +42,9 @@ class Walker:
         ``pulse_ticks``: STEP high time; ``gap_ticks``: least time between steps in opposite directions. Two that
         would be closer are both left out.
         """
-        self._cells.load(motion, joint, gap_ticks >> 3)
+        self._cells.load(motion, joint)
+        self._cells.graze_ticks = gap_ticks >> 3
+        self._brake.on = False
         self._state[stretch.PULSE] = pulse_ticks
         self._gap_ticks = gap_ticks
         self._position = position_steps + points.BIAS
@@ -80,6 +84,27 @@ class Walker:
         self.direction = -self.direction
         self.at_turn = False
 
+    def brake(self, start_ticks, length_ticks):
+        """Come to rest along the path from a time on (see braking.py); no step from there on may be written yet."""
+        self._brake.set(start_ticks, length_ticks)
+        self._halves = 0
+        self._known = False
+        if self._left and self._released:
+            self._held = True
+        else:
+            self._index -= self._left
+        self._left = 0
+        if self._held:
+            self._brake_held()
+        if 0 < self._index < self._count:
+            self._solve(self._a, self._index - 1, 0)
+
+    def _brake_held(self):
+        node = self._middle
+        node[crossing.TIME] = self._held_ticks
+        self._held = bool(braking.slow(node, self._brake.law, self._held_high, 0))
+        self._held_ticks = node[crossing.TIME] + node[crossing.DELAY]
+
     def last_1024(self):
         """Time of the step written last, in 1024 ticks."""
         return self._base_1024 + stretch.elapsed(self._state, 0)
@@ -109,7 +134,7 @@ class Walker:
 
     def _next_cell(self):
         found = self._cells.next(self._position)
-        if found == cells.END:
+        if found == cells.END or (self._brake.on and self._brake.passed(self._cells.time[0])):
             if self._held:
                 self._release()
             else:
@@ -157,7 +182,10 @@ class Walker:
         self._a[crossing.W] = 0
 
     def _solve(self, node, index, guess):
-        """Set a node to the cell's step ``index``, its time in ticks * 2**TIME_SCALE from the high word on."""
+        """Set a node to the cell's step ``index``, its time in ticks * 2**TIME_SCALE from the high word on.
+
+        False: braking ends before it.
+        """
         target = 0 if self._at_once else self._target + (index << self._scale)
         if target <= 0:
             node[crossing.W] = node[crossing.TIME] = 0
@@ -165,6 +193,9 @@ class Walker:
             node[crossing.W] = guess
             crossing.solve(self._cell, node, min(target, self._range))
         node[crossing.TIME] += self._offset
+        if not self._brake.on:
+            return True
+        return braking.slow(node, self._brake.law, self._cells.time[0], self._state[stretch.TIME_SCALE])
 
     def _in_cell(self):
         """Prepare the next step or steps of the cell."""
@@ -175,24 +206,30 @@ class Walker:
         if self._halves:
             self._second_half()
         elif remaining == 0:
-            self._step()
-            self._hold()
+            if self._step():
+                self._hold()
         elif remaining < 2 << _SMALLEST_POWER or self._at_once or not self._block(remaining):
-            self._step()
-            self._single()
+            if self._step():
+                self._single()
 
     def _step(self):
-        """Solve the next step by itself."""
-        self._solve(self._a, self._index, self._a[crossing.W])
+        """Solve the next step by itself; False where braking ends before it."""
+        comes = self._solve(self._a, self._index, self._a[crossing.W])
         self._index += 1
-        self._known = False
+        self.ended = not comes
+        return comes
 
     def _first(self):
         """The first step of a cell, against the one that was held back before it."""
         if not self._known:
-            self._solve(self._a, 0, 0)
+            self._comes = self._solve(self._a, 0, 0)
             self._known = True
-        if self._held:
+        if not self._comes:
+            if self._held:
+                self._release()
+            else:
+                self.ended = True
+        elif self._held:
             opposite = self._heading != self.direction
             if opposite and self._since_held(self._cells.time[0], self._ticks(self._a)) <= self._gap_ticks:
                 self._held = False  # a graze: neither comes
@@ -223,14 +260,18 @@ class Walker:
         return (high << 12) + ticks - self._held_ticks
 
     def _ticks(self, node):
+        """A node's time in ticks from the high word of the part on."""
         scale = self._state[stretch.TIME_SCALE]
-        return (node[crossing.TIME] + (1 << (scale - 1))) >> scale
+        delay = node[crossing.DELAY] if self._brake.on else 0
+        return ((node[crossing.TIME] + (1 << (scale - 1))) >> scale) + delay
 
     def _release(self):
         self._held = False
+        self._released = True
         self._write(self._held_high, self._held_ticks)
 
     def _single(self):
+        self._released = False
         self._write(self._cells.time[0], self._ticks(self._a))
 
     def _write(self, high, ticks):
@@ -245,16 +286,17 @@ class Walker:
             power -= 1
         self._slope(self._a)
         here = self._index - 1
-        self._solve(self._b, here + (2 << power), self._a[crossing.W])
+        comes = self._solve(self._b, here + (2 << power), self._a[crossing.W])
         self._slope(self._b)
         while power >= _SMALLEST_POWER:
-            self._solve(self._middle, here + (1 << power), self._a[crossing.W])
-            self._slope(self._middle)
-            if self._accept(power):
-                self._halves = 2
-                self._block_power = power
-                self._second_half()
-                return True
+            if self._solve(self._middle, here + (1 << power), self._a[crossing.W]):
+                self._slope(self._middle)
+                if comes and self._level() and self._accept(power):
+                    self._halves = 2
+                    self._block_power = power
+                    self._second_half()
+                    return True
+                comes = True
             power -= 1
             self._power = power
             self._b, self._middle = self._middle, self._b
@@ -262,8 +304,28 @@ class Walker:
         return False
 
     def _slope(self, node):
-        exponent = self._state[stretch.TIME_SCALE] - self._scale
-        crossing.slope(node, exponent)
+        crossing.slope(node, self._state[stretch.TIME_SCALE] - self._scale)
+        if self._brake.on:
+            braking.steepen(node)
+
+    def _level(self):
+        """Let the times of the three nodes count from the same base; False where braking takes them too far apart."""
+        high = self._cells.time[0]
+        state = self._state
+        state[stretch.BASE_HIGH] = high
+        if not self._brake.on:
+            return True
+        base = self._a[crossing.DELAY] & ~4095
+        state[stretch.BASE_HIGH] = high + (base >> 12)
+        scale = state[stretch.TIME_SCALE]
+        for node in self._nodes:
+            delay = node[crossing.DELAY] - base
+            if delay >> (28 - scale):
+                return False
+        for node in self._nodes:
+            node[crossing.TIME] += (node[crossing.DELAY] - base) << scale
+            node[crossing.DELAY] = base
+        return True
 
     def _accept(self, power):
         """Whether the stretches a-middle and middle-b of 2**power steps keep the error bound."""
@@ -283,10 +345,10 @@ class Walker:
     def _second_half(self):
         """Prepare the stretch from node a to the middle; the middle is the next node a."""
         state = self._state
-        state[stretch.BASE_HIGH] = self._cells.time[0]
+        self._released = False
         state[stretch.POWER] = self._block_power
         stretch.differences(state, self._a, self._middle)
-        self._base_1024 = _in_1024(self._cells.time[0], self._a[crossing.TIME] >> state[stretch.TIME_SCALE])
+        self._base_1024 = _in_1024(state[stretch.BASE_HIGH], self._a[crossing.TIME] >> state[stretch.TIME_SCALE])
         self._left = 1 << self._block_power
         self._index += self._left
         self._halves -= 1

@@ -1,0 +1,175 @@
+"""Coming to rest along the path: real time as a function of the motion's own time.
+
+From the start on, over a length L, the motion's time runs slower and slower: at x = (real time - start) / L its
+rate is 1 - S(x), S(x) = 10 x**3 - 15 x**4 + 6 x**5; it stops for good at start + L / 2. With r = 1 - x, the way
+left is e(r) = r**4 (2.5 - 3 r + r**2) of L, and the rate e'(r) = r**3 (10 - 15 r + 6 r**2). Nodes are moved by
+this law, time and slope; all between them stays as it is. Fractions here have 30 bits.
+"""
+
+from array import array
+
+import micropython
+from armtempo_board import points
+from micropython import const
+
+# what ``slow`` needs
+LENGTH = 0  # 2**UNIT ticks, 28 bits
+START_HIGH = 1  # 4096 ticks, + points.BIAS
+START_LOW = 2  # ticks
+UNIT = 3
+_SIZE = const(4)
+_LOW = const((1 << 15) - 1)
+_LONGEST = const(1 << 28)
+_FIVE_EIGHTHS = const(5 << 27)
+
+
+class Brake:
+    """Where a motion is braked; ``on``: it is."""
+
+    def __init__(self):
+        self.law = array("i", bytes(4 * _SIZE))
+        self.on = False
+
+    def set(self, start_ticks, length_ticks):
+        """Brake from a time on over ``length_ticks`` of real time; more than 2**30 (12.8 s) counts as that."""
+        length_ticks = min(length_ticks, 1 << 30)
+        unit = 0
+        while length_ticks >> unit >= _LONGEST:
+            unit += 1
+        law = self.law
+        law[LENGTH] = max(length_ticks >> unit, 2)
+        law[START_HIGH] = (start_ticks >> 12) + points.BIAS
+        law[START_LOW] = start_ticks & 4095
+        law[UNIT] = unit
+        self.on = True
+
+    def passed(self, high):
+        """Whether a time (4096 ticks, + points.BIAS) lies behind the end of the way."""
+        law = self.law
+        return high - law[START_HIGH] > (law[LENGTH] >> 13) + 1 << law[UNIT]
+
+
+@micropython.viper
+def slow(node: ptr32, law: ptr32, high: int, scale: int) -> int:
+    """Move a node's time (2**-scale ticks from ``high`` on) to real time; 0 where it never comes.
+
+    The whole ticks of delay go to node[6], the rest to its time; node[7] becomes the rate there.
+    """
+    one = 1 << 29
+    one += one
+    node[6] = 0
+    node[7] = one
+    unit = law[3]
+    high -= law[1]
+    if high < 0 - (1 << 17):
+        return 1
+    if high > (1 << 17):
+        return 0
+    ticks = (high << 12) + (node[1] >> scale) - law[2]
+    if ticks <= 0:
+        return 1
+    length = law[0]
+    if (ticks >> unit) >= (length >> 1):
+        return 0
+    # y: the way gone, ticks / length
+    way = ticks >> unit
+    rest = ((ticks & ((1 << unit) - 1)) << scale) + (node[1] & ((1 << scale) - 1))
+    up = 0
+    while length < (1 << 29):
+        length <<= 1
+        up += 1
+    lost = unit + scale - up
+    way <<= up
+    if lost >= 0:
+        way += rest >> lost
+    else:
+        way += rest << (0 - lost)
+    digit = length >> 15
+    first = way // digit
+    way = ((way - first * digit) << 15) - first * (length & _LOW)
+    y = (first << 15) + way // digit
+    left = (one >> 1) - y
+    if left <= 0:
+        return 0
+    # r: e(r) = left, by Newton from above, where e is convex
+    r = one - y
+    rounds = 0
+    rate = one
+    while rounds < 60:
+        rounds += 1
+        h = r >> 15
+        low = r & _LOW
+        square = h * h + ((h * low) >> 14) + ((low * low) >> 30)
+        rate = _FIVE_EIGHTHS - r + (r >> 4) + (square >> 2) + (square >> 3)
+        way = _FIVE_EIGHTHS - r + (r >> 2) + (square >> 2)
+        first = square >> 15
+        second = square & _LOW
+        cube = first * h + ((first * low) >> 15) + ((second * h) >> 15)
+        fourth = first * first + ((first * second) >> 14)
+        h = cube >> 15
+        low = cube & _LOW
+        rate = (h * (rate >> 15) + ((low * (rate >> 15)) >> 15) + ((h * (rate & _LOW)) >> 15)) << 4
+        h = fourth >> 15
+        low = fourth & _LOW
+        way = (h * (way >> 15) + ((low * (way >> 15)) >> 15) + ((h * (way & _LOW)) >> 15)) << 2
+        way -= left
+        if way <= 0 or rate < (1 << 10):
+            break
+        first = rate
+        up = 15
+        while first < (1 << 29):
+            first <<= 1
+            up += 1
+        while way < (1 << 28):
+            way <<= 1
+            up -= 1
+        way = way // (first >> 15)
+        if up >= 0:
+            way <<= up
+        else:
+            way >>= 0 - up
+        if way == 0:
+            break
+        r -= way
+    if rate < (1 << 10):
+        return 0
+    # the delay: length * (1 - r - y), in ticks and 2**-15 ticks
+    way = one - r - y
+    if way < 0:
+        way = 0
+    length = law[0]
+    first = length >> 14
+    second = length & ((1 << 14) - 1)
+    h = way >> 15
+    low = way & _LOW
+    high = first * h
+    low = ((high & 1) << 14) + ((first * low) >> 1) + second * h + ((second * low) >> 15)
+    high = ((high >> 1) + (low >> 15)) << unit
+    low = (low & _LOW) << unit
+    node[6] = high + (low >> 15)
+    node[7] = rate
+    low &= _LOW
+    if scale <= 15:
+        node[1] += low >> (15 - scale)
+    else:
+        node[1] += low << (scale - 15)
+    return 1
+
+
+@micropython.viper
+def steepen(node: ptr32):
+    """Divide a node's slope by the rate there: ticks of real time per step."""
+    rate = node[7]
+    time = node[4]
+    exponent = node[5]
+    while rate < (1 << 29):
+        rate <<= 1
+        exponent -= 1
+    if time >= rate:
+        time >>= 1
+        exponent -= 1
+    digit = rate >> 15
+    first = time // digit
+    rest = ((time - first * digit) << 15) - first * (rate & _LOW)
+    node[4] = (first << 15) + rest // digit
+    node[5] = exponent
