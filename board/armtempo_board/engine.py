@@ -27,7 +27,7 @@ from armtempo_board import access, evaluator, registers
 from armtempo_board.encoders import Encoder, NoEncoder
 from armtempo_board.following import Following
 from armtempo_board.inputs import Inputs
-from armtempo_board.joint import Joint
+from armtempo_board.joint import LOOKAHEAD_K, Joint
 from armtempo_board.readings import Readings
 from armtempo_board.sampler import Sampler
 
@@ -36,6 +36,7 @@ LEAD_TICKS = const(1680000)
 
 NO_JOINT = const(255)
 _PREFILLS = const(32)
+_BRAKE_MARGIN_K = const(2048)  # 25 ms, in which all joints are told
 _PULSE_SPARE_US = const(5)
 
 
@@ -62,7 +63,8 @@ class Engine:
         self._low = 0
         self._watched = 0
         self._homing = False
-        self._end_ticks = 0
+        self._brake_ticks = 0
+        self._braked = self._end_moves = False
         self.moving = False
         self.finished = False
         self.fault = 0
@@ -90,6 +92,8 @@ class Engine:
         self._end_ticks = self.duration_ticks
         self._sampler.plan(self._end_ticks)
         self._readings.clear()
+        self._brake_ticks = motion.brake_ticks
+        self._braked = self._end_moves = False
         for number, joint in enumerate(self._joints):
             joint.load(motion, number)
             self._inputs.watch(number, 1)
@@ -103,7 +107,7 @@ class Engine:
         self._look()
         if self.fault:
             return codes.FAULT_PENDING, self.fault_joint, self.fault
-        refused = evaluator.check(motion, self._arm)
+        refused = evaluator.check(motion, self._arm, self._joints[0].gap_ticks)
         if refused:
             return refused
         self.duration_ticks = evaluator.duration_ticks(motion)
@@ -143,19 +147,28 @@ class Engine:
         if self._block[access.FROZEN]:
             self._stopped()
             return
-        now_k = self._clock()
-        self._readings.convert(self._epoch, self._low)
-        for number in range(len(self._joints)):
-            fault = self._joints[number].serve(now_k)
-            if fault:
-                self._fail(fault, number)
-                return
+        if not self._serve():
+            return
         self._inputs.poll()
         self._follow()
         if self._block[access.LATE]:
             self._fail(codes.INTERNAL, NO_JOINT)
         elif self._over():
             self._finish()
+
+    def _serve(self):
+        """Refill all rings; False where that ended the motion."""
+        now_k = self._clock()
+        self._readings.convert(self._epoch, self._low)
+        if self._end_moves and self._sampler.quiet():
+            self._sampler.end_at(self.duration_ticks)
+            self._end_moves = False
+        for number in range(len(self._joints)):
+            fault = self._joints[number].serve(now_k)
+            if fault:
+                self._fail(fault, number)
+                return False
+        return True
 
     def _over(self):
         for joint in self._joints:
@@ -192,7 +205,29 @@ class Engine:
             self._stopped()
 
     def brake(self):
-        """Come to rest along the path."""
+        """Come to rest along the path, within the motion's own limits; freeze where it was not planned for that.
+
+        Braking begins behind what is in the rings, about 75 ms from now. A motion that is over by then just ends.
+        """
+        if not self.moving or self._braked:
+            return
+        if not self._brake_ticks:
+            self.freeze()
+            return
+        now_k = self._clock()
+        start_k = now_k + LOOKAHEAD_K + _BRAKE_MARGIN_K
+        for joint in self._joints:
+            start_k = max(start_k, now_k + joint.written_k())
+        if start_k << 10 < self.duration_ticks:
+            self._brake_at(start_k << 10)
+
+    def _brake_at(self, start_ticks):
+        self._braked = self._end_moves = True
+        self.duration_ticks = start_ticks + self._brake_ticks
+        for joint in self._joints:
+            joint.walker.brake(start_ticks, self._brake_ticks)
+            if not self._serve():
+                break
 
     def _fail(self, code, joint):
         self._inputs.freeze()

@@ -35,7 +35,7 @@ class Joint:
         self._pulse = head["pulse_ticks"]
         self._pulse_k = (self._pulse >> 10) + 1
         self._turn_delay = head["dir_hold_ticks"] + _TURN_SLACK
-        self._gap = max(
+        self.gap_ticks = max(
             self._pulse + self._turn_delay + _TURN_SLACK + head["dir_setup_ticks"],
             self._pulse + head["low_ticks"],
         )
@@ -59,7 +59,7 @@ class Joint:
     def load(self, motion, number):
         """Stand before a motion; the clock stands before 0."""
         position = self._base
-        self.walker.load(motion, number, position, self._pulse, self._gap)
+        self.walker.load(motion, number, position, self._pulse, self.gap_ticks)
         self._direction = self.walker.direction
         self._dir.value((self._direction > 0) ^ self._inverted)
         self.ring.stop()
@@ -78,6 +78,10 @@ class Joint:
             self._direction = -self._direction
             self._turns_out += 1
         return self._base + self._direction * (steps - self._base_steps)
+
+    def written_k(self):
+        """How far ahead steps are in the ring, in 1024 ticks, rounded up."""
+        return self.ring.last_k() + 1 if self.ring.left() > 0 else 0
 
     def serve(self, now_k):
         """Keep the ring filled; code of a fault, or 0."""

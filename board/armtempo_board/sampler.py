@@ -32,6 +32,7 @@ class Sampler:
         self._timer2 = stm.TIM2
         self._directions = stm.GPIOE
         self._dma = stm.DMA1
+        self._regular = 0
         self._hook = self._interrupt  # bound once: making a bound method allocates
 
     def connect(self):
@@ -58,23 +59,24 @@ class Sampler:
         for word in (access.TAKEN, access.READ, access.LOST, access.FROZEN, access.HIGH, access.LATE):
             block[word] = 0
         block[access.NEXT] = 0
-        block[access.LEFT] = -(-duration_ticks // SAMPLE_TICKS)
+        self._regular = -(-duration_ticks // SAMPLE_TICKS)  # samples before the last
+        block[access.LEFT] = self._regular
         block[access.END] = duration_ticks & _LOW32
         block[access.DONE] = 0
         mem32[self._timer2 + 4 * access.CCR4] = 0
         mem32[self._timer2 + 4 * access.SR] = 0
         mem32[self._timer2 + 4 * access.DIER] = 1 << 4
 
-    def end_at(self, ticks, begun):
-        """The motion ends at another time than planned; ``begun`` samples of the grid have been taken.
-
-        Call it while no sample is due.
-        """
-        left = -(-ticks // SAMPLE_TICKS) - begun
-        self.block[access.END] = ticks & _LOW32
-        self.block[access.LEFT] = max(left, 0)
-        if left <= 0:
-            self.block[access.NEXT] = ticks & _LOW32
+    def end_at(self, ticks):
+        """The motion ends at another time than planned. Call it while no sample is due."""
+        block = self.block
+        begun = self._regular - block[access.LEFT]
+        self._regular = max(-(-ticks // SAMPLE_TICKS), begun)
+        left = self._regular - begun
+        block[access.END] = ticks & _LOW32
+        block[access.NEXT] = (begun * SAMPLE_TICKS if left else ticks) & _LOW32
+        block[access.LEFT] = left
+        access.call_soon(self._timer2)
 
     def quiet(self):
         """Whether all raw samples are converted and the next is at least 1 ms away."""

@@ -2,10 +2,9 @@
 
 import random
 
+from armtempo_shared import armrecord, codes
 from engine_rig import FEWER, HEAD, TICK_HZ, Evaluator, Motion, Rig, Steps, arm, cases, row
 from simulator import inputs
-
-from armtempo_shared import armrecord, codes
 
 FREEZE_TICKS = 84 * 20
 SEED = 20261
@@ -126,7 +125,7 @@ def underrun_anywhere():
 
 
 def long_stall():
-    """The main loop is away for longer than the counter's whole range: the outputs stay where they stalled."""
+    """The main loop is away for nearly half the counter's range: the outputs stay where they stalled."""
     rig = Rig(arm(3))
     rig.start(MOTION)
     rig.run_to(800_000)

@@ -46,7 +46,7 @@ def three_joints():
 
 
 def highest_rate():
-    """Three joints at a third of a million steps a second each, on both timers; 2.5 us apart in a pulse of 1.2."""
+    """Three joints at a third of a million steps a second each, on both timers."""
     rig = Rig([dict(joint, channel=channel) for joint, channel in zip(arm(3), (0, 3, 5))], pulse_ticks=100)
     motion = Motion(TICK_HZ // 100, *[Steps((1000 + 7 * n, 252, 3000, 1 - 2 * (n & 1))) for n in range(3)])
     rig.run(motion)

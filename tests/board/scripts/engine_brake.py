@@ -1,0 +1,131 @@
+"""Braking a real motion at many moments: every joint comes to rest at the same point of the path."""
+
+import random
+
+from armtempo_shared import motion
+from armtempo_shared.basis import BASIS, FACTORIAL
+from engine_rig import FEWER, TICK_HZ, Rig, arm, cases
+
+SEED = 20262
+SEGMENTS = 9
+BRAKE_TICKS = TICK_HZ // 5
+# steps at the control points, seconds at those of the time axis
+ANGLES = (
+    (0, 0, 0, 0, 0, 400, 1800, 2500, 3000, 3000, 3000, 3000, 3000, 3000),
+    (0, 0, 0, 0, 0, -500, -900, 200, 700, 700, 700, 700, 700, 700),
+    (0, 0, 0, 0, 0, 3, 3, -3, 2, 2, 2, 2, 2, 2),
+)
+TIMES = (-0.2, -0.1, 0, 0.1, 0.2, 0.4, 0.55, 0.65, 0.8, 1.0, 1.1, 1.2, 1.3, 1.4)
+
+
+def whole(values, scale):
+    return [int(round(value * scale)) for value in values]
+
+
+def record(brake_ticks):
+    angles = [whole(points, 1 << 28) for points in ANGLES]
+    times = [whole(TIMES, TICK_HZ << 16)]
+    return motion.Motion(motion.pack(5, angles, times, SEGMENTS, 1, brake_ticks, 0))
+
+
+def spline(points, segment, u):
+    total = 0.0
+    for power in range(6):
+        total += u**power * sum([BASIS[5][power][i] * points[segment + i] for i in range(6)])
+    return total / FACTORIAL[5]
+
+
+def path(seconds):
+    """Where the joints are at a time of the motion."""
+    low, high = 0.0, float(SEGMENTS)
+    for _ in range(45):
+        middle = (low + high) / 2
+        segment = min(int(middle), SEGMENTS - 1)
+        if spline(TIMES, segment, middle - segment) < seconds:
+            low = middle
+        else:
+            high = middle
+    segment = min(int(low), SEGMENTS - 1)
+    return [spline(points, segment, low - segment) for points in ANGLES]
+
+
+def joints():
+    rows = arm(3)
+    rows[2]["following_counts"] = 0
+    return rows
+
+
+def whole_motion():
+    """Without braking it ends at the last points."""
+    rig = Rig(joints(), planned=False)
+    begin(rig, BRAKE_TICKS)
+    rig.run_to(3 * TICK_HZ)
+    assert rig.engine.fault == 0
+    expected = path(10.0)
+    assert [abs(a - b) <= 0.5 for a, b in zip(rig.commanded(), expected)] == [True] * 3, expected
+    assert rig.commanded() == [rig.arm.motors[n].position for n in range(3)]
+
+
+def begin(rig, brake_ticks):
+    rig.trusting()
+    refused = rig.engine.load(record(brake_ticks))
+    assert refused is None, refused
+    rig.engine.start()
+
+
+def anywhere():
+    """The stop is on the path, the samples go on to it, and nothing comes after it."""
+    random.seed(SEED)
+    for number in range(15 // FEWER):
+        rig = Rig(joints(), planned=False)
+        begin(rig, BRAKE_TICKS)
+        rig.run_to(random.randrange(-TICK_HZ // 50, TICK_HZ))
+        asked = rig.board.now - rig.zero()
+        rig.engine.brake()
+        rig.engine.brake()
+        end = rig.engine.duration_ticks
+        assert asked + BRAKE_TICKS < end < asked + BRAKE_TICKS + TICK_HZ // 6, (asked, end)
+        rig.run_to(3 * TICK_HZ)
+        assert rig.engine.fault == 0, rig.engine.fault
+        assert rig.engine.known == 7
+        rest = (end - BRAKE_TICKS / 2) / TICK_HZ
+        for joint, (position, exact) in enumerate(zip(rig.commanded(), path(rest))):
+            assert abs(position - exact) < 0.6, (number, joint, position, exact)
+        assert rig.commanded() == [motor.position for motor in rig.arm.motors]
+        last = (rig.samples[-1][0] & 0xFFFFFFFF) - end
+        assert 0 <= last < 1000, last
+        assert len(rig.samples) == -(-end // (TICK_HZ // 10)) + 1, len(rig.samples)
+        assert rig.samples[-1][2:5] == rig.commanded()
+
+
+def too_late():
+    """Asked for when the motion is nearly over, it ends as planned."""
+    rig = Rig(joints(), planned=False)
+    begin(rig, BRAKE_TICKS)
+    end = rig.engine.duration_ticks
+    rig.run_to(end - TICK_HZ // 25)
+    rig.engine.brake()
+    assert rig.engine.duration_ticks == end
+    rig.run_to(3 * TICK_HZ)
+    assert [abs(a - b) <= 0.5 for a, b in zip(rig.commanded(), path(10.0))] == [True] * 3
+
+
+def not_planned_for():
+    """A motion without a braking time is frozen."""
+    rig = Rig(joints(), planned=False)
+    begin(rig, 0)
+    rig.run_to(TICK_HZ // 2)
+    rig.engine.brake()
+    assert not rig.engine.moving
+    assert rig.engine.fault == 0
+    assert rig.commanded() == [motor.position for motor in rig.arm.motors]
+
+
+cases(
+    (
+        whole_motion,
+        anywhere,
+        too_late,
+        not_planned_for,
+    )
+)
