@@ -17,6 +17,9 @@ from armtempo.spline import Array
 MIN_DURATION_S = 0.01
 """No motion is planned shorter: a tenth of the time between two samples."""
 
+_REFINED_GAP = 5e-5
+"""How near to its local optimum a refined axis must come; more would take most of the time for nothing."""
+
 Progress = Callable[[float, float], None]
 """Called with the work done and the whole of it."""
 
@@ -89,8 +92,8 @@ def _refined(
     for factor in _factors(job.refine):
         y, count = timeaxis.refined(y, factor, job.degree), count * factor
         path = Path(angle_points_deg, job.degree, limits, timeaxis.free_map(count, job.degree))
-        y = polish.improve(path, y)
-    return path, polish.polish(path, y)
+        y = polish.improve(path, y).y
+    return path, polish.polish(path, y, _REFINED_GAP)
 
 
 def _factors(number: int) -> list[int]:
