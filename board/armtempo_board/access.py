@@ -319,35 +319,46 @@ def take(raw: ptr32, block: ptr32, dma: ptr32, encoders):
 
 
 @micropython.viper
-def freeze(block: ptr32, timer2: ptr32, timer5: ptr32, ports):
-    """Stop all STEP outputs now; a pulse that has begun gets its full width. 120 instructions, 45 a joint.
+def freeze(block: ptr32, timer2: ptr32, timer5: ptr32) -> int:
+    """Stop all STEP outputs now; 0 where they were stopped before. ``finish_pulses`` has to follow.
 
     First no more words come from DMA, then every compare value goes far away: from there on the pins stand
-    still and can be read. A high one gets its falling edge, a low one is held low. What DMA had been asked
-    for before is served within a few bus cycles, long before its compare value is overwritten here.
+    still. What DMA had been asked for before is served within a few bus cycles, long before its compare value
+    is overwritten here.
     """
     if block[FROZEN]:
-        return
+        return 0
     block[FROZEN] = 1
     timer2[DIER] = 0
     timer5[DIER] = 0
     now = timer2[CNT]
-    block[FROZEN_AT] = now
     half = 1
+    far = now + (half << 31)
     at = BLOCK_HEAD
     for _ in range(block[JOINTS]):
-        timer = timer2
         if block[at + ON_TIM5]:
-            timer = timer5
-        timer[block[at + CCR_AT]] = now + (half << 31)
+            timer5[block[at + CCR_AT]] = far
+        else:
+            timer2[block[at + CCR_AT]] = far
         at += JOINT_WORDS
+    block[FROZEN_AT] = now
+    return 1
+
+
+@micropython.viper
+def finish_pulses(block: ptr32, timer2: ptr32, timer5: ptr32, ports):
+    """After ``freeze``: a STEP pin that is high gets its falling edge, one that is low is held low."""
+    port_a = ptr32(ports[0])
+    port_b = ptr32(ports[1])
     high = 0
     at = BLOCK_HEAD
     for joint in range(block[JOINTS]):
         timer = timer2
         if block[at + ON_TIM5]:
             timer = timer5
-        port = ptr32(ports[block[at + ON_PORT_B]])
+        port = port_a
+        if block[at + ON_PORT_B]:
+            port = port_b
         if (port[IDR] >> block[at + PIN_BIT]) & 1:
             high |= 1 << joint
             timer[block[at + CCR_AT]] = timer[CNT] + block[PULSE]

@@ -68,8 +68,13 @@ class Inputs:
         self._count += 1
 
     @micropython.viper
+    def _freeze(self):
+        if int(access.freeze(self._block, self._timer2, self._timer5)):
+            access.finish_pulses(self._block, self._timer2, self._timer5, self._step_ports)
+
+    @micropython.viper
     def _on_estop(self, line):
-        access.freeze(self._block, self._timer2, self._timer5, self._step_ports)
+        self._freeze()
         access.trip(self._block, codes.ESTOP, _NOBODY)
         if self.releases:
             self.enable_pin.value(1 - int(self._on))
@@ -78,7 +83,7 @@ class Inputs:
     def _on_limit(self, line):
         joint = int(access.towards(self._pairs, self._count, line, access.directions(self._port)))
         if joint:
-            access.freeze(self._block, self._timer2, self._timer5, self._step_ports)
+            self._freeze()
             access.trip(self._block, codes.LIMIT_SWITCH, joint - 1)
 
     def trip_estop(self):
@@ -88,7 +93,7 @@ class Inputs:
     def freeze(self):
         """Stop all outputs now."""
         before = disable_irq()
-        access.freeze(self._block, self._timer2, self._timer5, self._step_ports)
+        self._freeze()
         enable_irq(before)
 
     def poll(self):
