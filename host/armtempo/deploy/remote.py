@@ -1,0 +1,114 @@
+"""A board's file system and REPL through mpremote, run as a process of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from armtempo.errors import LinkError
+
+_TIMEOUT_S = 300.0
+_SURVEY = Path(__file__).with_name("survey.txt")
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What firmware runs and what stands in its flash."""
+
+    machine: str
+    """What the firmware says it was built for."""
+    version: tuple[int, ...]
+    """Of MicroPython."""
+    mpy: int
+    """``sys.implementation._mpy``: format of compiled files and processor; 0: none."""
+    free_heap: int
+    free_blocks: int
+    block_size: int
+    sd_card: bool
+    """The firmware has an SD card in, and would start from that."""
+    files: dict[str, tuple[int, str]]
+    """Size and sha256, in hex, of each of our files, and of boot.py and main.py whoever they belong to."""
+
+    @property
+    def release(self) -> str:
+        """The version in words."""
+        return ".".join(map(str, self.version[:3]))
+
+
+class Remote:
+    """One board by its port; raises LinkError, with mpremote's last words, where a step fails."""
+
+    def __init__(self, port: str) -> None:
+        self.port = port
+
+    def run(self, *commands: Sequence[str]) -> str:
+        """Run mpremote's commands one after the other in one session; gives what they print."""
+        return "".join(self.lines(*commands))
+
+    def lines(self, *commands: Sequence[str]) -> Iterator[str]:
+        """The same, line by line as it comes."""
+        arguments = ["connect", self.port]
+        for command in commands:
+            arguments += ["+", *command]
+        with _process(arguments) as process:
+            assert process.stdout is not None
+            said = []
+            for line in process.stdout:
+                said.append(line)
+                yield line
+            if process.wait(_TIMEOUT_S):
+                last = next((text.strip() for text in reversed(said) if text.strip()), "it says nothing")
+                raise LinkError(
+                    f"mpremote failed on {self.port}: {last}; what was begun is repaired by doing it again"
+                )
+
+    def survey(self) -> Survey:
+        """Look at firmware and files."""
+        answer = self.run(["exec", _SURVEY.read_text(encoding="utf-8")])
+        try:
+            found: dict[str, Any] = json.loads(answer.strip().splitlines()[-1])
+            files = {path: (size, digest) for path, (size, digest) in found.pop("files").items()}
+            return Survey(**found | {"files": files, "version": tuple(found["version"])})
+        except (ValueError, IndexError, KeyError, TypeError) as error:
+            raise LinkError(
+                f"{self.port}: the board answers mpremote, but not as MicroPython should"
+            ) from error
+
+
+def each(function: str, paths: Iterable[str]) -> list[str]:
+    """The command that applies a function of ``os`` to paths of the board; what fails is passed over."""
+    return [
+        "exec",
+        f"import os\nfor path in {list(paths)!r}:\n try:\n  {function}(path)\n except OSError:\n  pass",
+    ]
+
+
+def rename(old: str, new: str) -> list[str]:
+    """The command that renames a file of the board."""
+    return ["exec", f"import os\nos.rename({old!r}, {new!r})"]
+
+
+@contextmanager
+def _process(arguments: list[str]) -> Iterator[subprocess.Popen[str]]:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "mpremote", *arguments],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    )
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            process.terminate()
+        process.communicate()
