@@ -41,8 +41,14 @@ class Extremes:
 
 def of_joint(joint: JointSpline) -> Extremes:
     """The extremes of a joint's whole motion."""
-    values = magnitudes(joint.angle_polynomials[None], joint.time_polynomials)[0]
-    return Extremes(*(float(value) for value in values))
+    return of_joints([joint])[0]
+
+
+def of_joints(joints: Sequence[JointSpline]) -> tuple[Extremes, ...]:
+    """The extremes of each joint's whole motion; all joints with the same number of segments."""
+    angle = np.stack([joint.angle_polynomials for joint in joints])
+    time = np.stack([joint.time_polynomials for joint in joints])
+    return tuple(Extremes(*map(float, values)) for values in magnitudes(angle, time))
 
 
 def magnitudes(angle: Array, time: Array) -> Array:

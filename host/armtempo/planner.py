@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import cache
 from importlib.metadata import version
 
 import numpy as np
@@ -39,7 +40,7 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
         part = None if progress is None else _part(progress, number, len(groups))
         timed.append(_time(points, joints, limits, job, part))
     trajectory = _trajectory(job, points, groups, timed)
-    reached = tuple(extremes.of_joint(joint) for joint in trajectory.joints)
+    reached = extremes.of_joints(trajectory.joints)
     checks.check_reached(arm, reached)
     searches = tuple(
         _search(points, joints, limits, job, axis) for joints, axis in zip(groups, timed, strict=True)
@@ -47,7 +48,8 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     return Plan(arm, job, via, notes, trajectory, searches, reached, versions())
 
 
-def versions() -> dict[str, str]:
+@cache
+def versions() -> Mapping[str, str]:
     """What a plan's numbers depend on besides its input."""
     return {
         "armtempo": armtempo.__version__,

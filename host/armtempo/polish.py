@@ -41,7 +41,7 @@ class Polished:
 
 
 def polish(path: Path, y: Array, gap: float = GAP) -> Polished:
-    """The local optimum near ``y`` (v,), to ``gap`` if it can; never worse than ``y`` stretched to the limits."""
+    """The local optimum near ``y`` (v,), to ``gap`` if it can; never worse than ``y`` stretched."""
     found = improve(path, y)
     if len(y) > _SLSQP_MOST or found.total_s <= found.bound_s * (1 + gap):
         return found

@@ -35,7 +35,7 @@ def _stretch_s(distance: float, limits: Limits, from_rest: bool, to_rest: bool) 
     down, way_down = _ramp(high, limits, to_rest)
     if way_up + way_down <= distance:
         return up + down + (distance - way_up - way_down) / high
-    for _ in range(100):
+    for _ in range(60):
         speed = 0.5 * (low + high)
         up, way_up = _ramp(speed, limits, from_rest)
         down, way_down = _ramp(speed, limits, to_rest)

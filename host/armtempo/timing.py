@@ -58,7 +58,6 @@ def axis(
     if job.refine > 1:
         path, polished = _refined(angle_points_deg, limits, job, y)
         y, optimum = polished.y, polished.bound_s
-    y = path.stretched(y)  # takes out the rounding of a large first factor
     y = y * max(1.0, MIN_DURATION_S / path.duration_s(y))
     return Timed(y @ path.axis, y, path.duration_s(y), searched, optimum, found)
 

@@ -6,7 +6,10 @@ which the end can still be reached, forwards the greatest path acceleration that
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
+from numpy.typing import NDArray
 
 from armtempo import spline
 from armtempo.spline import Array
@@ -96,7 +99,7 @@ def _fastest_before(first: Array, second: Array, step: float, after: float) -> f
     b = second - a
     rows = np.concatenate([np.stack([a, b], axis=1), -np.stack([a, b], axis=1), [[1.0, 0.0], [-1.0, 0.0]]])
     right = np.concatenate([np.ones(2 * len(a)), [after, 0.0]])
-    i, j = np.triu_indices(len(rows), 1)
+    i, j = _pairs(len(rows))
     det = rows[i, 0] * rows[j, 1] - rows[j, 0] * rows[i, 1]
     with np.errstate(divide="ignore", invalid="ignore"):
         y = (right[i] * rows[j, 1] - right[j] * rows[i, 1]) / det
@@ -104,6 +107,11 @@ def _fastest_before(first: Array, second: Array, step: float, after: float) -> f
         room = right[:, None] - rows[:, :1] * y - rows[:, 1:] * x
         inside = np.all(room >= -1e-9 * (1 + np.abs(right[:, None])), axis=0)
     return float(np.max(x, where=inside & np.isfinite(x), initial=0.0))
+
+
+@cache
+def _pairs(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    return np.triu_indices(count, 1)
 
 
 def _fastest_after(first: Array, second: Array, step: float, now: float, most: float) -> float:

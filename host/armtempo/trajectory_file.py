@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from armtempo_shared.basis import BASIS
 
-from armtempo import extremes, strictjson
+from armtempo import strictjson
 from armtempo.errors import InputError
 from armtempo.plan import Plan
 from armtempo.trajectory import JointSpline
@@ -94,5 +94,3 @@ def _check_joint(joint: JointSpline, segments: int, where: str) -> None:
             raise InputError(f"{where}: {points.size} {what} control points do not fit {pieces} segments")
     if not np.all(np.diff(joint.time_points_s) > 0):
         raise InputError(f"{where}: its time control points do not increase")
-    if not np.all(np.isfinite(extremes.of_joint(joint).values)):
-        raise InputError(f"{where}: speed, acceleration or jerk has no bound")
