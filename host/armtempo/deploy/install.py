@@ -59,9 +59,8 @@ def undeploy(port: str, tell: Tell) -> None:
     found = remote.survey()
     files = ours(found)
     aside = [path for path in found.files if path.endswith(KEPT_ASIDE)]
-    remote.run(
-        each("os.remove", [*(f"{program.ROOT}/{name}" for name in reversed(program.START_FILES)), *files])
-    )
+    started = [name for name, data in program.start_files().items() if _is_ours(remote, found, name, data)]
+    remote.run(each("os.remove", [*reversed(started), *files]))
     for path in aside:
         remote.run(rename(path, path.removesuffix(KEPT_ASIDE)))
         tell(f"{path.removesuffix(KEPT_ASIDE)} is the one from before again")
@@ -91,14 +90,15 @@ def end_program(port: str) -> None:
 def _keep_aside(remote: Remote, found: Survey, tell: Tell) -> None:
     """Rename a boot.py or main.py that is not one of ours."""
     for name, data in program.start_files().items():
-        old = found.files.get(name)
-        if old and program.STAMP_PATH not in found.files and not _is_ours(remote, name, data):
+        if name in found.files and not _is_ours(remote, found, name, data):
             remote.run(rename(name, name + KEPT_ASIDE))
             tell(f"{name} was there before; it is kept as {name + KEPT_ASIDE}")
 
 
-def _is_ours(remote: Remote, path: str, data: bytes) -> bool:
-    """Whether a start file begins like the one of this program, of whatever version."""
+def _is_ours(remote: Remote, found: Survey, path: str, data: bytes) -> bool:
+    """Whether a start file is there and begins like the one of this program, of whatever version."""
+    if path not in found.files:
+        return False
     return remote.run(["cat", f":{path}"]).encode().splitlines()[:1] == data.splitlines()[:1]
 
 

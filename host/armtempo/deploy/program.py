@@ -26,22 +26,13 @@ _ARCHITECTURES = {1: "x86", 2: "x64", 3: "armv6", 4: "armv6m", 5: "armv7m", 6: "
 
 def modules() -> dict[str, Path]:
     """Source file of each module the board needs, by its path below the library folder."""
-    folders = {name: package_folder(name) for name in PACKAGES}
-    board = {path.stem for path in folders[PACKAGES[0]].glob("*.py")} - {
-        Path(name).stem for name in START_FILES
-    }
-    shared = {"__init__"}
-    for stem in board:
-        shared |= _imported(folders[PACKAGES[0]] / f"{stem}.py")
-    while (
-        more := {stem for known in shared for stem in _imported(folders[PACKAGES[1]] / f"{known}.py")}
-        - shared
-    ):
-        shared |= more
-    wanted = ((PACKAGES[0], board), (PACKAGES[1], shared))
-    return {
-        f"{name}/{stem}.py": folders[name] / f"{stem}.py" for name, stems in wanted for stem in sorted(stems)
-    }
+    board, shared = (package_folder(name) for name in PACKAGES)
+    files = [path for path in sorted(board.glob("*.py")) if path.name not in START_FILES]
+    needed = {"__init__"}.union(*(_imported(path) for path in files))
+    while more := set[str]().union(*(_imported(shared / f"{stem}.py") for stem in needed)) - needed:
+        needed |= more
+    files += [shared / f"{stem}.py" for stem in sorted(needed)]
+    return {f"{path.parent.name}/{path.name}": path for path in files}
 
 
 def _imported(path: Path) -> set[str]:

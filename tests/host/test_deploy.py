@@ -1,0 +1,91 @@
+"""What a deployment would do: which files, in which form, on which boards."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from armtempo.boardfiles import own_crc
+from armtempo.deploy import changes, program
+from armtempo.deploy.remote import Survey
+from armtempo.errors import InputError, LinkError
+
+CORTEX_M4 = 6 | 3 << 8 | 7 << 10
+BOARD = Survey("STM32F4DISC with STM32F407", (1, 29, 0), CORTEX_M4, 95_000, 189, 512, False, {})
+
+
+def quiet(text: str) -> None: ...
+
+
+def test_modules_are_what_the_board_imports() -> None:
+    names = set(program.modules())
+    assert {"armtempo_board/app.py", "armtempo_board/__init__.py", "armtempo_shared/motion.py"} <= names
+    assert not {"armtempo_board/main.py", "armtempo_shared/wire.py", "armtempo_shared/meanings.py"} & names
+    assert program.stamp() == f"{own_crc():08x}\n".encode()
+
+
+def test_compiled_files_fit_the_smallest_board() -> None:
+    told: list[str] = []
+    library = changes.choose(BOARD, False, told.append)
+    assert {path.rsplit(".", 1)[1] for path in library} == {"mpy"}
+    assert "too small for the sources" in told[0]
+    assert all(data[:2] == b"M\x06" for data in library.values())
+
+
+def test_sources_go_where_there_is_room() -> None:
+    library = changes.choose(replace(BOARD, free_blocks=2000), False, quiet)
+    assert "/flash/lib/armtempo_board/app.py" in library
+
+
+def test_only_what_differs_is_written() -> None:
+    library = {"/flash/lib/armtempo_board/a.py": b"a", "/flash/lib/armtempo_board/b.py": b"b"}
+    files = {
+        "/flash/lib/armtempo_board/a.py": (1, changes.digest(b"a")),
+        "/flash/lib/armtempo_board/b.py": (1, changes.digest(b"old")),
+        "/flash/lib/armtempo_board/gone.py": (1, ""),
+        "/flash/boot.py": (1, ""),
+        program.STAMP_PATH: (9, ""),
+    }
+    change = changes.difference(replace(BOARD, files=files), library)
+    assert change.write == {"/flash/lib/armtempo_board/b.py": b"b"}
+    assert change.remove == ["/flash/lib/armtempo_board/gone.py"]
+
+
+def test_completeness_needs_stamp_and_start_files() -> None:
+    whole = {program.STAMP_PATH: program.stamp(), **program.start_files()}
+    files = {path: (len(data), changes.digest(data)) for path, data in whole.items()}
+    assert changes.is_complete(replace(BOARD, files=files))
+    for path in files:
+        assert not changes.is_complete(replace(BOARD, files={**files, path: (1, "")}))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"machine": "PYBD-SF6W with STM32F767IIK"}, "is a PYBD"),
+        ({"version": (1, 12, 0)}, "MicroPython 1.12.0; install 1.20"),
+        ({"sd_card": True}, "SD card"),
+        ({"free_heap": 20_000}, "20000 bytes of free memory"),
+    ],
+)
+def test_unsuitable_boards_are_refused(change: dict[str, object], words: str) -> None:
+    changes.check_suitable(BOARD)
+    with pytest.raises(LinkError, match=words):
+        changes.check_suitable(replace(BOARD, **change))  # type: ignore[arg-type]
+
+
+def test_full_flash_is_refused() -> None:
+    with pytest.raises(LinkError, match="has room for 20"):
+        changes.choose(replace(BOARD, free_blocks=20), True, quiet)
+
+
+@pytest.mark.parametrize("mpy", [0, 5 | 7 << 10, 6 | 3 << 8])
+def test_compiled_files_of_another_version_are_refused(mpy: int) -> None:
+    with pytest.raises(LinkError, match="takes compiled files of version"):
+        program.library(mpy)
+
+
+def test_missing_compiler_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(program, "can_compile", lambda: False)
+    with pytest.raises(InputError, match="mpy-cross"):
+        program.library(CORTEX_M4)
