@@ -175,9 +175,9 @@ class Walker:
         self._scale = scale
         twice = 2 * (self._position - walk.angle[0]) + heading
         self._target = heading * ((twice << (scale - 1)) - (walk.angle[6] >> (28 - scale)))
-        total = -5 * cell.DIFFERENCE_BIAS
-        for i in range(1, 6):
-            total += walk.angle_local[i]
+        total = 0
+        for i in range(cell.STEPS, cell.STEPS + 5):
+            total += walk.angle_local[i] - cell.DIFFERENCE_BIAS
         self._range = total * heading
         self._a[crossing.W] = 0
 

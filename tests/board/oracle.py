@@ -66,6 +66,19 @@ def crossings(motion: Motion, joint: int) -> Crossing:
     return Crossing(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
+def turns(piece: Piece) -> Array:
+    """Both ends of a piece, and where its angle turns."""
+    return _breaks(np.polynomial.Polynomial(piece.angle).deriv())
+
+
+def place_of(piece: Piece, ticks: NDArray[np.int64]) -> Array:
+    """v of those of the times that lie within the piece."""
+    time = np.polynomial.Polynomial(piece.time)
+    wanted = (ticks - piece.first_ticks).astype(float)
+    inside = wanted[(wanted >= time(0.0)) & (wanted <= time(1.0))]
+    return _invert(time, time.deriv(), inside, 0.0, 1.0)
+
+
 def without_grazes(exact: Crossing, gap_ticks: float) -> Crossing:
     """The same without pairs of opposite steps closer than ``gap_ticks``."""
     keep: list[int] = []
@@ -95,11 +108,14 @@ def _power(control: list[Fraction], degree: int) -> list[Fraction]:
 
 def _shift(power: list[Fraction], part: int, parts: int) -> list[Fraction]:
     """Coefficients of p((part + v) / parts)."""
-    return [
-        sum((comb(high, low) * power[high] * part ** (high - low) for high in range(low, len(power))), Fraction(0))
-        / parts**low
-        for low in range(len(power))
-    ]
+    result = []
+    for low in range(len(power)):
+        terms = [
+            comb(high, low) * power[high] * Fraction(part ** (high - low), parts**high)
+            for high in range(low, len(power))
+        ]
+        result.append(sum(terms, Fraction(0)))
+    return result
 
 
 def _piece_crossings(piece: Piece) -> tuple[Array, Array, Array]:

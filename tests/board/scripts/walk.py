@@ -1,59 +1,75 @@
-"""Walk every joint of a motion record and write the steps to a file; runs on all interpreters.
+"""Check motion records and walk every joint of them; runs on all interpreters.
 
-Arguments: record, output, pulse ticks, gap ticks, room, and, to brake, start and length in ticks. Output, little endian int32 per step: joint, direction,
-time of the step in 1024 ticks (room 2 only: of the last step of its batch), rising edge, falling edge.
+Arguments: pulse ticks, gap ticks, room, start and length of braking in ticks (0 0: none), then records. Prints
+what the check says of each, and writes its steps beside it (.steps), little endian int32 each: joint,
+direction, time of the last step of its batch in 1024 ticks, rising edge, falling edge.
 """
 
 import struct
 import sys
 from array import array
 
+import micropython
+from armtempo_board.evaluator import check
 from armtempo_board.walker import Walker
 from armtempo_shared.motion import Motion
 
 MASK = 1023
+NEVER = 1 << 28
+FREE = {"min_steps": -50000000, "max_steps": 50000000, "max_rate": 336330}
 
 
 def walk(motion, joint, walker, out, pulse, gap, room, start, length):
-    """All steps of one joint; returns their number."""
+    """All steps of one joint; nothing may be allocated on the way."""
     ring = array("I", bytes(4 * (MASK + 1)))
-    first = struct.unpack_from("<6q", motion.data, motion.angle_offset(joint))
-    weights = (1, 26, 66, 26, 1) if motion.degree == 5 else (20, 80, 20)
-    total = 0
-    for value, weight in zip(first, weights):
-        total += value * weight
-    position = (total // 60 + (1 << 28)) >> 29
-    walker.load(motion, joint, position, pulse, gap)
+    walker.load(motion, joint, first_position(motion, joint), pulse, gap)
     head = 0
-    steps = 0
     braked = not length
+    start_k = start >> 10
+    lock, unlock = heap_lock, heap_unlock
     while not walker.ended:
-        if not braked and walker.next_1024() > start >> 10:
-            walker.brake(start, length)
-            braked = True
+        lock()
         if walker.at_turn:
             walker.turn()
-        count = walker.fill(ring, MASK, head, room if braked else 2)
+        brake_now = not braked and walker.next_1024() >= start_k
+        count = 0 if brake_now else walker.fill(ring, MASK, head, room, NEVER if braked else start_k)
+        last = walker.last_1024()
+        unlock()
+        if brake_now:
+            walker.brake(start, length)
+            braked = True
         for i in range(0, count, 2):
             rise = ring[(head + i) & MASK]
             fall = ring[(head + i + 1) & MASK]
-            out.write(struct.pack("<iiiII", joint, walker.direction, walker.last_1024(), rise, fall))
+            out.write(struct.pack("<iiiII", joint, walker.direction, last, rise, fall))
         head = (head + count) & MASK
-        steps += count // 2
-    return steps
 
 
-def main(record, output, pulse, gap, room, start=0, length=0):
-    """Walk all joints with one walker, as the board reuses them."""
-    with open(record, "rb") as file:
-        motion = Motion(file.read())
+def first_position(motion, joint):
+    """Where the joint stands before: its first angle, rounded."""
+    first = struct.unpack_from("<%dq" % motion.degree, motion.data, motion.angle_offset(joint))
+    weights = (1, 26, 66, 26, 1) if motion.degree == 5 else (20, 80, 20)
+    total = sum([value * weight for value, weight in zip(first, weights)])
+    return (total // 60 + (1 << 28)) >> 29
+
+
+def main(pulse, gap, room, start, length, *records):
+    """Walk all with one walker, as the board reuses them."""
     walker = Walker()
-    with open(output, "wb") as out:
-        for joint in range(motion.joints):
-            steps = walk(
-                motion, joint, walker, out, int(pulse), int(gap), int(room), int(start), int(length)
-            )
-            print(joint, steps)
+    for record in records:
+        with open(record, "rb") as file:
+            motion = Motion(file.read())
+        wrong = check(motion, [FREE] * motion.joints, int(gap))
+        print(wrong)
+        with open(record + ".steps", "wb") as out:
+            for joint in range(0 if wrong else motion.joints):
+                walk(motion, joint, walker, out, int(pulse), int(gap), int(room), int(start), int(length))
 
 
+def nothing():
+    """There is no heap to lock on CPython."""
+
+
+heap_lock = getattr(micropython, "heap_lock", nothing)
+heap_unlock = getattr(micropython, "heap_unlock", nothing)
 main(*sys.argv[1:])

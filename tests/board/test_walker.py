@@ -1,0 +1,128 @@
+"""The evaluator against an independent computation of the same spline."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armtempo_shared.motion import Motion
+from tests import interpreters
+from tests.board import motions, oracle, walking
+
+BOARD = interpreters.ROOT / "board" / "armtempo_board"
+MOTION_PATH = ("points", "parts", "cell", "cells", "crossing", "stretch", "walker", "braking", "check", "rates", "ends")
+QUICK = next(name for name in ("micropython", "cpython") if name in interpreters.AVAILABLE)
+"""The interpreter for the long cases; that all give the same is shown on shorter ones."""
+
+NAMED = {
+    "feeding": motions.feeding,
+    "refined": lambda: motions.feeding(refine=8, slower=1.1),
+    "refined by three": lambda: motions.feeding(refine=3),
+    "cubic": lambda: motions.feeding(degree=3),
+    "cubic refined": lambda: motions.feeding(degree=3, refine=8),
+    "ten minutes": lambda: motions.feeding(slower=88.3, finer=4.0),
+    "333 000 steps/s": lambda: motions.cruise(333_000),
+    "thirtyfold microsteps": lambda: motions.feeding(finer=30.0),
+    "two steps": lambda: motions.record([np.array([0.0, 2.0])], [np.array([0.01])], 5),
+    "less than a step": lambda: motions.record([np.array([0.2, 0.45, 0.1])], [np.array([0.1, 0.1])], 5),
+    "no way at all": lambda: motions.record([np.array([7.0, 7.0])], [np.array([0.5])], 5),
+    "20 ms": lambda: motions.record([np.array([0.0, 700.0])], [np.array([0.02])], 5),
+    "to half steps": lambda: motions.record([np.array([0.0, 12.5, -3.5, 0.5])], [np.full(3, 0.2)], 5),
+}
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_steps_are_where_the_spline_says(name: str, tmp_path: Path) -> None:
+    record = NAMED[name]()
+    verdicts, steps = walking.walk(QUICK, tmp_path, [record])
+    assert verdicts == ["None"]
+    walking.verify(record, steps[0])
+
+
+def chance_records(count: int) -> list[bytes]:
+    rng = np.random.default_rng(20_240_607)
+    return [motions.chance(rng) for _ in range(count)]
+
+
+def test_two_hundred_motions_by_chance(tmp_path: Path) -> None:
+    records = [record for record in chance_records(260) if walking.peak_rate(record) < 330_000]
+    verdicts, steps = walking.walk(QUICK, tmp_path, records)
+    accepted = [number for number, verdict in enumerate(verdicts) if verdict == "None"]
+    assert len(accepted) >= 200
+    for number in accepted:
+        try:
+            walking.verify(records[number], steps[number])
+        except AssertionError as error:
+            raise AssertionError(f"motion {number} of seed 20240607") from error
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[bytes], list[bytes]]:
+    """Some records and their steps on one interpreter."""
+    records = [NAMED["feeding"](), NAMED["cubic refined"](), NAMED["20 ms"](), *chance_records(25)]
+    return records, walking.walk(QUICK, tmp_path_factory.mktemp("shared"), records, room=2)[1]
+
+
+def test_all_interpreters_give_the_same_edges(
+    interpreter: str, shared: tuple[list[bytes], list[bytes]], tmp_path: Path
+) -> None:
+    records, expected = shared
+    assert walking.walk(interpreter, tmp_path, records, room=2)[1] == expected
+
+
+def test_edges_do_not_depend_on_how_the_ring_is_filled(
+    shared: tuple[list[bytes], list[bytes]], tmp_path: Path
+) -> None:
+    records, expected = shared
+    for room in (14, 512, 1024):
+        steps = walking.walk(QUICK, tmp_path, records, room=room)[1]
+        for mine, other in zip(steps, expected, strict=True):
+            edges, others = (np.frombuffer(data, dtype="<i4").reshape(-1, 5) for data in (mine, other))
+            np.testing.assert_array_equal(edges[:, [0, 1, 3, 4]], others[:, [0, 1, 3, 4]])
+
+
+BRAKES = [(2.0, 0.6), (3.1, 0.1), (0.2, 0.5), (1.0, 2.5), (5.5, 0.4)]
+
+
+@pytest.mark.parametrize(("start_s", "length_s"), BRAKES)
+def test_braking_stays_on_the_path(interpreter: str, start_s: float, length_s: float, tmp_path: Path) -> None:
+    start, length = round(start_s * walking.TICK_HZ), round(length_s * walking.TICK_HZ)
+    record = motions.feeding()
+    steps = walking.walk(interpreter, tmp_path, [record], brake=(start, length))[1][0]
+    for joint in range(3):
+        _verify_braked(Motion(record), joint, walking.steps_of(steps, joint), start, length)
+
+
+def test_braking_from_full_speed(tmp_path: Path) -> None:
+    start, length = round(0.9 * walking.TICK_HZ), round(0.8 * walking.TICK_HZ)
+    record = motions.cruise(333_000)
+    steps = walking.walk(QUICK, tmp_path, [record], brake=(start, length))[1][0]
+    _verify_braked(Motion(record), 0, walking.steps_of(steps, 0), start, length)
+
+
+def _verify_braked(motion: Motion, joint: int, steps: walking.Steps, start: int, length: int) -> None:
+    exact = oracle.without_grazes(oracle.crossings(motion, joint), walking.GAP_TICKS)
+    count = int(np.sum(exact.ticks < start + length / 2))
+    assert abs(len(steps.ticks) - count) <= 1
+    count = min(count, len(steps.ticks))
+    np.testing.assert_array_equal(steps.direction[:count], exact.direction[:count])
+    path = walking.braked(steps.ticks[:count].astype(float), start, length)
+    error = np.abs(path - exact.ticks[:count])
+    assert np.max(error, initial=0.0) <= 1.5 + 12 * length / 2**30
+    assert np.max(error * exact.speed[:count], initial=0.0) / walking.TICK_HZ <= 0.02
+
+
+@pytest.mark.parametrize("module", MOTION_PATH)
+def test_no_float_can_occur(module: str) -> None:
+    """The chip has single floats only, so the motion path has none: no constant, no true division, no call."""
+    tree = ast.parse((BOARD / f"{module}.py").read_text())
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant):
+            assert not isinstance(node.value, float | complex)
+        if isinstance(node, ast.BinOp | ast.AugAssign):
+            assert not isinstance(node.op, ast.Div)
+        if isinstance(node, ast.Name):
+            assert node.id not in ("float", "round", "math", "divmod", "pow")
