@@ -75,19 +75,23 @@ class LimitSwitches:
 
 @dataclass(frozen=True)
 class JointModel:
-    """What the virtual arm needs to know of one joint beyond its data sheet; ideal where 0."""
+    """What the virtual arm needs to know of one joint beyond its drive."""
 
-    inertia_kg_m2: float = 0.0
-    """Load inertia at the joint."""
     holding_torque_nm: float = 0.0
-    """Of the motor, at its shaft."""
+    """Of the motor, at its shaft; 0: an ideal motor, which never lags."""
     rotor_inertia_kg_m2: float = 0.0
+    inertia_kg_m2: float = 0.0
+    """Of what the joint moves, at the joint."""
     damping_nm_s: float = 0.0
-    """Viscous, at the motor shaft."""
+    """Viscous, of the motor shaft against its turning field."""
+    corner_speed_rad_s: float = 0.0
+    """Of the motor shaft; there the torque has fallen to 0.71 of the holding torque. 0: it does not fall."""
     gravity_torque_nm: float = 0.0
-    """At the joint, arm horizontal."""
+    """At the joint, at angle 0; falls with the angle's cosine."""
     backlash_deg: float = 0.0
+    """Of the joint against its motor."""
     encoder_phase_counts: float = 0.0
+    """How far the encoder stands beyond its last count at power-up, 0 to 1."""
     scatter_deg: float = 0.0
     """Standard deviation between repetitions."""
 

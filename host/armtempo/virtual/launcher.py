@@ -19,8 +19,8 @@ from typing import Any
 from armtempo_shared import armrecord
 
 from armtempo import encode
-from armtempo.arm import Arm
-from armtempo.errors import LinkError
+from armtempo.arm import Arm, Joint
+from armtempo.errors import InputError, LinkError
 from armtempo.virtual.options import Fault, Options, unique_id
 
 INTERPRETER_VARIABLE = "ARMTEMPO_MICROPYTHON"
@@ -160,17 +160,27 @@ def launch(
 def describe(arm: Arm) -> dict[str, Any]:
     """What the board's process must know of the arm: its record's fields, and each joint's model."""
     head, joints, _ = armrecord.unpack(encode.arm_record(arm))
-    models = [
-        {
-            **asdict(joint.model),
-            "gear_ratio": joint.motor.gear_ratio if joint.motor else 1.0,
-            "home_deg": joint.home_deg,
-        }
-        for joint in arm.driven
-    ]
+    models = [_describe_joint(joint) for joint in arm.driven]
     return {
         "head": head,
         "joints": [{**row, "model": model} for row, model in zip(joints, models, strict=True)],
+    }
+
+
+def _describe_joint(joint: Joint) -> dict[str, float]:
+    model, motor = joint.model, joint.motor
+    assert motor is not None  # driven
+    if model.holding_torque_nm and not (model.inertia_kg_m2 or model.rotor_inertia_kg_m2):
+        raise InputError(
+            f"{joint.name}: model.holding_torque_nm without an inertia; "
+            "give model.inertia_kg_m2 or model.rotor_inertia_kg_m2 in the arm file"
+        )
+    return {
+        **asdict(model),
+        "gear_ratio": motor.gear_ratio,
+        "steps_per_rev": motor.steps_per_rev,
+        "microsteps": motor.microsteps,
+        "home_deg": joint.home_deg,
     }
 
 

@@ -1,4 +1,4 @@
-"""Ideal motors: each step counts, and the encoder follows at once."""
+"""The motors on the board's pins, and ideal ones: each step counts, and the encoder follows at once."""
 
 from armtempo_shared import armrecord
 
@@ -14,22 +14,22 @@ class Motor:
     """
 
     def __init__(self, step, direction, enable, encoder, joint):
-        self._step = step
+        self._pulses = step
         self._dir = direction
         self._enable = enable
         self._inverted = joint["dir_inverted"]
         self._encoder = encoder
         self._num = -joint["counts_num"] if joint["encoder_inverted"] else joint["counts_num"]
         self._den = joint["counts_den"]
-        self.moved = False
+        self.moved = False  # there is something to follow
         self._counts = self._at(0)
-        self.position = 0
+        self.position = 0  # steps taken since power-up
         self.blocked = False
         step.sinks.append(self)
 
     def disconnect(self):
         """Take it off the pins."""
-        self._step.sinks.remove(self)
+        self._pulses.sinks.remove(self)
 
     def _at(self, position):
         return (2 * position * self._num + self._den) // (2 * self._den)
@@ -47,7 +47,10 @@ class Motor:
         self._counts -= counts
         self.moved = True
 
-    def follow(self):
+    def begin(self, now):
+        """A motion begins."""
+
+    def follow(self, now):
         """Turn the encoder to where the motor stands."""
         self.moved = False
         counts = self._at(self.position)
@@ -71,13 +74,15 @@ class Enable:
 class Arm:
     """All motors, as the arm record in the flash has them."""
 
-    def __init__(self, board, pins, record):
+    def __init__(self, board, pins, record, seed):
+        self._seed = seed
         self._board = board
         self._pins = pins
         self._record = record
         self._known = None
         self.motors = []
         board.follow = self.follow
+        board.worlds.append(self)
         self.connect()
 
     def connect(self):
@@ -90,7 +95,7 @@ class Arm:
             motor.disconnect()
         head, joints = found or ({"flags": 0}, ())
         enable = Enable(self._board, self._pins.ENABLE, head["flags"] & armrecord.FLAG_ENABLE_HIGH)
-        self.motors = [self._motor(joint, enable) for joint in joints]
+        self.motors = [self._motor(number, joint, enable) for number, joint in enumerate(joints)]
         self._release_switches(head, joints)
 
     def _release_switches(self, head, joints):
@@ -102,16 +107,30 @@ class Arm:
                 if switch != armrecord.NONE:
                     set_level(self._pins.LIMIT[switch], 1 - joint["limit_active_high"])
 
-    def _motor(self, joint, enable):
+    def _motor(self, number, joint, enable):
         lines, pins = self._board.pins, self._pins
         step, direction = pins.STEP[joint["channel"]][0], pins.STEP[joint["channel"]][6]
         encoder = None
         if joint["encoder"] < len(pins.ENCODER):
             encoder = self._board.timers[pins.ENCODER[joint["encoder"]][0]]
-        return Motor(lines.line(step), lines.line(direction), enable, encoder, joint)
+        step, direction = lines.line(step), lines.line(direction)
+        if joint.get("model") and joint["model"]["holding_torque_nm"]:
+            from simulator.stepper import Stepper
+
+            return Stepper(step, direction, enable, encoder, joint, 100 * self._seed + number)
+        return Motor(step, direction, enable, encoder, joint)
 
     def follow(self):
         """Time has passed."""
         for motor in self.motors:
             if motor.moved:
-                motor.follow()
+                motor.follow(self._board.now)
+
+    def counting(self, timer, now):
+        """A timer started or stopped: motions begin with TIM2."""
+        if timer.number == 2 and timer.running:
+            for motor in self.motors:
+                motor.begin(now)
+
+    def input_changed(self, line, level, now):
+        """An input changed: nothing to do."""

@@ -33,7 +33,7 @@ def connect(pins):
     """Put motors and encoders on the pins; ``pins`` is the board program's own table."""
     from simulator import motors
 
-    the.arm = motors.Arm(the.board, pins, _arm_record)
+    the.arm = motors.Arm(the.board, pins, _arm_record, the.options["seed"])
     the.flash.renamed = the.arm.connect
 
 

@@ -25,6 +25,7 @@ DEFAULTS = {
     "turn_us": 1000,
     "arm": None,
     "faults": [],
+    "seed": 0,
     "up": "",
 }
 
