@@ -1,12 +1,12 @@
 """A stepper motor that is more than ideal: it lags, rings and, driven too hard, loses steps.
 
-The rotor hangs on the turning field as on a spring that slips (P. Acarnley, Stepping Motors, 4th ed., IET 2002,
+The rotor hangs on the turning field as on a spring that slips (P. Acarnley, Stepping Motors, 4th ed., 2002,
 chapters 3 to 5)::
 
     J x'' = T(v) sin(2 pi (c - x) / 4 m) - D (v - c') - T_load(x)
 
-with x the rotor's angle and c the command, both in microsteps, m microsteps a step. ``T(v)`` falls with speed as
-the winding's inductance holds the current back. Lag, ringing and lost steps come out of it. The joint follows
+with x the rotor's angle and c the command, both in microsteps, m microsteps a step. ``T(v)`` falls with speed
+as the winding's inductance holds the current back. Lag, ringing and lost steps come out of it. The joint follows
 the rotor through gear and backlash.
 
 It is integrated in steps of 1 ms from the start of each motion, drift-kick-drift, more finely where the rotor
