@@ -6,22 +6,27 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from armtempo import arm as arms
 from armtempo import job as jobs
 from armtempo import operate, pipeline, planner, runs, trajectory_file, virtual
+from armtempo.arm import Joint
 from armtempo.interrupt import StopRequest
 from armtempo.link import open_board
 from armtempo.plan import Plan
+from armtempo.trajectory import JointSpline
 from armtempo.virtual import edgelog
 
 from tests import interpreters
 
 JOBS: dict[str, dict[str, Any]] = {
     "shipped": {},
-    "refined": {"timing": "shared", "refine": 4, "iterations": 50},
+    "refined": {"timing": "shared", "iterations": 50},
     "cubic": {"degree": 3, "iterations": 50},
 }
 """What is changed in the shipped job."""
+REFINE = 4
+"""Time segments per path segment of "refined"; the planner's search for them takes too long for a test."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +46,34 @@ def plan_file(job: str, folder: Path) -> Path:
     arm = arms.load_arm(arms.default_path())
     plan = planner.plan(arm, replace(jobs.load_job(jobs.default_path(), arm), **JOBS[job]))
     path = folder / f"{job}.json"
-    trajectory_file.save(plan, path)
+    trajectory_file.save(refined(plan) if job == "refined" else plan, path)
     return path
+
+
+def refined(plan: Plan) -> Plan:
+    """The plan with a finer and somewhat uneven shared time axis, as fast as the limits allow."""
+    intervals = np.diff(plan.trajectory.joints[0].time_points_s)[2:-2]
+    middles = (np.arange(len(intervals) * REFINE) + 0.5) / REFINE - 0.5
+    steps = np.interp(middles, np.arange(len(intervals)), intervals)
+    steps *= np.random.default_rng(7).uniform(0.99, 1.01, len(steps))
+    # mirrored at both ends, so that time begins at 0 with the first segment
+    points = np.cumsum(np.concatenate(([0.0], steps[1::-1], steps, steps[:-3:-1])))
+    points -= points[2]
+    joints = [replace(joint, refine=REFINE, time_points_s=points) for joint in plan.trajectory.joints]
+    excess = max(_excess(joint, driven) for joint, driven in zip(joints, plan.arm.driven, strict=True))
+    slowed = tuple(replace(joint, time_points_s=points * excess) for joint in joints)
+    return replace(plan, trajectory=replace(plan.trajectory, joints=slowed))
+
+
+def _excess(joint: JointSpline, driven: Joint) -> float:
+    """By how much the joint must be slowed to keep its limits."""
+    instants = np.linspace(0.0, joint.duration_s, 5000)
+    assert driven.limits is not None
+    limits = (driven.limits.speed_deg_s, driven.limits.acceleration_deg_s2, driven.limits.jerk_deg_s3)
+    return max(
+        float(np.max(np.abs(joint(instants, order)) / limit) ** (1 / order))
+        for order, limit in enumerate(limits, start=1)
+    )
 
 
 def replay(trajectory: Path, interpreter: str, folder: Path) -> Replay:
