@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from armtempo.arm import Limits
+from armtempo.errors import InputError
 from armtempo.spline import Array
 from armtempo.trajectory import Trajectory
 
@@ -27,10 +28,15 @@ def brake_time_s(trajectory: Trajectory, limits: Sequence[Limits]) -> float:
     """Shortest brake time, in seconds, that keeps EXCESS from wherever braking starts.
 
     One of ``limits`` for each joint. Speed never rises. Found on a grid of starts and times, to 1 %.
+    Raises InputError where the motion itself does not keep EXCESS.
     """
     time = np.linspace(0.0, trajectory.duration_s, _SAMPLES)
     motion = [trajectory(time, order) for order in (1, 2, 3)]
     allowed = np.array([limit.values for limit in limits])
+    if any(np.any(np.abs(motion[n]) > EXCESS * allowed[:, n]) for n in (1, 2)):
+        raise InputError(
+            f"the motion {trajectory.name!r} goes beyond the arm's acceleration or jerk limits; plan it again"
+        )
     high = 0.01
     while _excess(time, motion, allowed, high) > EXCESS:
         high *= 2
