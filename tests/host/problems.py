@@ -1,0 +1,95 @@
+"""The planning problems of tests/data/problems.toml, and random ones, as arms and jobs."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from armtempo.arm import Arm, Joint, Limits, Motor
+from armtempo.job import Job
+
+FILE = Path(__file__).parents[1] / "data" / "problems.toml"
+
+
+@dataclass(frozen=True)
+class Problem:
+    name: str
+    arm: Arm
+    job: Job
+    expect: str
+    best_s: tuple[float, ...]
+
+
+def make_arm(
+    limits: Sequence[Sequence[float]], range_deg: tuple[float, float] = (-1e9, 1e9), microsteps: int = 1
+) -> Arm:
+    """An arm of joints with these limits, each with a motor."""
+    joints = [
+        Joint(
+            f"joint {number}",
+            0.0,
+            100.0,
+            0.0,
+            0.0,
+            range_deg,
+            0.0,
+            Limits(*limit),
+            Motor(number, 200, microsteps, 1.0),
+        )
+        for number, limit in enumerate(limits, 1)
+    ]
+    return Arm("test arm", tuple(joints))
+
+
+def load() -> list[Problem]:
+    """All problems of the file."""
+    with FILE.open("rb") as file:
+        return [_problem(entry) for entry in tomllib.load(file)["problem"]]
+
+
+def _problem(entry: dict[str, Any]) -> Problem:
+    low, high = entry.pop("range_deg", (-1e9, 1e9))
+    arm = make_arm(entry.pop("limits"), (low, high), entry.pop("microsteps", 1))
+    expect, best_s = entry.pop("expect", "plan"), tuple(entry.pop("best_s", ()))
+    via = tuple(tuple(row) for row in entry.pop("via_deg"))
+    return Problem(entry["name"], arm, Job(via=via, **entry), expect, best_s)
+
+
+def random_problem(seed: int) -> tuple[Arm, Job]:
+    """A job of any size from any corner: repeats, reversals, straight lines, tiny and huge, tight and loose."""
+    rng = np.random.default_rng(seed)
+    joints = int(rng.choice([1, 1, 2, 2, 3, 6]))
+    count = int(rng.choice([2, 3, 4, 5, 7, 12]))
+    via = rng.normal(0.0, 10.0 ** rng.uniform(-6, 4), (count, joints)) * 10.0 ** rng.uniform(-2, 0, joints)
+    kind = rng.integers(0, 9)
+    if kind == 0:
+        via[1:] = via[1]
+    elif kind == 1:
+        via[count // 2] = via[count // 2 - 1]
+    elif kind == 2:
+        via = np.cumsum(np.abs(via), axis=0)
+    elif kind == 3:
+        via = np.abs(via) * (-1.0) ** np.arange(count)[:, None]
+    elif kind == 4:
+        via[:, rng.integers(0, joints)] = 5.0
+    elif kind == 5:
+        via = np.round(via)
+    elif kind == 6:
+        via += 1e3
+    elif kind == 7:
+        via = np.repeat(via[:1], count, axis=0) + np.arange(count)[:, None] * rng.normal(0, 10, joints)
+    limits = 10.0 ** rng.uniform([-2, -2, -2], [2.7, 4, 6], (joints, 3))
+    job = Job(
+        name="random",
+        via=tuple(map(tuple, via.tolist())),
+        degree=int(rng.choice([3, 5])),
+        timing=str(rng.choice(["shared", "per-joint"])),
+        population=4,
+        iterations=1,
+        seed=seed,
+    )
+    return make_arm(limits.tolist()), job

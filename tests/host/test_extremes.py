@@ -1,0 +1,112 @@
+"""Extremes: bounds that hold and are reached, against dense grids; Bernstein forms; golden section."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from armtempo import bernstein, extremes, spline, timeaxis
+from armtempo.trajectory import JointSpline
+
+
+def random_joint(seed: int) -> JointSpline:
+    """A joint with any path and a time axis that may change pace by a factor of 100."""
+    rng = np.random.default_rng(seed)
+    degree, refine, count = int(rng.choice([3, 5])), int(rng.choice([1, 2, 5])), int(rng.integers(1, 9))
+    points = spline.fit(rng.normal(0, 50, count + 1), degree)
+    axis = timeaxis.control_points(10.0 ** rng.uniform(-1.5, 0.5, count * refine), degree)
+    return JointSpline(degree, refine, points, axis)
+
+
+def dense(joint: JointSpline, order: int, count: int = 400) -> float:
+    """Largest magnitude on a fine grid of u, both sides of each knot."""
+    u = np.tile(np.linspace(0, 1, count), len(joint.time_polynomials))
+    segment = np.repeat(np.arange(len(joint.time_polynomials)), count)
+
+    def at(pieces: np.ndarray, n: int) -> np.ndarray:
+        return spline.evaluate(spline.derivative(pieces, n), segment, u)
+
+    q = [at(joint.angle_polynomials, n) for n in range(4)]
+    t = [at(joint.time_polynomials, n) for n in range(4)]
+    values = [
+        q[1] / t[1],
+        (q[2] * t[1] - q[1] * t[2]) / t[1] ** 3,
+        (q[3] * t[1] ** 2 - 3 * q[2] * t[1] * t[2] + 3 * q[1] * t[2] ** 2 - q[1] * t[1] * t[3]) / t[1] ** 5,
+    ]
+    return float(np.abs(values[order - 1]).max())
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_bounds_hold_and_are_reached(seed: int) -> None:
+    joint = random_joint(seed)
+    for order, bound in enumerate(extremes.of_joint(joint).values, 1):
+        seen = dense(joint, order)
+        assert seen <= bound * (1 + 1e-12), f"seed {seed}, order {order}"
+        assert seen >= bound * (1 - 2e-3), f"seed {seed}, order {order}"
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_bounds_are_sharp(seed: int) -> None:
+    joint = random_joint(seed)
+    for order, bound in enumerate(extremes.of_joint(joint).values, 1):
+        assert dense(joint, order, 100_001) >= bound * (1 - 1e-8)
+
+
+def test_joints_together_are_the_joints_alone() -> None:
+    joints = [
+        JointSpline(
+            5,
+            1,
+            spline.fit(np.random.default_rng(n).normal(0, 9, 5), 5),
+            timeaxis.control_points([1, 2, 0.5, n + 1], 5),
+        )
+        for n in range(3)
+    ]
+    for joint, found in zip(joints, extremes.of_joints(joints), strict=True):
+        assert found.values == pytest.approx(extremes.of_joint(joint).values, rel=1e-10)
+
+
+def test_range_of_a_path() -> None:
+    points = spline.fit(np.array([[0.0, 5.0], [10.0, 5.0], [10.0, 5.0], [0.0, 5.0]]), 5)
+    pieces = np.moveaxis(spline.polynomials(points, 5), 2, 0)
+    low, high = extremes.range_of(pieces)
+    seen = np.polynomial.polynomial.polyval(np.linspace(0, 1, 10_001), pieces[0].T)
+    assert low == pytest.approx([seen.min(), 5.0], abs=1e-9)
+    assert high == pytest.approx([seen.max(), 5.0], abs=1e-6)
+
+
+def test_golden_section_finds_single_extremes() -> None:
+    found = extremes.golden_section(lambda x: 3 - (x - 0.3) ** 2, [0.0, 0.25], [1.0, 0.9])
+    assert found == pytest.approx([3.0, 3.0], abs=1e-12)
+
+
+def test_golden_section_agrees_on_the_unoptimised_motion() -> None:
+    """Section 3.1 of the paper, where each segment has one extreme of the speed."""
+    via = np.array([0.0, 20, 40, 90, 130, 160, 180])
+    joint = JointSpline(5, 1, spline.fit(via, 5), timeaxis.control_points([2.0] * 6, 5))
+    times = joint.via_times_s
+    found = extremes.golden_section(lambda t: joint(t, 1), times[:-1], times[1:])
+    assert found.max() == pytest.approx(extremes.of_joint(joint).speed_deg_s, rel=1e-9)
+
+
+def test_bernstein_products_derivatives_and_halves() -> None:
+    rng = np.random.default_rng(5)
+    a, b = rng.normal(size=(3, 4)), rng.normal(size=(3, 6))
+    x = np.linspace(0, 1, 9)
+
+    def value(form: np.ndarray, at: np.ndarray) -> np.ndarray:
+        degree = form.shape[-1] - 1
+        powers = at[:, None] ** np.arange(degree + 1) * (1 - at[:, None]) ** np.arange(degree, -1, -1)
+        return form @ powers.T
+
+    def polynomial(power: np.ndarray, at: np.ndarray) -> np.ndarray:
+        return power @ (at[:, None] ** np.arange(power.shape[-1])).T
+
+    fa, fb = bernstein.from_power(a), bernstein.from_power(b)
+    assert value(fa, x) == pytest.approx(polynomial(a, x))
+    assert value(bernstein.multiply(fa, fb), x) == pytest.approx(polynomial(a, x) * polynomial(b, x))
+    assert value(bernstein.elevate(fa, 9), x) == pytest.approx(polynomial(a, x))
+    assert value(bernstein.derivative(fb), x) == pytest.approx(polynomial(b[:, 1:] * np.arange(1, 6), x))
+    half = bernstein.halves(bernstein.unscale(fb))
+    binomials = fb / bernstein.unscale(fb)
+    assert value(half[:, 0] * binomials, x) == pytest.approx(polynomial(b, x / 2))
+    assert value(half[:, 1] * binomials, x) == pytest.approx(polynomial(b, (1 + x) / 2))
