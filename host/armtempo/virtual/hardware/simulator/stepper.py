@@ -6,8 +6,8 @@ chapters 3 to 5)::
     J x'' = T(v) sin(2 pi (c - x) / 4 m) - D (v - c') - T_load(x)
 
 with x the rotor's angle and c the command, both in microsteps, m microsteps a step. ``T(v)`` falls with speed
-as the winding's inductance holds the current back. Lag, ringing and lost steps come out of it. The joint follows
-the rotor through gear and backlash.
+as the winding's inductance holds the current back. Lag, ringing and lost steps come out of it. The joint
+follows the rotor through gear and backlash.
 
 It is integrated in steps of 1 ms from the start of each motion, drift-kick-drift, more finely where the rotor
 swings fast; each step sees the mean of what was commanded in it, so a pulse counts from its own moment on.
