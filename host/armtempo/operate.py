@@ -106,6 +106,7 @@ def _stop_after(board: Board, error: BaseException) -> None:
             "the board started anew during the motion: where the arm stands and what came after the last "
             "sample cannot be known; find the cause, then 'armtempo home'"
         ) from error
+    board.session.reopen = None  # a cable that is out is not waited for
     with suppress(LinkError):  # the first error says more
         board.stop(now=isinstance(error, KeyboardInterrupt))
 

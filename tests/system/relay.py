@@ -1,0 +1,76 @@
+"""A cable between host and virtual board that can be bad, and be pulled."""
+
+from __future__ import annotations
+
+import os
+import select
+import threading
+import tty
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+Way = Callable[[bytes], tuple[bytes, float]]
+"""Gets what is sent, gives what arrives (and a delay, not used here)."""
+_LOOK_S = 0.02
+
+
+class Relay:
+    """Carries bytes between ``device``, a virtual board's port, and a port of its own at ``path``."""
+
+    def __init__(self, device: str, path: Path, to_board: Way, from_board: Way) -> None:
+        self.port = str(path)
+        self._ways = (to_board, from_board)
+        self._board = os.open(device, os.O_RDWR | os.O_NOCTTY)
+        tty.setraw(self._board)
+        self._host = -1
+        self._out = threading.Event()
+        self._gone = threading.Event()
+        self._lock = threading.Lock()
+        self.plug()
+        self._thread = threading.Thread(target=self._carry)
+        self._thread.start()
+
+    def plug(self) -> None:
+        """Put the cable in: the port is there."""
+        with self._lock:
+            self._host, slave = os.openpty()
+            tty.setraw(slave)
+            os.symlink(os.ttyname(slave), self.port)
+            self._slave = slave
+
+    def unplug(self) -> None:
+        """Pull the cable: the port is gone, for whoever has it open as well."""
+        with self._lock:
+            os.unlink(self.port)
+            os.close(self._slave)
+            os.close(self._host)
+            self._host = -1
+
+    def _carry(self) -> None:
+        while not self._gone.is_set():
+            with self._lock:
+                ends = [self._board] + [self._host] * (self._host >= 0)
+                ready = select.select(ends, [], [], _LOOK_S)[0]
+                for end in ready:
+                    self._pass_on(end)
+
+    def _pass_on(self, end: int) -> None:
+        data = os.read(end, 4096)
+        arrives, _ = self._ways[end == self._board](data)
+        other = self._host if end == self._board else self._board
+        while arrives and other >= 0:
+            arrives = arrives[os.write(other, arrives) :]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._gone.set()
+        self._thread.join()
+        if self._host >= 0:
+            self.unplug()
+        os.close(self._board)

@@ -1,0 +1,69 @@
+"""A bad cable and a pulled one, between the command line and the virtual board's process."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+from armtempo import record, runs
+from armtempo.virtual import launch
+
+from tests.inprocess import Noise, clean
+from tests.system.boards import TIMEOUT_S, armtempo, small_plan, start
+from tests.system.relay import Relay
+
+
+@pytest.mark.parametrize("kind", ["lose", "double", "flip", "cut"])
+def test_run_over_a_bad_cable_is_complete(tmp_path: Path, kind: str) -> None:
+    file = small_plan(tmp_path / "small.json")
+    to_board, from_board = Noise(f"to {kind}", 0.002, (kind,)), Noise(f"from {kind}", 0.002, (kind,))
+    with launch() as board, Relay(board.port, tmp_path / "port", to_board, from_board) as relay:
+        armtempo("home", "--port", relay.port, cwd=tmp_path)
+        output = armtempo("run", file, "--port", relay.port, cwd=tmp_path)
+    assert "complete" in output
+    assert to_board.hits + from_board.hits > 0
+    samples = runs.load(tmp_path / "runs" / "small-001").repetitions[0]
+    assert samples.index.tolist() == list(range(len(samples.index)))
+    assert samples.state == record.COMPLETE
+
+
+def test_cable_pulled_during_a_run_and_put_back(tmp_path: Path) -> None:
+    file = small_plan(tmp_path / "small.json", (90.0, -75.0, 50.0))
+    with launch(virtual_time=False) as board, Relay(board.port, tmp_path / "port", clean, clean) as relay:
+        armtempo("home", "--port", relay.port, cwd=tmp_path)
+        process = start("run", file, "--port", relay.port, cwd=tmp_path)
+        path = tmp_path / "runs" / "small-001" / "samples-01.csv"
+        limit = time.monotonic() + TIMEOUT_S
+        while not path.is_file() or path.read_text().count("\n") < 8:
+            assert time.monotonic() < limit
+            time.sleep(0.02)
+        relay.unplug()
+        time.sleep(1.0)
+        relay.plug()
+        out, error = process.communicate(timeout=TIMEOUT_S)
+    assert process.returncode == 0, out + error
+    assert "waiting for it to come back" in error
+    assert "complete" in out
+    samples = runs.load(tmp_path / "runs" / "small-001").repetitions[0]
+    assert samples.index.tolist() == list(range(len(samples.index)))
+    assert samples.time_s[-1] > 3.0
+
+
+def test_interrupt_while_the_cable_is_out(tmp_path: Path) -> None:
+    file = small_plan(tmp_path / "small.json", (90.0, -75.0, 50.0))
+    with launch(virtual_time=False) as board, Relay(board.port, tmp_path / "port", clean, clean) as relay:
+        armtempo("home", "--port", relay.port, cwd=tmp_path)
+        process = start("run", file, "--port", relay.port, cwd=tmp_path)
+        path = tmp_path / "runs" / "small-001" / "samples-01.csv"
+        limit = time.monotonic() + TIMEOUT_S
+        while not path.is_file() or path.read_text().count("\n") < 5:
+            assert time.monotonic() < limit
+            time.sleep(0.02)
+        relay.unplug()
+        process.terminate()
+        time.sleep(0.5)
+        process.terminate()
+        out, error = process.communicate(timeout=TIMEOUT_S)
+    assert process.returncode == 130, out + error
+    assert len(runs.load(tmp_path / "runs" / "small-001").repetitions[0].index) >= 4
