@@ -1,0 +1,34 @@
+"""The page on the command line names every command, and every option that belongs to the board."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+import pytest
+from armtempo.cli import main
+
+PAGE = (Path(__file__).parents[2] / "host" / "docs" / "cli.md").read_text(encoding="utf-8")
+STORE = ("upload", "list", "show", "remove", "rename")
+MOTION = ("home", "goto", "run", "stop", "status", "clear")
+BOARD = ("monitor", "deploy", "undeploy", "ports", "virtual-board")
+
+
+@pytest.mark.parametrize("name", (*STORE, *MOTION, *BOARD))
+def test_board_command_is_described(name: str) -> None:
+    assert f"`{name}" in PAGE
+    context = click.Context(main)
+    command = main.get_command(context, name)
+    assert command is not None
+    if name == "virtual-board":  # its options are its own affair
+        return
+    for parameter in command.params:
+        for option in parameter.opts:
+            assert option.lstrip("-").upper() in PAGE.upper(), f"{name}: {option}"
+
+
+def test_examples_are_commands() -> None:
+    for line in PAGE.splitlines():
+        words = line.split()
+        if words[:1] == ["armtempo"]:
+            assert main.get_command(click.Context(main), words[1]) is not None, line
