@@ -98,7 +98,7 @@ def _vias(top: Table, arm: Arm) -> tuple[tuple[float, ...] | Pose, ...]:
     if top.has("via_deg") == top.has("via"):
         raise top.fail("via_deg", "given, or else [[via]] tables, but not both")
     if top.has("via_deg"):
-        rows = top.array("via_deg", "a list of lists of angles")
+        rows = top.array("via_deg", "a list of at least 2 lists of angles")
         named = Table({f"via_deg[{n}]": row for n, row in enumerate(rows, 1)}, top.file)
         vias: list[tuple[float, ...] | Pose] = [
             _angles(named, f"via_deg[{n}]", arm) for n in range(1, len(rows) + 1)

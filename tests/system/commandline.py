@@ -1,0 +1,68 @@
+"""The armtempo command as a process of its own, as a user meets it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+COMMAND = (sys.executable, "-c", "from armtempo.cli import main; main(prog_name='armtempo')")
+SLOW_S = 120.0
+"""Nothing here takes longer, on however loaded a machine."""
+
+
+@dataclass(frozen=True)
+class Ended:
+    """What a command did."""
+
+    exit_code: int
+    output: str
+    errors: str
+
+    def said(self, *words: str) -> None:
+        """All of the words stand in its error output, without a traceback."""
+        assert "Traceback" not in self.errors, self.errors
+        for word in words:
+            assert word in self.errors, self.errors
+
+
+def run(*arguments: str | Path, folder: Path, **environment: str) -> Ended:
+    """Run to the end in ``folder``."""
+    return ended(start(*arguments, folder=folder, **environment))
+
+
+def start(*arguments: str | Path, folder: Path, **environment: str) -> subprocess.Popen[str]:
+    """Start in ``folder``, away from the terminal's signals."""
+    return subprocess.Popen(
+        [*COMMAND, *map(str, arguments)],
+        cwd=folder,
+        env={**os.environ, **environment},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def ended(process: subprocess.Popen[str], within_s: float = SLOW_S) -> Ended:
+    """Wait for the end; a command that does not come to it within ``within_s`` is killed, and fails."""
+    try:
+        output, errors = process.communicate(timeout=within_s)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        output, errors = process.communicate()
+        raise AssertionError(f"no end within {within_s} s; it said:\n{output}\n{errors}") from None
+    return Ended(process.returncode, output, errors)
+
+
+def wait_for(condition: Callable[[], bool], what: str) -> None:
+    """Wait until ``condition`` holds."""
+    limit_s = time.monotonic() + SLOW_S
+    while not condition():
+        assert time.monotonic() < limit_s, f"waited in vain for {what}"
+        time.sleep(0.02)

@@ -1,0 +1,75 @@
+"""Ctrl-C, SIGTERM and boards that fall silent while the arm moves: the arm stops, the record is whole."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from armtempo import arm as arms
+from armtempo import operate, runs, virtual
+from armtempo.link import open_board
+from armtempo.virtual import Fault
+
+from tests.system import commandline
+
+ENDS_WITHIN_S = 60.0
+"""Far more than braking and freezing may take, for loaded machines."""
+
+
+@contextmanager
+def board_at_home(*faults: Fault) -> Iterator[virtual.VirtualBoard]:
+    """A virtual board in real time whose arm stands where the shipped motion begins."""
+    arm = arms.load_arm(arms.default_path())
+    with virtual.launch(arm=arm, virtual_time=False, faults=faults) as process:
+        with open_board(process.port) as board:
+            operate.configure(board, arm, replace=True)
+            operate.home(board, arm)
+        yield process
+
+
+def samples_in(folder: Path) -> int:
+    """Whole sample lines of the one run in ``folder``."""
+    return sum(path.read_text().count("\n") for path in folder.glob("*-001/samples-01.csv"))
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "SIGTERM"])
+def test_an_interrupted_run_stops_the_arm(
+    number: signal.Signals, plan_file: Callable[[str], Path], tmp_path: Path
+) -> None:
+    with board_at_home() as process:
+        command = commandline.start(
+            "run", plan_file("shipped"), "--port", process.port, "--out", tmp_path, folder=tmp_path
+        )
+        commandline.wait_for(lambda: samples_in(tmp_path) > 5, "the first samples")
+        command.send_signal(number)
+        done = commandline.ended(command, ENDS_WITHIN_S)
+        with open_board(process.port) as board:  # the port is free
+            status = board.status()
+    done.said("interrupted")
+    assert done.exit_code == 130
+    assert not status.moving
+    run = runs.load(tmp_path / "feed-001")
+    repetition = run.meta["repetitions"][0]
+    assert repetition["state"] == "interrupted"
+    assert repetition["duration_s"] < 6.7  # of 6.79
+    assert len(run.repetitions[0].time_s) == repetition["samples"] > 5
+    assert tuple(repetition["commanded_steps"]) == status.stand.commanded_steps
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "SIGTERM"])
+def test_a_command_ends_though_its_board_hangs(
+    number: signal.Signals, plan_file: Callable[[str], Path], tmp_path: Path
+) -> None:
+    with board_at_home(Fault("hang", at_s=0.5)) as process:
+        command = commandline.start(
+            "run", plan_file("shipped"), "--port", process.port, "--out", tmp_path, folder=tmp_path
+        )
+        commandline.wait_for(lambda: samples_in(tmp_path) > 3, "the first samples")
+        command.send_signal(number)
+        done = commandline.ended(command, ENDS_WITHIN_S)
+    done.said("armtempo: ")
+    assert done.exit_code in (1, 130)
+    assert runs.load(tmp_path / "feed-001").meta["repetitions"][0]["state"] != "running"
