@@ -14,7 +14,7 @@ MOTION = ("home", "goto", "run", "stop", "status", "clear")
 BOARD = ("monitor", "deploy", "undeploy", "ports", "virtual-board")
 
 
-@pytest.mark.parametrize("name", (*STORE, *MOTION, *BOARD))
+@pytest.mark.parametrize("name", [*STORE, *MOTION, *BOARD])
 def test_board_command_is_described(name: str) -> None:
     assert f"`{name}" in PAGE
     context = click.Context(main)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from armtempo.boardfiles import own_crc
-from armtempo.deploy import changes, program
+from armtempo.deploy import changes, package, program
 from armtempo.deploy.remote import Survey
 from armtempo.errors import InputError, LinkError
 
@@ -84,6 +86,17 @@ def test_full_flash_is_refused() -> None:
 def test_compiled_files_of_another_version_are_refused(mpy: int) -> None:
     with pytest.raises(LinkError, match="takes compiled files of version"):
         program.library(mpy)
+
+
+def test_package_folder_lists_what_it_holds(tmp_path: Path) -> None:
+    package.write(tmp_path / "new")
+    content = json.loads((tmp_path / "new" / "package.json").read_text())
+    names = [name for name, _ in content["urls"]]
+    files = [path for path in (tmp_path / "new").rglob("*") if path.is_file()]
+    assert {str(path.relative_to(tmp_path / "new")) for path in files} == {*names, "package.json"}
+    assert names[-1] == "main.py"
+    with pytest.raises(InputError, match="not empty"):
+        package.write(tmp_path / "new")
 
 
 def test_missing_compiler_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import click
 
 from armtempo.cli import options
@@ -10,15 +12,26 @@ from armtempo.cli.progress import Progress
 
 @click.command()
 @click.option("--mpy", is_flag=True, help="Compiled by mpy-cross: smaller, and quicker to start.")
+@click.option(
+    "--package",
+    type=click.Path(file_okay=False, path_type=Path),
+    metavar="FOLDER",
+    help="Instead write FOLDER for 'mpremote mip install --target /flash FOLDER/package.json'.",
+)
 @options.port
-def command(mpy: bool, port: str) -> None:
+def command(mpy: bool, package: Path | None, port: str) -> None:
     """Put the board program on a board, or bring it up to date.
 
     mpremote copies what differs below /flash/lib; every file is read back. A boot.py or main.py that was
     there before is kept aside. Interrupted, do it again.
     """
     from armtempo.deploy import deploy
+    from armtempo.deploy import package as packages
 
+    if package is not None:
+        packages.write(package)
+        click.echo(f"written: {package}")
+        return
     with Progress("copying") as progress:
         deploy(port, mpy, click.echo, progress)
     click.echo("the board runs armtempo")

@@ -4,7 +4,9 @@
 
     remote.py     mpremote as a process, and what stands on the board (``survey``)
     program.py    what must stand there: the files, as sources or compiled
+    changes.py    how the two differ, and whether the board is suitable
     install.py    the steps from one to the other
+    package.py    the same files as a folder for ``mpremote mip install``
 """
 
 from armtempo.deploy.install import deploy, undeploy

@@ -1,0 +1,35 @@
+"""The board program as a folder that ``mpremote mip install`` takes, from there or from a repository."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from armtempo import __version__
+from armtempo.deploy import program
+from armtempo.errors import InputError
+from armtempo.record import replace_text
+
+PACKAGE = "package.json"
+STM32F4 = 6 | 3 << 8 | 7 << 10
+"""``sys.implementation._mpy`` of MicroPython 1.23 and newer on an STM32F405 or F407."""
+
+
+def write(folder: Path) -> None:
+    """Write compiled files, start files and package.json into a new or empty folder.
+
+    Raises InputError where it holds something already or cannot be written.
+    """
+    files = {**program.library(STM32F4), program.STAMP_PATH: program.stamp(), **program.start_files()}
+    names = {path.removeprefix(f"{program.ROOT}/"): data for path, data in files.items()}
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if any(folder.iterdir()):
+            raise InputError(f"{folder} is not empty; name a new folder")
+        for name, data in names.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes(data)
+        content = {"version": __version__, "urls": [[name, name] for name in names]}
+        replace_text(folder / PACKAGE, json.dumps(content, indent=1) + "\n")
+    except OSError as error:
+        raise InputError(f"{folder} cannot be written: {error.strerror}") from error
