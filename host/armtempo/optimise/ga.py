@@ -1,6 +1,6 @@
 """The standard genetic algorithm: J. H. Holland, "Adaptation in Natural and Artificial Systems",
 University of Michigan Press 1975, in the form D. E. Goldberg gave it ("Genetic Algorithms in Search,
-Optimization and Machine Learning", Addison-Wesley 1989, chapter 3): bit strings, roulette wheel,
+Optimization and Machine Learning", Addison-Wesley 1989, chapter 3): bit strings, roulette wheel (by rank),
 one-point crossover, bit mutation, children replace their parents; nobody survives by privilege.
 """
 
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from armtempo.optimise.genes import crossover, decode, fitness, mutate, random_bits, roulette
+from armtempo.optimise.genes import crossover, decode, merits, mutate, random_bits, roulette
 from armtempo.optimise.tracker import Array, Function, Progress, Result, Tracker
 
 PARAMETERS: dict[str, float | str | bool] = {"bits": 16, "crossover_rate": 0.6, "mutation_rate": 0.01}
@@ -36,7 +36,7 @@ def search(
     values = tracker.evaluate(decode(genes, bounds))
     tracker.iteration_done()
     for _ in range(iterations):
-        parents = genes[roulette(fitness(values), rng)]
+        parents = genes[roulette(merits(values), rng)]
         genes = mutate(crossover(parents, rng, crossover_rate), rng, mutation_rate)
         values = tracker.evaluate(decode(genes, bounds))
         tracker.iteration_done()

@@ -25,19 +25,20 @@ def decode(genes: Bits, bounds: Array) -> Array:
     return np.clip(points, low, high)
 
 
-def fitness(values: Array) -> Array:
-    """What selection maximises, >= 0: how far each value (N,) lies below the worst finite one."""
-    merit = np.zeros(len(values))
-    finite = np.isfinite(values)
-    merit[finite] = values[finite].max(initial=-np.inf) - values[finite]
-    return merit
+def merits(values: Array) -> Array:
+    """What selection maximises: 2 for the smallest of the values (N,), falling by rank to 0 for the largest.
+
+    Linear ranking (J. E. Baker, "Adaptive selection methods for genetic algorithms", ICGA 1985, pp. 101-111),
+    as a few individuals far outside the limits would otherwise make all the others look alike.
+    """
+    rank = np.empty(len(values))
+    rank[np.argsort(values)] = np.arange(len(values))
+    return np.asarray(2.0 - 2.0 * rank / max(len(values) - 1, 1))
 
 
 def roulette(merit: Array, rng: np.random.Generator) -> NDArray[np.intp]:
     """Indices (N,) of parents, drawn with chances in proportion to ``merit`` (N,)."""
-    total = merit.sum()
-    chances = merit / total if total > 0.0 else None
-    return rng.choice(len(merit), size=len(merit), p=chances)
+    return rng.choice(len(merit), size=len(merit), p=merit / merit.sum())
 
 
 def crossover(parents: Bits, rng: np.random.Generator, probability: float | Array) -> Bits:

@@ -1,14 +1,14 @@
 """The improved adaptive genetic algorithm: M. Srinivas and L. M. Patnaik, "Adaptive probabilities of
 crossover and mutation in genetic algorithms", IEEE Transactions on Systems, Man and Cybernetics 24 (4),
-1994, pp. 656-667. Good individuals are kept together, poor ones are broken up. The paper does not say
-which improvement it means; this one is the root of all of them.
+1994, pp. 656-667. Good individuals are kept together, poor ones are broken up; the fitness in its formulas is
+the merit by rank here. The paper does not say which improvement it means; this is the one others build on.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from armtempo.optimise.genes import crossover, decode, fitness, mutate, random_bits, roulette
+from armtempo.optimise.genes import crossover, decode, merits, mutate, random_bits, roulette
 from armtempo.optimise.tracker import Array, Function, Progress, Result, Tracker
 
 PARAMETERS: dict[str, float | str | bool] = {
@@ -46,7 +46,7 @@ def search(
     values = tracker.evaluate(decode(genes, bounds))
     tracker.iteration_done()
     for _ in range(iterations):
-        merit = fitness(values)
+        merit = merits(values)
         chosen = roulette(merit, rng)
         rate = np.minimum(adaptive_rate(merit[chosen], merit, k2, k4) + least_mutation, 1.0)
         pairs = merit[chosen][: population // 2 * 2].reshape(-1, 2).max(axis=1)
@@ -63,7 +63,4 @@ def adaptive_rate(merit: Array, everybody: Array, above: float, below: float) ->
     ``below`` up to the mean; from there ``above``, falling to 0 at the best.
     """
     best, mean = everybody.max(), everybody.mean()
-    room = best - mean
-    if room <= 0.0:
-        return np.full(len(merit), below)
-    return np.where(merit < mean, below, above * (best - merit) / room)
+    return np.where(merit < mean, below, above * (best - merit) / (best - mean))
