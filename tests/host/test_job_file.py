@@ -52,7 +52,7 @@ def test_poses_and_angles_may_be_mixed(tmp_path: Path) -> None:
     ("text", "said"),
     [
         ("", ["via_deg is missing", "[[via]]"]),
-        ("via_deg = []\n", ["via_deg = []", "list of lists"]),
+        ("via_deg = []\n", ["via_deg = []", "at least 2 lists"]),
         ("via_deg = [[0, -60, 40]]\n", ["1 via point is not a motion", "at least 2"]),
         ("via_deg = [[0, -60, 40], [20, -75]]\n", ["via_deg[2] = [20, -75]", "list of 3 numbers"]),
         ("via_deg = [[0, -60, 40], [20, nan, 50]]\n", ["via_deg[2]", "list of 3 numbers"]),
