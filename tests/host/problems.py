@@ -30,15 +30,14 @@ def make_arm(
     """An arm of joints with these limits, each with a motor."""
     joints = [
         Joint(
-            f"joint {number}",
-            0.0,
-            100.0,
-            0.0,
-            0.0,
-            range_deg,
-            0.0,
-            Limits(*limit),
-            Motor(number, 200, microsteps, 1.0),
+            name=f"joint {number}",
+            d_mm=0.0,
+            a_mm=100.0,
+            alpha_deg=0.0,
+            theta_offset_deg=0.0,
+            range_deg=range_deg,
+            limits=Limits(*limit),
+            motor=Motor(number, 200, microsteps, 1.0),
         )
         for number, limit in enumerate(limits, 1)
     ]

@@ -67,7 +67,7 @@ def test_keeps_the_shape_of_the_times() -> None:
 def test_figures_of_joint_1(degree: int, intervals: list[float], figures: tuple[float | None, ...]) -> None:
     """Section 2.3 (29.12 and 15.76) and Tables 5 and 6 of the paper."""
     joint = made(FEEDING[:, 0], intervals, degree)
-    time = np.linspace(0, joint.duration_s, 200_001)
+    time = np.linspace(0, joint.duration_s, 20_001)
     for order, figure in enumerate(figures, 1):
         if figure is not None:
             assert np.abs(joint(time, order)).max() == pytest.approx(figure, rel=1.5e-4)
