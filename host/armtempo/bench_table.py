@@ -48,7 +48,7 @@ class Row:
     evaluations: int
     """Most that a run took."""
     seconds: float
-    """Median of a run."""
+    """Median of a run's computing."""
     curves: Array
 
 
