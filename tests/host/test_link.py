@@ -105,9 +105,9 @@ def test_runs_over_a_bad_line_are_complete(tmp_path: Path, seed: int) -> None:
     assert (end.fault, end.lost) == (0, ())
 
 
-def test_host_that_pauses_two_seconds_loses_nothing(tmp_path: Path) -> None:
+def test_ten_minutes_to_a_host_that_pauses_two_seconds_lose_nothing(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
-    pipe.run_samples = 600
+    pipe.run_samples = 6000
     board, data = ready(pipe)
     run, _ = board.start("feed", wire.record_crc(data))
     follower = Follower(board, run)
@@ -116,7 +116,7 @@ def test_host_that_pauses_two_seconds_loses_nothing(tmp_path: Path) -> None:
         indices.append(sample.index)
         if sample.index % 50 == 49:
             pipe.wait_away(2.0)
-    assert indices == list(range(600))
+    assert indices == list(range(6000))
 
 
 def test_gap_is_counted_where_the_board_ran_out_of_memory(tmp_path: Path) -> None:
@@ -295,3 +295,24 @@ def test_every_message_has_words() -> None:
         assert entry[0] in traffic.describe(traffic.TO_BOARD, 1, entry[1], payload)
     assert "unknown" in traffic.describe(traffic.FROM_BOARD, 1, 0xEE, b"")
     assert "malformed" in traffic.describe(traffic.FROM_BOARD, 1, wire.EVENT["done"][1], b"x")
+
+
+def test_a_motion_that_does_not_end_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, data = ready(pipe)
+    monkeypatch.setattr(pipe, "_move", lambda: None)
+    with pytest.raises(LinkError, match="its motion clock stands still"):
+        follow(board, data)
+
+
+def test_a_board_that_does_not_stop_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, data = ready(pipe)
+    board.start("feed", wire.record_crc(data))
+    monkeypatch.setattr(pipe.app.engine, "brake", lambda: None)
+    monkeypatch.setattr(pipe.app.engine, "freeze", lambda: None)
+    begin_s = pipe.clock()
+    pipe.run_samples = 10_000
+    with pytest.raises(LinkError, match="does not; switch off"):
+        operate.stop(board, now=False)
+    assert pipe.clock() - begin_s < 15.0

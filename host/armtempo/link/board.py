@@ -16,7 +16,7 @@ SLOW_S = 30.0
 """Silence allowed where the board erases flash or checks a whole motion before it answers."""
 HELLO_S = 1.2
 """Silence allowed at the first word; with the look at what else is there, under 2 s."""
-SMALLEST_PIECE = 32
+SMALLEST_PIECE = 16
 LARGEST_PIECE = MAX_PAYLOAD - 4
 PIECE_PATIENCE_S = 0.5
 

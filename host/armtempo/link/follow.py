@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from armtempo.errors import LinkError
 from armtempo.link.board import Board
 from armtempo.link.messages import Done, Event, Fault, Sample, Stand
 
@@ -16,6 +17,8 @@ GAP_S = 0.05
 """So long may a missing sample be on its way before it is asked for."""
 RESEND = 16
 """So many samples are asked for at once."""
+FUTILE = 40
+"""What has not moved on after so many questions (motion clock, resent samples) never will."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,7 @@ class Follower:
         self._lost: list[tuple[int, int]] = []
         self._last: Done | Fault | None = None
         self._asked_s = board.session.clock()
+        self._progress = (-1, 0)  # what should move on (motion clock, sample number); how often it did not
 
     def samples(self, between: Callable[[], None] = lambda: None) -> Iterator[Sample]:
         """The samples in order until the run has ended and all that can be had has arrived.
@@ -117,10 +121,13 @@ class Follower:
             while (event := self._board.session.poll(0.0)) is not None:
                 self._take(event)
             yield from self._ready()
-            if self._next >= self._total:
+            if self._stuck(self._next):
+                self._oldest = self._total
+            elif self._next < self._total:
+                self._request(RESEND)
+            else:
                 self._request(0)  # the last acknowledgement
                 return
-            self._request(RESEND)
 
     def _ask_status(self) -> None:
         status = self._board.status()
@@ -130,6 +137,14 @@ class Follower:
                 self._last = Fault(status.run, status.fault, status.fault_joint, status.ticks, status.stand)
             else:
                 self._last = Done(status.run, status.ticks, 0, status.samples_lost, status.stand)
+        elif self._stuck(status.ticks):
+            raise LinkError("the board says that it moves, but its motion clock stands still; reset it")
+
+    def _stuck(self, value: int) -> bool:
+        """Whether ``value``, which should move on, has been the same FUTILE times."""
+        before, times = self._progress
+        self._progress = (value, times + 1 if value == before else 0)
+        return self._progress[1] >= FUTILE
 
     def _run_end(self, last: Done | Fault) -> RunEnd:
         fault, joint = (last.code, last.joint) if isinstance(last, Fault) else (0, 255)
