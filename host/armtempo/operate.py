@@ -114,13 +114,14 @@ def _stop_after(board: Board, error: BaseException) -> None:
 class _Brake:
     """Called between two messages: passes a stop request on; freezes a board that does not come to rest."""
 
-    def __init__(self, board: Board, stop: StopRequest) -> None:
+    def __init__(self, board: Board, stop: StopRequest, now: bool = False) -> None:
         self._board = board
         self._stop = stop
+        brake_s = 0.0 if now else BRAKE_S
         self._steps: list[tuple[float, Callable[[], None]]] = [
-            (0.0, lambda: stop_moving(board)),
-            (BRAKE_S, lambda: stop_moving(board, now=True)),
-            (BRAKE_S + FREEZE_S, _does_not_stop),
+            (0.0, lambda: stop_moving(board, now)),
+            (brake_s, lambda: stop_moving(board, now=True)),
+            (brake_s + FREEZE_S, _does_not_stop),
         ]
         self._told_s = 0.0
 
@@ -147,9 +148,13 @@ def stop_moving(board: Board, now: bool = False) -> None:
 
 
 def stop(board: Board, now: bool) -> None:
-    """Stop and wait until the arm rests."""
-    stop_moving(board, now)
+    """Stop and wait until the arm rests; LinkError where it does not come to rest."""
+    request = StopRequest()
+    request.wanted = True
+    stopping = _Brake(board, request, now)
+    stopping()
     while board.status().moving:
+        stopping()
         board.session.poll(CHECK_S)
         board.session.events.clear()
 

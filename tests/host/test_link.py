@@ -24,8 +24,8 @@ from tests.inprocess import Noise, Pipe, connect
 ARM = stand_in.arm(3)
 
 
-def random_motion(numbers: random.Random, segments: int = 6) -> bytes:
-    points = [[numbers.randrange(2**40) for _ in range(segments + 5)] for _ in range(3)]
+def random_motion(numbers: random.Random, segments: int = 6, joints: int = 3) -> bytes:
+    points = [[numbers.randrange(2**40) for _ in range(segments + 5)] for _ in range(joints)]
     return motion.pack(5, points, points, segments, 1, 0, armrecord.unpack(ARM)[2])
 
 
@@ -90,11 +90,11 @@ def test_thousand_uploads_over_a_bad_line_arrive_identical(tmp_path: Path) -> No
     numbers = random.Random(1)
     board.upload(wire.ARM_RECORD_NAME, ARM)
     for number in range(1000):
-        data = random_motion(numbers, segments=numbers.randrange(1, 4))
+        data = random_motion(numbers, segments=numbers.randrange(1, 4), joints=1)
         board.upload("feed", data)
         assert (tmp_path / "flash" / "feed.atm").read_bytes() == data, f"upload {number}"
-    assert to_board.hits > 5000
-    assert from_board.hits > 500
+    assert to_board.hits > 2000
+    assert from_board.hits > 300
 
 
 @pytest.mark.parametrize("seed", range(8))
