@@ -223,7 +223,7 @@ class Engine:
 
     def _brake_at(self, start_ticks):
         self._braked = self._end_moves = True
-        self.duration_ticks = start_ticks + self._brake_ticks
+        self.duration_ticks = self._end_ticks = start_ticks + self._brake_ticks
         for joint in self._joints:
             joint.walker.brake(start_ticks, self._brake_ticks)
             if not self._serve():

@@ -13,7 +13,7 @@ from machine import disable_irq, enable_irq
 from micropython import const
 from pyb import ExtInt, Pin
 
-from armtempo_board import access, pins
+from armtempo_board import access, pins, registers
 
 _NOBODY = const(255)
 
@@ -38,6 +38,7 @@ class Inputs:
             self._estop_level = 1 if flags & armrecord.FLAG_ESTOP_ACTIVE_HIGH else 0
             self._estop = self._hook(pins.ESTOP, self._estop_level, self._on_estop)
         self._add_limits()
+        registers.apply(registers.PRIORITIES)
 
     def _hook(self, name, level, callback):
         mode = ExtInt.IRQ_RISING if level else ExtInt.IRQ_FALLING

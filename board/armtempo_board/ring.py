@@ -29,11 +29,13 @@ class Ring:
         self._fed = memoryview(self.words)[1:]  # what the stream runs over
         self._block = block
         self._at = at
-        self._stream = stream
         self._mode = registers.stream_mode(dma_channel)
         self.timer = getattr(stm, "TIM%d" % timer)
         self._compare = access.CCR1 + compare - 1
+        # addresses are large integers: made once, here
         self._registers = registers.stream_address(stream)
+        self._ndtr = self._registers + 4 * access.STREAM_NDTR
+        self._flags, self._all_flags = registers.stream_flags(stream)
         address = registers.compare_address(timer, compare)
         registers.apply(registers.stream_rows(stream, dma_channel, address, uctypes.addressof(self._fed)))
         self._describe(pin, timer, compare)
@@ -41,7 +43,7 @@ class Ring:
 
     def _describe(self, pin, timer, compare):
         block, at = self._block, self._at
-        block[at + access.NDTR_AT] = 4 + 6 * self._stream + access.STREAM_NDTR
+        block[at + access.NDTR_AT] = (self._ndtr - stm.DMA1) // 4
         block[at + access.ON_TIM5] = timer == 5
         block[at + access.CCR_AT] = self._compare
         block[at + access.CCMR_AT] = access.CCMR1 + (compare - 1) // 2
@@ -85,8 +87,8 @@ class Ring:
     def stop(self):
         """Switch the stream off, ready to be filled from entry 0."""
         mem32[self._registers] = self._mode
-        registers.clear_flags(self._stream)
-        mem32[self._registers + 4 * access.STREAM_NDTR] = _RESET_NDTR
+        mem32[self._flags] = self._all_flags
+        mem32[self._ndtr] = _RESET_NDTR
         self.state[access.MADE] = 0
         self.state[access.LOADS] = 0
         self.state[access.FIRST] = _RESET_NDTR
@@ -94,7 +96,7 @@ class Ring:
     def run(self):
         """Switch the stream on and let the output toggle; False where its first entry came too late."""
         mem32[self._registers] = self._mode | registers.STREAM_ON
-        self.state[access.FIRST] = mem32[self._registers + 4 * access.STREAM_NDTR] & 0xFFFF
+        self.state[access.FIRST] = mem32[self._ndtr] & 0xFFFF
         before = disable_irq()
         in_time = access.arm_channel(self._block, self.timer, self.words, self._at)
         enable_irq(before)

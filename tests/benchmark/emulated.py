@@ -125,7 +125,10 @@ class Machine:
         ]
         for node, code in zip(names, _children(_compile(module)), strict=True):
             if isinstance(node, ast.FunctionDef) and code is not None:
-                kinds = [arg.annotation.id for arg in node.args.args]  # type: ignore[union-attr]
+                annotations = [arg.annotation for arg in node.args.args]
+                if not all(isinstance(annotation, ast.Name) for annotation in annotations):
+                    continue  # takes objects: needs a runtime
+                kinds = [annotation.id for annotation in annotations]  # type: ignore[union-attr]
                 self._uc.mem_write(self._next_code, code)
                 self._functions[node.name] = (self._next_code, kinds)
                 self._next_code += (len(code) + 15) & ~15

@@ -13,10 +13,24 @@ SCRIPTS = Path(__file__).parent / "scripts"
 HEAP = "6M"
 
 
-@pytest.mark.parametrize("script", ["engine_pulses", "engine_faults", "engine_brake"])
+@pytest.mark.parametrize(
+    "script", ["engine_pulses", "engine_faults", "engine_brake", "ring_cases", "encoder_cases"]
+)
 def test_cases(interpreter: str, script: str) -> None:
     path = SCRIPTS / f"{script}.py"
     listed = re.findall(r"^    +(\w+),$", path.read_text().rpartition("cases(")[2], re.MULTILINE)
     short = ["short"] if interpreter == "micropython-arm" else []
     assert interpreters.run(interpreter, path, *short, heap=HEAP).split() == listed
     assert len(listed) >= 4
+
+
+@pytest.mark.parametrize("name", [name for name in interpreters.AVAILABLE if name != "cpython"])
+def test_nothing_is_allocated_while_a_motion_runs(name: str) -> None:
+    """Whole motions with the heap locked; what an engine keeps, in bytes on the 32-bit interpreter."""
+    output = interpreters.run(name, SCRIPTS / "no_allocation.py", heap=HEAP).splitlines()
+    three, six = map(int, output[0].split())
+    if name == "micropython-arm":
+        assert three < 24_000, three
+        assert six < 42_000, six
+    assert output[1].startswith("13 [3000, 700, 2]")
+    assert len(output) == 3

@@ -2,51 +2,10 @@
 
 import random
 
-from armtempo_shared import motion
-from armtempo_shared.basis import BASIS, FACTORIAL
+from brake_motion import BRAKE_TICKS, path, record
 from engine_rig import FEWER, TICK_HZ, Rig, arm, cases
 
 SEED = 20262
-SEGMENTS = 9
-BRAKE_TICKS = TICK_HZ // 5
-# steps at the control points, seconds at those of the time axis
-ANGLES = (
-    (0, 0, 0, 0, 0, 400, 1800, 2500, 3000, 3000, 3000, 3000, 3000, 3000),
-    (0, 0, 0, 0, 0, -500, -900, 200, 700, 700, 700, 700, 700, 700),
-    (0, 0, 0, 0, 0, 3, 3, -3, 2, 2, 2, 2, 2, 2),
-)
-TIMES = (-0.2, -0.1, 0, 0.1, 0.2, 0.4, 0.55, 0.65, 0.8, 1.0, 1.1, 1.2, 1.3, 1.4)
-
-
-def whole(values, scale):
-    return [int(round(value * scale)) for value in values]
-
-
-def record(brake_ticks):
-    angles = [whole(points, 1 << 28) for points in ANGLES]
-    times = [whole(TIMES, TICK_HZ << 16)]
-    return motion.Motion(motion.pack(5, angles, times, SEGMENTS, 1, brake_ticks, 0))
-
-
-def spline(points, segment, u):
-    total = 0.0
-    for power in range(6):
-        total += u**power * sum([BASIS[5][power][i] * points[segment + i] for i in range(6)])
-    return total / FACTORIAL[5]
-
-
-def path(seconds):
-    """Where the joints are at a time of the motion."""
-    low, high = 0.0, float(SEGMENTS)
-    for _ in range(45):
-        middle = (low + high) / 2
-        segment = min(int(middle), SEGMENTS - 1)
-        if spline(TIMES, segment, middle - segment) < seconds:
-            low = middle
-        else:
-            high = middle
-    segment = min(int(low), SEGMENTS - 1)
-    return [spline(points, segment, low - segment) for points in ANGLES]
 
 
 def joints():

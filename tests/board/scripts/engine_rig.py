@@ -2,50 +2,12 @@
 
 import sys
 
+from arm_rows import HEAD, arm, row  # noqa: F401
 from simulator import motors, standalone, the
 
 TICK_HZ = 84_000_000
 FEWER = 3 if "short" in sys.argv else 1
 """Repetitions are divided by it; the emulated interpreter is slow."""
-HEAD = {
-    "flags": 0,
-    "pulse_ticks": 168,
-    "low_ticks": 168,
-    "dir_setup_ticks": 420,
-    "dir_hold_ticks": 420,
-    "link_timeout_ms": 1000,
-}
-JOINT = {
-    "channel": 0,
-    "dir_inverted": 0,
-    "encoder": 255,
-    "encoder_inverted": 0,
-    "counts_num": 5,
-    "counts_den": 16,
-    "min_steps": -1000000,
-    "max_steps": 1000000,
-    "max_rate": 333000,
-    "following_counts": 20,
-    "limit_low": 255,
-    "limit_high": 255,
-    "limit_active_high": 0,
-    "spare": 0,
-}
-
-
-def row(**values):
-    """A joint of the arm record, with these fields changed."""
-    joint = dict(JOINT)
-    joint.update(values)
-    return joint
-
-
-def arm(count):
-    """Joints on channels 0, 1, …; every other one inverted; encoders on the first four."""
-    return [
-        row(channel=n, dir_inverted=n & 1, encoder=n if n < 4 else 255, encoder_inverted=n >> 1 & 1)
-        for n in range(count)
-    ]
 
 
 class Steps:
@@ -245,7 +207,7 @@ class Rig:
         if planned:
             armtempo_board.joint.Walker = Walker
             armtempo_board.engine.evaluator = Evaluator
-        self.arm = the.arm = motors.Arm(self.board, pins, lambda: (self.head, joints))
+        self.arm = the.arm = motors.Arm(self.board, pins, lambda: (self.head, joints), 1)
         self.pins = pins
         self.pulses = [
             Pulses(self, joint, pins.STEP[joint["channel"]][0], pins.STEP[joint["channel"]][6])

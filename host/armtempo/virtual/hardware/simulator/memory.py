@@ -12,6 +12,7 @@ BLOCKS = (
     "TIM1", "TIM2", "TIM3", "TIM4", "TIM5", "TIM6", "TIM7", "TIM8",
     "GPIOA", "GPIOB", "GPIOC", "GPIOD", "GPIOE",
     "DMA1", "DMA2", "RCC", "EXTI", "SYSCFG", "DBGMCU", "PWR", "IWDG", "FLASH",
+    "NVIC_IPR",
 )  # fmt: skip
 # where the chip has them (RM0090 table 1), for programs that name addresses themselves
 _ON_CHIP = (

@@ -1,0 +1,40 @@
+"""Pins, timers and interrupts that only remember what they were told."""
+
+
+class Pin:
+    """A pin."""
+
+    IN, OUT_PP, AF_PP, PULL_NONE, PULL_UP, PULL_DOWN = range(6)
+
+    def __init__(self, name, mode=0, pull=0, value=0, alt=0):
+        self.level = value
+
+    def value(self, level=None):
+        """Read or drive it."""
+        if level is None:
+            return self.level
+        self.level = level
+        return None
+
+
+class ExtInt:
+    """An external interrupt."""
+
+    IRQ_RISING, IRQ_FALLING = 1, 2
+
+    def __init__(self, pin, mode, pull, callback):
+        pass
+
+
+class Timer:
+    """A timer."""
+
+    OC_TIMING = 1
+    callbacks = {}
+
+    def __init__(self, number, prescaler=0, period=0):
+        self._number = number
+
+    def channel(self, number, mode, callback=None):
+        """Remember the callback."""
+        Timer.callbacks[self._number, number] = callback

@@ -1,0 +1,119 @@
+"""The main loop and the interrupt with the heap locked: MicroPython raises MemoryError where anything allocates.
+
+Registers are plain memory here; the counter, the streams and the interrupt are moved by this script.
+"""
+
+import gc
+import sys
+
+import micropython
+
+sys.path.insert(0, __file__.rsplit("/", 1)[0] + "/bare")
+
+from array import array
+
+import pyb
+import stm
+from arm_rows import HEAD, arm
+from armtempo_board import access
+from armtempo_board.engine import Engine
+from brake_motion import BRAKE_TICKS, record
+
+STEP_TICKS = 30_000
+BUFFER = array("i", [0] * 8)
+
+
+class Streams:
+    """Plays the compare matches and the DMA of a ring."""
+
+    def __init__(self, ring):
+        self.ring = ring
+        self.matched = 0
+
+    def play(self, now):
+        """Let match what lies before ``now`` (ticks, modulo 2**32)."""
+        ring = self.ring
+        at = (ring._registers - stm.DMA1) // 4 + access.STREAM_NDTR
+        dma = stm.BLOCKS["DMA1"]
+        timer = stm.BLOCKS["TIM5" if ring.timer == stm.TIM5 else "TIM2"]
+        if not dma[at - 1] & 1 or not timer[access.DIER] >> (8 + ring._compare - access.CCR1 + 1) & 1:
+            return
+        loads = (access.RING - dma[at]) % access.RING
+        while (now - timer[ring._compare]) & 0xFFFFFFFF < 1 << 31:
+            loads += 1
+            timer[ring._compare] = ring.words[(loads - 1) % access.RING + 1]
+            self.matched += 1
+        dma[at] = (access.RING - loads) % access.RING or access.RING
+
+
+def move_to(now, streams):
+    """All that the hardware does until ``now``, the compare interrupt at its time."""
+    timer = stm.BLOCKS["TIM2"]
+    while timer[access.DIER] & 16 and (now - timer[access.CCR4]) & 0xFFFFFFFF < 1 << 30:
+        show((timer[access.CCR4] + 200) & 0xFFFFFFFF, streams)
+        locked(pyb.Timer.callbacks[2, 4], 4)
+    show(now & 0xFFFFFFFF, streams)
+
+
+def show(counter, streams):
+    """Bring the registers to a time."""
+    for name in ("TIM2", "TIM5"):
+        stm.BLOCKS[name][access.CNT] = counter
+    for stream in streams:
+        stream.play(counter)
+    stm.BLOCKS["TIM1"][access.CNT] = streams[0].matched // 2 * 5 // 16 & 0xFFFF
+
+
+def locked(function, argument=None):
+    """Call with the heap locked; without an argument where it is None."""
+    micropython.heap_lock()
+    try:
+        if argument is None:
+            return function()
+        return function(argument)
+    finally:
+        micropython.heap_unlock()
+
+
+def run(joints, brake_at):
+    """A whole motion, braked at a time (or not)."""
+    stm.BLOCKS["TIM1"][access.CNT] = 0
+    engine = Engine(HEAD, joints)
+    engine.home(7, [0, 0, 0])
+    motion = record(BRAKE_TICKS)
+    refused = engine.load(motion)
+    assert refused is None, refused
+    streams = [Streams(joint.ring) for joint in engine._joints]
+    now = stm.BLOCKS["TIM2"][access.CNT] - (1 << 32)
+    engine.moving = True
+    samples = 0
+    while engine.moving:
+        now += STEP_TICKS
+        move_to(now, streams)
+        if engine._block[access.DONE] or (brake_at and now > brake_at):
+            engine.brake() if brake_at else engine.service()
+            brake_at = 0
+        else:
+            locked(engine.service)
+        while locked(engine.next_sample, BUFFER):
+            samples += 1
+        assert now < 200_000_000
+    assert engine.fault == 0, engine.fault
+    return samples, [engine.commanded(number) for number in range(3)], [s.matched for s in streams]
+
+
+def heap(count):
+    """Bytes that an engine with so many joints keeps."""
+    gc.collect()
+    before = gc.mem_alloc()
+    engine = Engine(HEAD, arm(count))
+    gc.collect()
+    return gc.mem_alloc() - before if engine else 0
+
+
+JOINTS = arm(3)
+for joint in JOINTS[1:]:
+    joint["following_counts"] = 0
+print(heap(3), heap(6))
+print(*run(JOINTS, 0))
+print(*run(JOINTS, 40_000_000))

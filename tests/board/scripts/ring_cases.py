@@ -1,0 +1,201 @@
+"""Counting, times and turns on plain memory: what the rings and the interrupts compute with."""
+
+from array import array
+
+import simulator.standalone  # noqa: F401
+import uctypes
+from armtempo_board import access
+from engine_rig import cases
+
+BLOCK = access.BLOCK_HEAD + 6 * access.JOINT_WORDS
+
+
+def words(count):
+    return array("I", bytearray(4 * count))
+
+
+def counting_loads():
+    """NDTR counts down and starts again; every load is counted whatever the number since the last look."""
+    for first in (access.RING, access.RING - 1):
+        state = words(access.STATE_WORDS)
+        state[access.FIRST] = first
+        state[access.MADE] = 1 << 29
+        total = 0
+        for jump in (0, 1, 2, 1023, 0, 511, 1023, 1000, 7) * 3:
+            total += jump
+            ndtr = (first - total) % access.RING or access.RING
+            assert access.advance(state, ndtr) == (1 << 29) - total
+            assert state[access.LOADS] == total
+
+
+def seal_and_wrap():
+    """The far-away entry stands behind the newest, and the first word is repeated behind the end."""
+    state = words(access.STATE_WORDS)
+    ring = words(access.RING + 1)
+    made = 0
+    for count in (2, 1000, 20, 2, 0x3F0, 16, 2):
+        for n in range(count):
+            ring[(made + n) & access.MASK] = (made + n) * 3_000_000 & 0xFFFFFFFF
+        access.seal(state, ring, count)
+        made += count
+        last = (made - 1) * 3_000_000 & 0xFFFFFFFF
+        assert state[access.MADE] == made
+        assert state[access.LAST] == last
+        assert ring[made & access.MASK] == last ^ 0x80000000 == state[access.FAR]
+        assert ring[access.RING] == ring[0]
+
+
+def times_across_the_wrap():
+    """Differences of times that straddle 2**32, and both halves of the range."""
+    timer = words(18)
+    times = words(1)
+    for now in (0, 5, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, 0xFFFFF000):
+        timer[access.CNT] = now
+        assert access.clock_k(timer) == now >> 10
+        for gap_k in (0, 1, 16, 1000, (1 << 21) - 1, -1, -16, -(1 << 20)):
+            times[0] = (now + 1024 * gap_k) & 0xFFFFFFFF
+            assert access.until_k(timer, times, 0) == gap_k, (now, gap_k)
+
+
+def due_or_not():
+    """Turns and samples at, before and after the present, around the wrap; the soonest is armed."""
+    for now in (0, 1000, 0x7FFFFFF0, 0xFFFFFFF0):
+        block, timer, port, state = words(BLOCK), words(18), words(8), words(access.STATE_WORDS)
+        block[access.JOINTS] = 2
+        block[access.SLACK] = 100
+        timer[access.CNT] = now
+        for joint in range(2):
+            block[access.BLOCK_HEAD + joint * access.JOINT_WORDS + access.DIR_BIT] = 1 << (7 + joint)
+        second = access.BLOCK_HEAD + access.JOINT_WORDS
+        block[access.NEXT] = (now + 900) & 0xFFFFFFFF
+        state[access.LAST] = (now - 50) & 0xFFFFFFFF
+        assert access.add_turn(block, state, access.BLOCK_HEAD, 50)
+        assert access.add_turn(block, state, second, 51)
+        assert access.add_turn(block, state, second, 400)
+        assert access.serve(block, timer, port) == 0
+        assert port[access.BSRR] == 1 << 7
+        port[access.ODR] = 1 << 7
+        assert timer[access.CCR4] == (now + 1) & 0xFFFFFFFF
+        timer[access.CNT] = (now + 20) & 0xFFFFFFFF
+        assert access.serve(block, timer, port) == 0
+        assert port[access.BSRR] == 1 << 8
+        port[access.ODR] = 3 << 7
+        assert timer[access.CCR4] == (now + 350) & 0xFFFFFFFF
+        assert block[access.LATE] == 0
+        timer[access.CNT] = (now + 460) & 0xFFFFFFFF
+        assert access.serve(block, timer, port) == 0
+        assert port[access.BSRR] == 1 << (8 + 16)
+        assert block[access.LATE] == 1
+        timer[access.CNT] = (now + 900) & 0xFFFFFFFF
+        assert access.serve(block, timer, port) == 1
+        assert block[access.NOW] == timer[access.CNT]
+
+
+def turn_queue():
+    """Eight turns fit; the ninth waits."""
+    block, state = words(BLOCK), words(access.STATE_WORDS)
+    for n in range(access.TURN_ROOM):
+        state[access.LAST] = 1000 * n
+        assert access.add_turn(block, state, access.BLOCK_HEAD, 5)
+    assert not access.add_turn(block, state, access.BLOCK_HEAD, 5)
+    block[access.BLOCK_HEAD + access.TURNS_OUT] = 1
+    assert access.add_turn(block, state, access.BLOCK_HEAD, 5)
+
+
+def sample_times():
+    """From 0 in steps of a tenth of a second to the end; raw samples that find no room are counted."""
+    block, raw, dma, encoder = words(BLOCK), words(access.RAW_ROOM * access.RAW_WORDS), words(60), words(18)
+    block[access.JOINTS] = 1
+    block[access.ENCODERS] = 1
+    block[access.LEFT] = 3
+    block[access.END] = 20_000_000
+    block[access.BLOCK_HEAD + access.NDTR_AT] = 35
+    dma[35] = 77
+    encoder[access.CNT] = 65535
+    times = []
+    for n in range(4):
+        times.append(block[access.NEXT])
+        assert not block[access.DONE]
+        block[access.NOW] = 1000 + n
+        access.take(raw, block, dma, (uctypes.addressof(encoder),))
+    assert times == [0, 8_400_000, 16_800_000, 20_000_000]
+    assert block[access.DONE]
+    assert list(raw[11:13]) == [1001, 77] and raw[18] == 65535
+    for _ in range(20):
+        access.take(raw, block, dma, (uctypes.addressof(encoder),))
+    assert (block[access.TAKEN], block[access.LOST]) == (16, 8)
+    assert raw[0] == 1000
+
+
+def late_first_step():
+    """A channel is armed only while its first edge lies ahead, and behind a turn of DIR and its set-up time."""
+    block, timer, ring = words(BLOCK), words(18), words(access.RING + 1)
+    at = access.BLOCK_HEAD
+    block[at + access.CCR_AT] = access.CCR1 + 1
+    block[at + access.CCMR_AT] = access.CCMR1
+    block[at + access.MODE_SHIFT] = 12
+    block[access.SETUP] = 420
+    timer[access.CNT] = 0xFFFFFFF0
+    for first, turn, in_time in (
+        (200, None, 1),
+        (0xFFFFFFF0 + 84, None, 1),
+        (0xFFFFFFF0 + 83, None, 0),
+        (0xFFFFFF00, None, 0),
+        (1000, 580, 1),
+        (1000, 581, 0),
+        (1000, 0xFFFFFFFF, 1),
+    ):
+        block[at + access.TURNS_IN] = block[at + access.TURNS_OUT] = 0
+        if turn is not None:
+            block[at + access.TURN_TIMES] = turn
+            block[at + access.TURNS_IN] = 1
+        ring[0] = first & 0xFFFFFFFF
+        timer[access.CCMR1] = 4 << 4 | 4 << 12
+        timer[access.DIER] = 1 << 4
+        assert access.arm_channel(block, timer, ring, at) == in_time, (first, turn)
+        if in_time:
+            assert timer[access.CCR1 + 1] == ring[0]
+            assert timer[access.CCMR1] == 4 << 4 | 3 << 12
+            assert timer[access.DIER] == 1 << 4 | 1 << 10
+    access.release_channel(block, timer, at)
+    assert timer[access.CCMR1] == 4 << 4 | 4 << 12
+    assert timer[access.DIER] == 1 << 4
+
+
+def counters_in_step():
+    """Two counters that were read one after the other agree, or do not."""
+    first, second = words(18), words(18)
+    for a, b, agree in (
+        (5, 5, 1),
+        (5, 0xFFFFFFFF, 1),
+        (0xFFFFFFF8, 3, 1),
+        (1000, 1016, 1),
+        (1000, 1017, 0),
+        (1000, 900, 0),
+    ):
+        first[access.CNT], second[access.CNT] = a, b
+        assert access.in_step(first, second) == agree, (a, b)
+
+
+def towards_a_switch():
+    """Line, direction and movement all have to fit."""
+    pairs = array("I", [8, 7, 1, 0, 1, 8, 10, 0, 2, 1, 9, 7, 0, 0, 0])
+    port = words(8)
+    for line, levels, found in ((8, 1 << 7, 1), (8, 1 << 10, 0), (8, 0, 3), (9, 0, 0), (10, 1 << 7, 0)):
+        port[access.ODR] = levels
+        assert access.towards(pairs, 3, line, access.directions(port)) == found
+
+
+cases(
+    (
+        counting_loads,
+        seal_and_wrap,
+        times_across_the_wrap,
+        due_or_not,
+        turn_queue,
+        sample_times,
+        late_first_step,
+        counters_in_step,
+        towards_a_switch,
+    )
+)

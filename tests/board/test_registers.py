@@ -1,0 +1,99 @@
+"""The start-up sequence, replayed: every register it leaves, against the reference manual's bit fields."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests import interpreters
+
+SCRIPTS = Path(__file__).parent / "scripts"
+
+# RM0090: TIMx_CCMRx OCxM forced inactive (18.4.7), TIMx_CCER CCxE (18.4.9), DMA_SxCR fields (10.5.5)
+_LOW_1, _LOW_2 = 0b100 << 4, 0b100 << 12
+_ON = {1: 1 << 0, 2: 1 << 4, 3: 1 << 8, 4: 1 << 12}
+_WORDS, _UP, _CIRCULAR, _TO_PERIPHERAL, _URGENT = 2 << 13 | 2 << 11, 1 << 10, 1 << 8, 1 << 6, 3 << 16
+_STREAM = _WORDS | _UP | _CIRCULAR | _TO_PERIPHERAL | _URGENT
+
+EXPECTED = {
+    "RCC+30": 1 << 21,  # AHB1ENR: DMA1
+    "RCC+40": 0b1111,  # APB1ENR: TIM2 to TIM5
+    "RCC+44": 0b11,  # APB2ENR: TIM1, TIM8
+    "TIM2+04": 0b001 << 4,  # CR2.MMS: enable
+    "TIM2+08": 1 << 7,  # SMCR.MSM
+    "TIM2+18": _LOW_1 | _LOW_2,
+    "TIM2+1c": _LOW_1,
+    "TIM2+20": _ON[1] | _ON[2] | _ON[3],
+    "TIM2+2c": 0xFFFFFFFF,  # ARR
+    "TIM5+08": 0b110,  # SMCR: TS ITR0 (TIM2), SMS trigger
+    "TIM5+18": _LOW_1 | _LOW_2,
+    "TIM5+1c": _LOW_1 | _LOW_2,
+    "TIM5+20": _ON[1] | _ON[3] | _ON[4],
+    "TIM5+2c": 0xFFFFFFFF,
+}
+EXPECTED |= {
+    "NVIC_IPR+14": 12 << 28,  # IRQ 23, EXTI9_5: above the timers' 13
+    "NVIC_IPR+28": 12 << 4,  # IRQ 40, EXTI15_10
+}
+for _timer in (1, 3, 4, 8):  # encoders
+    EXPECTED |= {
+        f"TIM{_timer}+00": 1,  # CR1.CEN
+        f"TIM{_timer}+08": 0b011,  # SMCR.SMS: encoder mode 3
+        f"TIM{_timer}+10": 1,  # SR.UIF: of the update event that took the period over
+        f"TIM{_timer}+18": 0b0011 << 4 | 0b01 | 0b0011 << 12 | 0b01 << 8,  # IC1F, CC1S, IC2F, CC2S
+        f"TIM{_timer}+2c": 0xFFFF,
+    }
+# stream: request channel, compare register as seen from TIM2 (blocks of the virtual board are 256 bytes)
+_STREAMS = {5: (3, 0x34), 6: (3, 0x38), 1: (3, 0x3C), 2: (6, 0x334), 0: (6, 0x33C), 3: (6, 0x340)}
+for _stream, (_request, _compare) in _STREAMS.items():
+    _at = 0x10 + 0x18 * _stream
+    EXPECTED[f"DMA1+{_at:02x}"] = _request << 25 | _STREAM
+    EXPECTED[f"DMA1+{_at + 8:02x}"] = _compare
+    EXPECTED[f"DMA1+{_at + 12:02x}"] = 1  # a ring
+
+
+def _image(interpreter: str) -> dict[str, int]:
+    lines = interpreters.run(interpreter, SCRIPTS / "register_image.py", heap="6M").splitlines()
+    return {name: int(value, 16) for name, value in (line.split() for line in lines)}
+
+
+def _field(image: dict[str, int], register: str, pin: int, bits: int) -> int:
+    return image.get(register, 0) >> pin * bits & (1 << bits) - 1
+
+
+def test_timers_and_streams(interpreter: str) -> None:
+    image = {name: value for name, value in _image(interpreter).items() if not name.startswith("GPIO")}
+    assert image == EXPECTED
+
+
+def test_pins() -> None:
+    """Modes (8.4.1), pulls (8.4.4) and alternate functions (8.4.9, data sheet table 9) of every pin in use."""
+    image = _image("cpython")
+    alternate = {
+        "A15": 1, "A1": 1, "B10": 1, "A2": 2, "A3": 2, "A0": 2,
+        "E9": 1, "E11": 1, "B4": 2, "B5": 2, "C6": 3, "C7": 3, "B6": 2, "B7": 2,
+    }  # fmt: skip
+    outputs = {"E7", "E8", "E10", "E13", "E14", "E6", "E12"}
+    pulls = {"E9": 1, "E11": 1, "B4": 1, "B5": 1, "C6": 1, "C7": 1, "B6": 1, "B7": 1, "D8": 2, "D10": 2}
+    for port in "ABCDE":
+        for number in range(16):
+            pin = f"{port}{number}"
+            mode = 2 if pin in alternate else 1 if pin in outputs else 0
+            assert _field(image, f"GPIO{port}+00", number, 2) == mode, pin
+            assert _field(image, f"GPIO{port}+0c", number, 2) == pulls.get(pin, 0), pin
+            if mode == 2:
+                register = f"GPIO{port}+{0x20 + 4 * (number >> 3):02x}"
+                assert _field(image, register, number & 7, 4) == alternate[pin], pin
+    assert image["GPIOE+14"] == 1 << 12, "ENABLE is inactive, DIR low"
+
+
+@pytest.mark.parametrize("document", ["hardware.md"])
+def test_table_in_the_documentation(document: str) -> None:
+    """The documented register table has the rows that the board applies."""
+    text = (interpreters.ROOT / "board" / "docs" / document).read_text()
+    source = (interpreters.ROOT / "board" / "armtempo_board" / "registers.py").read_text()
+    sections = set(re.findall(r'"(\d+\.\d+\.\d+)"', source))
+    assert sections
+    assert not [section for section in sections if section not in text]
