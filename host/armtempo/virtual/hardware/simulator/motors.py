@@ -76,7 +76,7 @@ class Arm:
 
     def __init__(self, board, pins, record, seed):
         self._seed = seed
-        self._board = board
+        self.board = board
         self._pins = pins
         self._record = record
         self._known = None
@@ -94,7 +94,7 @@ class Arm:
         for motor in self.motors:
             motor.disconnect()
         head, joints = found or ({"flags": 0}, ())
-        enable = Enable(self._board, self._pins.ENABLE, head["flags"] & armrecord.FLAG_ENABLE_HIGH)
+        enable = Enable(self.board, self._pins.ENABLE, head["flags"] & armrecord.FLAG_ENABLE_HIGH)
         self.motors = [self._motor(number, joint, enable) for number, joint in enumerate(joints)]
         self._release_switches(head, joints)
 
@@ -108,11 +108,11 @@ class Arm:
                     set_level(self._pins.LIMIT[switch], 1 - joint["limit_active_high"])
 
     def _motor(self, number, joint, enable):
-        lines, pins = self._board.pins, self._pins
+        lines, pins = self.board.pins, self._pins
         step, direction = pins.STEP[joint["channel"]][0], pins.STEP[joint["channel"]][6]
         encoder = None
         if joint["encoder"] < len(pins.ENCODER):
-            encoder = self._board.timers[pins.ENCODER[joint["encoder"]][0]]
+            encoder = self.board.timers[pins.ENCODER[joint["encoder"]][0]]
         step, direction = lines.line(step), lines.line(direction)
         if joint.get("model") and joint["model"]["holding_torque_nm"]:
             from simulator.stepper import Stepper
@@ -124,7 +124,7 @@ class Arm:
         """Time has passed."""
         for motor in self.motors:
             if motor.moved:
-                motor.follow(self._board.now)
+                motor.follow(self.board.now)
 
     def counting(self, timer, now):
         """A timer started or stopped: motions begin with TIM2."""

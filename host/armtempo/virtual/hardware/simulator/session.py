@@ -1,59 +1,97 @@
-"""From power-up to power-up: ``boot.py``, ``main.py``, the REPL, resets."""
+"""From power-up to power-up: ``boot.py``, ``main.py``, the prompt, resets."""
 
 import builtins
 import sys
 
-from simulator import setup, the
-from simulator.board import print_exception
+from simulator import memory, setup, the, timers
+from simulator.repl import Repl, SoftReset, board_print
 from simulator.reset import PowerOff, Reset
 
-_POWER_ON = 1
+_POWER_ON, _SOFT = 1, 0
 
 
 def run(options):
     """Run the board until the launcher goes."""
     before = list(sys.modules)
+    builtins.print = board_print
     cause = _POWER_ON
     while True:
         setup.power_up(options, cause)
         builtins.open = the.flash.open
         try:
-            _program(options)
+            _live(options, before)
         except Reset as reset:
             cause = reset.cause
+            _forget(before)
         except PowerOff:
             break
-        for name in list(sys.modules):
-            if name not in before:
-                del sys.modules[name]
     if the.edges:
         the.edges.flush()
 
 
-def _program(options):
+def _live(options, before):
+    """Run the program, then the prompt, again after each soft reset."""
+    raw = False
+    while True:
+        if the.arm is None or the.arm.board is not the.board:
+            _connect()
+        repl = Repl(raw)
+        try:
+            _execute(options, repl, "boot.py")
+            if not raw:
+                _execute(options, repl, "main.py")
+        except SoftReset:
+            pass
+        repl.run()
+        raw = repl.raw
+        _soft_reset()
+        _forget(before)
+
+
+def _connect():
+    """Put the arm on the pins, by the pin table of the program that is there."""
     try:
         from armtempo_board import pins
 
         setup.connect(pins)
-    except ImportError:  # nothing deployed yet
+    except ImportError:  # nothing, or not all, is deployed
         pass
-    for name in ("boot.py", "main.py"):
-        try:
-            _execute(options, name)
-        except Exception as error:
-            print_exception(error)
-    while True:
-        the.pace.idle()
+    except Exception as error:
+        sys.stderr.write("no arm on the pins: %r\n" % error)
 
 
-def _execute(options, name):
+def _execute(options, repl, name):
     """Run a file of the flash, or of the program that is not deployed."""
-    folders = [options["flash"]] + [folder + "/armtempo_board" for folder in options["program"]]
+    folders = ["/flash"] + [folder + "/armtempo_board" for folder in options["program"]]
     for folder in folders:
         try:
             with the.flash.open(folder + "/" + name) as file:
                 text = file.read()
         except OSError:
             continue
-        exec(compile(text, name, "exec"), {"__name__": "__main__"})
+        repl.execute(text, name, log=True)
         return
+
+
+def _soft_reset():
+    """What the firmware does between two runs: timers it made stop, callbacks go; registers stay."""
+    board = the.board
+    for number in board.api:
+        at = board.timers[number].at
+        memory.words[at + timers.CR1] = memory.words[at + timers.CCER] = memory.words[at + timers.DIER] = 0
+    for known in (board.api, board.callbacks, board.extints):
+        known.clear()
+    board.scheduled = []
+    board.pending = []
+    board.masked = False
+    board.sync()
+    the.serial.attached = True
+    the.serial.rts = the.serial.cts = False
+    the.settings["reset_cause"] = _SOFT
+
+
+def _forget(before):
+    """The program's modules are loaded afresh the next time."""
+    for name in list(sys.modules):
+        if name not in before:
+            del sys.modules[name]

@@ -1,0 +1,51 @@
+"""The board program's ``sys``: the interpreter's own, with the STM32 port's name and the serial port."""
+
+import sys as _own
+
+from simulator import repl as _repl
+from simulator import the as _the
+
+platform = "pyboard"
+
+
+class _Implementation(tuple):
+    """As the firmware of STM32F4DISC shows itself; version and ``.mpy`` kind are the interpreter's."""
+
+    name = "micropython"
+    version = tuple(_own.implementation.version[:3]) + ("",)
+    _machine = "STM32F4DISC with STM32F407"
+    _build = "STM32F4DISC"
+    _mpy = getattr(_own.implementation, "_mpy", 0)
+
+
+implementation = _Implementation()
+
+
+class _Stdout:
+    """``sys.stdout``."""
+
+    def write(self, data):
+        """Show text or bytes."""
+        _repl.show(data if isinstance(data, str) else bytes(data).decode())
+        return len(data)
+
+    def flush(self):
+        """Nothing waits here."""
+
+
+class _Stdin:
+    """``sys.stdin``."""
+
+    def read(self, count):
+        """Wait for so many bytes."""
+        return _the.port.recv(count, timeout=1 << 30)
+
+
+stdout = _Stdout()
+stdout.buffer = stdout
+stdin = _Stdin()
+stdin.buffer = stdin
+
+
+def __getattr__(name):
+    return getattr(_own, name)
