@@ -59,17 +59,33 @@ def test_an_interrupted_run_stops_the_arm(
     assert tuple(repetition["commanded_steps"]) == status.stand.commanded_steps
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "SIGTERM"])
-def test_a_command_ends_though_its_board_hangs(
-    number: signal.Signals, plan_file: Callable[[str], Path], tmp_path: Path
+def test_sigterm_ends_a_run_whose_board_has_fallen_silent(
+    plan_file: Callable[[str], Path], tmp_path: Path
 ) -> None:
-    with board_at_home(Fault("hang", at_s=0.5)) as process:
+    with board_at_home(Fault("silence", at_s=0.5, ms=1e9)) as process:
         command = commandline.start(
             "run", plan_file("shipped"), "--port", process.port, "--out", tmp_path, folder=tmp_path
         )
         commandline.wait_for(lambda: samples_in(tmp_path) > 3, "the first samples")
-        command.send_signal(number)
+        command.terminate()
         done = commandline.ended(command, ENDS_WITHIN_S)
-    done.said("armtempo: ")
-    assert done.exit_code in (1, 130)
-    assert runs.load(tmp_path / "feed-001").meta["repetitions"][0]["state"] != "running"
+    done.said("armtempo: the board was told to stop and does not", "switch off")
+    assert done.exit_code == 1
+    assert runs.load(tmp_path / "feed-001").meta["repetitions"][0]["state"] == "broken"
+
+
+def test_a_second_ctrl_c_ends_it_at_once(plan_file: Callable[[str], Path], tmp_path: Path) -> None:
+    with board_at_home() as process:
+        command = commandline.start(
+            "run", plan_file("shipped"), "--port", process.port, "--out", tmp_path, folder=tmp_path
+        )
+        commandline.wait_for(lambda: samples_in(tmp_path) > 5, "the first samples")
+        command.send_signal(signal.SIGINT)
+        commandline.wait_for(lambda: samples_in(tmp_path) > 7 or command.poll() == 130, "the brakes")
+        command.send_signal(signal.SIGINT)
+        done = commandline.ended(command, ENDS_WITHIN_S)
+        with open_board(process.port) as board:
+            assert not board.status().moving
+    done.said("interrupted")
+    assert done.exit_code == 130
+    assert runs.load(tmp_path / "feed-001").meta["repetitions"][0]["state"] == "interrupted"
