@@ -68,6 +68,7 @@ class App:
         self._fault = fault
         self._running = False  # a run has begun and its end has not been noted
         self._braking = False
+        self._brakes = False  # the motion can come to rest along its path
         self._by_host = False  # the run was started by a command
         self._failures = 0
         self.commands = Commands(self, rows)
@@ -183,13 +184,13 @@ class App:
                 raise Refused(codes.OUT_OF_RANGE, joint, steps[joint])
         self.engine.home(mask, steps)
 
-    def begin(self, name, flags, crc, by_host=True):
-        """Start a stored motion, or refuse; ``crc`` None takes whatever is stored under the name."""
+    def begin(self, name, flags, crc=None):
+        """Start a stored motion, or refuse. ``crc``: of the record that the host means; None: there is none."""
         self.check_ready()
-        missing = self._everyone() & ~self.known()
+        missing = self.everyone() & ~self.known()
         if missing:
             raise Refused(codes.UNHOMED, _lowest(missing))
-        motion = self._load(name, crc)
+        motion = self.load(name, crc)
         refused = self.engine.load(motion)
         if refused:
             raise Refused(*refused)
@@ -197,13 +198,15 @@ class App:
         self.events.clear()
         self.duration = self.engine.duration_ticks
         self.run_number += 1
-        self._by_host = by_host
+        self._by_host = crc is not None
         self._braking = False
+        self._brakes = motion.brake_ticks > 0
         gc.collect()
         self._running = True
         self.engine.start(bool(flags & START_HOMING))
 
-    def _load(self, name, crc):
+    def load(self, name, crc=None):
+        """The stored motion, checked as far as that needs no evaluator, or refused."""
         data = self.store.read(name + store.MOTION)
         try:
             motion = Motion(data)
@@ -218,11 +221,11 @@ class App:
         return motion
 
     def stop(self, now):
-        """Brake along the path, or freeze."""
-        if now:
+        """Brake along the path; freeze where ``now``, or where the motion has no way to brake."""
+        self._braking = True
+        if now or not self._brakes:
             self.engine.freeze()
         else:
-            self._braking = True
             self.engine.brake()
 
     def clear(self):
@@ -261,7 +264,7 @@ class App:
             return _FAULT
         if not self.engine:
             return _UNCONFIGURED
-        return _IDLE if self.known() == self._everyone() else _UNHOMED
+        return _IDLE if self.known() == self.everyone() else _UNHOMED
 
     def look_around(self):
         """Bring ``free_flash`` and ``free_heap`` up to date; costs milliseconds, so not while moving."""
@@ -277,7 +280,8 @@ class App:
         spread(target, self._raw, places(ticks_at, joints_at), self.joints)
         return 8 * self.joints
 
-    def _everyone(self):
+    def everyone(self):
+        """Bit a joint, all set."""
         return (1 << self.joints) - 1
 
 

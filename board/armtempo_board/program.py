@@ -9,6 +9,7 @@ from armtempo_shared import codes
 from armtempo_shared.program import program_crc
 from micropython import const
 
+from armtempo_board import points, walker  # noqa: F401  the deepest first: nested imports cost stack
 from armtempo_board.app import App
 from armtempo_board.button import Button
 from armtempo_board.leds import Leds
@@ -63,7 +64,7 @@ def _fault_at_start():
 
 def _replay_default():
     try:
-        app.begin(app.store.default(), 0, None, False)
+        app.begin(app.store.default(), 0)
     except Refused as refused:
         app.events.note("button: refused, error %d" % refused.code)
 

@@ -7,7 +7,7 @@ import stand_in
 stand_in.install()
 
 from armtempo_board.app import App  # noqa: E402
-from armtempo_shared import armrecord, messages, wire  # noqa: E402
+from armtempo_shared import armrecord, messages, motion, wire  # noqa: E402
 
 ROOT = sys.argv[1]
 COUNT = [0]
@@ -214,6 +214,16 @@ def case_stop_brakes_or_freezes():
     assert app.engine.calls[-1] == "freeze"
 
 
+def case_stop_freezes_what_cannot_brake():
+    app, host = connected()
+    crc = armrecord.unpack(stand_in.arm())[2]
+    stiff = motion.pack(5, [[0] * 8] * 2, [[0] * 8] * 2, 3, 1, 0, crc)
+    host.upload("stiff", stiff)
+    host.ask("start", (0, wire.record_crc(stiff)), "stiff")
+    host.ask("stop", (0,))
+    assert app.engine.calls[-1] == "freeze"
+
+
 def case_samples_are_kept_until_acknowledged():
     app, host = connected()
     start(host)
@@ -358,7 +368,7 @@ def case_samples_of_a_run_without_host_are_kept():
     host.ask("set_default", (), "feed")
     again = App(host.port, ROOT + str(COUNT[0]))
     again.engine.home(3, [0, 0])
-    again.begin(again.store.default(), 0, None, False)
+    again.begin(again.store.default(), 0)
     host = stand_in.Host(again, host.port)
     host.turn()
     again.engine.advance(4)

@@ -26,7 +26,7 @@ def _install_time():
 
 class Pin:
     IN, OUT_PP, PULL_DOWN = 0, 1, 2
-    levels: "dict[str, int]" = {}  # noqa: RUF012
+    levels: "dict[str, int]" = {}
 
     def __init__(self, name, mode, pull=0):
         self.name = name
@@ -217,13 +217,13 @@ class Host:
     def _note(self, frame):
         entry = wire.EVENT_BY_ID[frame[1]]
         if entry[0] not in ("ok", "error"):
-            self.events.append((entry[0],) + wire.decode(entry, frame[2]))  # noqa: RUF005
+            self.events.append((entry[0],) + wire.decode(entry, frame[2]))
 
     def _answer(self, name, kind, fields, rest):
         assert fields[0] == wire.COMMAND[name][1]
         if kind == "error":
-            return ("error", wire.ERRORS[fields[1]][0]) + fields[2:]  # noqa: RUF005
-        return ("ok",) + wire.decode(wire.ANSWER[name], rest)  # noqa: RUF005
+            return ("error", wire.ERRORS[fields[1]][0]) + fields[2:]
+        return ("ok",) + wire.decode(wire.ANSWER[name], rest)
 
     def hello(self, session=1):
         return self.ask("hello", (wire.PROTOCOL_VERSION, session))
@@ -254,4 +254,4 @@ def record(arm_record, joints=2, segments=3):
     """A motion record for that arm; its numbers mean nothing."""
     angles = [list(range(segments + 5)) for _ in range(joints)]
     crc = armrecord.unpack(arm_record)[2]
-    return motion.pack(5, angles, angles, segments, 1, 0, crc)
+    return motion.pack(5, angles, angles, segments, 1, 84000, crc)

@@ -1,0 +1,57 @@
+"""``armtempo_board.replay("feed")``: one stored motion from the REPL, without a host."""
+
+from armtempo_board import evaluator, program
+from armtempo_board.app import App
+from armtempo_board.refusal import Refused
+
+
+class _Nobody:
+    """Takes the place of the serial port, which is the REPL's."""
+
+    def readinto(self, buffer, count):
+        """Nothing comes."""
+
+    def write(self, buffer, start, count):
+        """Nothing is taken."""
+
+
+def replay(name="", root=program.ROOT):
+    """Run a stored trajectory, the default where no name is given, and say how it ended.
+
+    Where the position is unknown the arm must stand where the motion begins: calling this declares it.
+    Ctrl-C brakes, a second one freezes. A refusal is printed with its code, see ``armtempo_shared/codes.py``.
+    """
+    app = program.app or App(_Nobody(), root)
+    program.app = app
+    port, app.link.stream = app.link.stream, _Nobody()
+    try:
+        _begin(app, name or app.store.default())
+        _follow(app)
+        steps = [app.engine.commanded(joint) for joint in range(app.joints)]
+        print("fault %d," % app.fault() if app.fault() else "done,", "joints at", steps, "steps")
+    except Refused as refused:
+        print("refused, error", refused.code, "joint", refused.joint + 1, refused.value)
+    finally:
+        app.link.stream = port
+
+
+def _begin(app, name):
+    if app.engine and not app.fault():
+        motion = app.load(name)
+        unknown = app.everyone() & ~app.known()
+        if unknown:
+            print("taking the posture of the arm as the start of", name)
+            starts = [evaluator.start_offset(motion, joint, 0) for joint in range(app.joints)]
+            app.home(unknown, starts)
+    app.begin(name, 0)
+
+
+def _follow(app):
+    presses = 0
+    while app.moving():
+        try:
+            app.turn()
+        except KeyboardInterrupt:
+            app.stop(presses)
+            presses = 1
+    app.turn()

@@ -1,0 +1,13 @@
+"""armtempo_board.replay() as typed at the REPL: replay.py FLASH NAME."""
+
+import sys
+
+from simulator import standalone
+
+standalone.start(flash=sys.argv[1], program=sys.path[:])
+
+import armtempo_board  # noqa: E402
+
+armtempo_board.replay(sys.argv[2])
+armtempo_board.replay(sys.argv[2])
+armtempo_board.replay("nothing")
