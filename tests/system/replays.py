@@ -82,7 +82,7 @@ def replay(trajectory: Path, interpreter: str, folder: Path) -> Replay:
     log = folder / "edges.bin"
     starter = interpreters.starter(interpreter)
     with (
-        virtual.launch(arm=motion.arm, edge_log=log, interpreter=starter) as process,
+        virtual.launch(edge_log=log, interpreter=starter) as process,  # without an arm: ideal motors
         open_board(process.port) as board,
         StopRequest() as stop,
     ):
