@@ -7,6 +7,7 @@ from micropython import const
 from armtempo_board import access
 
 _ROOM = const(16)
+_HALF_K = const(1 << 21)  # half a round of the counter in 1024 ticks
 
 
 class Readings:
@@ -42,8 +43,11 @@ class Readings:
 
     def _convert(self, at, to, epoch, now_k):
         raw, words = self._sampler.raw, self._words
-        if access.word_k(raw, at) > now_k:
+        ahead = access.word_k(raw, at) - now_k  # a sample may have come since the clock was read
+        if ahead > _HALF_K:
             epoch -= 1
+        elif ahead < -_HALF_K:
+            epoch += 1
         words[to] = 0
         words[to + 1] = max(epoch, 0)
         if epoch >= 0:
