@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -139,6 +140,7 @@ def postures(chains_mm: Array, tool_path_mm: Array) -> Figure:
 
 def save(figure: Figure, path: Path) -> None:
     """Write the figure as its suffix says: PNG on white, SVG without a background."""
+    _lay_out(figure)
     if path.suffix == ".svg":
         path.write_text(_svg(figure).replace(_PAGE_COLOUR, "#222222"), encoding="utf-8")
     else:
@@ -157,9 +159,18 @@ def inline_svg(figure: Figure, name: str, description: str) -> str:
     return text.replace("<svg ", f'<svg role="img" aria-label="{escape(description)}" style="{style}" ', 1)
 
 
+def _lay_out(figure: Figure) -> None:
+    """Place everything once and for all: with a layout engine left, each file would be drawn twice."""
+    if figure.get_layout_engine() is not None:
+        figure.draw_without_rendering()
+        figure.set_layout_engine(None)
+
+
+@lru_cache(maxsize=8)
 def _svg(figure: Figure) -> str:
     from matplotlib import rc_context
 
+    _lay_out(figure)
     buffer = io.StringIO()
     with rc_context({"svg.fonttype": "none", "svg.hashsalt": "armtempo"}):
         figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
