@@ -26,6 +26,7 @@ from armtempo.virtual.options import Fault, Options, unique_id
 INTERPRETER_VARIABLE = "ARMTEMPO_MICROPYTHON"
 _MAIN = Path(__file__).with_name("main.py")
 _HEAP = "4M"
+_DEPLOYED_BLOCKS = 256
 _START_S = 60.0
 _STOP_S = 1.0
 
@@ -118,6 +119,7 @@ def launch(
     faults: Sequence[Fault] = (),
     power_cut_at: int = 0,
     deployed: bool = False,
+    flash_blocks: int | None = None,
 ) -> VirtualBoard:
     """Start a virtual board; use it as a context manager.
 
@@ -126,7 +128,8 @@ def launch(
     edge. ``interpreter``: MicroPython or CPython; None: $ARMTEMPO_MICROPYTHON, ``micropython`` on PATH, or
     this Python. ``arm``: gets motors with its ``model``; None: ideal motors for whatever arm the board is set
     up for. ``deployed``: run the program in the flash (``armtempo deploy`` puts it there) instead of the
-    installed one. Raises LinkError where it does not start.
+    installed one. ``flash_blocks``: size of the flash; None: the chip's, and with ``deployed`` more, as compiled
+    files for this machine's processor are larger than for the chip's. Raises LinkError where it does not start.
     """
     folder = Path(tempfile.mkdtemp(prefix="armtempo-virtual-"))
     flash = Path(flash_dir).resolve() if flash_dir else folder / "flash"
@@ -135,6 +138,7 @@ def launch(
         options = Options(
             flash=str(flash),
             program=[] if deployed else program_folders(),
+            flash_blocks=flash_blocks or (_DEPLOYED_BLOCKS if deployed else Options.flash_blocks),
             speed=0.0 if virtual_time else 1.0,
             edge_log=str(Path(edge_log).resolve()) if edge_log else None,
             unique_id=unique_id(seed),

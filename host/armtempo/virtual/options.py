@@ -37,6 +37,8 @@ class Options:
     """Folder that is the board's ``/flash``."""
     program: list[str]
     """Folders with the board's packages, as if they were deployed; empty: only what the flash has."""
+    flash_blocks: int = 190
+    """Size of the flash: what an STM32F4DISC's file system has for files."""
     speed: float = 0.0
     """Motions run at this multiple of real time; 0: as fast as they can."""
     edge_log: str | None = None

@@ -51,7 +51,7 @@ def stat(path):
 def statvfs(path):
     """Block size, fragment size, blocks, free blocks, …"""
     free = the.flash.free_blocks()
-    return (_flash.BLOCK, _flash.BLOCK, 190, free, free, 0, 0, 0, 0, 255)
+    return (_flash.BLOCK, _flash.BLOCK, the.flash.size, free, free, 0, 0, 0, 0, 255)
 
 
 def rename(old, new):

@@ -11,7 +11,6 @@ import os
 from simulator.reset import Reset
 
 BLOCK = 512
-_BLOCKS = 190
 _WRITE_MS = 1
 _CLOSE_MS = 60
 _POWER_ON = 1
@@ -20,13 +19,14 @@ _ENOENT, _EEXIST, _EISDIR, _ENOSPC = 2, 17, 21, 28
 
 
 class Flash:
-    """The folder ``root``; ``stall(ms)`` lets time pass while the flash is busy.
+    """The folder ``root`` of ``size`` blocks; ``stall(ms)`` lets time pass while the flash is busy.
 
     ``programs``: folders of the host that hold a program which is not deployed to the flash; read only.
     """
 
-    def __init__(self, root, programs, stall, cut_at=0):
+    def __init__(self, root, size, programs, stall, cut_at=0):
         self.root = root
+        self.size = size
         self._programs = programs
         self.cwd = "/flash"
         self.operations = 0
@@ -79,7 +79,7 @@ class Flash:
 
     def free_blocks(self):
         """Blocks that are free."""
-        return max(0, _BLOCKS + 1 - self.blocks(self.root))
+        return max(0, self.size + 1 - self.blocks(self.root))
 
     def open(self, path, mode="r", **options):
         """As the built-in ``open``."""

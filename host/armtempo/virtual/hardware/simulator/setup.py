@@ -21,7 +21,7 @@ def power_up(options, cause):
     the.pace = pace.Pace(board, the.serial, options["speed"])
     the.port = serial.USB_VCP()
     cut_at = options["power_cut_at"] if cause == _POWER_ON else 0
-    the.flash = flash.Flash(options["flash"], options["program"], _stall, cut_at)
+    the.flash = flash.Flash(options["flash"], options["flash_blocks"], options["program"], _stall, cut_at)
     faults.Faults(board, options["faults"])
     if options["edge_log"]:
         if the.edges is None:

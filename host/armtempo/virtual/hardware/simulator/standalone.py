@@ -16,6 +16,7 @@ from simulator.serial import Line
 
 DEFAULTS = {
     "flash": ".",
+    "flash_blocks": 190,
     "program": [],
     "speed": 0,
     "edge_log": None,
