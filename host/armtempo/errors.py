@@ -5,6 +5,7 @@
     ArmtempoError                exit code 1 unless a subclass says otherwise
     ├── InputError               the user's file, option or argument is wrong (exit code 2)
     ├── PlanError                no plan under these limits, or no posture for this pose
+    ├── MissingPackageError      an optional package is not installed
     ├── RunFolderError           a recorded run cannot be read or is not whole
     └── LinkError                the board cannot be reached or stopped answering
         └── BoardError           the board answered, and refused; carries its code
@@ -29,6 +30,10 @@ class InputError(ArmtempoError):
 
 class PlanError(ArmtempoError):
     """The input is well formed but has no solution, and the message says why."""
+
+
+class MissingPackageError(ArmtempoError):
+    """An optional package is needed for this and is not installed."""
 
 
 class RunFolderError(ArmtempoError):

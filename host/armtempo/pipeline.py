@@ -125,15 +125,19 @@ def repeat(
 
 
 def results(motion: Motion, repetition: Repetition) -> list[str]:
-    """What became of each joint, one line each: steps made, and how far the arm ended from the plan."""
+    """What became of each joint, one line each: steps sent, and how far the arm ended from the plan."""
     end_deg = motion.trajectory(motion.trajectory.duration_s)
     scales = record.scales(motion.arm)
-    lines = [f"{'joint':<12}{'steps':>10}{'angle':>12}{'error':>12}", f"{'':<22}{'deg':>12}{'deg':>12}"]
+    lines = [
+        f"{'joint':<12}{'steps sent':>10}{'angle':>12}{'error':>12}",
+        f"{'':<16}{'net':>6}{'deg':>12}{'deg':>12}",
+    ]
     for joint, scale in enumerate(scales):
         steps = repetition.commanded_steps[joint]
         angle_deg = steps / scale.steps_per_deg
         if scale.counts_per_deg:
             angle_deg = repetition.counts[joint] / scale.counts_per_deg
         error_deg = angle_deg - end_deg[joint]
-        lines.append(f"{scale.name:<12}{steps:>10}{angle_deg:>12.3f}{error_deg:>+12.4f}")
+        sent = steps - round(motion.start_deg[joint] * scale.steps_per_deg)
+        lines.append(f"{scale.name:<12}{sent:>10}{angle_deg:>12.3f}{error_deg:>+12.4f}")
     return lines

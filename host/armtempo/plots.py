@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from armtempo.analyse import Curves
 from armtempo.arm import Limits
-from armtempo.errors import ArmtempoError
+from armtempo.errors import MissingPackageError
 from armtempo.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -39,12 +39,12 @@ _POINTS = 600
 def new_figure(rows: int, columns: int, width: float, height: float) -> tuple[Figure, Any]:
     """A figure and its axes, an array (rows, columns).
 
-    Raises ArmtempoError where matplotlib is not installed.
+    Raises MissingPackageError where matplotlib is not installed.
     """
     try:
         from matplotlib.figure import Figure
     except ImportError:
-        raise ArmtempoError(
+        raise MissingPackageError(
             "figures need matplotlib, which is not installed; install it with: pip install 'armtempo[plot]'"
         ) from None
     figure = Figure(figsize=(width, height), layout="constrained")

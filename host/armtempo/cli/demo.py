@@ -23,6 +23,7 @@ def command(out: Path, port: str, log_traffic: Path | None) -> None:
     from armtempo import arm as arms
     from armtempo import job as jobs
     from armtempo import operate, pipeline, planner, report, summary
+    from armtempo.errors import MissingPackageError
 
     arm = arms.load_arm(arms.default_path())
     with Progress("planning") as progress:
@@ -33,4 +34,7 @@ def command(out: Path, port: str, log_traffic: Path | None) -> None:
     with options.board(port, log_traffic, arm) as board:
         operate.configure(board, arm, replace=True)
         folder = replay(board, port, motion, 1, out)
-    click.echo(f"report: {report.write(folder)}")
+    try:
+        click.echo(f"report: {report.write(folder)}")
+    except MissingPackageError as error:
+        click.echo(f"no report: {error}, then: armtempo report {folder}", err=True)
