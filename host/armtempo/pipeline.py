@@ -110,7 +110,8 @@ def repeat(
 ) -> Iterator[Repetition]:
     """Upload the motion and replay it ``times`` times, with the motion backwards in between.
 
-    ``watch`` sees each sample. Gives each repetition when it has ended; a fault or a stop request ends the series.
+    ``watch`` sees each sample. Gives each repetition when it has ended; a fault or a stop request ends the
+    series.
     """
     stored = operate.store(board, motion.name, motion.data)
     back = moves.backwards(motion.trajectory, operate.TEMPORARY + "back")
