@@ -1,8 +1,14 @@
 """``armtempo_board.replay("feed")``: one stored motion from the REPL, without a host."""
 
+from armtempo_shared import codes
+from micropython import const
+
 from armtempo_board import evaluator, program
 from armtempo_board.app import App
 from armtempo_board.refusal import Refused
+from armtempo_board.watchdog import Watchdog
+
+_NO_JOINT = const(255)
 
 
 class _Nobody:
@@ -19,19 +25,22 @@ def replay(name="", root=program.ROOT):
     """Run a stored trajectory, the default where no name is given, and say how it ended.
 
     Where the position is unknown the arm must stand where the motion begins: calling this declares it.
-    Ctrl-C brakes, a second one freezes. A refusal is printed with its code, see ``armtempo_shared/codes.py``.
+    Ctrl-C brakes, a second one freezes.
     """
     app = program.app or App(_Nobody(), root)
     program.app = app
     port, app.link.stream = app.link.stream, _Nobody()
+    watchdog = Watchdog()
     try:
         _begin(app, name or app.store.default())
-        _follow(app)
+        _follow(app, watchdog)
         steps = [app.engine.commanded(joint) for joint in range(app.joints)]
-        print("fault %d," % app.fault() if app.fault() else "done,", "joints at", steps, "steps")
+        print("fault: " + _name(app.fault()) if app.fault() else "done", "at steps", steps)
     except Refused as refused:
-        print("refused, error", refused.code, "joint", refused.joint + 1, refused.value)
+        where = "" if refused.joint == _NO_JOINT else "joint %d" % (refused.joint + 1)
+        print("refused:", _name(refused.code), where, refused.value or "")
     finally:
+        watchdog.leave()
         app.link.stream = port
 
 
@@ -46,12 +55,21 @@ def _begin(app, name):
     app.begin(name, 0)
 
 
-def _follow(app):
+def _follow(app, watchdog):
     presses = 0
     while app.moving():
         try:
             app.turn()
+            watchdog.feed()
         except KeyboardInterrupt:
             app.stop(presses)
             presses = 1
     app.turn()
+
+
+def _name(code):
+    """Of a refusal or fault, as in ``codes``."""
+    for name in dir(codes):
+        if getattr(codes, name) == code:
+            return name.lower()
+    return str(code)

@@ -6,6 +6,10 @@ from simulator import standalone
 
 standalone.start(flash=sys.argv[1], program=sys.path[:])
 
+from armtempo_board import pins  # noqa: E402
+from simulator import setup  # noqa: E402
+
+setup.connect(pins)
 import armtempo_board  # noqa: E402
 
 armtempo_board.replay(sys.argv[2])
