@@ -69,9 +69,9 @@ def quotients(angle: Array, time: Array) -> tuple[Array, Array]:
 
     With ' = d/du: q' / t', (q'' t' - q' t'') / t'^3 =: a / t'^3, (a' t' - 3 a t'') / t'^5.
     """
-    q = bernstein.from_power(angle)
-    t = bernstein.from_power(np.broadcast_to(time, angle.shape))
-    q1, t1 = bernstein.derivative(q), bernstein.derivative(t)
+    powers = np.arange(1, angle.shape[-1])
+    q1 = bernstein.from_power(angle[..., 1:] * powers)
+    t1 = bernstein.from_power(np.broadcast_to(time, angle.shape)[..., 1:] * powers)
     q2, t2 = bernstein.derivative(q1), bernstein.derivative(t1)
     multiply = bernstein.multiply
     a = multiply(q2, t1) - multiply(q1, t2)

@@ -76,7 +76,10 @@ def polynomials(control_points: Array, degree: int) -> Array:
     ``control_points``: (n + degree, ...). Returns (n, degree + 1, ...).
     """
     windows = np.lib.stride_tricks.sliding_window_view(control_points, degree + 1, axis=0)
-    return np.asarray(np.einsum("pc,s...c->sp...", basis(degree), windows))
+    middle = windows[..., degree // 2]
+    pieces = np.einsum("pc,s...c->sp...", basis(degree), windows - middle[..., None])
+    pieces[:, 0] += middle  # apart, so that a small motion far from zero keeps its digits
+    return np.asarray(pieces)
 
 
 def subdivide(coefficients: Array, parts: int) -> Array:

@@ -59,7 +59,7 @@ def _problem(entry: dict[str, Any]) -> Problem:
 
 
 def random_problem(seed: int) -> tuple[Arm, Job]:
-    """A job of any size from any corner: repeats, reversals, straight lines, tiny and huge, tight and loose."""
+    """A job from any corner: repeats, reversals, straight lines, tiny and huge, tight and loose."""
     rng = np.random.default_rng(seed)
     joints = int(rng.choice([1, 1, 2, 2, 3, 6]))
     count = int(rng.choice([2, 3, 4, 5, 7, 12]))

