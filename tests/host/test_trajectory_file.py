@@ -1,0 +1,147 @@
+"""The trajectory file: whole, repeatable, and refused where it is not what it should be."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from armtempo import arm as arms
+from armtempo import job as jobs
+from armtempo import planner, trajectory_file
+from armtempo.errors import InputError
+from armtempo.job import Pose
+from armtempo.plan import Plan
+
+ARM = arms.load_arm(arms.default_path())
+JOB = replace(
+    jobs.load_job(jobs.default_path(), ARM), iterations=20, parameters={"a": 0.5, "variant": "paper"}
+)
+
+
+@pytest.fixture(scope="module")
+def plan() -> Plan:
+    return planner.plan(ARM, JOB)
+
+
+@pytest.fixture
+def path(plan: Plan, tmp_path: Path) -> Path:
+    trajectory_file.save(plan, tmp_path / "feed.json")
+    return tmp_path / "feed.json"
+
+
+def test_comes_back_to_the_last_bit(plan: Plan, path: Path) -> None:
+    loaded = trajectory_file.load(path)
+    assert loaded.arm == plan.arm
+    assert loaded.job == plan.job
+    assert loaded.versions == plan.versions
+    assert loaded.extremes == plan.extremes
+    for one, two in zip(loaded.trajectory.joints, plan.trajectory.joints, strict=True):
+        assert np.array_equal(one.angle_points_deg, two.angle_points_deg)
+        assert np.array_equal(one.time_points_s, two.time_points_s)
+    again = path.with_name("again.json")
+    trajectory_file.save(loaded, again)
+    assert again.read_bytes() == path.read_bytes()
+
+
+def test_is_enough_to_plan_again(path: Path) -> None:
+    loaded = trajectory_file.load(path)
+    again = planner.plan(loaded.arm, loaded.job)
+    for one, two in zip(loaded.trajectory.joints, again.trajectory.joints, strict=True):
+        assert np.array_equal(one.time_points_s, two.time_points_s)
+
+
+def test_keeps_poses(plan: Plan, tmp_path: Path) -> None:
+    pose = Pose(
+        ((1.0, 0.0, 0.0, 5.0), (0.0, 1.0, 0.0, 6.0), (0.0, 0.0, 1.0, 7.0), (0.0, 0.0, 0.0, 1.0)), None
+    )
+    posed = replace(plan, job=replace(plan.job, via=(plan.job.via[0], pose)))
+    trajectory_file.save(posed, tmp_path / "posed.json")
+    assert trajectory_file.load(tmp_path / "posed.json").job == posed.job
+
+
+def test_refuses_every_cut_of_the_file(path: Path, tmp_path: Path) -> None:
+    content = path.read_bytes().rstrip()
+    cut = tmp_path / "cut.json"
+    for length in [0, 1, 10, len(content) // 2, len(content) - 2, len(content) - 1]:
+        cut.write_bytes(content[:length])
+        with pytest.raises(InputError, match=r"cut\.json"):
+            trajectory_file.load(cut)
+
+
+def edited(path: Path, edit: Callable[[Any], None]) -> Path:
+    """The file with its content changed."""
+    content = json.loads(path.read_text(encoding="utf-8"))
+    edit(content)
+    path.write_text(json.dumps(content), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("edit", "message"),
+    [
+        (lambda c: c.update(format="gcode"), "not a trajectory file"),
+        (lambda c: c.update(version=2), "version 2"),
+        (lambda c: c.update(extra=1), "unknown or missing key"),
+        (lambda c: c["plan"].update(colour="red"), "plan: unknown key colour"),
+        (lambda c: c["plan"]["job"].pop("seed"), "plan.job: missing key seed"),
+        (lambda c: c["plan"]["job"].update(seed="one"), "plan.job.seed"),
+        (lambda c: c["plan"]["job"].update(seed=True), "plan.job.seed"),
+        (lambda c: c["plan"]["job"].update(polish=1), "plan.job.polish"),
+        (lambda c: c["plan"]["arm"]["joints"][0]["limits"].update(speed_deg_s="50"), "limits"),
+        (lambda c: c["plan"]["arm"]["joints"][0].update(range_deg=[1.0, 2.0, 3.0]), "range_deg"),
+        (lambda c: c["plan"]["trajectory"]["joints"].pop(), "2 joints in the trajectory"),
+        (lambda c: c["plan"]["trajectory"]["joints"][1]["time_points_s"].reverse(), "do not increase"),
+        (lambda c: c["plan"]["trajectory"]["joints"][1]["time_points_s"].pop(), "10 time control points"),
+        (
+            lambda c: c["plan"]["trajectory"]["joints"][2]["angle_points_deg"].append(1.0),
+            "12 angle control points",
+        ),
+        (lambda c: c["plan"]["trajectory"]["joints"][2].update(degree=4), "degree 4"),
+        (lambda c: c["plan"]["trajectory"]["joints"][2].update(refine=0), "refine 0"),
+        (lambda c: c["plan"].update(via_deg=[[1.0, 2.0], [3.0]]), "differ in length"),
+        (lambda c: c["plan"].update(via_deg=["a"]), "finite numbers"),
+        (lambda c: c["plan"].update(searches={}), "should be a list"),
+    ],
+)
+def test_refuses_what_it_does_not_understand(path: Path, edit: Callable[[Any], None], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        trajectory_file.load(edited(path, edit))
+
+
+@pytest.mark.parametrize("text", ["[]", "1", "null", '{"format": NaN}', "[" * 100_000, "\xff"])
+def test_refuses_what_is_no_trajectory(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "other.json"
+    path.write_bytes(text.encode("latin-1"))
+    with pytest.raises(InputError, match=r"other\.json"):
+        trajectory_file.load(path)
+
+
+def test_refuses_a_missing_file_and_a_folder(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        trajectory_file.load(tmp_path / "none.json")
+    with pytest.raises(InputError, match="cannot be read"):
+        trajectory_file.load(tmp_path)
+
+
+def test_writes_whole_or_not_at_all(plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    target = tmp_path / "feed.json"
+    target.write_text("old")
+
+    def broken(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.replace", broken)
+    with pytest.raises(InputError, match="No space left"):
+        trajectory_file.save(plan, target)
+    assert target.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_says_where_it_cannot_write(plan: Plan, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot be written"):
+        trajectory_file.save(plan, tmp_path / "none" / "feed.json")
