@@ -1,0 +1,83 @@
+"""``armtempo plan``: what it prints, writes and refuses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from armtempo import trajectory_file
+from armtempo.cli import main
+from click.testing import CliRunner, Result
+
+POINT_TO_POINT = """
+name = "move"
+via_deg = [[0.0, -60.0, 40.0], [20.0, -75.0, 50.0]]
+iterations = 10
+"""
+
+
+def run(*arguments: str) -> Result:
+    """The command's outcome."""
+    return CliRunner().invoke(main, ["plan", *arguments])
+
+
+@pytest.fixture(autouse=True)
+def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("move.toml").write_text(POINT_TO_POINT)
+
+
+def test_plans_the_shipped_job_without_options() -> None:
+    result = run("--iterations", "20")
+    assert result.exit_code == 0, result.output
+    assert "joint 3" in result.output
+    assert "written: feed.json" in result.output
+    assert trajectory_file.load("feed.json").job.iterations == 20
+
+
+def test_options_go_before_the_file() -> None:
+    result = run(
+        "--job",
+        "move.toml",
+        "-o",
+        "out.json",
+        "--timing",
+        "shared",
+        "--degree",
+        "3",
+        "--seed",
+        "5",
+        "--polish",
+    )
+    assert result.exit_code == 0, result.output
+    plan = trajectory_file.load("out.json")
+    assert (plan.job.timing, plan.job.degree, plan.job.seed, plan.job.polish) == ("shared", 3, 5, True)
+    assert plan.trajectory.shared
+    assert plan.searches[0].optimum_s > 0
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("via_deg = [[0.0, -60.0, 40.0]]", "2"),
+        ("via_deg = [[0.0, -60.0, nan], [1.0, -60.0, 40.0]]", "nan"),
+        ("via_deg = [[0.0, -60.0, 40.0], [500.0, -75.0, 50.0]]", "500"),
+        ("colour = 'red'", "colour"),
+    ],
+)
+def test_says_what_is_wrong_with_a_job(change: str, message: str) -> None:
+    lines = [line for line in POINT_TO_POINT.splitlines() if not line.startswith(change.split(" =")[0])]
+    Path("wrong.toml").write_text("\n".join([*lines, change]))
+    result = run("--job", "wrong.toml")
+    assert result.exit_code == 2
+    assert "wrong.toml" in result.output
+    assert message in result.output
+    assert "Traceback" not in result.output
+    assert not Path("move.json").exists()
+
+
+def test_says_why_there_is_no_plan() -> None:
+    Path("still.toml").write_text('name = "still"\nvia_deg = [[1.0, -60.0, 40.0], [1.0, -60.0, 40.0]]\n')
+    result = run("--job", "still.toml")
+    assert result.exit_code == 1
+    assert "nothing moves" in result.output
