@@ -16,7 +16,7 @@ EXPONENT = 5
 DELAY = 6  # while braking: whole ticks to be added to the time, and the rate of time
 RATE = 7
 NODE_SIZE = 8
-_ONE = const(1 << 15)
+_HALF = const(1 << 14)
 _LOW = const((1 << 15) - 1)
 
 
@@ -24,15 +24,14 @@ _LOW = const((1 << 15) - 1)
 def solve(cell: ptr32, node: ptr32, target: int):
     """Set ``node`` to where the (rising) angle equals ``target``; Newton starts at the node's own w.
 
-    Each step leaves at most the square of the relative error; the last one starts below 2**-14.
-    Products are made of 15-bit halves: nothing exceeds 31 bits.
+    Each round leaves at most the square of the relative error; the last one starts below 2**-14. Products are
+    made of 15-bit halves: nothing exceeds 31 bits.
     """
     bias = 1 << 29
     bias += bias
     w = node[0]
-    last = 0
     rounds = 0
-    while True:
+    while rounds < 12:
         wh = w >> 15
         wl = w & _LOW
         angle = cell[4] - bias
@@ -40,44 +39,47 @@ def solve(cell: ptr32, node: ptr32, target: int):
         i = 3
         while i >= 0:
             h = angle >> 15
-            angle = h * wh + (((angle & _LOW) * wh + (1 << 14)) >> 15) + ((h * wl) >> 15) + cell[i] - bias
+            angle = h * wh + (((angle & _LOW) * wh + _HALF) >> 15) + ((h * wl) >> 15) + cell[i] - bias
             h = rate >> 15
             rate = h * wh + (((rate & _LOW) * wh) >> 15) + ((h * wl) >> 15) + cell[i + 5] - bias
             i -= 1
-        if last:
-            break
         h = angle >> 15
-        angle = h * wh + (((angle & _LOW) * wh + (1 << 14)) >> 15) + ((h * wl) >> 15)
+        angle = h * wh + (((angle & _LOW) * wh + _HALF) >> 15) + ((h * wl) >> 15)
         rest = target - angle
         slope = rate * 5
         while slope < (1 << 27):
             slope <<= 1
             rest <<= 1
-        h = slope >> 14
         rounds += 1
-        if (rest < h and rest > 0 - h) or rounds == 12:
-            last = 1
+        h = slope >> 14
+        if rest < h and rest > 0 - h:
+            rounds = 12
             w += ((rest << 12) // (slope >> 15)) << 3
         else:
             w += (rest // (slope >> 15)) << 15
         if w < 0:
             w = 0
-        if w > bias:
-            w = bias
+        if w >= bias:
+            w = bias - 1  # still a small integer
+    wh = w >> 15
+    wl = w & _LOW
+    rate = cell[9] - bias
     time = cell[14] - bias
-    h = cell[19] - bias
-    i = 13
-    while i >= 10:
-        angle = time >> 15
-        time = angle * wh + (((time & _LOW) * wh + (1 << 14)) >> 15) + ((angle * wl) >> 15) + cell[i] - bias
-        angle = h >> 15
-        h = angle * wh + (((h & _LOW) * wh) >> 15) + ((angle * wl) >> 15) + cell[i + 5] - bias
+    rest = cell[19] - bias
+    i = 3
+    while i >= 0:
+        h = rate >> 15
+        rate = h * wh + (((rate & _LOW) * wh) >> 15) + ((h * wl) >> 15) + cell[i + 5] - bias
+        h = time >> 15
+        time = h * wh + (((time & _LOW) * wh + _HALF) >> 15) + ((h * wl) >> 15) + cell[i + 10] - bias
+        h = rest >> 15
+        rest = h * wh + (((rest & _LOW) * wh) >> 15) + ((h * wl) >> 15) + cell[i + 15] - bias
         i -= 1
-    angle = time >> 15
+    h = time >> 15
     node[0] = w
-    node[1] = angle * wh + (((time & _LOW) * wh + (1 << 14)) >> 15) + ((angle * wl) >> 15)
+    node[1] = h * wh + (((time & _LOW) * wh + _HALF) >> 15) + ((h * wl) >> 15)
     node[2] = rate
-    node[3] = h
+    node[3] = rest
 
 
 @micropython.viper

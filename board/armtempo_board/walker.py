@@ -11,6 +11,7 @@ _LARGEST_POWER = const(10)
 _SMALLEST_POWER = const(2)
 _DEVIATION = const(4)  # half ticks: the Hermite cubic over two stretches may miss the middle node by 2 ticks,
 # so that each half is 16 times better by the h**4 law, with a factor of four to spare
+_WHOLE = const((1 << 30) - 1)  # w at a cell's end
 _FAR = const(1000)  # 4096 ticks: longer than any gap
 _LONG = const(1 << 19)  # 1024 ticks: longer than any stretch
 _NEVER = const(1 << 28)  # in 1024 ticks: 54 minutes
@@ -180,6 +181,7 @@ class Walker:
             total += walk.angle_local[i] - cell.DIFFERENCE_BIAS
         self._range = total * heading
         self._a[crossing.W] = 0
+        self._pace = _WHOLE // self._count  # about what a step adds to w
 
     def _solve(self, node, index, guess):
         """Set a node to the cell's step ``index``, its time in ticks * 2**TIME_SCALE from the high word on.
@@ -214,10 +216,15 @@ class Walker:
 
     def _step(self):
         """Solve the next step by itself; False where braking ends before it."""
-        comes = self._solve(self._a, self._index, self._a[crossing.W])
+        comes = self._solve(self._a, self._index, self._ahead(0))
         self._index += 1
         self.ended = not comes
         return comes
+
+    def _ahead(self, power):
+        """About where 2**power steps on from node a lie; in quarters, to stay a small integer."""
+        quarter = (self._a[crossing.W] >> 2) + (self._pace >> 2 << power)
+        return (quarter if quarter < _WHOLE >> 2 else _WHOLE >> 2) << 2
 
     def _first(self):
         """The first step of a cell, against the one that was held back before it."""
@@ -286,10 +293,12 @@ class Walker:
             power -= 1
         self._slope(self._a)
         here = self._index - 1
-        comes = self._solve(self._b, here + (2 << power), self._a[crossing.W])
+        start = self._a[crossing.W]
+        comes = self._solve(self._b, here + (2 << power), self._ahead(power + 1))
+        self._pace = (self._b[crossing.W] - start) >> power + 1
         self._slope(self._b)
         while power >= _SMALLEST_POWER:
-            if self._solve(self._middle, here + (1 << power), self._a[crossing.W]):
+            if self._solve(self._middle, here + (1 << power), (start >> 1) + (self._b[crossing.W] >> 1)):
                 self._slope(self._middle)
                 if comes and self._level() and self._accept(power):
                     self._halves = 2
