@@ -298,7 +298,7 @@ def serve(block: ptr32, timer: ptr32, port: ptr32) -> int:
 
 @micropython.viper
 def take(raw: ptr32, block: ptr32, dma: ptr32, encoders):
-    """Store a raw sample and find the time of the next. About 250 instructions, 30 a joint, 100 an encoder."""
+    """Store a raw sample and find the time of the next. 250 instructions, 30 a joint, 100 an encoder."""
     taken = block[TAKEN]
     if ((taken - block[READ]) & 0xFF) >= RAW_ROOM:
         block[LOST] += 1

@@ -9,11 +9,11 @@ from armtempo_board import access, pins, registers
 class Encoder:
     """One encoder input. ``inverted``: it counts down when the joint's angle grows.
 
-    A reading is right while the encoder moves less than 32 768 counts between two of them: at a million counts a
-    second, one every 32 ms.
+    A reading is right while the encoder moves less than 32 768 counts between two of them: one every 32 ms at
+    a million counts a second.
     """
 
-    def __init__(self, channel, inverted):
+    def __init__(self, channel: int, inverted: int) -> None:
         timer, first, second, alternate = pins.ENCODER[channel]
         for name in (first, second):
             Pin(name, Pin.AF_PP, pull=Pin.PULL_UP, alt=alternate)
@@ -23,11 +23,11 @@ class Encoder:
         self._inverted = inverted
         self._last = access.read_counter(self.address)
 
-    def update(self):
+    def update(self) -> None:
         """Read the counter."""
         self.take(access.read_counter(self.address))
 
-    def take(self, counter):
+    def take(self, counter: int) -> None:
         """Go on to a reading of the counter; readings come in their order."""
         moved = (counter - self._last) & 0xFFFF
         if moved >= 0x8000:
@@ -35,7 +35,7 @@ class Encoder:
         self._last = counter
         self.counts += -moved if self._inverted else moved
 
-    def declare(self, counts):
+    def declare(self, counts: int) -> None:
         """The encoder stands at ``counts``."""
         self.update()
         self.counts = counts
@@ -46,11 +46,11 @@ class NoEncoder:
 
     counts = 0
 
-    def update(self):
+    def update(self) -> None:
         """Nothing to read."""
 
-    def take(self, counter):
+    def take(self, counter: int) -> None:
         """Nothing to count."""
 
-    def declare(self, counts):
+    def declare(self, counts: int) -> None:
         """Nothing to declare."""

@@ -4,9 +4,10 @@ import struct
 
 from armtempo_shared.basis import BASIS, FACTORIAL
 from armtempo_shared.limits import STEP_FRACTION_BITS, TICK_FRACTION_BITS
+from armtempo_shared.motion import Motion
 
 
-def _node(motion, offset, node):
+def _node(motion: Motion, offset: int, node: int) -> "tuple[int, int]":
     """(numerator, denominator) of a spline at the start of its segment ``node``, Eq. (15) at u = 0."""
     degree = motion.degree
     points = struct.unpack_from("<%dq" % degree, motion.data, offset + 8 * node)
@@ -14,7 +15,7 @@ def _node(motion, offset, node):
     return sum([weights[i] * points[i] for i in range(degree)]), FACTORIAL[degree]
 
 
-def duration_ticks(motion):
+def duration_ticks(motion: Motion) -> int:
     """Time at which the last joint is done, in whole ticks, rounded up."""
     longest = 0
     for joint in range(1 if motion.shared else motion.joints):
@@ -23,7 +24,7 @@ def duration_ticks(motion):
     return longest
 
 
-def start_offset(motion, joint, position_steps):
+def start_offset(motion: Motion, joint: int, position_steps: int) -> int:
     """0 where the joint stands at the motion's start, else how many steps the start is away (not 0).
 
     Within half a step and 1/64 counts as standing there: the walker takes it from that.

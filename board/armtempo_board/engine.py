@@ -1,7 +1,7 @@
 """The hardware side of a motion: from its splines to the pins, and back to samples.
 
-``load`` checks a motion and fills the rings, ``start`` lets the counters run, ``service`` keeps the rings filled
-(call it every few hundred microseconds), until ``moving`` is False. Then ``fault`` says why it ended.
+``load`` checks a motion and fills the rings, ``start`` lets the counters run, ``service`` keeps the rings
+filled (call it every few hundred microseconds), until ``moving`` is False. Then ``fault`` says why it ended.
 After any stop ``commanded`` is exact for every joint whose bit in ``known`` is set:
 
 =====================  =============================================================
@@ -16,10 +16,12 @@ DIR turned too late    unknown for all joints
 
 import gc
 import time
+from array import array
 
 import stm
 from armtempo_shared import armrecord, codes
 from armtempo_shared.limits import TICK_HZ
+from armtempo_shared.motion import Motion
 from machine import mem32
 from micropython import const
 
@@ -43,7 +45,7 @@ _PULSE_SPARE_US = const(5)
 class Engine:
     """``head`` and ``joints`` as ``armrecord.unpack`` gives them. Nothing moves, drivers are off."""
 
-    def __init__(self, head, joints):
+    def __init__(self, head: "dict[str, int]", joints: "list[dict[str, int]]") -> None:
         rows = [row for row in joints if row["encoder"] != armrecord.NONE]
         fitted = [Encoder(row["encoder"], row["encoder_inverted"]) for row in rows]
         self._sampler = Sampler(len(joints), tuple([encoder.address for encoder in fitted]))
@@ -74,7 +76,7 @@ class Engine:
 
     # before a motion
 
-    def home(self, mask, steps):
+    def home(self, mask: int, steps: "list[int]") -> None:
         """The joints of ``mask`` stand at ``steps`` (one number for every joint)."""
         for number, joint in enumerate(self._joints):
             if mask >> number & 1:
@@ -82,7 +84,7 @@ class Engine:
                 self._encoders[number].declare(self._following[number].expected(steps[number]))
         self.known |= mask
 
-    def load(self, motion):
+    def load(self, motion: Motion) -> "tuple[int, int, int] | None":
         """Check a motion and fill the rings; None, or (code, joint, value) where it is refused."""
         refused = self._refusal(motion)
         if refused:
@@ -101,7 +103,7 @@ class Engine:
         self.finished = False
         return None
 
-    def _refusal(self, motion):
+    def _refusal(self, motion: Motion) -> "tuple[int, int, int] | None":
         if self.moving:
             return codes.BUSY, NO_JOINT, 0
         self._look()
@@ -119,12 +121,12 @@ class Engine:
                 return codes.WRONG_START, number, off
         return None
 
-    def _prefill(self, joint):
+    def _prefill(self, joint: Joint) -> None:
         now_k = self._clock()
         for _ in range(_PREFILLS):
             joint.serve(now_k)
 
-    def start(self, homing=False):
+    def start(self, homing: bool = False) -> None:
         """Let the counters run. ``homing``: a limit switch ends the motion without a fault."""
         gc.collect()
         self._homing = homing
@@ -139,7 +141,7 @@ class Engine:
 
     # while it moves
 
-    def service(self):
+    def service(self) -> None:
         """Refill the rings, convert samples, look for faults."""
         if not self.moving:
             self._look()
@@ -156,7 +158,7 @@ class Engine:
         elif self._over():
             self._finish()
 
-    def _serve(self):
+    def _serve(self) -> bool:
         """Refill all rings; False where that ended the motion."""
         now_k = self._clock()
         self._readings.convert(self._epoch, self._low)
@@ -170,13 +172,13 @@ class Engine:
                 return False
         return True
 
-    def _over(self):
+    def _over(self) -> bool:
         for joint in self._joints:
             if not joint.over:
                 return False
         return self._sampler.done()
 
-    def _follow(self):
+    def _follow(self) -> None:
         """Compare one joint with its encoder; the next joint comes with the next call."""
         number = self._watched
         self._watched = (number + 1) % len(self._joints)
@@ -189,7 +191,7 @@ class Engine:
             self.known &= ~(1 << number)
             self._fail(codes.FOLLOWING, number)
 
-    def _look(self):
+    def _look(self) -> None:
         """While nothing moves: follow the encoders; the E-stop counts here too."""
         for encoder in self._encoders:
             encoder.update()
@@ -198,16 +200,16 @@ class Engine:
         if self._block[access.FAULT] and not self.fault:
             self._note_fault()
 
-    def freeze(self):
+    def freeze(self) -> None:
         """Stop all outputs now; not a fault."""
         self._inputs.freeze()
         if self.moving:
             self._stopped()
 
-    def brake(self):
-        """Come to rest along the path, within the motion's own limits; freeze where it was not planned for that.
+    def brake(self) -> None:
+        """Come to rest along the path within the motion's own limits; freeze where that was not planned for.
 
-        Braking begins behind what is in the rings, about 75 ms from now. A motion that is over by then just ends.
+        Braking begins behind what is in the rings, about 75 ms from now. A motion that is over by then ends.
         """
         if not self.moving or self._braked:
             return
@@ -221,7 +223,7 @@ class Engine:
         if start_k << 10 < self.duration_ticks:
             self._brake_at(start_k << 10)
 
-    def _brake_at(self, start_ticks):
+    def _brake_at(self, start_ticks: int) -> None:
         self._braked = self._end_moves = True
         self.duration_ticks = self._end_ticks = start_ticks + self._brake_ticks
         for joint in self._joints:
@@ -229,14 +231,14 @@ class Engine:
             if not self._serve():
                 break
 
-    def _fail(self, code, joint):
+    def _fail(self, code: int, joint: int) -> None:
         self._inputs.freeze()
         access.trip(self._block, code, joint)
         self._stopped()
 
     # after it
 
-    def _stopped(self):
+    def _stopped(self) -> None:
         """The outputs were frozen: let begun pulses end, then count."""
         time.sleep_us(self._pulse_us)
         self._stop_counters()
@@ -257,13 +259,13 @@ class Engine:
             self._note_fault()
         self._finish()
 
-    def _note_fault(self):
+    def _note_fault(self) -> None:
         self.fault = self._block[access.FAULT]
         self.fault_joint = self._block[access.FAULT_JOINT]
         if self.fault == codes.ESTOP and self._inputs.releases:
             self.known = 0
 
-    def _finish(self):
+    def _finish(self) -> None:
         self._stop_counters()
         for number, joint in enumerate(self._joints):
             joint.rest()
@@ -271,12 +273,12 @@ class Engine:
         self.moving = False
         self.finished = True
 
-    def _stop_counters(self):
+    def _stop_counters(self) -> None:
         mem32[stm.TIM2 + 4 * access.DIER] = 0
         mem32[stm.TIM2 + 4 * access.CR1] = 0
         mem32[stm.TIM5 + 4 * access.CR1] = 0
 
-    def clear(self):
+    def clear(self) -> bool:
         """Clear the fault, unless its cause is still there; True where it is cleared."""
         if self.moving or self._inputs.estop_active():
             return False
@@ -285,24 +287,24 @@ class Engine:
         self.fault_joint = NO_JOINT
         return True
 
-    def close(self):
+    def close(self) -> None:
         """Let go of the hardware; the rings may be forgotten after it."""
         self.freeze()
         self._inputs.close()
 
     # what it knows
 
-    def commanded(self, joint):
+    def commanded(self, joint: int) -> int:
         """Steps issued so far, as a position."""
         while self._joints[joint].ring.left() < 0:
             self._readings.convert(self._epoch, self._low)
         return self._joints[joint].position()
 
-    def next_sample(self, buffer):
-        """Copy the oldest sample to ``buffer``: ticks (low, high word), commanded[], counts[]; False: none."""
+    def next_sample(self, buffer: "array[int]") -> bool:
+        """Copy the oldest sample to ``buffer``: ticks (low, high), commanded[], counts[]; False: none."""
         return self._readings.next(buffer)
 
-    def snapshot(self, buffer):
+    def snapshot(self, buffer: "array[int]") -> None:
         """The same as a sample, of this moment; after a motion with the time at which it ended."""
         ticks = self._end_ticks if self.finished else max(self.motion_ticks(), 0)
         low = ticks & 0xFFFFFFFF
@@ -314,18 +316,18 @@ class Engine:
             self._encoders[number].update()
             buffer[2 + count + number] = self._encoders[number].counts
 
-    def motion_ticks(self):
+    def motion_ticks(self) -> int:
         """The motion clock, 64 bits; negative before time 0."""
         counter = mem32[stm.TIM2 + 4 * access.CNT] & 0xFFFFFFFF
         epoch = self._epoch + (1 if counter >> 10 < self._low else 0)
         return (epoch << 32) + counter
 
-    def _set_clock(self, ticks):
+    def _set_clock(self, ticks: int) -> None:
         registers.set_counters(ticks & 0xFFFFFFFF)
         self._epoch = ticks >> 32
         self._low = access.clock_k(stm.TIM2)
 
-    def _clock(self):
+    def _clock(self) -> int:
         """The motion clock in units of 1024 ticks: a small integer."""
         low = access.clock_k(stm.TIM2)
         if low < self._low:

@@ -6,25 +6,25 @@ from armtempo_shared import armrecord
 class Following:
     """``row``: the joint's part of the arm record."""
 
-    def __init__(self, row):
+    def __init__(self, row: "dict[str, int]") -> None:
         numerator, denominator = row["counts_num"], row["counts_den"]
         common = _common_divisor(abs(numerator), denominator) or 1
         self._numerator = numerator // common
         self._denominator = (denominator // common) or 1
         self.limit = 0 if row["encoder"] == armrecord.NONE else row["following_counts"]
 
-    def expected(self, steps):
+    def expected(self, steps: int) -> int:
         """Counts that belong to a commanded position; small parts, so that nothing is allocated."""
         whole = steps // self._denominator
         part = steps - whole * self._denominator
         return whole * self._numerator + part * self._numerator // self._denominator
 
-    def lost(self, steps, counts):
+    def lost(self, steps: int, counts: int) -> bool:
         """Whether the joint is further from its command than the arm file allows."""
         return self.limit > 0 and abs(counts - self.expected(steps)) > self.limit
 
 
-def _common_divisor(a, b):
+def _common_divisor(a: int, b: int) -> int:
     while b:
         a, b = b, a % b
     return a

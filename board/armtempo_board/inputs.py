@@ -14,14 +14,18 @@ from micropython import const
 from pyb import ExtInt, Pin
 
 from armtempo_board import access, pins, registers
+from armtempo_board.sampler import Sampler
 
 _NOBODY = const(255)
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 
 class Inputs:
     """``sampler`` lends its block; ``head`` and ``joints`` are the arm record's."""
 
-    def __init__(self, head, joints, sampler):
+    def __init__(self, head: "dict[str, int]", joints: "list[dict[str, int]]", sampler: Sampler) -> None:
         flags = head["flags"]
         self._block = sampler.block
         self._timer2, self._timer5, self._port = stm.TIM2, stm.TIM5, stm.GPIOE
@@ -30,7 +34,7 @@ class Inputs:
         self.enable_pin = Pin(pins.ENABLE, Pin.OUT_PP, value=1 - self._on)
         self.releases = bool(flags & armrecord.FLAG_ESTOP_RELEASES)
         self._estop = None
-        self._limits = []  # (pin, level when tripped, line)
+        self._limits: "list[tuple[Pin, int, int]]" = []  # pin, level when tripped, line
         self._joints = joints
         self._pairs = array("I", bytearray(4 * access.PAIR_WORDS * 2 * len(joints)))
         self._count = 0
@@ -40,7 +44,7 @@ class Inputs:
         self._add_limits()
         registers.apply(registers.PRIORITIES)
 
-    def _hook(self, name, level, callback):
+    def _hook(self, name: str, level: int, callback: "Callable[[int], None]") -> Pin:
         mode = ExtInt.IRQ_RISING if level else ExtInt.IRQ_FALLING
         pull = Pin.PULL_UP if level else Pin.PULL_DOWN
         pin = Pin(name, Pin.IN, pull=pull)
@@ -48,7 +52,7 @@ class Inputs:
         ExtInt(pin, mode, pull, callback)
         return pin
 
-    def _add_limits(self):
+    def _add_limits(self) -> None:
         fitted = {}
         for number, joint in enumerate(self._joints):
             for side, positive in (("limit_low", 0), ("limit_high", 1)):
@@ -61,7 +65,7 @@ class Inputs:
             pin = self._hook(pins.LIMIT[switch], level, self._on_limit)
             self._limits.append((pin, level, int(pins.LIMIT[switch][1:])))
 
-    def _add_pair(self, number, joint, line, positive):
+    def _add_pair(self, number: int, joint: "dict[str, int]", line: int, positive: int) -> None:
         at = access.PAIR_WORDS * self._count
         direction = int(pins.STEP[joint["channel"]][6][1:])
         for word, value in enumerate((line, direction, positive ^ joint["dir_inverted"], number, 0)):
@@ -87,37 +91,37 @@ class Inputs:
             self._freeze()
             access.trip(self._block, codes.LIMIT_SWITCH, joint - 1)
 
-    def trip_estop(self):
+    def trip_estop(self) -> None:
         """As the E-stop's interrupt does."""
         self._on_estop(None)
 
-    def freeze(self):
+    def freeze(self) -> None:
         """Stop all outputs now."""
         before = disable_irq()
         self._freeze()
         enable_irq(before)
 
-    def poll(self):
+    def poll(self) -> None:
         """What the interrupts would have missed: a switch that was tripped before the joint turned to it."""
         for pin, level, line in self._limits:
             if pin.value() == level:
                 self._on_limit(line)
 
-    def watch(self, joint, moves):
+    def watch(self, joint: int, moves: int) -> None:
         """Whether the joint moves: a switch stops it only then."""
         for pair in range(self._count):
             if self._pairs[access.PAIR_WORDS * pair + 3] == joint:
                 self._pairs[access.PAIR_WORDS * pair + 4] = moves
 
-    def estop_active(self):
+    def estop_active(self) -> bool:
         """Whether the E-stop is tripped at this moment."""
         return self._estop is not None and self._estop.value() == self._estop_level
 
-    def enable(self, on):
+    def enable(self, on: bool) -> None:
         """Drivers on or off."""
         self.enable_pin.value(self._on if on else 1 - self._on)
 
-    def close(self):
+    def close(self) -> None:
         """Let go of the interrupts; drivers off."""
         self.enable(False)
         for pin, _, _ in self._limits:

@@ -4,11 +4,13 @@ from array import array
 
 import stm
 from armtempo_shared import codes
+from armtempo_shared.motion import Motion
 from micropython import const
 from pyb import Pin
 
 from armtempo_board import access, pins
 from armtempo_board.ring import Ring
+from armtempo_board.sampler import Sampler
 from armtempo_board.walker import Walker
 
 BATCH = const(512)
@@ -25,7 +27,7 @@ _TURNS = const(8)
 class Joint:
     """``head`` and ``row``: the arm record; ``sampler`` lends the memory that the interrupt reads."""
 
-    def __init__(self, number, head, row, sampler):
+    def __init__(self, number: int, head: "dict[str, int]", row: "dict[str, int]", sampler: Sampler) -> None:
         self._sampler = sampler
         self._block = sampler.block
         self._at = sampler.joint_at(number)
@@ -50,13 +52,13 @@ class Joint:
         self._reset(0)
         self.over = True
 
-    def _reset(self, position):
+    def _reset(self, position: int) -> None:
         """Count from here: the ring begins anew."""
         self._base = position
         self._base_steps = 0
         self._turns_in = self._turns_out = 0
 
-    def load(self, motion, number):
+    def load(self, motion: Motion, number: int) -> None:
         """Stand before a motion; the clock stands before 0."""
         position = self._base
         self.walker.load(motion, number, position, self._pulse, self.gap_ticks)
@@ -66,7 +68,7 @@ class Joint:
         self._reset(position)
         self.over = False
 
-    def position(self):
+    def position(self) -> int:
         """Commanded steps as the ring's count has them."""
         steps = self.ring.steps()
         while self._turns_out != self._turns_in:
@@ -79,11 +81,11 @@ class Joint:
             self._turns_out += 1
         return self._base + self._direction * (steps - self._base_steps)
 
-    def written_k(self):
+    def written_k(self) -> int:
         """How far ahead steps are in the ring, in 1024 ticks, rounded up."""
         return self.ring.last_k() + 1 if self.ring.left() > 0 else 0
 
-    def serve(self, now_k):
+    def serve(self, now_k: int) -> int:
         """Keep the ring filled; code of a fault, or 0."""
         ring = self.ring
         left = ring.left()
@@ -98,10 +100,10 @@ class Joint:
                 self.over = True
         return 0
 
-    def _still_ahead(self):
+    def _still_ahead(self) -> bool:
         return self.ring.last_k() - self._pulse_k > _GUARD_K
 
-    def _extend(self, now_k, left):
+    def _extend(self, now_k: int, left: int) -> int:
         ring = self.ring
         room = min(ring.room(left), BATCH)
         if self.walker.at_turn and not self._turn():
@@ -115,7 +117,7 @@ class Joint:
                 return codes.UNDERRUN
         return 0
 
-    def _turn(self):
+    def _turn(self) -> bool:
         """Queue the turn of DIR that the walker stands at; False while the queue is full."""
         if self._turns_in - self._turns_out >= _TURNS:
             return False
@@ -127,7 +129,7 @@ class Joint:
         access.call_soon(stm.TIM2)
         return True
 
-    def _restart(self, now_k):
+    def _restart(self, now_k: int) -> int:
         """Fill a ring that ran dry from its start, once steps come near."""
         ring = self.ring
         if self.walker.at_turn:
@@ -145,12 +147,12 @@ class Joint:
         ring.seal(count)
         return 0 if ring.run() else codes.UNDERRUN
 
-    def _rewind(self):
+    def _rewind(self) -> None:
         """Empty the ring; the position stays."""
         self._reset(self.position())
         self.ring.stop()
 
-    def settle(self, high):
+    def settle(self, high: int) -> None:
         """The joint stands still for good; ``high``: STEP was high when all was frozen.
 
         A rising edge that came after the last word from DMA is not in the ring's count, but the pin shows it.
@@ -161,10 +163,10 @@ class Joint:
         self.ring.release()
         self.over = True
 
-    def rest(self):
+    def rest(self) -> None:
         """Stand still for good where the count says: the motion is forgotten."""
         self._rewind()
 
-    def declare(self, steps):
+    def declare(self, steps: int) -> None:
         """The joint stands at ``steps``; nothing moves."""
         self._base = steps

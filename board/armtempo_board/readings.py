@@ -5,6 +5,9 @@ from array import array
 from micropython import const
 
 from armtempo_board import access
+from armtempo_board.encoders import Encoder, NoEncoder
+from armtempo_board.joint import Joint
+from armtempo_board.sampler import Sampler
 
 _ROOM = const(16)
 _HALF_K = const(1 << 21)  # half a round of the counter in 1024 ticks
@@ -13,7 +16,13 @@ _HALF_K = const(1 << 21)  # half a round of the counter in 1024 ticks
 class Readings:
     """``joints`` and ``encoders``: one of each a joint; ``slots``: place of its encoder in a raw sample."""
 
-    def __init__(self, sampler, joints, encoders, slots):
+    def __init__(
+        self,
+        sampler: Sampler,
+        joints: "list[Joint]",
+        encoders: "list[Encoder | NoEncoder]",
+        slots: "list[int]",
+    ) -> None:
         self._sampler = sampler
         self._joints = joints
         self._encoders = encoders
@@ -23,12 +32,12 @@ class Readings:
         self._in = self._out = 0
         self.lost = 0
 
-    def clear(self):
+    def clear(self) -> None:
         """Forget what was not fetched."""
         self._in = self._out = 0
         self.lost = 0
 
-    def convert(self, epoch, now_k):
+    def convert(self, epoch: int, now_k: int) -> None:
         """Convert all raw samples; the counter is at ``epoch`` * 2**32 + ``now_k`` * 1024."""
         sampler = self._sampler
         at = sampler.next_raw()
@@ -41,7 +50,7 @@ class Readings:
             sampler.drop()
             at = sampler.next_raw()
 
-    def _convert(self, at, to, epoch, now_k):
+    def _convert(self, at: int, to: int, epoch: int, now_k: int) -> None:
         raw, words = self._sampler.raw, self._words
         ahead = access.word_k(raw, at) - now_k  # a sample may have come since the clock was read
         if ahead > _HALF_K:
@@ -60,7 +69,7 @@ class Readings:
             words[to + 2 + number] = joint.position()
             words[to + 2 + len(self._joints) + number] = encoder.counts
 
-    def next(self, buffer):
+    def next(self, buffer: "array[int]") -> bool:
         """Copy the oldest sample to ``buffer`` and forget it; False where there is none."""
         if self._in == self._out:
             return False

@@ -1,7 +1,7 @@
 """The start-up of the hardware as one table: which register gets which bits, and where the manual says so.
 
-``docs/hardware.md`` explains the choices. Sections are those of the reference manual RM0090. A test replays the
-table and compares the resulting register image.
+``docs/hardware.md`` explains the choices. Sections are those of the reference manual RM0090. A test replays
+the table and compares the resulting register image.
 """
 
 import stm
@@ -70,7 +70,7 @@ _STREAM_MODE = 3 << 16 | 2 << 13 | 2 << 11 | 1 << 10 | 1 << 8 | 1 << 6
 _FLAG_SHIFT = (0, 6, 16, 22)
 
 
-def encoder_rows(timer):
+def encoder_rows(timer: int) -> "tuple[tuple[str, int, int, int, str, str], ...]":
     """Rows for a timer that counts an encoder: both edges of both inputs, filtered."""
     name = "TIM%d" % timer
     register, bit = ENCODER_CLOCK[timer]
@@ -88,7 +88,7 @@ def encoder_rows(timer):
     )
 
 
-def stream_mode(dma_channel):
+def stream_mode(dma_channel: int) -> int:
     """CR of a stream that feeds a compare register, still off (RM0090 10.5.5).
 
     Very high priority, words to words, memory incremented, circular, memory to peripheral.
@@ -96,7 +96,9 @@ def stream_mode(dma_channel):
     return dma_channel << 25 | _STREAM_MODE
 
 
-def stream_rows(stream, dma_channel, compare_address, ring_address):
+def stream_rows(
+    stream: int, dma_channel: int, compare_address: int, ring_address: int
+) -> "tuple[tuple[str, int, int, int, str, str], ...]":
     """Rows that point a DMA1 stream at a compare register and at its ring."""
     at = 4 + 6 * stream
     return (
@@ -108,22 +110,22 @@ def stream_rows(stream, dma_channel, compare_address, ring_address):
     )
 
 
-def compare_address(timer, channel):
+def compare_address(timer: int, channel: int) -> int:
     """Address of a compare register."""
     return getattr(stm, "TIM%d" % timer) + 4 * (CCR1 + channel - 1)
 
 
-def stream_address(stream):
+def stream_address(stream: int) -> int:
     """Address of a DMA1 stream's registers."""
     return stm.DMA1 + 0x10 + 0x18 * stream
 
 
-def stream_flags(stream):
-    """(address, value) to write to forget what a stream has signalled: else it cannot be switched on (10.5.3)."""
+def stream_flags(stream: int) -> "tuple[int, int]":
+    """(address, value) that make a stream forget what it signalled: else it cannot be started (10.5.3)."""
     return stm.DMA1 + (12 if stream > 3 else 8), 0x3D << _FLAG_SHIFT[stream & 3]
 
 
-def apply(rows):
+def apply(rows: "tuple[tuple[str, int, int, int, str, str], ...]") -> None:
     """Write the rows in their order."""
     for block, register, clear, value, _, _ in rows:
         address = getattr(stm, block, _NVIC_IPR) + 4 * register
@@ -133,7 +135,7 @@ def apply(rows):
             mem32[address] = mem32[address] & ~clear | value
 
 
-def set_counters(ticks):
+def set_counters(ticks: int) -> None:
     """Give both counters the same value; they stand still."""
     mem32[stm.TIM2 + 4 * CNT] = ticks
     mem32[stm.TIM5 + 4 * CNT] = ticks

@@ -1,8 +1,9 @@
 """One STEP output: its pin, its ring of edge times and the DMA stream that feeds its compare register.
 
 The stream fetches one word ahead of the match that asks for it (RM0090 10.3.12), so what stands in the
-compare register and the word behind it are settled; only later words may still be written. Therefore new entries
-are added while the last rising edge is still well ahead, and an output that has run dry is started afresh.
+compare register and the word behind it are settled; only later words may still be written. Therefore new
+entries are added while the last rising edge is still well ahead, and an output that has run dry is started
+afresh.
 """
 
 from array import array
@@ -20,9 +21,9 @@ _RESET_NDTR = access.RING
 
 
 class Ring:
-    """``channel`` indexes ``pins.STEP``; ``block`` and ``at`` are the interrupt's memory and the place in it."""
+    """``channel`` indexes ``pins.STEP``; ``block`` and ``at``: the interrupt's memory, the place in it."""
 
-    def __init__(self, channel, block, at):
+    def __init__(self, channel: int, block: "array[int]", at: int) -> None:
         pin, timer, compare, alternate, stream, dma_channel, _ = pins.STEP[channel]
         self.words = array("I", bytearray(4 * access.RING + 4))
         self.state = array("I", bytearray(4 * access.STATE_WORDS))
@@ -41,7 +42,7 @@ class Ring:
         self._describe(pin, timer, compare)
         Pin(pin, Pin.AF_PP, alt=alternate)
 
-    def _describe(self, pin, timer, compare):
+    def _describe(self, pin: str, timer: int, compare: int) -> None:
         block, at = self._block, self._at
         block[at + access.NDTR_AT] = (self._ndtr - stm.DMA1) // 4
         block[at + access.ON_TIM5] = timer == 5
@@ -51,40 +52,40 @@ class Ring:
         block[at + access.ON_PORT_B] = pin[0] == "B"
         block[at + access.PIN_BIT] = int(pin[1:])
 
-    def left(self):
+    def left(self) -> int:
         """Entries that have not matched yet; -1 while a raw sample waits to be converted."""
         ndtr = access.read_ndtr(self._registers, self._block)
         return ndtr if ndtr < 0 else access.advance(self.state, ndtr)
 
-    def left_at(self, ndtr):
+    def left_at(self, ndtr: int) -> int:
         """Entries that had not matched yet when NDTR was read; readings come in their order."""
         return access.advance(self.state, ndtr)
 
-    def room(self, left):
+    def room(self, left: int) -> int:
         """Entries that may be added."""
         return access.RING - _SPARE - left
 
-    def made(self):
+    def made(self) -> int:
         """Entries written since the stream was started."""
         return self.state[access.MADE]
 
-    def steps(self):
+    def steps(self) -> int:
         """Rising edges that have matched since the stream was started."""
         return (self.state[access.LOADS] + 1) >> 1
 
-    def settled_low(self):
+    def settled_low(self) -> bool:
         """Whether STEP is low after the matches that were counted."""
         return self.state[access.LOADS] & 1 == 0
 
-    def last_k(self):
+    def last_k(self) -> int:
         """Units of 1024 ticks from now to the last entry."""
         return access.until_k(self.timer, self.state, access.LAST)
 
-    def seal(self, count):
+    def seal(self, count: int) -> None:
         """Take ``count`` entries in that were written behind the last."""
         access.seal(self.state, self.words, count)
 
-    def stop(self):
+    def stop(self) -> None:
         """Switch the stream off, ready to be filled from entry 0."""
         mem32[self._registers] = self._mode
         mem32[self._flags] = self._all_flags
@@ -93,7 +94,7 @@ class Ring:
         self.state[access.LOADS] = 0
         self.state[access.FIRST] = _RESET_NDTR
 
-    def run(self):
+    def run(self) -> int:
         """Switch the stream on and let the output toggle; False where its first entry came too late."""
         mem32[self._registers] = self._mode | registers.STREAM_ON
         self.state[access.FIRST] = mem32[self._ndtr] & 0xFFFF
@@ -102,18 +103,18 @@ class Ring:
         enable_irq(before)
         return in_time
 
-    def release(self):
+    def release(self) -> None:
         """Hold the output low."""
         before = disable_irq()
         access.release_channel(self._block, self.timer, self._at)
         enable_irq(before)
 
-    def push_away(self):
+    def push_away(self) -> None:
         """Keep the compare value of a dry output far from the counter."""
         if access.until_k(self.timer, self.state, access.FAR) < 1 << 20:
             self.mark_now()
             access.push_away(self.timer, self._compare, self.state)
 
-    def mark_now(self):
+    def mark_now(self) -> None:
         """Count the last entry as being now: the output is dry, only turns of DIR are measured from it."""
         access.mark(self.timer, self.state)

@@ -19,9 +19,9 @@ _QUIET_K = const(80)  # 1 ms
 
 
 class Sampler:
-    """Owner of the memory shared with the interrupts. ``counters``: addresses of the encoder timers in use."""
+    """Owns the memory shared with the interrupts. ``counters``: addresses of the encoder timers in use."""
 
-    def __init__(self, joints, counters):
+    def __init__(self, joints: int, counters: "tuple[int, ...]") -> None:
         words = access.BLOCK_HEAD + MAX_JOINTS * access.JOINT_WORDS
         self.block = array("I", bytearray(4 * words))
         self.raw = array("I", bytearray(4 * access.RAW_WORDS * access.RAW_ROOM))
@@ -35,7 +35,7 @@ class Sampler:
         self._regular = 0
         self._hook = self._interrupt  # bound once: making a bound method allocates
 
-    def connect(self):
+    def connect(self) -> None:
         """Hook the interrupt. Starts TIM2, so set the timers up after it."""
         timer = Timer(2, prescaler=0, period=0x3FFFFFFF)
         timer.channel(4, Timer.OC_TIMING, callback=self._hook)
@@ -46,11 +46,11 @@ class Sampler:
         while int(access.serve(self.block, self._timer2, self._directions)):
             access.take(self.raw, self.block, self._dma, self._counters)
 
-    def joint_at(self, joint):
+    def joint_at(self, joint: int) -> int:
         """Place of a joint's words in the block."""
         return access.BLOCK_HEAD + joint * access.JOINT_WORDS
 
-    def plan(self, duration_ticks):
+    def plan(self, duration_ticks: int) -> None:
         """Samples at 0, then every SAMPLE_TICKS, and one at the end."""
         block = self.block
         for joint in range(block[access.JOINTS]):
@@ -67,7 +67,7 @@ class Sampler:
         mem32[self._timer2 + 4 * access.SR] = 0
         mem32[self._timer2 + 4 * access.DIER] = 1 << 4
 
-    def end_at(self, ticks):
+    def end_at(self, ticks: int) -> None:
         """The motion ends at another time than planned. Call it while no sample is due."""
         block = self.block
         begun = self._regular - block[access.LEFT]
@@ -78,29 +78,29 @@ class Sampler:
         block[access.LEFT] = left
         access.call_soon(self._timer2)
 
-    def quiet(self):
+    def quiet(self) -> bool:
         """Whether all raw samples are converted and the next is at least 1 ms away."""
         block = self.block
         if block[access.TAKEN] != block[access.READ]:
             return False
-        return block[access.DONE] or access.until_k(self._timer2, block, access.NEXT) >= _QUIET_K
+        return block[access.DONE] != 0 or access.until_k(self._timer2, block, access.NEXT) >= _QUIET_K
 
-    def done(self):
+    def done(self) -> bool:
         """Whether the last sample has been taken and converted."""
-        return self.block[access.DONE] and self.block[access.TAKEN] == self.block[access.READ]
+        return self.block[access.DONE] != 0 and self.block[access.TAKEN] == self.block[access.READ]
 
-    def next_raw(self):
+    def next_raw(self) -> int:
         """Place of the oldest raw sample in ``raw``, or -1; ``drop`` it when it has been converted."""
         read = self.block[access.READ]
         if read == self.block[access.TAKEN]:
             return -1
         return (read & (access.RAW_ROOM - 1)) * access.RAW_WORDS
 
-    def drop(self):
+    def drop(self) -> None:
         """The oldest raw sample has been converted."""
         self.block[access.READ] = (self.block[access.READ] + 1) & 0xFF
 
-    def take_now(self):
+    def take_now(self) -> None:
         """Store a raw sample of this moment, the last; the interrupt must be off."""
         block = self.block
         block[access.NOW] = mem32[self._timer2 + 4 * access.CNT] & _LOW32

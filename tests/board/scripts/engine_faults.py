@@ -1,4 +1,4 @@
-"""Whatever stops a motion, at whatever moment: no wrong pulse, and the position is exact or declared unknown."""
+"""Whatever stops a motion, at whatever moment: no wrong pulse; the position is exact or declared unknown."""
 
 import random
 
