@@ -45,3 +45,47 @@ ERROR_CODES: "dict[str, int]" = {}
 for _row in _ROWS:
     ERROR_CODES[_row[0]] = getattr(codes, _row[0].upper())
     ERRORS[ERROR_CODES[_row[0]]] = _row
+
+COMMANDS: "dict[str, str]" = {
+    "hello": "Begins a session; `session` is a number that differs between hosts, so that the board knows a "
+    "new one. Refused with `protocol` where the versions differ. Answer: who the board is; `joints` and "
+    "`arm_crc` are 0 without an arm record; `boot` differs after every start of the program; the tail is the "
+    "unique id in hex and the firmware.",
+    "status": "What the board is doing. `known`: bit a joint, its position is known. `run`: number of the "
+    "current or last run since the start. `ticks`: motion clock. Tail: per joint commanded steps and encoder "
+    "counts (two i32).",
+    "put_begin": "Begins an upload of `size` bytes; the tail is the trajectory's name, or `/arm` for the arm "
+    "record. `crc` is the record's own checksum, its last four bytes. An upload under way is given up.",
+    "put_data": "The bytes from `offset` on; pieces may overlap what came before but leave no hole. Answer: "
+    "the offset that comes next.",
+    "put_commit": "All bytes are there: the record is read back from the flash, checked against `crc` and "
+    "for being whole, and takes the place of the old one. An arm record takes effect at once.",
+    "list": "The stored trajectory number `index` (from 0, in order of names) of `count`; `not_found` behind "
+    "the last. A damaged one has `crc`, `duration` and `joints` 0. Tail of the answer: its name.",
+    "remove": "Removes the trajectory of that name.",
+    "rename": "The tail is the old name (`old_length` bytes), then the new one. The default goes with it.",
+    "get": "Up to `length` bytes of a stored record (`/arm`: the arm record) from `offset` on.",
+    "set_default": "What the button starts; an empty name for nothing.",
+    "home": "The joints of the mask `joints` stand at these steps; the tail has an i32 for every joint.",
+    "start": "Starts a stored trajectory whose checksum is `crc`. `flags` 1: a limit switch ends it without "
+    "a fault. Answer: number of the run and its length in ticks.",
+    "stop": "`now` 0: brake along the path (freeze where the motion has no braking time); 1: freeze.",
+    "clear": "Clears the fault; refused with `fault_pending` while its cause is still there.",
+    "leave": "Ends the program; the port becomes MicroPython's prompt.",
+    "samples": "All samples before `acknowledged` have arrived and may go; those from there on, `wanted` of "
+    "them, are to be sent again. Answer: the oldest kept and how many are kept.",
+}
+"""What each command does and what its answer says."""
+EVENTS: "dict[str, str]" = {
+    "sample": "One sample of run `run`, `index` counting from 0. `ticks`: motion clock. `flags` 1: taken "
+    "while braking. Tail: per joint commanded steps and encoder counts (two i32).",
+    "done": "The run ended without a fault, at its end or after a stop; sent behind its last sample. "
+    "`lost`: samples that gave way before they were acknowledged. Tail as in `sample`.",
+    "fault": "Something went wrong; no step comes any more. `code` from the table below, `joint` 255 where "
+    "it is about none. Tail as in `sample`.",
+    "notice": "Words, such as the traceback behind an `internal` fault.",
+    "ok": "The command was carried out; behind its number the answer's fields.",
+    "error": "The command was refused, nothing was changed. `code` from the table below, `joint` 255 where "
+    "it is about none, `value` as the code says.",
+}
+"""What each event and reply says."""

@@ -1,0 +1,43 @@
+"""The protocol page and the message table say the same."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+
+from armtempo_shared import codes, meanings
+from armtempo_shared.table import rows
+
+SCRIPT = Path(__file__).parents[2] / "shared" / "docs" / "make_protocol.py"
+
+
+def _script() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("make_protocol", SCRIPT)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_page_is_current() -> None:
+    script = _script()
+    text = script.PAGE.read_text()
+    assert script.page(text) == text, "run: python shared/docs/make_protocol.py"
+
+
+def test_every_message_and_code_has_its_words() -> None:
+    assert set(meanings.COMMANDS) == {row[0] for row in rows("C")} == {row[0] for row in rows("A")}
+    assert set(meanings.EVENTS) == {row[0] for row in rows("E") + rows("R")}
+    numbers = {name: value for name, value in vars(codes).items() if name.isupper()}
+    assert {name.upper(): code for name, code in meanings.ERROR_CODES.items()} == numbers
+    assert len(set(numbers.values())) == len(numbers)
+    assert all(meaning and cure for _, meaning, cure in meanings.ERRORS.values())
+
+
+def test_numbers_are_used_once_and_answers_match_their_commands() -> None:
+    commands, answers, others = rows("C"), rows("A"), rows("E") + rows("R")
+    numbers = [row[1] for row in commands + others]
+    assert len(set(numbers)) == len(numbers)
+    assert [row[:2] for row in commands] == [row[:2] for row in answers]
