@@ -64,6 +64,7 @@ class Joint:
         self.walker.load(motion, number, position, self._pulse, self.gap_ticks)
         self._direction = self.walker.direction
         self._dir.value((self._direction > 0) ^ self._inverted)
+        self.ring.release()  # a motion may have been loaded and never started
         self.ring.stop()
         self._reset(position)
         self.over = False

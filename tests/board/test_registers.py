@@ -69,7 +69,7 @@ def test_timers_and_streams(interpreter: str) -> None:
 
 
 def test_pins() -> None:
-    """Modes (8.4.1), pulls (8.4.4) and alternate functions (8.4.9, data sheet table 9) of every pin in use."""
+    """Modes (8.4.1), pulls (8.4.4), alternate functions (8.4.9, data sheet table 9) of every pin in use."""
     image = _image("cpython")
     alternate = {
         "A15": 1, "A1": 1, "B10": 1, "A2": 2, "A3": 2, "A0": 2,

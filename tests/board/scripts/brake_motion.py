@@ -16,7 +16,7 @@ TIMES = (-0.2, -0.1, 0, 0.1, 0.2, 0.4, 0.55, 0.65, 0.8, 1.0, 1.1, 1.2, 1.3, 1.4)
 
 
 def whole(values, scale):
-    return [int(round(value * scale)) for value in values]
+    return [round(value * scale) for value in values]
 
 
 def record(brake_ticks):

@@ -58,7 +58,7 @@ def expected_counts():
 
 
 def at_full_speed():
-    """A joint at 300 000 steps a second with 4 counts a step, over many rounds of its counter, there and back."""
+    """300 000 steps a second with 4 counts a step, over many rounds of the counter, there and back."""
     joints = [row(channel=0, encoder=2, counts_num=4, counts_den=1, following_counts=300)]
     there = Steps((1000, 280, 30_000, 1))
     back = Steps((1000, 280, 30_000, -1))

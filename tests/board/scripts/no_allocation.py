@@ -1,4 +1,4 @@
-"""The main loop and the interrupt with the heap locked: MicroPython raises MemoryError where anything allocates.
+"""The main loop and the interrupt with the heap locked: MemoryError where anything allocates.
 
 Registers are plain memory here; the counter, the streams and the interrupt are moved by this script.
 """

@@ -128,7 +128,7 @@ def sample_times():
 
 
 def late_first_step():
-    """A channel is armed only while its first edge lies ahead, and behind a turn of DIR and its set-up time."""
+    """A channel is armed only while its first edge lies ahead, and behind a DIR turn and its set-up."""
     block, timer, ring = words(BLOCK), words(18), words(access.RING + 1)
     at = access.BLOCK_HEAD
     block[at + access.CCR_AT] = access.CCR1 + 1
