@@ -75,12 +75,14 @@ def store(board: Board, name: str, data: bytes, progress: Progress | None = None
     return stored
 
 
-def replay(board: Board, motion: Stored, stop: StopRequest, take: Take = lambda *_: None) -> RunEnd:
+def replay(
+    board: Board, motion: Stored, stop: StopRequest, take: Take = lambda *_: None, flags: int = 0
+) -> RunEnd:
     """Start a stored motion and follow it to its end; a stop request makes the board brake.
 
     Whatever fails here stops the board. Raises BoardError where the board refuses to start.
     """
-    run, duration_s = board.start(motion.name, motion.crc)
+    run, duration_s = board.start(motion.name, motion.crc, flags)
     follower = Follower(board, run)
     braking = _Brake(board, stop)
     heard_s = board.session.clock()

@@ -11,23 +11,37 @@ from armtempo.cli import options, posture
 
 @click.command(context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
 @click.argument("where", required=False)
+@click.option("--switches", is_flag=True, help="Move to the limit switches instead of taking WHERE on trust.")
 @options.job
 @options.arm
 @options.port
 @options.log_traffic
 def command(
-    where: str | None, job_path: Path | None, arm_path: Path | None, port: str, log_traffic: Path | None
+    where: str | None,
+    switches: bool,
+    job_path: Path | None,
+    arm_path: Path | None,
+    port: str,
+    log_traffic: Path | None,
 ) -> None:
     """Declare where the arm stands.
 
     WHERE: angles such as '0,-60,40', a via point such as P0, or a trajectory file for its start. Without
-    it: the home posture of the arm file. Nothing moves; afterwards motions may start.
+    it: the home posture of the arm file. Nothing moves; afterwards motions may start. With --switches the
+    joints that have a switch of known angle move: to it, off it, and slowly to it again.
     """
-    from armtempo import operate
+    from armtempo import homing, operate
+    from armtempo.interrupt import StopRequest
 
+    if switches and where is not None:
+        raise click.UsageError("give either WHERE or --switches")
     arm = options.load_arm(arm_path)
     angles_deg = operate.home_deg(arm) if where is None else posture.parse(where, arm, job_path)
-    with options.board(port, log_traffic) as board:
+    with options.board(port, log_traffic, arm) as board, StopRequest() as stop:
         operate.configure(board, arm, replace=arm_path is not None)
-        operate.home(board, arm, angles_deg)
-    click.echo(f"the arm stands at {posture.words(angles_deg)}")
+        if switches:
+            homing.home_to_switches(board, arm, stop)
+        else:
+            operate.home(board, arm, angles_deg)
+        stands_deg = operate.posture_deg(board, arm)
+    click.echo(f"the arm stands at {posture.words(stands_deg)}")

@@ -7,8 +7,6 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
-from armtempo_shared.messages import SYNC
-
 from armtempo.arm import Arm
 from armtempo.boardfiles import own_crc
 from armtempo.errors import InputError, LinkError
@@ -80,9 +78,10 @@ def greet(
             board.hello()
             return board
         except NoAnswer:
-            if SYNC not in board.session.recent:
+            reason = diagnose.explain(transport, bytes(board.session.recent))
+            if not isinstance(reason, diagnose.Garbled):
                 break
-    raise diagnose.explain(transport, bytes(board.session.recent))
+    raise reason
 
 
 def _virtual_port(stack: ExitStack, port: str, arm: Arm | None) -> str:

@@ -13,6 +13,10 @@ _NUDGE = b"\r\x02\r"
 """Ends a line, leaves a raw REPL, asks for a prompt; without meaning to the board program."""
 
 
+class Garbled(LinkError):
+    """Pieces of frames arrive, but none whole: worth another try."""
+
+
 def explain(transport: Transport, heard: bytes) -> LinkError:
     """The error to raise: silence, a bare MicroPython REPL, or something else; ``heard`` so far."""
     transport.write(_NUDGE)
@@ -23,7 +27,7 @@ def explain(transport: Transport, heard: bytes) -> LinkError:
             f"{where} runs MicroPython but not the armtempo program; install it with 'armtempo deploy'"
         )
     if SYNC in heard:
-        return LinkError(
+        return Garbled(
             f"{where} is hardly to be understood: pieces of armtempo's messages arrive, too few of them "
             "whole; check cable and plugs"
         )

@@ -92,7 +92,9 @@ class Session:
             if reply is not None:
                 return _answer(name, *reply)
             now_s = self.clock()
-            silent = now_s - self._heard_s >= silence_s and not self.frames_bad  # on a bad line all may be lost
+            silent = (
+                now_s - self._heard_s >= silence_s and not self.frames_bad
+            )  # on a bad line all may be lost
             if silent or now_s - begin_s >= patience_s:
                 raise NoAnswer(self._no_answer(name, now_s - begin_s))
             self.repeats += 1
