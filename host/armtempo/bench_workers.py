@@ -13,7 +13,7 @@ from importlib import import_module
 from typing import Any
 
 import armtempo
-from armtempo.errors import ArmtempoError, InputError
+from armtempo.errors import ArmtempoError, InputError, MissingPackageError
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _CONNECT_S = 10
@@ -40,13 +40,13 @@ def local(workers: int | None = None) -> Iterator[Executor]:
 def cluster(address: str) -> Iterator[Executor]:
     """The workers of the Dask scheduler at ``address``.
 
-    Raises ArmtempoError where the extra ``cluster`` is missing here or armtempo is missing or another
-    version on a worker, InputError where no scheduler answers.
+    Raises MissingPackageError where the extra ``cluster`` is not installed, InputError where no scheduler
+    answers, ArmtempoError where a worker has no armtempo or another version.
     """
     try:
         distributed: Any = import_module("distributed")
     except ImportError:
-        raise ArmtempoError(
+        raise MissingPackageError(
             "--scheduler needs distributed, which is not installed; "
             "install it with: pip install 'armtempo[cluster]'"
         ) from None

@@ -11,7 +11,7 @@ import click
 
 from armtempo.cli import INTERRUPTED, options
 from armtempo.cli.progress import Progress
-from armtempo.errors import ArmtempoError
+from armtempo.errors import MissingPackageError
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -141,7 +141,7 @@ def _plot(path: Path, found: Sequence[Row]) -> list[str]:
 
     try:
         plots.save(bench_plot.convergence(found), path)
-    except ArmtempoError as error:
+    except MissingPackageError as error:
         click.echo(f"no plot: {error}", err=True)
         return []
     return [path.name]
