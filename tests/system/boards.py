@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
-import sys
 from pathlib import Path
 
 from armtempo import arm, planner, trajectory_file
 from armtempo.job import Job
 
+from tests.system import commandline
+
 ARM = arm.load_arm(arm.default_path())
-COMMAND = [sys.executable, "-c", "from armtempo.cli import main; main()"]
-TIMEOUT_S = 120
+TIMEOUT_S = commandline.SLOW_S
 
 
 def small_plan(path: Path, end_deg: tuple[float, ...] = (20.0, -75.0, 50.0)) -> Path:
@@ -25,19 +24,11 @@ def small_plan(path: Path, end_deg: tuple[float, ...] = (20.0, -75.0, 50.0)) -> 
 
 def start(*arguments: str | Path, cwd: Path) -> subprocess.Popen[str]:
     """An armtempo command under way."""
-    return subprocess.Popen(
-        [*COMMAND, *map(str, arguments)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        cwd=cwd,
-        env={**os.environ, "PYTHONUNBUFFERED": "1"},
-    )
+    return commandline.start(*arguments, folder=cwd, PYTHONUNBUFFERED="1")
 
 
 def armtempo(*arguments: str | Path, cwd: Path, code: int = 0) -> str:
     """An armtempo command's output, both streams; it must end with ``code``."""
-    process = start(*arguments, cwd=cwd)
-    out, error = process.communicate(timeout=TIMEOUT_S)
-    assert process.returncode == code, out + error
-    return out + error
+    done = commandline.run(*arguments, folder=cwd)
+    assert done.exit_code == code, done.output + done.errors
+    return done.output + done.errors

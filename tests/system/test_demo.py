@@ -79,6 +79,14 @@ def test_it_sums_up_the_run(joint: str, net_steps: int, demo: tuple[Ended, Path]
     assert abs(error_deg) < 0.2  # two encoder counts
 
 
+def test_its_trajectory_file_runs_again(demo: tuple[Ended, Path]) -> None:
+    _, folder = demo
+    again = commandline.run("run", folder / "trajectory.json", folder=folder.parent.parent)
+    assert again.exit_code == 0, again.errors
+    first, second = (runs.load(folder.with_name(name)).repetitions[0] for name in ("feed-001", "feed-002"))
+    assert first.commanded_steps[-1].tolist() == second.commanded_steps[-1].tolist()
+
+
 def test_without_matplotlib_it_says_what_is_missing_and_keeps_the_run(tmp_path: Path) -> None:
     blocked = tmp_path / "blocked"
     (blocked / "matplotlib").mkdir(parents=True)

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
-from armtempo import record, runs
+from armtempo import record, runs, trajectory_file
 from armtempo.link import open_board
 from armtempo.virtual import launch
 
@@ -28,10 +28,14 @@ def test_interrupted_run(tmp_path: Path, number: signal.Signals) -> None:
         assert "interrupted" in error
         assert "Traceback" not in error
         with open_board(board.port) as found:
-            assert not found.status().moving
+            status = found.status()
+    assert not status.moving
     run = runs.load(tmp_path / "runs" / "small-001")
-    assert run.repetitions[0].state == record.INTERRUPTED
-    assert len(run.repetitions[0].index) >= 3
+    repetition = run.meta["repetitions"][0]
+    assert repetition["state"] == record.INTERRUPTED
+    assert len(run.repetitions[0].index) == repetition["samples"] >= 3
+    assert repetition["duration_s"] < trajectory_file.load(file).trajectory.duration_s - 0.1
+    assert tuple(repetition["commanded_steps"]) == status.stand.commanded_steps
 
 
 def test_killed_host_leaves_a_readable_folder_and_a_board_to_talk_to(tmp_path: Path) -> None:

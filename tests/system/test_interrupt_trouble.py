@@ -1,4 +1,4 @@
-"""Ctrl-C, SIGTERM and boards that fall silent while the arm moves: the arm stops, the record is whole."""
+"""Interrupts that meet a board that has fallen silent, or a user in a hurry."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import pytest
 from armtempo import arm as arms
 from armtempo import operate, runs, virtual
 from armtempo.link import open_board
@@ -33,30 +32,6 @@ def board_at_home(*faults: Fault) -> Iterator[virtual.VirtualBoard]:
 def samples_in(folder: Path) -> int:
     """Whole sample lines of the one run in ``folder``."""
     return sum(path.read_text().count("\n") for path in folder.glob("*-001/samples-01.csv"))
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "SIGTERM"])
-def test_an_interrupted_run_stops_the_arm(
-    number: signal.Signals, plan_file: Callable[[str], Path], tmp_path: Path
-) -> None:
-    with board_at_home() as process:
-        command = commandline.start(
-            "run", plan_file("shipped"), "--port", process.port, "--out", tmp_path, folder=tmp_path
-        )
-        commandline.wait_for(lambda: samples_in(tmp_path) > 5, "the first samples")
-        command.send_signal(number)
-        done = commandline.ended(command, ENDS_WITHIN_S)
-        with open_board(process.port) as board:  # the port is free
-            status = board.status()
-    done.said("interrupted")
-    assert done.exit_code == 130
-    assert not status.moving
-    run = runs.load(tmp_path / "feed-001")
-    repetition = run.meta["repetitions"][0]
-    assert repetition["state"] == "interrupted"
-    assert repetition["duration_s"] < 6.7  # of 6.79
-    assert len(run.repetitions[0].time_s) == repetition["samples"] > 5
-    assert tuple(repetition["commanded_steps"]) == status.stand.commanded_steps
 
 
 def test_sigterm_ends_a_run_whose_board_has_fallen_silent(
