@@ -25,7 +25,7 @@ from armtempo_shared.messages import SAMPLE_BRAKING, START_HOMING, STATES
 from armtempo_shared.motion import Motion, MotionError
 from micropython import const
 
-from armtempo_board import store
+from armtempo_board import evaluator, store
 from armtempo_board.commands import Commands
 from armtempo_board.engine import Engine
 from armtempo_board.events import Events
@@ -70,6 +70,7 @@ class App:
         self._braking = False
         self._brakes = False  # the motion can come to rest along its path
         self._by_host = False  # the run was started by a command
+        self._assumed = 0  # joints whose position a homing motion took for granted
         self._failures = 0
         self.commands = Commands(self, rows)
         self.events = Events(self, rows)
@@ -134,6 +135,7 @@ class App:
 
     def _end(self):
         self._collect()
+        self._forget()
         self._running = False
         self._braking = False
         if not self.fault():
@@ -187,12 +189,16 @@ class App:
     def begin(self, name, flags, crc=None):
         """Start a stored motion, or refuse. ``crc``: of the record that the host means; None: there is none."""
         self.check_ready()
+        homing = bool(flags & START_HOMING)
         missing = self.everyone() & ~self.known()
-        if missing:
+        if missing and not homing:
             raise Refused(codes.UNHOMED, _lowest(missing))
         motion = self.load(name, crc)
+        if missing:
+            self._assume(motion, missing)
         refused = self.engine.load(motion)
         if refused:
+            self._forget()
             raise Refused(*refused)
         self.samples.clear()
         self.events.clear()
@@ -203,7 +209,17 @@ class App:
         self._brakes = motion.brake_ticks > 0
         gc.collect()
         self._running = True
-        self.engine.start(bool(flags & START_HOMING))
+        self.engine.start(homing)
+
+    def _assume(self, motion, mask):
+        """A homing motion may begin wherever joints of unknown position stand; after it they are unknown again."""
+        self.home(mask, [evaluator.start_offset(motion, joint, 0) for joint in range(self.joints)])
+        self._assumed = mask
+
+    def _forget(self):
+        if self._assumed:
+            self.engine.known &= ~self._assumed
+            self._assumed = 0
 
     def load(self, name, crc=None):
         """The stored motion, checked as far as that needs no evaluator, or refused."""

@@ -147,6 +147,22 @@ def test_fault_ends_the_run(tmp_path: Path) -> None:
     assert (follower.end.fault, follower.end.fault_joint) == (wire.ERROR_CODES["following"], 1)
 
 
+def test_homing_motion_starts_anywhere_and_leaves_nothing_known(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board = connect(pipe)
+    board.upload(wire.ARM_RECORD_NAME, ARM)
+    data = random_motion(random.Random(5))
+    board.upload("feed", data)
+    board.home([5, None, None])
+    with pytest.raises(BoardError, match="position is unknown"):
+        board.start("feed", wire.record_crc(data))
+    run, _ = board.start("feed", wire.record_crc(data), wire.START_HOMING)
+    assert board.status().known == 7
+    samples = list(Follower(board, run).samples())
+    assert samples[0].stand.commanded_steps == (5, 7, 7)
+    assert board.status().known == 1
+
+
 def test_cable_out_during_a_run_costs_no_sample(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
     board, data = ready(pipe)

@@ -49,6 +49,7 @@ def install():
     engine.Engine = Engine
     evaluator = Module()
     evaluator.duration_ticks = lambda motion: 84000
+    evaluator.start_offset = lambda motion, joint, position: 7 - position
     sys.modules["machine"] = machine
     sys.modules["pyb"] = pyb
     sys.modules["armtempo_board.engine"] = engine
