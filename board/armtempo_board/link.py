@@ -18,7 +18,7 @@ _OUT_SIZE = const(1200)
 _ESCAPE_QUIET_MS = const(50)
 _CTRL_C = const(3)
 _CONTROLS = b"\r\x03"
-_ESCAPE_SESSION_MS = const(500)
+_ESCAPE_SESSION_MS = const(100)
 
 
 class Link:
@@ -30,7 +30,7 @@ class Link:
         self.reply = bytearray(MAX_PAYLOAD + OVERHEAD)
         self.out = bytearray(_OUT_SIZE)
         self.heard_ms = 0  # when the last good frame came
-        self.fresh = False  # whether that was within the last half second
+        self.fresh = False  # whether that was a moment ago
         self.escape = False  # somebody outside of any frame asks for the REPL
         self._begin = 0
         self._end = 0
