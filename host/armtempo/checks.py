@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from armtempo_shared.limits import MAX_SEGMENTS, MAX_STEP_RATE, MAX_STEP_RATE_SUM
+from armtempo_shared import motion
+from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS, MAX_STEP_RATE, MAX_STEP_RATE_SUM
 
 from armtempo import extremes, optimise, spline
 from armtempo.arm import Arm, Joint, Limits
@@ -54,7 +55,7 @@ def _check_step_rate(arm: Arm, joint: Joint, speed_deg_s: float) -> None:
         )
 
 
-def check_job(job: Job) -> None:
+def check_job(arm: Arm, job: Job) -> None:
     """Raises InputError for settings that the planner does not know or the board cannot hold."""
     if job.timing not in ("per-joint", "shared"):
         raise InputError(f"job {job.name!r}: timing {job.timing!r} must be 'per-joint' or 'shared'")
@@ -63,6 +64,12 @@ def check_job(job: Job) -> None:
         raise InputError(
             f"job {job.name!r}: {segments} segments with refine {job.refine} make more than the board's "
             f"{MAX_SEGMENTS}; lower refine or use fewer via points"
+        )
+    size = motion.size(job.degree, len(arm.driven), job.timing == "shared", segments, job.refine)
+    if size > MAX_MOTION_BYTES:
+        raise InputError(
+            f"job {job.name!r}: its motion record would have {size} bytes, the board takes "
+            f"{MAX_MOTION_BYTES}; lower refine, use shared timing or fewer via points"
         )
     kind = job.parameters.get("fitness", FITNESS[0])
     if kind not in FITNESS:
@@ -93,7 +100,7 @@ def check_ranges(arm: Arm, angle_points_deg: Array, degree: int) -> None:
         room = TOLERANCE * max(1.0, abs(least), abs(most))
         if lowest < least - room or highest > most + room:
             raise PlanError(
-                f"{joint.name}: the path reaches {lowest:.3f} to {highest:.3f} degrees, its range is "
+                f"{joint.name}: the path reaches {lowest:.7g} to {highest:.7g} degrees, its range is "
                 f"{least:g} to {most:g}; move the via points away from the end of the range, or add one "
                 "where it swings out"
             )

@@ -22,6 +22,7 @@ Progress = Callable[[float, float], None]
 """Called with the work done and the whole of it."""
 
 
+@np.errstate(all="ignore")  # what overflows ends as not a number, which no check passes
 def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     """A motion through the job's via points, from rest to rest, as short as the search finds it.
 
@@ -29,7 +30,7 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     job and arm do not fit each other, PlanError where there is no motion under these limits and ranges.
     """
     limits = checks.limits_of(arm)
-    checks.check_job(job)
+    checks.check_job(arm, job)
     via, notes = via_angles(arm, job)
     points = spline.fit(via, job.degree)
     checks.check_ranges(arm, points, job.degree)

@@ -167,6 +167,24 @@ def test_refuses_wrong_input(arm: Arm, changes: dict[str, object], message: str)
         planner.plan(arm, job)
 
 
+@pytest.mark.parametrize(
+    ("via", "limits", "bounds_s"),
+    [
+        ((0.0, 10.0, 30.0), (1e-200, 1e-200, 1e-200), (0.1, 3.0)),
+        ((0.0, 10.0, 30.0), (50.0, 50.0, 150.0), (1e300, 1e301)),
+        ((0.0, 10.0, 30.0), (50.0, 50.0, 150.0), (1e-200, 1e-199)),
+        ((0.0, 1e150, 3e150), (50.0, 50.0, 150.0), (0.1, 3.0)),
+    ],
+)
+def test_refuses_sizes_that_cannot_be_computed_with(
+    via: tuple[float, ...], limits: tuple[float, ...], bounds_s: tuple[float, float]
+) -> None:
+    arm = problems.make_arm([limits], (-1e160, 1e160))
+    job = Job("far", tuple((angle,) for angle in via), bounds_s=bounds_s, iterations=5)
+    with pytest.raises(PlanError, match="too far apart in size"):
+        planner.plan(arm, job)
+
+
 def test_refuses_more_steps_than_the_board_makes_together() -> None:
     fast = problems.make_arm([[300_000 / 200 * 360 / 8, 1e9, 1e12]] * 6, microsteps=8)
     via = (tuple([0.0] * 6), tuple([1e6] * 6))

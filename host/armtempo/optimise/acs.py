@@ -53,13 +53,13 @@ def search(
     ``a``, ``b`` of Eq. (25), ``pa`` the part abandoned, ``beta`` of Eq. (23). Raises InputError for an
     unknown ``variant``.
     """
-    if variant not in _VARIANTS:
-        raise InputError(f"optimiser 'acs': variant {variant!r} must be one of {', '.join(_VARIANTS)}")
+    if variant not in VARIANTS:
+        raise InputError(f"optimiser 'acs': variant {variant!r} must be one of {', '.join(VARIANTS)}")
     if not (0 < pa <= 1 and 1 <= beta < 2):
         raise InputError(
             f"optimiser 'acs': needs 0 < pa <= 1 and 1 <= beta < 2, not pa = {pa}, beta = {beta}"
         )
-    nests = _VARIANTS[variant](
+    nests = VARIANTS[variant](
         Tracker(function, iterations, progress), bounds, rng, population, (a, b, pa, beta)
     )
     for iteration in range(1, iterations + 1):
@@ -67,7 +67,7 @@ def search(
     return nests.tracker.result()
 
 
-class _Nests:
+class Nests:
     """Points and their values; a new point replaces its nest where it is better."""
 
     def __init__(
@@ -106,8 +106,11 @@ class _Nests:
         self.values[which] = np.where(better, values, self.values[which])
 
 
-class _Paper(_Nests):
+class Paper(Nests):
+    """As the paper has it."""
+
     def iterate(self, part: float) -> None:
+        """Flights of all nests, then of the worst ones again, alpha_A from Eq. (25)."""
         alpha = self.a * self.size**self.b * math.exp(-part * min(float(self.values.mean()), 700.0))
         self.settle(self.x + alpha * self.levy(self.x.shape))
         worst = np.argsort(self.values)[self.size - math.floor(self.pa * self.size) :]
@@ -116,19 +119,23 @@ class _Paper(_Nests):
         self.tracker.iteration_done()
 
 
-class _Differences(_Nests):
+class Differences(Nests):
+    """Steps measured by the population itself."""
+
     def iterate(self, part: float) -> None:
-        self.settle(self.x + self.a * self.levy((self.size, 1)) * self._difference())
+        """A flight of each nest, then a move of some of its variables."""
+        self.settle(self.x + self.a * self.levy((self.size, 1)) * self.difference())
         abandoned = self.rng.random(self.x.shape) < self.pa
-        moved = self.x + abandoned * self.rng.random((self.size, 1)) * self._difference()
+        moved = self.x + abandoned * self.rng.random((self.size, 1)) * self.difference()
         if part < 1:  # the evaluations left out here pay for the first population
             self.settle(moved)
         self.tracker.iteration_done()
 
-    def _difference(self) -> Array:
+    def difference(self) -> Array:
         """For each nest the difference of two nests drawn at random."""
         permutation = self.rng.permutation
         return np.asarray(self.x[permutation(self.size)] - self.x[permutation(self.size)])
 
 
-_VARIANTS: dict[str, type[_Nests]] = {"differences": _Differences, "paper": _Paper}
+VARIANTS: dict[str, type[Nests]] = {"differences": Differences, "paper": Paper}
+"""Values of the parameter ``variant``."""
