@@ -205,8 +205,10 @@ def find_interpreter() -> str:
 
 def _command(interpreter: Path | str | None, options: Path) -> list[str]:
     chosen = str(interpreter or find_interpreter())
+    if os.sep in chosen:
+        chosen = os.path.abspath(chosen)  # the process starts in the folder of its flash
     if chosen == sys.executable or not is_micropython(chosen):
-        flags = ["-I", "-B"]
+        flags = ["-I", "-S", "-B"]
     else:
         flags = ["-X", f"heapsize={_HEAP}"]
     return [chosen, *flags, str(_MAIN), str(options)]

@@ -13,16 +13,15 @@ HERE = sys.argv[0].rsplit("/", 1)[0]
 
 def prepare(options):
     """Make the simulated modules importable; returns the simulator's ``session`` module."""
-    sys.path.insert(0, HERE + "/hardware")
+    folders = [HERE + "/hardware"]
     if sys.implementation.name != "micropython":
-        sys.path.insert(0, HERE + "/cpython")
+        folders.append(HERE + "/cpython")
+    sys.path[0:0] = [*folders, options["flash"], options["flash"] + "/lib", *options["program"]]
+    if sys.implementation.name != "micropython":
         import additions  # noqa: F401
     from simulator import modules, session
 
     modules.replace()
-    sys.path.append(options["flash"])
-    sys.path.append(options["flash"] + "/lib")
-    sys.path.extend(options["program"])
     return session
 
 

@@ -16,7 +16,7 @@ class Fault:
     ``kind``: ``stall`` (the main loop loses ``ms``), ``input`` (the pin ``name`` gets ``level`` 0 or 1),
     ``block`` (the joint ``joint``, counted from 0, cannot turn any more), ``slip`` (its encoder is turned by
     ``counts``), ``silence`` (the serial cable is out for ``ms``), ``hang`` (the program stops for ever) or
-    ``crash`` (an exception in the main loop).
+    ``crash`` (the next look at the time raises).
     """
 
     kind: str

@@ -141,9 +141,6 @@ class Board:
         if self.lost_ticks:
             lost, self.lost_ticks = self.lost_ticks, 0
             self._pass(self.now + lost, False)
-        if self.crash:
-            self.crash = False
-            raise RuntimeError("injected crash")
         if self.now >= self.next_ms and self.millisecond:
             self.next_ms = (self.now // TICKS_PER_MS + 1) * TICKS_PER_MS
             self.millisecond()

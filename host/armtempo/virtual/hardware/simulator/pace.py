@@ -85,7 +85,10 @@ class Pace:
             self._board.run_until(min(target, self._board.next_ms))
 
     def milliseconds(self):
-        """Milliseconds since power-up, modulo 2**30."""
+        """Milliseconds since power-up, modulo 2**30; where an injected crash comes to light."""
+        if self._board.crash:
+            self._board.crash = False
+            raise RuntimeError("injected crash")
         self._board.call()
         return self._board.now // TICKS_PER_MS & 0x3FFFFFFF
 
