@@ -224,7 +224,7 @@ class Repl:
                 return ""
             if byte in b"\r\n":
                 send("\r\n")
-                return line.decode()
+                return "".join([chr(byte) for byte in line])  # whatever it is, it is no reason to end
             if byte in b"\x08\x7f":
                 if line:
                     line = line[:-1]
