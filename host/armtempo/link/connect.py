@@ -9,7 +9,7 @@ from pathlib import Path
 
 from armtempo.arm import Arm
 from armtempo.boardfiles import own_crc
-from armtempo.errors import InputError, LinkError
+from armtempo.errors import BoardError, InputError, LinkError
 from armtempo.link import diagnose, ports, traffic
 from armtempo.link.board import Board
 from armtempo.link.session import NoAnswer, Session
@@ -35,7 +35,7 @@ def open_board(
     else.
     """
     with ExitStack() as stack:
-        device = _virtual_port(stack, port, arm) if ports.is_sim(port) else port
+        device = stack.enter_context(_virtual_port(port, arm)) if ports.is_sim(port) else port
         sinks = _sinks(stack, log_traffic, sink)
 
         def open_transport() -> Transport:
@@ -84,10 +84,19 @@ def greet(
     raise reason
 
 
-def _virtual_port(stack: ExitStack, port: str, arm: Arm | None) -> str:
+@contextmanager
+def _virtual_port(port: str, arm: Arm | None) -> Iterator[str]:
+    """A virtual board's port; where its program fails, the errors meanwhile end with its last words."""
     from armtempo import virtual
 
-    return stack.enter_context(virtual.launch(ports.sim_flash(port), arm=arm)).port
+    with virtual.launch(ports.sim_flash(port), arm=arm) as board:
+        try:
+            yield board.port
+        except LinkError as error:
+            words = board.log().strip().splitlines()[-1:]
+            if isinstance(error, BoardError) or not words:
+                raise
+            raise LinkError(f"{error}; the virtual board says: {words[0]}") from error
 
 
 def _sinks(stack: ExitStack, path: Path | None, sink: traffic.Sink | None) -> list[traffic.Sink]:
