@@ -4,7 +4,7 @@
 """
 
 
-def replay(name=""):
+def replay(name: str = "") -> None:
     """Run a stored trajectory without a host; see ``standalone.py``."""
     from armtempo_board import standalone
 

@@ -120,7 +120,7 @@ def word_k(words: ptr32, at: int) -> int:
 
 
 @micropython.viper
-def copy_word(source: ptr32, at: int, target: ptr32, to: int):
+def copy_word(source: ptr32, at: int, target: ptr32, to: int) -> object:
     """Copy a word that may be too large for a small integer."""
     target[to] = source[at]
 
@@ -165,7 +165,7 @@ def read_ndtr(stream: ptr32, block: ptr32) -> int:
 
 
 @micropython.viper
-def seal(state: ptr32, ring: ptr32, count: int):
+def seal(state: ptr32, ring: ptr32, count: int) -> object:
     """Take ``count`` new entries in and write the far-away entry behind them.
 
     Entry 0 goes into the compare register by hand, so the stream begins with entry 1 and runs over the
@@ -208,7 +208,7 @@ def arm_channel(block: ptr32, timer: ptr32, ring: ptr32, at: int) -> int:
 
 
 @micropython.viper
-def release_channel(block: ptr32, timer: ptr32, at: int):
+def release_channel(block: ptr32, timer: ptr32, at: int) -> object:
     """Hold the output low and take no more words from DMA. Call it with interrupts off."""
     shift = block[at + MODE_SHIFT]
     channel = block[at + CCR_AT] - CCR1 + 1
@@ -218,7 +218,7 @@ def release_channel(block: ptr32, timer: ptr32, at: int):
 
 
 @micropython.viper
-def push_away(timer: ptr32, compare: int, state: ptr32):
+def push_away(timer: ptr32, compare: int, state: ptr32) -> object:
     """Move an idle compare value as far away as the counter allows."""
     half = 1
     far = timer[CNT] + (half << 31)
@@ -227,7 +227,7 @@ def push_away(timer: ptr32, compare: int, state: ptr32):
 
 
 @micropython.viper
-def mark(timer: ptr32, state: ptr32):
+def mark(timer: ptr32, state: ptr32) -> object:
     """Count the last entry as being now."""
     state[LAST] = timer[CNT]
 
@@ -244,7 +244,7 @@ def add_turn(block: ptr32, state: ptr32, at: int, delay: int) -> int:
 
 
 @micropython.viper
-def call_soon(timer: ptr32):
+def call_soon(timer: ptr32) -> object:
     """Have the compare interrupt come in 4 us, to look at what was queued."""
     while True:
         timer[CCR4] = timer[CNT] + 336
@@ -297,7 +297,7 @@ def serve(block: ptr32, timer: ptr32, port: ptr32) -> int:
 
 
 @micropython.viper
-def take(raw: ptr32, block: ptr32, dma: ptr32, encoders):
+def take(raw: ptr32, block: ptr32, dma: ptr32, encoders: object) -> object:
     """Store a raw sample and find the time of the next. 250 instructions, 30 a joint, 100 an encoder."""
     taken = block[TAKEN]
     if ((taken - block[READ]) & 0xFF) >= RAW_ROOM:
@@ -310,7 +310,7 @@ def take(raw: ptr32, block: ptr32, dma: ptr32, encoders):
             raw[to + 1 + joint] = dma[block[at]]
             at += JOINT_WORDS
         for index in range(block[ENCODERS]):
-            counter = ptr32(encoders[index])
+            counter = ptr32(encoders[index])  # type: ignore[index]
             raw[to + 7 + index] = counter[CNT]
         block[TAKEN] = (taken + 1) & 0xFF
     left = block[LEFT]
@@ -354,10 +354,10 @@ def freeze(block: ptr32, timer2: ptr32, timer5: ptr32) -> int:
 
 
 @micropython.viper
-def finish_pulses(block: ptr32, timer2: ptr32, timer5: ptr32, ports):
+def finish_pulses(block: ptr32, timer2: ptr32, timer5: ptr32, ports: object) -> object:
     """After ``freeze``: a STEP pin that is high gets its falling edge, one that is low is held low."""
-    port_a = ptr32(ports[0])
-    port_b = ptr32(ports[1])
+    port_a = ptr32(ports[0])  # type: ignore[index]
+    port_b = ptr32(ports[1])  # type: ignore[index]
     high = 0
     at = BLOCK_HEAD
     for joint in range(block[JOINTS]):
@@ -379,7 +379,7 @@ def finish_pulses(block: ptr32, timer2: ptr32, timer5: ptr32, ports):
 
 
 @micropython.viper
-def trip(block: ptr32, code: int, joint: int):
+def trip(block: ptr32, code: int, joint: int) -> object:
     """Note a fault; the first one stays."""
     if block[FAULT] == 0:
         block[FAULT] = code

@@ -34,6 +34,11 @@ from armtempo_board.octets import places, spread
 from armtempo_board.refusal import Refused
 from armtempo_board.samples import Samples
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from typing import Any
+
 SAMPLE_MEMORY = const(4096)
 _UNCONFIGURED, _UNHOMED, _IDLE, _MOVING, _BRAKING, _FAULT = range(len(STATES))
 _MOST_FAILURES = const(10)  # failing turns of the loop one after the other, then the program gives up
@@ -45,12 +50,12 @@ class App:
     ``fault``: what the program begins with, 0 for none.
     """
 
-    def __init__(self, stream, root, program_crc=0, fault=0):
+    def __init__(self, stream: object, root: str, program_crc: int = 0, fault: int = 0) -> None:
         from armtempo_shared.table import rows  # here, so that it can be forgotten
 
         self.store = store.Store(root)
         self.link = Link(stream)
-        self.engine = None
+        self.engine: "Any" = None
         self.samples = Samples(MAX_JOINTS, 0)
         self.joints = 0
         self.arm_crc = 0
@@ -62,8 +67,8 @@ class App:
         self.run_number = 0
         self.duration = 0
         self._leaving = False
-        self._head = {}
-        self._arm_joints = []
+        self._head: "dict[str, int]" = {}
+        self._arm_joints: "list[dict[str, int]]" = []
         self._raw = array("i", [0] * 2)
         self._fault = fault
         self._running = False  # a run has begun and its end has not been noted
@@ -78,17 +83,17 @@ class App:
 
     # the loop
 
-    def enter(self):
+    def enter(self) -> None:
         """The program begins, perhaps again after it was left."""
         self._leaving = False
         self.commands.greeted = False
         self.link.forget()
 
-    def left(self):
+    def left(self) -> int:
         """Whether somebody has asked for the REPL, and the reply is out."""
         return self._leaving and self.link.idle()
 
-    def turn(self):
+    def turn(self) -> None:
         """One turn of the loop; an exception in it becomes a fault."""
         try:
             self._turn()
@@ -96,7 +101,7 @@ class App:
         except Exception as error:
             self._fail(error)
 
-    def _turn(self):
+    def _turn(self) -> None:
         if self.link.poll():
             self.commands.act()
         if self.engine:
@@ -108,11 +113,11 @@ class App:
         self.link.flush()
         self._watch_escape()
 
-    def _collect(self):
+    def _collect(self) -> None:
         while self.engine.next_sample(self._raw):
             self.samples.add(self._raw, SAMPLE_BRAKING if self._braking else 0)
 
-    def _watch(self):
+    def _watch(self) -> None:
         if self._running:
             if not self.engine.moving:
                 self._end()
@@ -120,20 +125,20 @@ class App:
                 self._watch_link()
         self.events.note_fault(self.fault())
 
-    def _watch_link(self):
+    def _watch_link(self) -> None:
         silent_ms = time.ticks_diff(time.ticks_ms(), self.link.heard_ms)
         if silent_ms > self._head["link_timeout_ms"] and self._head["flags"] & FLAG_STOP_ON_LINK_LOSS:
             self._fault = codes.LINK_LOST
             self.stop(0)
 
-    def _watch_escape(self):
+    def _watch_escape(self) -> None:
         if self.link.escape:
             self.link.escape = False
             if not self.moving():
                 self.link.forget()
                 self._leaving = True
 
-    def _end(self):
+    def _end(self) -> None:
         self._collect()
         self._forget()
         self._running = False
@@ -141,7 +146,7 @@ class App:
         if not self.fault():
             self.events.note_done()
 
-    def _fail(self, error):
+    def _fail(self, error: "BaseException") -> None:
         self._failures += 1
         self._fault = codes.INTERNAL
         if self.engine:
@@ -153,7 +158,7 @@ class App:
 
     # what commands and the button ask for
 
-    def configure(self):
+    def configure(self) -> None:
         """Take the stored arm record; without one the board stays unconfigured."""
         try:
             head, joints, crc = unpack_arm(self.store.read(store.ARM))
@@ -171,14 +176,14 @@ class App:
         self._raw = array("i", [0] * (2 + 2 * self.joints))
         self.samples = Samples(self.joints, SAMPLE_MEMORY)
 
-    def check_ready(self):
+    def check_ready(self) -> None:
         """Refuses while a fault is pending or no arm is configured."""
         if self.fault():
             raise Refused(codes.FAULT_PENDING, self.fault_joint(), self.fault())
         if not self.engine:
             raise Refused(codes.UNCONFIGURED)
 
-    def home(self, mask, steps):
+    def home(self, mask: int, steps: "Sequence[int]") -> None:
         """Declare where the joints of ``mask`` stand; ``steps`` has a number for every joint."""
         for joint in range(self.joints):
             row = self._arm_joints[joint]
@@ -186,7 +191,7 @@ class App:
                 raise Refused(codes.OUT_OF_RANGE, joint, steps[joint])
         self.engine.home(mask, steps)
 
-    def begin(self, name, flags, crc=None):
+    def begin(self, name: str, flags: int, crc: "int | None" = None) -> None:
         """Start a stored motion, or refuse. ``crc``: of the record that the host means; None: there is none."""
         self.check_ready()
         homing = bool(flags & START_HOMING)
@@ -194,7 +199,7 @@ class App:
         if missing and not homing:
             raise Refused(codes.UNHOMED, _lowest(missing))
         motion = self.load(name, crc)
-        if missing:
+        if homing:
             self._assume(motion, missing)
         refused = self.engine.load(motion)
         if refused:
@@ -211,17 +216,21 @@ class App:
         self._running = True
         self.engine.start(homing)
 
-    def _assume(self, motion, mask):
-        """A homing motion may begin wherever joints of unknown position stand; after it they are unknown again."""
+    def _assume(self, motion: "Motion", mask: int) -> None:
+        """A homing motion may begin anywhere; joints that are not known to stand there are unknown after it."""
+        self.engine.snapshot(self._raw)
+        for joint in range(self.joints):
+            if evaluator.start_offset(motion, joint, self._raw[2 + joint]):
+                mask |= 1 << joint
         self.home(mask, [evaluator.start_offset(motion, joint, 0) for joint in range(self.joints)])
         self._assumed = mask
 
-    def _forget(self):
+    def _forget(self) -> None:
         if self._assumed:
             self.engine.known &= ~self._assumed
             self._assumed = 0
 
-    def load(self, name, crc=None):
+    def load(self, name: str, crc: "int | None" = None) -> "Motion":
         """The stored motion, checked as far as that needs no evaluator, or refused."""
         data = self.store.read(name + store.MOTION)
         try:
@@ -236,7 +245,7 @@ class App:
             raise Refused(codes.WRONG_JOINTS, value=motion.joints)
         return motion
 
-    def stop(self, now):
+    def stop(self, now: int) -> None:
         """Brake along the path; freeze where ``now``, or where the motion has no way to brake."""
         self._braking = True
         if now or not self._brakes:
@@ -244,35 +253,35 @@ class App:
         else:
             self.engine.brake()
 
-    def clear(self):
+    def clear(self) -> None:
         """Clear what is pending; the cause must be gone."""
         if self.engine and not self.engine.clear():
             raise Refused(codes.FAULT_PENDING, self.fault_joint(), self.fault())
         self._fault = 0
 
-    def leave(self):
+    def leave(self) -> None:
         """End the program once the reply is out; the port becomes the REPL."""
         self._leaving = True
 
     # what the board tells
 
-    def moving(self):
+    def moving(self) -> bool:
         """Whether steps may still come."""
         return self.engine is not None and self.engine.moving
 
-    def known(self):
+    def known(self) -> int:
         """Bit a joint: its position is known."""
         return self.engine.known if self.engine else 0
 
-    def fault(self):
+    def fault(self) -> int:
         """Code of the pending fault, 0 for none."""
         return self._fault or (self.engine.fault if self.engine else 0)
 
-    def fault_joint(self):
+    def fault_joint(self) -> int:
         """The joint that the fault is about; 255: none."""
         return self.engine.fault_joint if self.engine and self.engine.fault else 255
 
-    def state(self):
+    def state(self) -> int:
         """Index into STATES."""
         if self.moving():
             return _BRAKING if self._braking else _MOVING
@@ -282,13 +291,13 @@ class App:
             return _UNCONFIGURED
         return _IDLE if self.known() == self.everyone() else _UNHOMED
 
-    def look_around(self):
+    def look_around(self) -> None:
         """Bring ``free_flash`` and ``free_heap`` up to date; costs milliseconds, so not while moving."""
         if not self.moving():
             self.free_flash = self.store.free()
             self.free_heap = _free_heap()
 
-    def stand(self, target, ticks_at, joints_at):
+    def stand(self, target: bytearray, ticks_at: int, joints_at: int) -> int:
         """Write motion clock and per joint commanded steps and counts as the wire has them; bytes a tail."""
         if not self.engine:
             return 0
@@ -296,28 +305,28 @@ class App:
         spread(target, self._raw, places(ticks_at, joints_at), self.joints)
         return 8 * self.joints
 
-    def everyone(self):
+    def everyone(self) -> int:
         """Bit a joint, all set."""
         return (1 << self.joints) - 1
 
 
-def _lowest(mask):
+def _lowest(mask: int) -> int:
     joint = 0
     while not mask >> joint & 1:
         joint += 1
     return joint
 
 
-def _board_id():
+def _board_id() -> bytes:
     return b"".join([b"%02x" % byte for byte in machine.unique_id()]) + b" " + sys.version.encode()
 
 
-def _free_heap():
+def _free_heap() -> int:
     free = getattr(gc, "mem_free", None)
     return free() if free else 0
 
 
-def _traceback(error):
+def _traceback(error: "BaseException") -> str:
     text = io.StringIO()
     sys.print_exception(error, text)
-    return text.getvalue()
+    return str(text.getvalue())

@@ -13,16 +13,16 @@ _STEADY_MS = const(30)
 class Button:
     """``pressed`` says True once for each press that lasts long enough."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._pin = Pin(pins.BUTTON, Pin.IN, Pin.PULL_DOWN)
         self._high = True  # a level that is high from the start is no press
         self._changed_ms = time.ticks_ms()
 
-    def held(self):
+    def held(self) -> bool:
         """Whether it is down now."""
         return bool(self._pin.value())
 
-    def pressed(self):
+    def pressed(self) -> bool:
         """Whether it went down and has been steady since."""
         now_ms = time.ticks_ms()
         if self.held() == self._high:

@@ -320,7 +320,7 @@ class Engine:
         """The motion clock, 64 bits; negative before time 0."""
         counter = mem32[stm.TIM2 + 4 * access.CNT] & 0xFFFFFFFF
         epoch = self._epoch + (1 if counter >> 10 < self._low else 0)
-        return (epoch << 32) + counter
+        return int((epoch << 32) + counter)
 
     def _set_clock(self, ticks: int) -> None:
         registers.set_counters(ticks & 0xFFFFFFFF)

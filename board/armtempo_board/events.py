@@ -5,6 +5,13 @@ from struct import calcsize, pack_into
 from armtempo_shared.messages import MAX_PAYLOAD
 from micropython import const
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
+
+    from armtempo_board.app import App
+
 _SAMPLE_HEAD = "<II"  # run and index; the rest of the fields stands in the slot
 _SAMPLE_HEAD_SIZE = const(8)
 _DONE_TICKS = const(4)  # index of the ticks in done
@@ -15,7 +22,7 @@ _IN_ONE_TURN = const(4)  # so many samples at most, so that the loop stays short
 class Events:
     """Pushes what is waiting as the link takes it."""
 
-    def __init__(self, app, rows):
+    def __init__(self, app: "App", rows: "Callable[[str], list[Any]]") -> None:
         """``rows`` of the message table."""
         self._app = app
         events = rows("E")
@@ -25,27 +32,27 @@ class Events:
         self._notice = b""
         self.clear()
 
-    def clear(self):
+    def clear(self) -> None:
         """A new run begins."""
         self._done = False
         self._fault = False
 
-    def note_done(self):
+    def note_done(self) -> None:
         """The run has ended without a fault."""
         self._done = True
 
-    def note_fault(self, code):
+    def note_fault(self, code: int) -> None:
         """Called every turn with the pending fault (0: none); tells each once."""
         if code != self._noted:
             self._noted = code
             self._fault = code != 0
 
-    def note(self, text):
+    def note(self, text: str) -> None:
         """Keep words for the host; the first ones where more come than go."""
         if not self._notice:
             self._notice = text.encode()[:MAX_PAYLOAD]
 
-    def push(self):
+    def push(self) -> None:
         """Hand the link what is waiting and has room."""
         for _ in range(_IN_ONE_TURN):
             if not self._push_sample():
@@ -54,7 +61,7 @@ class Events:
             self._push_end()
         self._push_notice()
 
-    def _push_sample(self):
+    def _push_sample(self) -> bool:
         samples = self._app.samples
         index = samples.waiting()
         if index < 0 or not self._app.link.room(_SAMPLE_HEAD_SIZE + samples.size):
@@ -66,7 +73,7 @@ class Events:
         link.event(self._numbers[0], _SAMPLE_HEAD_SIZE + samples.size)
         return True
 
-    def _push_end(self):
+    def _push_end(self) -> None:
         if self._done and self._room(0):
             self._done = False
             samples = self._app.samples
@@ -76,10 +83,10 @@ class Events:
             app = self._app
             self._put(1, _FAULT_TICKS, app.run_number, app.fault(), app.fault_joint(), 0)
 
-    def _room(self, kind):
+    def _room(self, kind: int) -> int:
         return self._app.link.room(calcsize(self._forms[kind]) + 8 * self._app.joints)
 
-    def _put(self, kind, ticks, *values):
+    def _put(self, kind: int, ticks: int, *values: int) -> None:
         link = self._app.link
         at = link.payload()
         pack_into(self._forms[kind], link.out, at, *values)
@@ -87,7 +94,7 @@ class Events:
         size += self._app.stand(link.out, at + ticks, at + size)
         link.event(self._numbers[1 + kind], size)
 
-    def _push_notice(self):
+    def _push_notice(self) -> None:
         link = self._app.link
         if self._notice and link.room(len(self._notice)):
             at = link.payload()

@@ -11,6 +11,10 @@ from micropython import const
 
 from armtempo_board.octets import TABLE, copy, places, sealed
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
 _HEAD = const(5)  # SYNC, length, sequence, message id
 _QUIET_MS = const(50)  # half a frame, then nothing for so long: its rest is not coming
 _TURNS = const(8)  # reads or rejected candidates in one poll: bounds its time
@@ -20,7 +24,7 @@ _PIECE = const(64)
 class FrameReader:
     """``poll`` until it says True; then the frame stands in ``data``, its payload from ``PAYLOAD`` on."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.data = bytearray(MAX_PAYLOAD + OVERHEAD)
         self.bad = 0  # stretches of bytes passed over
         self.outside = -1  # last byte that came outside of any frame; -1: none in this poll
@@ -30,15 +34,15 @@ class FrameReader:
         self._piece = bytearray(_PIECE)
         self._heard_ms = 0
 
-    def length(self):
+    def length(self) -> int:
         """Payload bytes of the frame that stands in ``data``."""
         return self._whole - OVERHEAD
 
-    def empty(self):
+    def empty(self) -> bool:
         """Whether no part of a frame waits for its rest."""
         return self._filled == 0
 
-    def poll(self, stream, now_ms):
+    def poll(self, stream: "Any", now_ms: "Any") -> bool:
         """Whether a whole frame with the right check stands in ``data``, until the next poll."""
         self.outside = -1
         if self._whole:
@@ -53,7 +57,7 @@ class FrameReader:
                 return False
         return False
 
-    def _missing(self):
+    def _missing(self) -> int:
         """Bytes still needed to judge the frame that begins at data[0]."""
         if self._filled < _HEAD:
             return 1 if self._filled == 0 else _HEAD - self._filled
@@ -62,7 +66,7 @@ class FrameReader:
             return 0
         return max(0, length + OVERHEAD - self._filled)
 
-    def _accept(self):
+    def _accept(self) -> bool:
         length = self.data[1] | self.data[2] << 8
         if length <= MAX_PAYLOAD and sealed(TABLE, self.data, 1, length + _HEAD):
             self._whole = length + OVERHEAD
@@ -71,7 +75,7 @@ class FrameReader:
         self._reject()
         return False
 
-    def _read(self, stream, missing, now_ms):
+    def _read(self, stream: "Any", missing: int, now_ms: "Any") -> bool:
         """Take up to ``missing`` bytes; False where none are there."""
         count = stream.readinto(self._piece, min(missing, _PIECE))
         if not count:
@@ -88,12 +92,12 @@ class FrameReader:
         self._filled += count
         return True
 
-    def _skip(self):
+    def _skip(self) -> None:
         if not self._skipping:
             self._skipping = True
             self.bad += 1
 
-    def _reject(self):
+    def _reject(self) -> None:
         """What begins at data[0] is no frame: go on at the next SYNC behind it."""
         self._skip()
         at = 1
@@ -101,7 +105,7 @@ class FrameReader:
             at += 1
         self._drop(at)
 
-    def _drop(self, count):
+    def _drop(self, count: int) -> None:
         self._filled -= count
         copy(self.data, self.data, places(0, count), self._filled)
         at = 0

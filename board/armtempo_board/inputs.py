@@ -40,7 +40,7 @@ class Inputs:
         self._count = 0
         if flags & armrecord.FLAG_ESTOP_FITTED:
             self._estop_level = 1 if flags & armrecord.FLAG_ESTOP_ACTIVE_HIGH else 0
-            self._estop = self._hook(pins.ESTOP, self._estop_level, self._on_estop)
+            self._estop = self._hook(pins.ESTOP, self._estop_level, self._on_estop)  # type: ignore[arg-type]
         self._add_limits()
         registers.apply(registers.PRIORITIES)
 
@@ -62,7 +62,7 @@ class Inputs:
                 fitted[switch] = joint["limit_active_high"]
                 self._add_pair(number, joint, int(pins.LIMIT[switch][1:]), positive)
         for switch, level in fitted.items():
-            pin = self._hook(pins.LIMIT[switch], level, self._on_limit)
+            pin = self._hook(pins.LIMIT[switch], level, self._on_limit)  # type: ignore[arg-type]
             self._limits.append((pin, level, int(pins.LIMIT[switch][1:])))
 
     def _add_pair(self, number: int, joint: "dict[str, int]", line: int, positive: int) -> None:
@@ -73,19 +73,19 @@ class Inputs:
         self._count += 1
 
     @micropython.viper
-    def _freeze(self):
+    def _freeze(self) -> object:
         if int(access.freeze(self._block, self._timer2, self._timer5)):
             access.finish_pulses(self._block, self._timer2, self._timer5, self._step_ports)
 
     @micropython.viper
-    def _on_estop(self, line):
+    def _on_estop(self, line: object) -> object:
         self._freeze()
         access.trip(self._block, codes.ESTOP, _NOBODY)
         if self.releases:
             self.enable_pin.value(1 - int(self._on))
 
     @micropython.viper
-    def _on_limit(self, line):
+    def _on_limit(self, line: object) -> object:
         joint = int(access.towards(self._pairs, self._count, line, access.directions(self._port)))
         if joint:
             self._freeze()

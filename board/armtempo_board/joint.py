@@ -13,9 +13,6 @@ from armtempo_board.ring import Ring
 from armtempo_board.sampler import Sampler
 from armtempo_board.walker import Walker
 
-BATCH = const(512)
-"""Most entries written in one go: bounds how long the other joints wait (0.4 ms)."""
-
 LOOKAHEAD_K = const(4096)
 """How far ahead steps are computed, in 1024 ticks: 50 ms. Braking begins behind what is computed."""
 
@@ -106,7 +103,7 @@ class Joint:
 
     def _extend(self, now_k: int, left: int) -> int:
         ring = self.ring
-        room = min(ring.room(left), BATCH)
+        room = ring.room(left)
         if self.walker.at_turn and not self._turn():
             return 0
         made = ring.made()
@@ -142,7 +139,7 @@ class Joint:
             return 0
         if ring.made():
             self._rewind()
-        count = self.walker.fill(ring.words, access.MASK, 0, BATCH, now_k + LOOKAHEAD_K)
+        count = self.walker.fill(ring.words, access.MASK, 0, ring.room(0), now_k + LOOKAHEAD_K)
         if not count:
             return 0
         ring.seal(count)

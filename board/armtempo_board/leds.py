@@ -19,13 +19,13 @@ _LED_OF_STATE = {
 class Leds:
     """Lights the LED of the state; touches the pins only where the state has changed."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._pins = [Pin(name, Pin.OUT_PP) for name in pins.LEDS]
         self._led_of_state = [_LED_OF_STATE[name] for name in STATES]
         self._state = -1
         self.show(0)
 
-    def show(self, state):
+    def show(self, state: int) -> None:
         """``state`` is an index into STATES."""
         if state != self._state:
             self._state = state

@@ -13,6 +13,10 @@ from micropython import const
 from armtempo_board.frames import FrameReader
 from armtempo_board.octets import TABLE, copy, places, same, seal
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
 PAYLOAD = const(5)  # index of the payload in a frame
 _OUT_SIZE = const(1200)
 _ESCAPE_QUIET_MS = const(50)
@@ -24,12 +28,12 @@ _ESCAPE_SESSION_MS = const(100)
 class Link:
     """``poll`` gives commands; ``answer`` and ``event`` queue frames; ``flush`` hands them to the port."""
 
-    def __init__(self, stream):
+    def __init__(self, stream: "Any") -> None:
         self.stream = stream
         self.reader = FrameReader()
         self.reply = bytearray(MAX_PAYLOAD + OVERHEAD)
         self.out = bytearray(_OUT_SIZE)
-        self.heard_ms = 0  # when the last good frame came
+        self.heard_ms: "Any" = 0  # when the last good frame came
         self.fresh = False  # whether that was a moment ago
         self.escape = False  # somebody outside of any frame asks for the REPL
         self._begin = 0
@@ -42,7 +46,7 @@ class Link:
         self._interrupt = False  # whether one of them was Ctrl-C
         self._control_ms = 0
 
-    def poll(self):
+    def poll(self) -> bool:
         """Whether a command that has not been acted on stands in ``reader.data``."""
         now_ms = time.ticks_ms()
         reader = self.reader
@@ -58,27 +62,27 @@ class Link:
             return False
         return not self._reply_waits  # an answer still waits for room: the host repeats its command
 
-    def answer(self, number, size):
+    def answer(self, number: int, size: int) -> None:
         """Send the reply whose payload of ``size`` bytes stands in ``reply``."""
         self._remember()
         self._reply_size = self._finish(self.reply, 0, self._request[0], number, size)
         self._reply_waits = True
 
-    def room(self, size):
+    def room(self, size: int) -> bool:
         """Whether an event with so many bytes of payload fits into ``out`` now; replies go first."""
         self._queue_reply()
         return not self._reply_waits and self._fits(size + OVERHEAD)
 
-    def payload(self):
+    def payload(self) -> int:
         """Index in ``out`` where the next event's payload is to be put."""
         return self._end + PAYLOAD
 
-    def event(self, number, size):
+    def event(self, number: int, size: int) -> None:
         """Send the event whose payload was put at ``payload()``; ask ``room()`` before."""
         self._end += self._finish(self.out, self._end, self._events, number, size)
         self._events = (self._events + 1) & 0xFF
 
-    def flush(self):
+    def flush(self) -> None:
         """Hand to the port what it takes."""
         self._queue_reply()
         if self._begin == self._end:
@@ -89,47 +93,49 @@ class Link:
             if self._begin == self._end:
                 self._begin = self._end = 0
 
-    def forget(self):
+    def forget(self) -> None:
         """A new host: drop what was meant for the old one."""
         self._begin = self._end = 0
         self._reply_waits = False
 
-    def idle(self):
+    def idle(self) -> bool:
         """Whether nothing is under way in either direction."""
         return self._begin == self._end and not self._reply_waits and self.reader.empty()
 
-    def _finish(self, buffer, start, sequence, number, size):
+    def _finish(self, buffer: bytearray, start: int, sequence: int, number: int, size: int) -> int:
         pack_into("<BHBB", buffer, start, SYNC, size, sequence, number)
         seal(TABLE, buffer, start + 1, start + PAYLOAD + size)
         return size + OVERHEAD
 
-    def _fits(self, size):
+    def _fits(self, size: int) -> bool:
         if self._end + size > _OUT_SIZE and self._begin:
             copy(self.out, self.out, places(0, self._begin), self._end - self._begin)
             self._end -= self._begin
             self._begin = 0
         return self._end + size <= _OUT_SIZE
 
-    def _queue_reply(self):
+    def _queue_reply(self) -> None:
         if self._reply_waits and self._fits(self._reply_size):
             copy(self.out, self.reply, places(self._end, 0), self._reply_size)
             self._end += self._reply_size
             self._reply_waits = False
 
-    def _remember(self):
+    def _remember(self) -> None:
         data = self.reader.data
         copy(self._request, data, places(0, 3), 2)
         copy(self._request, data, places(2, PAYLOAD + self.reader.length()), 4)
 
-    def _repeated(self):
+    def _repeated(self) -> bool:
         """Whether the frame is the one that was answered last: same number, same content."""
         if not self._reply_size:
             return False
         data = self.reader.data
         check = PAYLOAD + self.reader.length()
-        return same(self._request, data, places(0, 3), 2) and same(self._request, data, places(2, check), 4)
+        return bool(
+            same(self._request, data, places(0, 3), 2) and same(self._request, data, places(2, check), 4)
+        )
 
-    def _watch_escape(self, byte, now_ms):
+    def _watch_escape(self, byte: int, now_ms: "Any") -> None:
         """Tell a Ctrl-C (of mpremote, or typed twice) from noise: nothing but CR and Ctrl-C, after quiet."""
         if self.fresh and time.ticks_diff(now_ms, self.heard_ms) >= _ESCAPE_SESSION_MS:
             self.fresh = False
@@ -143,7 +149,7 @@ class Link:
         if self._controls >= needed and self._interrupt and not self.fresh:
             self.escape = True
 
-    def _count_control(self, byte, quiet):
+    def _count_control(self, byte: int, quiet: bool) -> None:
         if byte not in _CONTROLS:
             self._controls = -1
         elif self._controls > 0 or quiet:

@@ -5,7 +5,7 @@ from array import array
 import micropython
 
 
-def _nibble_table():
+def _nibble_table() -> array:
     """crc32 (IEEE, reflected) of the 16 nibbles, each as low and high half word."""
     table = array("H", [0] * 32)
     for nibble in range(16):
@@ -23,7 +23,7 @@ TABLE = _nibble_table()
 
 # The crc is kept in two half words, so that no word needs more than 31 bits on any interpreter.
 @micropython.viper
-def seal(table: ptr16, data: ptr8, start: int, end: int):
+def seal(table: ptr16, data: ptr8, start: int, end: int) -> object:
     """Write the crc32 of data[start:end] behind it, little endian."""
     low = 0xFFFF
     high = 0xFFFF
@@ -63,7 +63,7 @@ def sealed(table: ptr16, data: ptr8, start: int, end: int) -> int:
 
 
 @micropython.viper
-def copy(target: ptr8, source: ptr8, places: int, count: int):
+def copy(target: ptr8, source: ptr8, places: int, count: int) -> object:
     """Copy ``count`` bytes; ``places`` = index in target | index in source << 15, see ``places()``.
 
     Within one buffer it may only move bytes down.
@@ -91,7 +91,7 @@ def same(one: ptr8, other: ptr8, places: int, count: int) -> int:
 
 
 @micropython.viper
-def spread(target: ptr8, raw: ptr8, places: int, joints: int):
+def spread(target: ptr8, raw: ptr8, places: int, joints: int) -> object:
     """From the engine's (ticks low, high, commanded[], counts[]) to the order of the wire.
 
     ``places``: index of the ticks in target | index of the joints' pairs (commanded, count) << 15.
@@ -108,11 +108,11 @@ def spread(target: ptr8, raw: ptr8, places: int, joints: int):
         to += 8
 
 
-def places(to, at):
+def places(to: int, at: int) -> int:
     """Both indices of ``copy`` in one small integer (viper functions take four arguments at most)."""
     return to | at << 15
 
 
-def u32(data, at):
+def u32(data: "bytes | bytearray", at: int) -> int:
     """The unsigned word at data[at:at+4]; allocates only where it is 2**30 or more."""
     return data[at] | data[at + 1] << 8 | data[at + 2] << 16 | data[at + 3] << 24

@@ -16,15 +16,19 @@ from armtempo_board.leds import Leds
 from armtempo_board.refusal import Refused
 from armtempo_board.watchdog import Watchdog, bit
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
 ROOT = "/flash/armtempo"
 _CTRL_C = const(3)
 _EXCEPTION_BUFFER = const(100)
 
-app = None
+app: "Any" = None
 """The program's App, kept when it is left for the REPL."""
 
 
-def main(root=ROOT):
+def main(root: str = ROOT) -> None:
     """Run until somebody asks for the REPL; a button held down at the start asks for it at once."""
     global app
     button = Button()
@@ -46,7 +50,7 @@ def main(root=ROOT):
     print("armtempo ended; Ctrl-D starts it again")
 
 
-def _loop(leds, button, watchdog):
+def _loop(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
     while not app.left():
         app.turn()
         leds.show(app.state())
@@ -58,27 +62,27 @@ def _loop(leds, button, watchdog):
         machine.idle()
 
 
-def _fault_at_start():
+def _fault_at_start() -> int:
     return codes.WATCHDOG if bit() else 0
 
 
-def _replay_default():
+def _replay_default() -> None:
     try:
         app.begin(app.store.default(), 0)
     except Refused as refused:
         app.events.note("button: refused, error %d" % refused.code)
 
 
-def _detach(port):
+def _detach(port: "Any") -> None:
     os.dupterm(None, 1)
     micropython.kbd_intr(-1)
     port.init(flow=pyb.USB_VCP.RTS | pyb.USB_VCP.CTS)  # without CTS a write waits for the host
 
 
-def _attach(port):
+def _attach(port: "Any") -> None:
     micropython.kbd_intr(_CTRL_C)
     os.dupterm(port, 1)
 
 
-def _folders():
+def _folders() -> "list[str]":
     return [path.rsplit("/", 1)[0] for path in (__file__, codes.__file__)]

@@ -4,7 +4,7 @@
 class Refused(Exception):
     """``code`` of ``armtempo_shared.codes``, the joint that it is about (255: none) and a value."""
 
-    def __init__(self, code, joint=255, value=0):
+    def __init__(self, code: int, joint: int = 255, value: int = 0) -> None:
         super().__init__(code)
         self.code = code
         self.joint = joint

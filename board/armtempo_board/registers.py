@@ -112,7 +112,7 @@ def stream_rows(
 
 def compare_address(timer: int, channel: int) -> int:
     """Address of a compare register."""
-    return getattr(stm, "TIM%d" % timer) + 4 * (CCR1 + channel - 1)
+    return int(getattr(stm, "TIM%d" % timer)) + 4 * (CCR1 + channel - 1)
 
 
 def stream_address(stream: int) -> int:

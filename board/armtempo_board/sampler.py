@@ -38,10 +38,10 @@ class Sampler:
     def connect(self) -> None:
         """Hook the interrupt. Starts TIM2, so set the timers up after it."""
         timer = Timer(2, prescaler=0, period=0x3FFFFFFF)
-        timer.channel(4, Timer.OC_TIMING, callback=self._hook)
+        timer.channel(4, Timer.OC_TIMING, callback=self._hook)  # type: ignore[arg-type]
 
     @micropython.viper
-    def _interrupt(self, timer):
+    def _interrupt(self, timer: object) -> object:
         # 9 us before the first pin turns (see docs/hardware.md)
         while int(access.serve(self.block, self._timer2, self._directions)):
             access.take(self.raw, self.block, self._dma, self._counters)

@@ -8,6 +8,10 @@ from micropython import const
 
 from armtempo_board.octets import copy, places, spread
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from array import array
+
 _FLAGS = const(8)  # index of the flags in a slot
 _HEAD = const(9)  # ticks, flags
 
@@ -15,7 +19,7 @@ _HEAD = const(9)  # ticks, flags
 class Samples:
     """First in, first out; the oldest gives way where the memory ends, and is counted in ``lost``."""
 
-    def __init__(self, joints, memory):
+    def __init__(self, joints: int, memory: int) -> None:
         """``memory``: bytes to keep samples in."""
         self.size = _HEAD + 8 * joints
         self._joints = joints
@@ -23,7 +27,7 @@ class Samples:
         self._buffer = bytearray(self._places * self.size)
         self.clear()
 
-    def clear(self):
+    def clear(self) -> None:
         """A new run begins."""
         self.first = 0  # index of the oldest sample kept
         self.next = 0  # index of the next sample
@@ -32,7 +36,7 @@ class Samples:
         self._again = 0  # the next one to be sent again,
         self._again_end = 0  # up to here
 
-    def add(self, raw, flags):
+    def add(self, raw: "array[int]", flags: int) -> None:
         """Keep one: ``raw`` as the engine fills it; ``flags`` of the sample event."""
         if self.next - self.first == self._places:
             self.first += 1
@@ -43,28 +47,28 @@ class Samples:
         self._buffer[at + _FLAGS] = flags
         self.next += 1
 
-    def acknowledge(self, index):
+    def acknowledge(self, index: int) -> None:
         """All before ``index`` have arrived; what was never sent cannot have."""
         self.first = max(self.first, min(index, self.sent))
 
-    def skip(self):
+    def skip(self) -> None:
         """A new host: it asks for what it wants of the older ones."""
         self.sent = self.next
         self._again = self._again_end = 0
 
-    def again(self, index, count):
+    def again(self, index: int, count: int) -> None:
         """Send up to ``count`` from ``index`` on again."""
         self._again = max(index, self.first)
         self._again_end = min(index + count, self.sent)
 
-    def waiting(self):
+    def waiting(self) -> int:
         """Index of the next sample to send, or -1."""
         self._again = max(self._again, self.first)
         if self._again < self._again_end:
             return self._again
         return self.sent if self.sent < self.next else -1
 
-    def take(self, index, target, at):
+    def take(self, index: int, target: bytearray, at: int) -> None:
         """Copy the sample ``waiting`` named to target[at:]; it counts as sent."""
         copy(target, self._buffer, places(at, index % self._places * self.size), self.size)
         if index == self.sent:

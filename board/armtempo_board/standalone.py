@@ -14,14 +14,14 @@ _NO_JOINT = const(255)
 class _Nobody:
     """Takes the place of the serial port, which is the REPL's."""
 
-    def readinto(self, buffer, count):
+    def readinto(self, buffer: bytearray, count: int) -> None:
         """Nothing comes."""
 
-    def write(self, buffer, start, count):
+    def write(self, buffer: bytearray, start: int, count: int) -> None:
         """Nothing is taken."""
 
 
-def replay(name="", root=program.ROOT):
+def replay(name: str = "", root: str = program.ROOT) -> None:
     """Run a stored trajectory, the default where no name is given, and say how it ended.
 
     Where the position is unknown the arm must stand where the motion begins: calling this declares it.
@@ -44,7 +44,7 @@ def replay(name="", root=program.ROOT):
         app.link.stream = port
 
 
-def _begin(app, name):
+def _begin(app: "App", name: str) -> None:
     if app.engine and not app.fault():
         motion = app.load(name)
         unknown = app.everyone() & ~app.known()
@@ -55,7 +55,7 @@ def _begin(app, name):
     app.begin(name, 0)
 
 
-def _follow(app, watchdog):
+def _follow(app: "App", watchdog: "Watchdog") -> None:
     presses = 0
     while app.moving():
         try:
@@ -67,7 +67,7 @@ def _follow(app, watchdog):
     app.turn()
 
 
-def _name(code):
+def _name(code: int) -> str:
     """Of a refusal or fault, as in ``codes``."""
     for name in dir(codes):
         if getattr(codes, name) == code:

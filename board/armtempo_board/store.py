@@ -16,6 +16,11 @@ from micropython import const
 
 from armtempo_board.refusal import Refused
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
+
 MOTION = ".atm"
 ARM = "arm.ata"
 _DEFAULT = "default.txt"
@@ -25,7 +30,7 @@ _PIECE = const(512)
 _MOST_FREE = const(0x3FFFFFFF)
 
 
-def check_name(name):
+def check_name(name: str) -> None:
     """Refuses a name that is no name for a trajectory."""
     if not 0 < len(name) <= MAX_NAME:
         raise Refused(codes.BAD_NAME)
@@ -34,13 +39,13 @@ def check_name(name):
             raise Refused(codes.BAD_NAME)
 
 
-def _sync():
+def _sync() -> None:
     sync = getattr(os, "sync", None)
     if sync:
         sync()
 
 
-def _whole(file_name, data):
+def _whole(file_name: str, data: bytes) -> bool:
     """Whether the bytes are a whole record of the kind that the name tells."""
     if file_name.endswith(MOTION):
         try:
@@ -60,15 +65,15 @@ def _whole(file_name, data):
 class Store:
     """The folder ``root``; every method refuses with FLASH_ERROR or FLASH_FULL where the flash fails."""
 
-    def __init__(self, root):
+    def __init__(self, root: str) -> None:
         self._root = root
-        self._file = None  # the upload under way,
+        self._file: "Any" = None  # the upload under way,
         self._target = ""  # its file name,
         self._size = 0  # bytes announced
         self._received = 0  # and received so far
         self.recover()
 
-    def recover(self):
+    def recover(self) -> None:
         """Make the folder if it is missing, finish or undo what a power cut interrupted."""
         try:
             os.mkdir(self._root)
@@ -78,7 +83,7 @@ class Store:
             if name.endswith(_NEW):
                 self._recover(name[: -len(_NEW)])
 
-    def free(self):
+    def free(self) -> int:
         """Bytes free in the flash, as far as a small integer can tell."""
         try:
             stat = os.statvfs(self._root)
@@ -86,11 +91,11 @@ class Store:
             return 0
         return min(stat[0] * stat[3], _MOST_FREE)
 
-    def names(self):
+    def names(self) -> "list[str]":
         """Names of the stored trajectories, sorted."""
         return sorted([name[: -len(MOTION)] for name in self._files() if name.endswith(MOTION)])
 
-    def begin(self, file_name, size):
+    def begin(self, file_name: str, size: int) -> None:
         """Begin an upload; gives up one that was under way."""
         self.abandon()
         if size > MAX_MOTION_BYTES:
@@ -103,7 +108,7 @@ class Store:
         self._size = size
         self._received = 0
 
-    def write(self, offset, data):
+    def write(self, offset: int, data: bytes) -> int:
         """Add a piece; one that came before is passed over. Returns the offset of the next."""
         if not self._file or not offset <= self._received or offset + len(data) > self._size:
             raise Refused(codes.BAD_OFFSET, value=self._received)
@@ -117,7 +122,7 @@ class Store:
             self._received += len(fresh)
         return self._received
 
-    def commit(self, crc):
+    def commit(self, crc: int) -> str:
         """Check the upload as it stands in the flash and put it in place; returns its file name."""
         if not self._file or self._received != self._size:
             raise Refused(codes.BAD_OFFSET, value=self._received)
@@ -131,7 +136,7 @@ class Store:
         self._replace(name)
         return name
 
-    def abandon(self):
+    def abandon(self) -> None:
         """Give up the upload under way, if any."""
         if self._file:
             try:
@@ -141,11 +146,11 @@ class Store:
             self._file = None
             self._discard(self._target + _NEW)
 
-    def read(self, file_name):
+    def read(self, file_name: str) -> bytes:
         """All bytes of a file; NOT_FOUND, or TOO_LONG where they do not fit into memory."""
         return self._read(file_name)
 
-    def part(self, file_name, offset, length):
+    def part(self, file_name: str, offset: int, length: int) -> "tuple[int, bytes]":
         """(size of the file, bytes from offset on)."""
         size = self.size(file_name)
         file = self._guard(open, self._path(file_name), "rb")
@@ -155,20 +160,20 @@ class Store:
         finally:
             file.close()
 
-    def size(self, file_name):
+    def size(self, file_name: str) -> int:
         """Bytes of a file; NOT_FOUND."""
         try:
             return os.stat(self._path(file_name))[6]
         except OSError:
             raise Refused(codes.NOT_FOUND)
 
-    def remove(self, name):
+    def remove(self, name: str) -> None:
         """Remove a trajectory."""
         self.size(name + MOTION)
         self._guard(os.remove, self._path(name + MOTION))
         self._guard(_sync)
 
-    def rename(self, old, new):
+    def rename(self, old: str, new: str) -> None:
         """Give a trajectory another name; the default goes with it."""
         self.size(old + MOTION)
         if new.lower() in [name.lower() for name in self.names() if name != old] or new == old:
@@ -181,7 +186,7 @@ class Store:
         if was_default:
             self._write_default(new)
 
-    def default(self):
+    def default(self) -> str:
         """Name of the default trajectory, "" for none."""
         try:
             lines = self._read(_DEFAULT).decode().split("\n")
@@ -193,13 +198,13 @@ class Store:
                 return name
         return ""
 
-    def set_default(self, name):
+    def set_default(self, name: str) -> None:
         """Make a stored trajectory the default; "" for none."""
         if name:
             self.size(name + MOTION)
         self._write_default(name)
 
-    def _write_default(self, text):
+    def _write_default(self, text: str) -> None:
         file = self._guard(open, self._path(_DEFAULT + _NEW), "wb")
         try:
             self._put(file, text.encode() + b"\n")
@@ -210,52 +215,52 @@ class Store:
         self._guard(file.close)
         self._replace(_DEFAULT)
 
-    def _other_case(self, file_name):
+    def _other_case(self, file_name: str) -> None:
         """FAT does not tell upper from lower case: two names must differ in more than that."""
         for name in self._files():
             if name != file_name and name.lower() == file_name.lower():
                 raise Refused(codes.EXISTS)
 
-    def _files(self):
+    def _files(self) -> "list[str]":
         try:
             return os.listdir(self._root)
         except OSError:
             return []
 
-    def _path(self, file_name):
+    def _path(self, file_name: str) -> str:
         return self._root + "/" + file_name
 
-    def _read(self, file_name):
+    def _read(self, file_name: str) -> bytes:
         size = self.size(file_name)
         if size > MAX_MOTION_BYTES:
             raise Refused(codes.TOO_LONG, value=size)
         file = self._guard(open, self._path(file_name), "rb")
         try:
-            return self._guard(file.read)
+            return bytes(self._guard(file.read))
         except MemoryError:
             raise Refused(codes.TOO_LONG, value=size)
         finally:
             file.close()
 
-    def _put(self, file, data):
+    def _put(self, file: "Any", data: bytes) -> None:
         if self._guard(file.write, data) != len(data):
             raise Refused(codes.FLASH_FULL)
 
-    def _close(self):
+    def _close(self) -> None:
         file = self._file
         self._file = None
         self._received = 0
         self._guard(file.close)
         self._guard(_sync)
 
-    def _check(self, name, crc):
+    def _check(self, name: str, crc: int) -> None:
         data = self._read(name + _NEW)
         if int.from_bytes(data[-4:], "little") != crc or crc32(memoryview(data)[:-4]) != crc:
             raise Refused(codes.BAD_CHECKSUM)
         if not _whole(name, data):
             raise Refused(codes.BAD_RECORD)
 
-    def _replace(self, name):
+    def _replace(self, name: str) -> None:
         try:
             self._guard(os.rename, self._path(name + _NEW), self._path(name))
         except Refused:
@@ -263,13 +268,13 @@ class Store:
             raise
         self._guard(_sync)
 
-    def _discard(self, file_name):
+    def _discard(self, file_name: str) -> None:
         try:
             os.remove(self._path(file_name))
         except OSError:
             pass
 
-    def _recover(self, name):
+    def _recover(self, name: str) -> None:
         try:
             whole = name not in self._files() and _whole(name, self._read(name + _NEW))
         except Refused:
@@ -282,7 +287,7 @@ class Store:
         except OSError:
             return None  # the next start tries again
 
-    def _guard(self, function, *arguments):
+    def _guard(self, function: "Callable[..., Any]", *arguments: object) -> "Any":
         try:
             return function(*arguments)
         except OSError as error:

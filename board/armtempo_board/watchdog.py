@@ -20,28 +20,28 @@ _kept = None
 class Watchdog:
     """Starts with the loop, never before: a program that fails on the way there leaves a usable REPL."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._watchdog = machine.WDT(timeout=_TIMEOUT_MS)
         self.feed = self._watchdog.feed
         if _kept:
             _kept.deinit()
 
-    def leave(self):
+    def leave(self) -> None:
         """Feed it from a timer interrupt from now on."""
         keep_fed()
 
 
-def bit():
+def bit() -> bool:
     """Whether the last reset was its doing."""
     return machine.reset_cause() == machine.WDT_RESET
 
 
-def running():
+def running() -> bool:
     """Whether it was started since the last hard reset."""
-    return machine.mem32[_RELOAD] & _UNTOUCHED != _UNTOUCHED
+    return bool(machine.mem32[_RELOAD] & _UNTOUCHED != _UNTOUCHED)
 
 
-def keep_fed():
+def keep_fed() -> None:
     """Feed it once a second from a timer interrupt, which allocates nothing."""
     global _kept
     feed = machine.WDT(timeout=_TIMEOUT_MS).feed
