@@ -153,13 +153,13 @@ def test_homing_motion_starts_anywhere_and_leaves_nothing_known(tmp_path: Path) 
     board.upload(wire.ARM_RECORD_NAME, ARM)
     data = random_motion(random.Random(5))
     board.upload("feed", data)
-    board.home([5, None, None])
+    board.home([7, None, None])
     with pytest.raises(BoardError, match="position is unknown"):
         board.start("feed", wire.record_crc(data))
     run, _ = board.start("feed", wire.record_crc(data), wire.START_HOMING)
     assert board.status().known == 7
     samples = list(Follower(board, run).samples())
-    assert samples[0].stand.commanded_steps == (5, 7, 7)
+    assert samples[0].stand.commanded_steps == (7, 7, 7)
     assert board.status().known == 1
 
 
