@@ -422,7 +422,7 @@ def case_noise_does_not_open_the_repl():
     host.send("status")
     host.turn(10)
     host.port.inbox.extend(b"\r\x03\r")
-    host.turn(100)
+    host.turn(40)
     assert not app.left()
 
 
