@@ -16,7 +16,8 @@ def prepare(options):
     folders = [HERE + "/hardware"]
     if sys.implementation.name != "micropython":
         folders.append(HERE + "/cpython")
-    sys.path[0:0] = [*folders, options["flash"], options["flash"] + "/lib", *options["program"]]
+    folders += [options["flash"], options["flash"] + "/lib"]
+    sys.path[0:0] = folders + options["program"]  # noqa: RUF005: MicroPython has no other way
     if sys.implementation.name != "micropython":
         import additions  # noqa: F401
     from simulator import modules, session
