@@ -41,7 +41,7 @@ def bring_pip() -> None:
 
 def main() -> int:
     """Make .venv; 1 with advice where that is not possible."""
-    if sys.version_info < (3, 11):
+    if sys.version_info < (3, 11):  # noqa: UP036 - run by whatever python3 is here
         print(
             f"armtempo needs Python 3.11 or newer, this is {sys.version.split()[0]}: make PYTHON=python3.11"
         )
