@@ -11,16 +11,12 @@ import tempfile
 import time
 import tty
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
-from typing import Any
 
-from armtempo_shared import armrecord
-
-from armtempo import encode
-from armtempo.arm import Arm, Joint
-from armtempo.errors import InputError, LinkError
+from armtempo.arm import Arm
+from armtempo.errors import LinkError
+from armtempo.virtual.describe import describe
 from armtempo.virtual.options import Fault, Options, unique_id
 
 INTERPRETER_VARIABLE = "ARMTEMPO_MICROPYTHON"
@@ -115,6 +111,7 @@ def launch(
     edge_log: Path | str | None = None,
     interpreter: Path | str | None = None,
     arm: Arm | None = None,
+    start_deg: Sequence[float] | None = None,
     seed: int = 0,
     faults: Sequence[Fault] = (),
     power_cut_at: int = 0,
@@ -127,9 +124,10 @@ def launch(
     ``virtual_time``: motions run as fast as they can; else in real time. ``edge_log``: file for every pin
     edge. ``interpreter``: MicroPython or CPython; None: $ARMTEMPO_MICROPYTHON, ``micropython`` on PATH, or
     this Python. ``arm``: gets motors with its ``model``; None: ideal motors for whatever arm the board is set
-    up for. ``deployed``: run the program in the flash (``armtempo deploy`` puts it there) instead of the
-    installed one. ``flash_blocks``: size of the flash; None: the chip's, and with ``deployed`` more, as compiled
-    files for this machine's processor are larger than for the chip's. Raises LinkError where it does not start.
+    up for. ``start_deg`` (J,): where the arm stands at power-up, else at home. ``deployed``: run the program
+    in the flash (``armtempo deploy`` puts it there) instead of the installed one. ``flash_blocks``: size of
+    the flash; None: the chip's, and with ``deployed`` more, as compiled files for this machine's processor
+    are larger than for the chip's. Raises LinkError where it does not start.
     """
     folder = Path(tempfile.mkdtemp(prefix="armtempo-virtual-"))
     flash = Path(flash_dir).resolve() if flash_dir else folder / "flash"
@@ -142,7 +140,7 @@ def launch(
             speed=0.0 if virtual_time else 1.0,
             edge_log=str(Path(edge_log).resolve()) if edge_log else None,
             unique_id=unique_id(seed),
-            arm=describe(arm) if arm else None,
+            arm=describe(arm, start_deg) if arm else None,
             power_cut_at=power_cut_at,
             seed=seed,
             faults=list(faults),
@@ -159,33 +157,6 @@ def launch(
         board.__exit__(None, None, None)
         raise
     return board
-
-
-def describe(arm: Arm) -> dict[str, Any]:
-    """What the board's process must know of the arm: its record's fields, and each joint's model."""
-    head, joints, _ = armrecord.unpack(encode.arm_record(arm))
-    models = [_describe_joint(joint) for joint in arm.driven]
-    return {
-        "head": head,
-        "joints": [{**row, "model": model} for row, model in zip(joints, models, strict=True)],
-    }
-
-
-def _describe_joint(joint: Joint) -> dict[str, float]:
-    model, motor = joint.model, joint.motor
-    assert motor is not None  # driven
-    if model.holding_torque_nm and not (model.inertia_kg_m2 or model.rotor_inertia_kg_m2):
-        raise InputError(
-            f"{joint.name}: model.holding_torque_nm without an inertia; "
-            "give model.inertia_kg_m2 or model.rotor_inertia_kg_m2 in the arm file"
-        )
-    return {
-        **asdict(model),
-        "gear_ratio": motor.gear_ratio,
-        "steps_per_rev": motor.steps_per_rev,
-        "microsteps": motor.microsteps,
-        "home_deg": joint.home_deg,
-    }
 
 
 def program_folders() -> list[str]:

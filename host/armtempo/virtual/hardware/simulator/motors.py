@@ -2,7 +2,7 @@
 
 from armtempo_shared import armrecord
 
-from simulator import gpio
+from simulator import gpio, switches
 from simulator.inputs import set_level
 
 
@@ -25,6 +25,8 @@ class Motor:
         self._counts = self._at(0)
         self.position = 0  # steps taken since power-up
         self.blocked = False
+        self._start_deg = joint.get("start_deg", 0.0)
+        self._steps_per_deg = joint.get("steps_per_deg", 1.0)
         step.sinks.append(self)
 
     def disconnect(self):
@@ -46,6 +48,10 @@ class Motor:
         """The encoder's coupling slips by so many counts."""
         self._counts -= counts
         self.moved = True
+
+    def angle_deg(self):
+        """Where the joint stands."""
+        return self._start_deg + self.position / self._steps_per_deg
 
     def begin(self, now):
         """A motion begins."""
@@ -72,10 +78,15 @@ class Enable:
 
 
 class Arm:
-    """All motors, as the arm record in the flash has them."""
+    """All motors, as the arm record in the flash has them.
 
-    def __init__(self, board, pins, record, seed):
+    ``record()`` gives (head, joints) or None; ``angles``: where the joints stand, else where ``joints`` says.
+    """
+
+    def __init__(self, board, pins, record, seed, angles):
         self._seed = seed
+        self._angles = angles
+        self._switches = ()
         self.board = board
         self._pins = pins
         self._record = record
@@ -96,16 +107,12 @@ class Arm:
         head, joints = found or ({"flags": 0}, ())
         enable = Enable(self.board, self._pins.ENABLE, head["flags"] & armrecord.FLAG_ENABLE_HIGH)
         self.motors = [self._motor(number, joint, enable) for number, joint in enumerate(joints)]
-        self._release_switches(head, joints)
-
-    def _release_switches(self, head, joints):
-        """Drive the inputs that are fitted to where they have not tripped."""
         if head["flags"] & armrecord.FLAG_ESTOP_FITTED:
             set_level(self._pins.ESTOP, 0 if head["flags"] & armrecord.FLAG_ESTOP_ACTIVE_HIGH else 1)
-        for joint in joints:
-            for switch in (joint["limit_low"], joint["limit_high"]):
-                if switch != armrecord.NONE:
-                    set_level(self._pins.LIMIT[switch], 1 - joint["limit_active_high"])
+        self._switches = []
+        for motor, joint in zip(self.motors, joints):
+            self._switches.extend(switches.fitted(motor, joint, self._pins))
+        self.follow()
 
     def _motor(self, number, joint, enable):
         lines, pins = self.board.pins, self._pins
@@ -114,6 +121,8 @@ class Arm:
         if joint["encoder"] < len(pins.ENCODER):
             encoder = self.board.timers[pins.ENCODER[joint["encoder"]][0]]
         step, direction = lines.line(step), lines.line(direction)
+        if number < len(self._angles):
+            joint = dict(joint, start_deg=self._angles[number])
         if joint.get("model") and joint["model"]["holding_torque_nm"]:
             from simulator.stepper import Stepper
 
@@ -125,6 +134,8 @@ class Arm:
         for motor in self.motors:
             if motor.moved:
                 motor.follow(self.board.now)
+        for switch in self._switches:
+            switch.look()
 
     def counting(self, timer, now):
         """A timer started or stopped: motions begin with TIM2."""

@@ -33,7 +33,8 @@ def connect(pins):
     """Put motors and encoders on the pins; ``pins`` is the board program's own table."""
     from simulator import motors
 
-    the.arm = motors.Arm(the.board, pins, _arm_record, the.options["seed"])
+    angles = [motor.angle_deg() for motor in the.arm.motors] if the.arm else ()
+    the.arm = motors.Arm(the.board, pins, _arm_record, the.options["seed"], angles)
     the.flash.renamed = the.arm.connect
 
 

@@ -26,22 +26,19 @@ _SCATTER_LENGTH_DEG = 2.0  # of motion, in which a new repetition's scatter come
 
 
 class Stepper(Motor):
-    """``joint["model"]``: the joint's model and drive figures from the arm file (``launcher.describe``)."""
+    """``joint``: also what the arm file says of the joint's drive, and its ``model``."""
 
     def __init__(self, step, direction, enable, encoder, joint, seed):
         super().__init__(step, direction, enable, encoder, joint)
         model = joint["model"]
-        self._gear = model["gear_ratio"]
-        self._per_rad = model["steps_per_rev"] * model["microsteps"] / (2 * pi)
-        self._electrical = 2 * pi / (4 * model["microsteps"])
-        inertia = model["rotor_inertia_kg_m2"] + model["inertia_kg_m2"] / self._gear**2
-        self._holding = model["holding_torque_nm"]
-        self._pull = self._holding * self._per_rad / inertia
+        gear = joint["gear_ratio"]
+        per_rad = self._steps_per_deg * 360 / gear / (2 * pi)  # of the motor shaft
+        self._electrical = 2 * pi / (4 * joint["microsteps"])
+        inertia = model["rotor_inertia_kg_m2"] + model["inertia_kg_m2"] / gear**2
+        self._pull = model["holding_torque_nm"] * per_rad / inertia
         self._damping = model["damping_nm_s"] / inertia
-        self._gravity = model["gravity_torque_nm"] / self._gear * self._per_rad / inertia
-        self._corner = model["corner_speed_rad_s"] * self._per_rad
-        self._steps_per_deg = self._per_rad * 2 * pi * self._gear / 360
-        self._home_deg = model["home_deg"]
+        self._gravity = model["gravity_torque_nm"] / gear * per_rad / inertia
+        self._corner = model["corner_speed_rad_s"] * per_rad
         self._play = model["backlash_deg"] * self._steps_per_deg / 2
         self._phase = model["encoder_phase_counts"]
         self._ratio = self._num / self._den
@@ -69,6 +66,10 @@ class Stepper(Motor):
         for tick in rises:
             self._pending.append((tick, way))
         self.position += way * len(rises)
+
+    def angle_deg(self):
+        """Where the joint stands."""
+        return self._start_deg + self._joint / self._steps_per_deg
 
     def begin(self, now):
         """A motion begins: the grid of time steps starts here, and a new scatter is drawn."""
@@ -130,7 +131,7 @@ class Stepper(Motor):
         """What gravity asks of the motor at ``x``, in steps/s²."""
         if not self._gravity:
             return 0.0
-        return self._gravity * cos((self._home_deg + x / self._steps_per_deg) * pi / 180)
+        return self._gravity * cos((self._start_deg + x / self._steps_per_deg) * pi / 180)
 
     def _come_up(self, moved):
         """The scatter of this repetition comes up as the joint moves."""
