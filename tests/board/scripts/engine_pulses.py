@@ -86,10 +86,10 @@ def across_the_wrap():
     wrap = 1 << 32
     motion = Motion(
         3 * wrap + TICK_HZ,
-        Steps(*[(n * wrap - 1_000_000, 2000, 1000, 1) for n in (1, 2, 3)]),
+        Steps(*[(n * wrap - 2_000_000, 4000, 1000, 1) for n in (1, 2, 3)]),
         Steps((wrap - 1, 10_000, 30, 1), (2 * wrap, 10_000, 30, -1), (3 * wrap - 30_000 * 7, 30_000, 15, 1)),
     )
-    rig = Rig(arm(2), turn_us=5000)
+    rig = Rig(arm(2), turn_us=20000)
     rig.run(motion)
     check(rig, motion)
 

@@ -207,7 +207,7 @@ class Rig:
         if planned:
             armtempo_board.joint.Walker = Walker
             armtempo_board.engine.evaluator = Evaluator
-        self.arm = the.arm = motors.Arm(self.board, pins, lambda: (self.head, joints), 1)
+        self.arm = the.arm = motors.Arm(self.board, pins, lambda: (self.head, joints), 1, ())
         self.pins = pins
         self.pulses = [
             Pulses(self, joint, pins.STEP[joint["channel"]][0], pins.STEP[joint["channel"]][6])
