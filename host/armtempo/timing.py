@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
+from operator import mul
 
 import numpy as np
 
@@ -47,7 +49,9 @@ def axis(
     progress: Progress | None = None,
 ) -> Timed:
     """The time axis of the joints whose control points are given, (n + degree, J), one of ``limits`` each."""
-    found = _search(Fitness(angle_points_deg, job.degree, limits), job, rng, progress)
+    stages = _Stages(progress, job)
+    found = _search(Fitness(angle_points_deg, job.degree, limits), job, rng, stages.within)
+    stages.done()
     count = len(angle_points_deg) - job.degree
     path = Path(angle_points_deg, job.degree, limits, timeaxis.step_map(count, job.degree))
     y = path.stretched(found.x)
@@ -55,16 +59,15 @@ def axis(
     if job.polish or job.refine > 1:
         polished = polish.polish(path, y)
         y, optimum = polished.y, polished.bound_s
+        stages.done()
     if job.refine > 1:
-        path, polished = _refined(angle_points_deg, limits, job, y)
+        path, polished = _refined(angle_points_deg, limits, job, y, stages)
         y, optimum = polished.y, polished.bound_s
     y = y * max(1.0, MIN_DURATION_S / path.duration_s(y))
     return Timed(y @ path.axis, y, path.duration_s(y), searched, optimum, found)
 
 
-def _search(
-    fitness: Fitness, job: Job, rng: np.random.Generator, progress: Progress | None
-) -> optimise.Result:
+def _search(fitness: Fitness, job: Job, rng: np.random.Generator, progress: Progress) -> optimise.Result:
     parameters = dict(job.parameters)
     function = getattr(fitness, str(parameters.pop("fitness", checks.FITNESS[0])))
     return optimise.minimise(
@@ -80,7 +83,7 @@ def _search(
 
 
 def _refined(
-    angle_points_deg: Array, limits: Sequence[Limits], job: Job, intervals_s: Array
+    angle_points_deg: Array, limits: Sequence[Limits], job: Job, intervals_s: Array, stages: _Stages
 ) -> tuple[Path, polish.Polished]:
     """The best axis of job.refine times as many segments, through ever finer ones.
 
@@ -92,7 +95,35 @@ def _refined(
         y, count = timeaxis.refined(y, factor, job.degree), count * factor
         path = Path(angle_points_deg, job.degree, limits, timeaxis.free_map(count, job.degree))
         y = polish.improve(path, y).y
-    return path, polish.polish(path, y, _REFINED_GAP)
+        stages.done()
+    found = polish.polish(path, y, _REFINED_GAP)
+    stages.done()
+    return path, found
+
+
+class _Stages:
+    """Progress through search, polish and refinement, each weighted by what it takes."""
+
+    def __init__(self, progress: Progress | None, job: Job) -> None:
+        self._progress = progress
+        self._weights = [1.0]
+        if job.polish or job.refine > 1:
+            self._weights.append(1.0)
+        parts = list(accumulate(_factors(job.refine), mul))
+        self._weights.extend(part**1.5 for part in [*parts, *parts[-1:]])
+        self._stage = 0
+
+    def within(self, done: float, whole: float) -> None:
+        """A part of the stage is done."""
+        if self._progress is not None:
+            before = sum(self._weights[: self._stage])
+            share = self._weights[self._stage] if self._stage < len(self._weights) else 0.0
+            self._progress(before + share * done / whole, sum(self._weights))
+
+    def done(self) -> None:
+        """The stage is done, the next one begins."""
+        self._stage += 1
+        self.within(0.0, 1.0)
 
 
 def _factors(number: int) -> list[int]:

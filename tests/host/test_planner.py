@@ -131,11 +131,14 @@ def test_other_searches_make_plans_too(fitness: str, optimiser: str) -> None:
     check(planner.plan(ARM, job), optimiser)
 
 
-def test_progress_grows_to_the_whole() -> None:
+@pytest.mark.parametrize("refine", [1, 2])
+@pytest.mark.parametrize("polish", [False, True])
+def test_progress_grows_to_the_whole(refine: int, polish: bool) -> None:
     seen: list[float] = []
-    planner.plan(ARM, replace(JOB, iterations=5), lambda done, whole: seen.append(done / whole))
+    job = replace(JOB, iterations=5, refine=refine, polish=polish)
+    planner.plan(ARM, job, lambda done, whole: seen.append(done / whole))
     assert seen == sorted(seen)
-    assert seen[-1] == 1.0
+    assert seen[-1] == pytest.approx(1.0)
 
 
 def with_limits(*limits: float) -> Arm:
