@@ -1,5 +1,9 @@
 """Becomes ``/flash/main.py``: starts the board program."""
 
-from armtempo_board import program
+import micropython
+
+micropython.kbd_intr(-1)  # what a host sends may hold a Ctrl-C, which must not end the start
+
+from armtempo_board import program  # noqa: E402
 
 program.main()

@@ -29,14 +29,11 @@ app: "Any" = None
 
 
 def main(root: str = ROOT) -> None:
-    """Run until somebody asks for the REPL; a button held down at the start asks for it at once."""
+    """Run until somebody asks for the REPL."""
     global app
-    button = Button()
-    if button.held():
-        print("button held: armtempo not started")
-        return
     micropython.alloc_emergency_exception_buf(_EXCEPTION_BUFFER)
     leds = Leds()
+    button = Button()  # before the engine, which may take its pin for a sixth joint
     port = pyb.USB_VCP()
     app = app or App(port, root, program_crc(*_folders()), _fault_at_start())
     app.enter()
