@@ -1,0 +1,85 @@
+"""The virtual arm: its motors by themselves, and what they make of whole motions."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from armtempo import encode, homing, operate, planner
+from armtempo import job as jobs
+from armtempo.arm import Arm, JointModel, LimitSwitches
+from armtempo.interrupt import StopRequest
+from armtempo.link import open_board
+from armtempo.link.messages import Sample
+from armtempo.virtual import edgelog, launch
+from armtempo_shared.limits import TICK_HZ
+
+from tests import interpreters
+from tests.system import boards
+
+SCRIPT = Path(__file__).parent / "scripts" / "virtual_arm.py"
+FINE_COUNTS = 400_000
+"""Counts per revolution of an encoder that shows what the paper's cannot."""
+
+
+def test_motor_cases(interpreter: str) -> None:
+    """Each case asserts by itself and prints its name when it holds."""
+    lines = interpreters.run(interpreter, SCRIPT, heap="4M").splitlines()
+    assert lines == sorted(re.findall(r"def (case_\w+)", SCRIPT.read_text()))
+
+
+def first_joint(arm: Arm, **changed: object) -> Arm:
+    """The arm with some things of its first joint changed."""
+    return replace(arm, joints=(replace(arm.joints[0], **changed), *arm.joints[1:]))  # type: ignore[arg-type]
+
+
+def swing_deg(degree: int) -> float:
+    """How far joint 1 swings about its command in the first 0.6 s of the feeding motion."""
+    encoder = boards.ARM.joints[0].encoder
+    assert encoder is not None
+    model = replace(boards.ARM.joints[0].model, backlash_deg=0.0, scatter_deg=0.0)
+    arm = first_joint(boards.ARM, encoder=replace(encoder, counts_per_rev=FINE_COUNTS), model=model)
+    job = replace(jobs.load_job(jobs.default_path(), arm), degree=degree, iterations=50)
+    trajectory = planner.plan(arm, job).trajectory
+    samples: list[Sample] = []
+    with launch(arm=arm) as process, open_board(process.port) as board, StopRequest() as stop:
+        operate.configure(board, arm, replace=True)
+        operate.home(board, arm)
+        stored = operate.store(board, "feed", encode.motion_record(trajectory, arm))
+        operate.replay(board, stored, stop, lambda sample, _: samples.append(sample))
+    commanded_deg = trajectory(np.array([sample.ticks / TICK_HZ for sample in samples]))[:, 0]
+    seen_deg = np.array([sample.stand.counts[0] for sample in samples]) * 360 / FINE_COUNTS
+    return float(np.max(np.abs(seen_deg - commanded_deg)[1:7]))
+
+
+def test_cubic_starts_ring_more_than_quintic_ones() -> None:
+    """As section 4.2 of the paper finds of its arm; by how much is in docs/virtual-board.md."""
+    quintic_deg, cubic_deg = swing_deg(5), swing_deg(3)
+    assert 0.0 < quintic_deg < cubic_deg / 2, (quintic_deg, cubic_deg)
+
+
+def test_homing_by_limit_switch(tmp_path: Path) -> None:
+    """The virtual arm's switch trips at its angle; after the homing run the board knows where it stands."""
+    switches = LimitSwitches(low=1, low_deg=-8.0)
+    arm = first_joint(boards.ARM, switches=switches, model=JointModel())
+    start_deg = [6.0, -60.0, 40.0]
+    log = tmp_path / "edges"
+    with (
+        launch(arm=arm, start_deg=start_deg, edge_log=log) as process,
+        open_board(process.port) as board,
+        StopRequest() as stop,
+    ):
+        operate.configure(board, arm, replace=True)
+        homing.home_to_switches(board, arm, stop)
+        believed = board.status().stand.commanded_steps[0]
+        assert board.status().joint_known(0)
+    (session,) = edgelog.read(log)
+    steps, directions = session.pins["A15"], session.pins["E7"]
+    rises = steps[0][steps[1] == 1]
+    before = np.searchsorted(directions[0], rises) - 1
+    forward = np.where(before >= 0, directions[1][before], 0)
+    moved = np.sum(np.where(forward == 1, 1, -1))
+    true = start_deg[0] * encode.steps_per_deg(arm.joints[0]) + moved
+    assert abs(believed - true) <= 2, (believed, true)
