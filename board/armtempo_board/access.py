@@ -34,8 +34,7 @@ IDR = const(4)
 ODR = const(5)
 BSRR = const(6)
 
-RING = const(1024)
-"""Entries of a ring; a power of two, so that an index is a mask away."""
+RING = const(1024)  # entries of a ring; a power of two, so that an index is a mask away
 MASK = const(1023)
 
 # words of a ring's state
@@ -82,11 +81,10 @@ TURN_TIMES = const(10)
 TURN_ROOM = const(8)
 JOINT_WORDS = const(18)
 
+# a limit switch and a joint: line, DIR bit, DIR level that moves towards it, joint, whether it moves
 PAIR_WORDS = const(5)
-"""A limit switch and a joint: line, DIR bit, DIR level that moves towards it, joint, whether it moves."""
-
+# a raw sample: counter, NDTR a joint (6), encoder counter (4)
 RAW_WORDS = const(11)
-"""A raw sample: counter, NDTR a joint (6), encoder counter (4)."""
 RAW_ROOM = const(16)
 _SAMPLE_TICKS = const(8400000)
 _LATEST = const(84)  # 1 us: a compare value nearer than that may be missed
@@ -326,9 +324,7 @@ def take(raw: ptr32, block: ptr32, dma: ptr32, encoders: object) -> object:
 
 @micropython.viper
 def freeze(block: ptr32, timer2: ptr32, timer5: ptr32) -> int:
-    """Stop all STEP outputs now; 0 where they were stopped before. 135 instructions, 50 a joint.
-
-    ``finish_pulses`` has to follow.
+    """Stop all STEP outputs now; ``finish_pulses`` has to follow; 0 where that is done. 135 + 50 a joint.
 
     First no more words come from DMA, then every compare value goes far away: from there on the pins stand
     still. What DMA had been asked for before is served within a few bus cycles, long before its compare value
