@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armtempo import analyse, page, plots, reach, runs, trajectory_file
+from armtempo import analyse, page, plan_page, plots, reach, runs, trajectory_file
 from armtempo.arm import Arm, Limits
 from armtempo.encode import counts_per_deg
 from armtempo.errors import RunFolderError
@@ -82,8 +82,16 @@ def complaints(run: runs.Run) -> list[str]:
             found.append(f"{repetition.file}: the sample count starts again in the middle (a reset?)")
         if repetition.state != COMPLETE:
             end = repetition.time_s[-1]
-            found.append(f"{repetition.file}: ended as {repetition.state!r} after {end:.1f} s")
+            state = _state(run, repetition)
+            found.append(f"{repetition.file}: cut short, ended as {state} after {end:.1f} s")
     return found
+
+
+def _state(run: runs.Run, repetition: runs.Samples) -> str:
+    """How a repetition ended, its fault named."""
+    faults = {entry["file"]: entry.get("fault") for entry in run.meta["repetitions"]}
+    fault = faults.get(repetition.file)
+    return f"{repetition.state} ({fault})" if fault else repetition.state
 
 
 def write(folder: Path) -> Path:
@@ -148,8 +156,10 @@ def render(found: Evaluation, drawn: dict[str, tuple[Figure, str]]) -> str:
         if name in _HEADINGS:
             sheet.heading(_HEADINGS[name])
         if name == "motion":
-            _plan_table(sheet, found)
+            plan_page.extremes(sheet, plan)
         sheet.figure(plots.inline_svg(figure, name, caption), caption)
+        if name == "motion":
+            plan_page.timing(sheet, plan)
     _origin(sheet, found)
     return sheet.render()
 
@@ -202,30 +212,19 @@ def _limit_table(sheet: page.Page, found: Evaluation) -> None:
     sheet.table(("joint", "quantity", "peak", "limit", "unit", "verdict"), rows, caption)
 
 
-def _plan_table(sheet: page.Page, found: Evaluation) -> None:
-    rows = []
-    for joint, (name, reached, limit) in enumerate(
-        zip(found.names, found.plan.extremes, found.limits, strict=True)
-    ):
-        duration = found.plan.trajectory.joints[joint].duration_s
-        peaks = [f"{value:.3f} of {most:g}" for value, most in zip(reached.values, limit.values, strict=True)]
-        rows.append([name, f"{duration:.4f}", *peaks])
-    header = ("joint", "motion time (s)", "speed (°/s)", "acceleration (°/s²)", "jerk (°/s³)")
-    sheet.table(header, rows, "Motion time and exact extremes of the plan beside the limits")
-
-
 def _origin(sheet: page.Page, found: Evaluation) -> None:
-    job, meta = found.plan.job, found.run.meta
+    meta = found.run.meta
     sheet.heading("How to repeat it")
     sheet.code("armtempo run trajectory.json --repeat " + str(len(found.run.repetitions)))
-    rows = [
-        ("optimiser", f"{job.optimiser}, population {job.population}, {job.iterations} iterations"),
-        ("seed", job.seed),
-        ("degree, timing, refine", f"{job.degree}, {job.timing}, {job.refine}"),
-        *((f"version of {name}", value) for name, value in found.plan.versions.items()),
-        *((key, meta[key]) for key in ("port", "board") if key in meta),
-    ]
-    sheet.table(("what", "value"), [(name, str(value)) for name, value in rows])
+    known = [(key, meta[key]) for key in ("port", "board") if key in meta]
+    plan_page.origin(sheet, found.plan, [(key, _flat(value)) for key, value in known])
+
+
+def _flat(value: object) -> str:
+    """A value of run.json as text; a table as name and value pairs."""
+    if isinstance(value, dict):
+        return ", ".join(f"{name.replace('_', ' ')} {item}" for name, item in value.items())
+    return str(value)
 
 
 def _serves(names: Sequence[str], joints: Sequence[int]) -> str:

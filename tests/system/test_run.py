@@ -9,6 +9,7 @@ import pytest
 from armtempo import arm, runs
 from armtempo.virtual import launch
 
+from tests.system import commandline
 from tests.system.boards import armtempo, small_plan
 
 
@@ -49,6 +50,29 @@ def test_board_set_up_for_another_arm(tmp_path: Path) -> None:
     armtempo("home", "--arm", "other.toml", "--port", "sim:flash", cwd=tmp_path)
     assert "--arm" in armtempo("home", "--port", "sim:flash", cwd=tmp_path, code=1)
     armtempo("home", "--arm", "other.toml", "--port", "sim:flash", cwd=tmp_path)
+
+
+def test_live_says_where_there_is_no_display(tmp_path: Path) -> None:
+    file = small_plan(tmp_path / "small.json")
+    done = commandline.run("run", file, "--live", folder=tmp_path, MPLBACKEND="agg")
+    assert done.exit_code == 0, done.errors
+    done.said("no live plot: there is no display")
+    assert "samples-01.csv: complete" in done.output
+
+
+def test_fault_is_named_in_terminal_run_folder_and_report(tmp_path: Path) -> None:
+    """A joint far too heavy for its motor: it loses steps, and the encoder's watch ends the run."""
+    heavy = arm.default_path().read_text().replace("\ninertia_kg_m2 = 0.15", "\ninertia_kg_m2 = 6.0")
+    (tmp_path / "heavy.toml").write_text(heavy)
+    job = 'name = "throw"\nvia_deg = [[0.0, -60.0, 40.0], [30.0, -60.0, 40.0]]\niterations = 20\n'
+    (tmp_path / "job.toml").write_text(job)
+    armtempo("plan", "--arm", "heavy.toml", "--job", "job.toml", "-o", "throw.json", cwd=tmp_path)
+    output = armtempo("run", "throw.json", cwd=tmp_path, code=1)
+    assert "samples-01.csv: fault (following)" in output
+    assert "joint 1" in output
+    assert runs.load(tmp_path / "runs" / "throw-001").repetitions[0].state == "fault"
+    armtempo("report", "runs/throw-001", cwd=tmp_path)
+    assert "cut short, ended as fault (following)" in (tmp_path / "runs/throw-001/report.html").read_text()
 
 
 @pytest.mark.parametrize("arguments", [("run", "missing.json"), ("upload", "missing.json")])

@@ -39,7 +39,7 @@ def command(
     arm = motion.arm if motion else options.load_arm(arm_path)
     with options.board(port, log_traffic, arm) as board:
         operate.configure(board, arm, replace=motion is not None or arm_path is not None)
-        replay(board, port, motion or pipeline.from_board(board, what, arm), repeat, out)
+        replay(board, port, motion or pipeline.from_board(board, what, arm), repeat, out, live)
 
 
 def _file(what: str) -> Path | None:
@@ -50,7 +50,8 @@ def _file(what: str) -> Path | None:
 def _told(done: Repetition) -> str:
     lost = sum(count for _, count in done.lost)
     missing = f", {lost} lost" if lost else ""
-    return f"{done.file}: {done.state}, {done.duration_s:.3f} s, {done.samples} samples{missing}"
+    state = f"{done.state} ({done.fault})" if done.fault else done.state
+    return f"{done.file}: {state}, {done.duration_s:.3f} s, {done.samples} samples{missing}"
 
 
 def replay(board: Board, port: str, motion: Motion, repeat: int, out: Path, live: bool = False) -> Path:
