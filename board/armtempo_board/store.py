@@ -75,10 +75,12 @@ class Store:
 
     def recover(self) -> None:
         """Make the folder if it is missing, finish or undo what a power cut interrupted."""
-        try:
-            os.mkdir(self._root)
-        except OSError:
-            pass
+        for function in (os.stat, os.mkdir):  # a folder that is there costs no write
+            try:
+                function(self._root)
+                break
+            except OSError:
+                pass
         for name in self._files():
             if name.endswith(_NEW):
                 self._recover(name[: -len(_NEW)])

@@ -15,6 +15,7 @@ class Flash:
     """Takes the place of ``os`` and ``open`` in the store; ``error`` None cuts the power at ``fail_at``."""
 
     def __init__(self):
+        self.root = ""
         self.files = {}
         self.opened = []
         self.changes = 0
@@ -40,12 +41,14 @@ class Flash:
     # os
 
     def mkdir(self, path):
-        pass
+        self.root = path
 
     def listdir(self, path):
         return [name[len(path) + 1 :] for name in self.files]
 
     def stat(self, path):
+        if path == self.root:
+            return (0x4000,)
         if path not in self.files:
             raise OSError(ENOENT)
         return (0, 0, 0, 0, 0, 0, len(self.files[path]))
