@@ -26,3 +26,13 @@ def test_cases(name: str, tmp_path: Path) -> None:
     lines = interpreters.run(name, script, f"{tmp_path}/flash").splitlines()
     wanted = sorted(re.findall(r"def (case_\w+)", script.read_text()))
     assert lines == wanted
+
+
+@pytest.mark.parametrize("name", [name for name in interpreters.AVAILABLE if name != "cpython"])
+def test_the_loop_allocates_nothing_while_moving(name: str, tmp_path: Path) -> None:
+    """2000 turns with the heap locked: samples, status, resending, refusals, noise."""
+    output = interpreters.run(name, SCRIPTS / "turns_locked.py", str(tmp_path / "flash"))
+    taken, first, sent = map(int, output.split())
+    assert taken > 195
+    assert 0 < first < taken
+    assert sent > 200 * 40

@@ -1,0 +1,109 @@
+"""Turns of the loop while moving with the heap locked: MicroPython raises MemoryError where anything allocates.
+
+Samples come and go, the host asks for status and samples; prints what was done that way.
+"""
+
+import sys
+
+import micropython
+import stand_in
+
+stand_in.install()
+
+from armtempo_board.app import App  # noqa: E402
+from armtempo_shared import wire  # noqa: E402
+
+TURNS = 2000
+
+
+class Still:
+    """An engine whose own work allocates nothing, and which has a sample every tenth turn."""
+
+    def __init__(self):
+        self.moving = True
+        self.fault = 0
+        self.known = 3
+        self.turns = 0
+        self.due = False
+
+    def service(self):
+        self.turns += 1
+        self.due = self.turns % 10 == 0
+
+    def next_sample(self, raw):
+        due = self.due
+        self.due = False
+        raw[0] = self.turns
+        return due
+
+    def snapshot(self, raw):
+        raw[0] = self.turns
+
+
+class Port:
+    """Gives one prepared frame after the other, one every 20 turns; takes everything and counts it."""
+
+    def __init__(self, frames):
+        self.frames = frames
+        self.frame = 0
+        self.at = 0
+        self.taken = 0
+        self.open = False
+
+    def readinto(self, buffer, count):
+        if not self.open:
+            return None
+        data = self.frames[self.frame]
+        given = 0
+        while given < count and self.at < len(data):
+            buffer[given] = data[self.at]
+            self.at += 1
+            given += 1
+        if self.at == len(data):
+            self.at = 0
+            self.frame = (self.frame + 1) % len(self.frames)
+            self.open = False
+        return given
+
+    def write(self, buffer, start, count):
+        self.taken += count
+        return count
+
+
+def command(sequence, name, *values):
+    entry = wire.COMMAND[name]
+    return wire.frame(sequence, entry[1], wire.encode(entry, values))
+
+
+def prepared():
+    port = stand_in.Port()
+    app = App(port, sys.argv[1])
+    host = stand_in.Host(app, port)
+    host.hello()
+    host.upload("/arm", stand_in.arm())
+    host.upload("feed", stand_in.record(stand_in.arm()))
+    host.ask("home", (3,), bytes(8))
+    assert host.ask("start", (0, wire.record_crc(stand_in.record(stand_in.arm()))), "feed")[0] == "ok"
+    return app
+
+
+app = prepared()
+frames = []
+for number in range(40):
+    frames.append(command(number, "samples", 5 * number, 3) if number % 2 else command(number, "status"))
+frames.append(b"noise" + frames[0][:-1] + b"x")
+frames.append(command(200, "home", 0) + command(201, "list", 0))
+app.link.stream = port = Port(frames)
+app.engine = Still()
+app.turn()
+micropython.heap_lock()
+for turn in range(TURNS):
+    if turn % 20 == 0:
+        port.open = True
+    stand_in.Clock.now_ms += 1
+    app.turn()
+micropython.heap_unlock()
+assert app.fault() == 0, app.fault()
+assert app.samples.next > TURNS // 10 - 5
+assert port.taken > TURNS
+print(app.samples.next, app.samples.first, port.taken)
