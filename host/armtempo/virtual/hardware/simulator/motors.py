@@ -105,6 +105,7 @@ class Arm:
         for motor in self.motors:
             motor.disconnect()
         head, joints = found or ({"flags": 0}, ())
+        self.watches_host = bool(head["flags"] & armrecord.FLAG_STOP_ON_LINK_LOSS)
         enable = Enable(self.board, self._pins.ENABLE, head["flags"] & armrecord.FLAG_ENABLE_HIGH)
         self.motors = [self._motor(number, joint, enable) for number, joint in enumerate(joints)]
         if head["flags"] & armrecord.FLAG_ESTOP_FITTED:

@@ -1,7 +1,8 @@
 """How virtual time goes beside real time, and the calls that wait.
 
 While a timer has something to do soon, virtual time runs as fast as this process can, or, with ``speed``, at
-that multiple of real time. While nothing moves it keeps to real time, asleep until input comes.
+that multiple of real time. It keeps to real time while nothing moves (asleep until input comes), and where the
+arm is to stop when the host falls silent: the host's silence is real.
 """
 
 import time
@@ -13,6 +14,7 @@ from simulator.reset import PowerOff
 
 _HORIZON_TICKS = 500 * TICKS_PER_MS
 _NAP_MS = 5
+_LAG_US = 20_000  # a delay beyond this is not made up for
 
 
 class Pace:
@@ -26,6 +28,7 @@ class Pace:
         self._ticks_diff = time.ticks_diff
         self._last_us = self._ticks_us()
         self._lead_us = 0
+        self._last_tick = 0
         board.millisecond = self._first_millisecond
 
     def idle(self):
@@ -49,8 +52,8 @@ class Pace:
             raise KeyboardInterrupt
         if not self._board.moving(_HORIZON_TICKS):
             self._nap()
-        elif self._speed:
-            self._keep_pace()
+        elif self._speed or (the.arm and the.arm.watches_host):
+            self._keep_pace(self._speed or 1)
 
     def _elapsed_us(self):
         now = self._ticks_us()
@@ -71,10 +74,14 @@ class Pace:
             board.next_ms = board.now + 10 * _NAP_MS * TICKS_PER_MS
             board.run_until(board.now + (slept_ms - 1) * TICKS_PER_MS)
             board.next_ms = (board.now // TICKS_PER_MS + 1) * TICKS_PER_MS
+        self._lead_us = 0
+        self._last_tick = board.now
 
-    def _keep_pace(self):
+    def _keep_pace(self, speed):
         """Moving in real time: sleep while virtual time is ahead."""
-        self._lead_us = max(self._lead_us + 1000 / self._speed - self._elapsed_us(), -20000)
+        passed_us = (self._board.now - self._last_tick) // TICKS_PER_US
+        self._last_tick = self._board.now
+        self._lead_us = max(self._lead_us + passed_us / speed - self._elapsed_us(), -_LAG_US)
         if self._lead_us > 1000:
             self._serial.wait(int(self._lead_us) // 1000)
 

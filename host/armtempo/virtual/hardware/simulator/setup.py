@@ -5,7 +5,6 @@ from binascii import unhexlify
 from simulator import edgelog, faults, flash, pace, serial, the
 from simulator.board import TICKS_PER_MS, Board
 
-_POWER_ON = 1
 _ARM_RECORD = "/armtempo/arm.ata"
 
 
@@ -20,7 +19,7 @@ def power_up(options, cause):
     the.serial.reset()
     the.pace = pace.Pace(board, the.serial, options["speed"])
     the.port = serial.USB_VCP()
-    cut_at = options["power_cut_at"] if cause == _POWER_ON else 0
+    cut_at = options["power_cut_at"] if the.flash is None else 0  # the power fails once
     the.flash = flash.Flash(options["flash"], options["flash_blocks"], options["program"], _stall, cut_at)
     faults.Faults(board, options["faults"])
     if options["edge_log"]:

@@ -34,7 +34,7 @@ DEFAULTS = {
 def start(cause=1, line=None, **options):
     """Power up; ``line`` is the serial line, with nobody at the other end by default."""
     the.serial = line or Line()
-    the.edges = None
+    the.edges = the.flash = None
     setup.power_up(dict(DEFAULTS, **options), cause)
     builtins.open = the.flash.open if "flash" in options else flash.real_open
     return the.board
