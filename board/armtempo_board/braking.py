@@ -6,66 +6,57 @@ left is e(r) = r**4 (2.5 - 3 r + r**2) of L, and the rate e'(r) = r**3 (10 - 15 
 this law, time and slope; all between them stays as it is. Fractions here have 30 bits.
 """
 
-from array import array
-
 import micropython
-from armtempo_board import points
 from micropython import const
 
-# what ``slow`` needs
-LENGTH = 0  # 2**UNIT ticks, 28 bits
-START_HIGH = 1  # 4096 ticks, + points.BIAS
-START_LOW = 2  # ticks
-UNIT = 3
-_SIZE = const(4)
+from armtempo_board import points
+from armtempo_board.crossing import LAW
+
 _LOW = const((1 << 15) - 1)
 _LONGEST = const(1 << 28)
 _FIVE_EIGHTHS = const(5 << 27)
 
 
-class Brake:
-    """Where a motion is braked; ``on``: it is."""
+def set_law(block, start_ticks, length_ticks):
+    """Brake from a time on over ``length_ticks`` of real time; more than 2**30 (12.8 s) counts as that.
 
-    def __init__(self):
-        self.law = array("i", bytes(4 * _SIZE))
-        self.on = False
+    Written to the block at LAW: length in units of 2**u ticks (28 bits), start in 4096 ticks (+ points.BIAS) and
+    the rest of it in ticks, u.
+    """
+    length_ticks = min(length_ticks, 1 << 30)
+    unit = 0
+    while length_ticks >> unit >= _LONGEST:
+        unit += 1
+    block[LAW] = max(length_ticks >> unit, 2)
+    block[LAW + 1] = (start_ticks >> 12) + points.BIAS
+    block[LAW + 2] = start_ticks & 4095
+    block[LAW + 3] = unit
 
-    def set(self, start_ticks, length_ticks):
-        """Brake from a time on over ``length_ticks`` of real time; more than 2**30 (12.8 s) counts as that."""
-        length_ticks = min(length_ticks, 1 << 30)
-        unit = 0
-        while length_ticks >> unit >= _LONGEST:
-            unit += 1
-        law = self.law
-        law[LENGTH] = max(length_ticks >> unit, 2)
-        law[START_HIGH] = (start_ticks >> 12) + points.BIAS
-        law[START_LOW] = start_ticks & 4095
-        law[UNIT] = unit
-        self.on = True
 
-    def passed(self, high):
-        """Whether a time (4096 ticks, + points.BIAS) lies behind the end of the way."""
-        law = self.law
-        return high - law[START_HIGH] > (law[LENGTH] >> 13) + 1 << law[UNIT]
+def passed(block, high):
+    """Whether a time (4096 ticks, + points.BIAS) lies behind the end of the way."""
+    return high - block[LAW + 1] > (block[LAW] >> 13) + 1 << block[LAW + 3]
 
 
 @micropython.viper
-def slow(node: ptr32, law: ptr32, high: int, scale: int) -> int:
-    """Move a node's time (2**-scale ticks from ``high`` on) to real time; 0 where it never comes.
+def slow(block: ptr32, where: int, high: int, scale: int) -> int:
+    """Move the time (2**-scale ticks from ``high`` on) of the node at ``where`` to real time; 0: it never comes.
 
-    The whole ticks of delay go to node[6], the rest to its time; node[7] becomes the rate there.
+    The whole ticks of delay go to the node's DELAY, the rest to its time; RATE becomes that of the motion's time.
     """
+    node = ptr32(int(block) + 4 * where)
+    law = ptr32(int(block) + 240)
     one = 1 << 29
     one += one
-    node[6] = 0
-    node[7] = one
+    node[3] = 0
+    node[4] = one
     unit = law[3]
     high -= law[1]
     if high < 0 - (1 << 17):
         return 1
     if high > (1 << 17):
         return 0
-    ticks = (high << 12) + (node[1] >> scale) - law[2]
+    ticks = (high << 12) + (node[0] >> scale) - law[2]
     if ticks <= 0:
         return 1
     length = law[0]
@@ -73,7 +64,7 @@ def slow(node: ptr32, law: ptr32, high: int, scale: int) -> int:
         return 0
     # y: the way gone, ticks / length
     way = ticks >> unit
-    rest = ((ticks & ((1 << unit) - 1)) << scale) + (node[1] & ((1 << scale) - 1))
+    rest = ((ticks & ((1 << unit) - 1)) << scale) + (node[0] & ((1 << scale) - 1))
     up = 0
     while length < (1 << 29):
         length <<= 1
@@ -146,22 +137,23 @@ def slow(node: ptr32, law: ptr32, high: int, scale: int) -> int:
     low = ((high & 1) << 14) + ((first * low) >> 1) + second * h + ((second * low) >> 15)
     high = ((high >> 1) + (low >> 15)) << unit
     low = (low & _LOW) << unit
-    node[6] = high + (low >> 15)
-    node[7] = rate
+    node[3] = high + (low >> 15)
+    node[4] = rate
     low &= _LOW
     if scale <= 15:
-        node[1] += low >> (15 - scale)
+        node[0] += low >> (15 - scale)
     else:
-        node[1] += low << (scale - 15)
+        node[0] += low << (scale - 15)
     return 1
 
 
 @micropython.viper
-def steepen(node: ptr32):
-    """Divide a node's slope by the rate there: ticks of real time per step."""
-    rate = node[7]
-    time = node[4]
-    exponent = node[5]
+def steepen(block: ptr32, where: int):
+    """Divide the slope of the node at ``where`` by the rate there: ticks of real time per step."""
+    node = ptr32(int(block) + 4 * where)
+    rate = node[4]
+    time = node[1]
+    exponent = node[2]
     while rate < (1 << 29):
         rate <<= 1
         exponent -= 1
@@ -171,5 +163,5 @@ def steepen(node: ptr32):
     digit = rate >> 15
     first = time // digit
     rest = ((time - first * digit) << 15) - first * (rate & _LOW)
-    node[4] = (first << 15) + rest // digit
-    node[5] = exponent
+    node[1] = (first << 15) + rest // digit
+    node[2] = exponent if exponent > 0 else 0

@@ -5,9 +5,10 @@ A cell's angle is monotone, its speed and that of time vary by no more than a fa
 hull of the Bezier points holds the curve, and differences of one sign prove it monotone.
 """
 
+from micropython import const
+
 from armtempo_board import cell
 from armtempo_board.parts import Parts
-from micropython import const
 
 # verdicts
 NOTHING = 0  # no step in this part, or it was split: go on

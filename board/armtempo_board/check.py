@@ -6,11 +6,12 @@ passes is proven, not sampled.
 
 import struct
 
-from armtempo_board import cell, cells, points, rates
-from armtempo_board.parts import Parts
 from armtempo_shared import codes
 from armtempo_shared.limits import MAX_STEP_RATE, TICK_FRACTION_BITS, TICK_HZ
 from micropython import const
+
+from armtempo_board import cell, cells, points, rates
+from armtempo_board.parts import Parts
 
 LONGEST_TICKS = 1 << 38
 """A little under an hour: 1024-tick units stay small integers."""

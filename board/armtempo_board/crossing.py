@@ -1,106 +1,160 @@
-"""Where a cell crosses a threshold: Newton on the local polynomials.
+"""Where a cell passes its thresholds: Newton on the local polynomials.
 
-A cell is array('i') of 20: what ``cell.powers`` wrote for the angle, then for the time.
-A node is array('i'): w in 2**-30 of the cell, time in local units, and the two derivatives there (fifths).
+What belongs to a cell stands in one block, array('i'): the polynomials that ``cell.powers`` wrote for the angle (10
+words) and for the time (10 words), the words named here, and nodes. A node is where one of the cell's steps is.
 """
 
 import micropython
 from micropython import const
 
-W = 0
-TIME = 1
-ANGLE_RATE = 2
-TIME_RATE = 3
-MANTISSA = 4  # ticks per step = MANTISSA / 2**EXPONENT; MANTISSA has 30 bits
-EXPONENT = 5
-DELAY = 6  # while braking: whole ticks to be added to the time, and the rate of time
-RATE = 7
-NODE_SIZE = 8
+# block
+TIME_POWERS = 10
+TARGET = 20  # the first threshold in local angle units, + 2**29
+SCALE = 21  # fraction bits of local angle units
+RANGE = 22  # angle at the cell's end; 0: all steps come at its start
+OFFSET = 23  # what is added to each node's time
+EXPONENT_OFFSET = 24  # fraction bits of time less those of angle, + 64
+LAST_W = 25  # of the node solved last, from where the next is guessed: w in 2**-30 of the cell,
+LAST_RATE = 26  # a fifth of the angle's derivative,
+LAST_ANGLE = 27  # angle
+A = 28  # nodes: the one reached last, and two ahead of it
+MIDDLE = 36
+B = 44
+HELD = 52  # the step held back, only while it is moved by braking
+LAW = 60  # the law of braking, see braking.py
+BLOCK_SIZE = 64
+
+# node
+TIME = 0  # ticks * 2**(scale of the cell's time), counted from the high word at the cell's start
+MANTISSA = 1  # ticks per step = MANTISSA / 2**EXPONENT; MANTISSA has 29 or 30 bits
+EXPONENT = 2
+DELAY = 3  # while braking: whole ticks to be added to the time,
+RATE = 4  # and the rate of the motion's time
+
+_BIAS = const(1 << 29)
 _HALF = const(1 << 14)
 _LOW = const((1 << 15) - 1)
 
 
 @micropython.viper
-def solve(cell: ptr32, node: ptr32, target: int):
-    """Set ``node`` to where the (rising) angle equals ``target``; Newton starts at the node's own w.
-
-    Each round leaves at most the square of the relative error; the last one starts below 2**-14. Products are
-    made of 15-bit halves: nothing exceeds 31 bits.
-    """
-    bias = 1 << 29
-    bias += bias
-    w = node[0]
-    rounds = 0
-    while rounds < 12:
-        wh = w >> 15
-        wl = w & _LOW
-        angle = cell[4] - bias
-        rate = cell[9] - bias
-        i = 3
-        while i >= 0:
-            h = angle >> 15
-            angle = h * wh + (((angle & _LOW) * wh + _HALF) >> 15) + ((h * wl) >> 15) + cell[i] - bias
-            h = rate >> 15
-            rate = h * wh + (((rate & _LOW) * wh) >> 15) + ((h * wl) >> 15) + cell[i + 5] - bias
-            i -= 1
-        h = angle >> 15
-        angle = h * wh + (((angle & _LOW) * wh + _HALF) >> 15) + ((h * wl) >> 15)
-        rest = target - angle
-        slope = rate * 5
-        while slope < (1 << 27):
-            slope <<= 1
-            rest <<= 1
-        rounds += 1
-        h = slope >> 14
-        if rest < h and rest > 0 - h:
-            rounds = 12
-            w += ((rest << 12) // (slope >> 15)) << 3
-        else:
-            w += (rest // (slope >> 15)) << 15
-        if w < 0:
-            w = 0
-        if w >= bias:
-            w = bias - 1  # still a small integer
-    wh = w >> 15
-    wl = w & _LOW
-    rate = cell[9] - bias
-    time = cell[14] - bias
-    rest = cell[19] - bias
-    i = 3
-    while i >= 0:
-        h = rate >> 15
-        rate = h * wh + (((rate & _LOW) * wh) >> 15) + ((h * wl) >> 15) + cell[i + 5] - bias
-        h = time >> 15
-        time = h * wh + (((time & _LOW) * wh + _HALF) >> 15) + ((h * wl) >> 15) + cell[i + 10] - bias
-        h = rest >> 15
-        rest = h * wh + (((rest & _LOW) * wh) >> 15) + ((h * wl) >> 15) + cell[i + 15] - bias
-        i -= 1
-    h = time >> 15
-    node[0] = w
-    node[1] = h * wh + (((time & _LOW) * wh + _HALF) >> 15) + ((h * wl) >> 15)
-    node[2] = rate
-    node[3] = rest
+def aim(cell: ptr32, angle: ptr32, local: ptr32, twice: int):
+    """Set the first threshold, ``twice`` / 2 from the high word of the cell's first point."""
+    scale = local[0]
+    height = 0
+    i = 1
+    while i < 6:
+        height += local[i] - _BIAS
+        i += 1
+    sign = 1
+    if height < 0:
+        sign = -1
+    cell[20] = ((twice << (scale - 1)) - (angle[6] >> (28 - scale))) * sign + _BIAS
+    cell[21] = scale
+    cell[22] = height * sign
+    cell[25] = 0
+    bias = _BIAS
+    bias += _BIAS
+    cell[26] = cell[5] - bias
+    cell[27] = 0
 
 
 @micropython.viper
-def slope(node: ptr32, exponent: int):
-    """Ticks per step at a node, MANTISSA / 2**EXPONENT; ``exponent``: of one time unit per angle unit.
+def solve(cell: ptr32, index: int, length: int):
+    """Set node A to the cell's step ``index``, or MIDDLE and B to those ``length`` and twice ``length`` behind it.
 
-    Long division with 15-bit digits: relative error below 2**-28.
+    Each Newton step leaves at most the square of the relative error; the last one starts below 2**-14. Products
+    are made of 15-bit halves: nothing exceeds 31 bits. The slope is a long division with 15-bit digits,
+    its relative error below 2**-28.
     """
-    time = node[3]
-    angle = node[2]
-    while angle < (1 << 29):
-        angle <<= 1
-        exponent -= 1
-    while time < (1 << 29):
-        time <<= 1
-        exponent += 1
-    if time >= angle:
-        time >>= 1
-        exponent -= 1
-    digit = angle >> 15
-    first = time // digit
-    rest = ((time - first * digit) << 15) - first * (angle & _LOW)
-    node[4] = (first << 15) + rest // digit
-    node[5] = exponent + 30
+    where = 28
+    if length > 0:
+        where = 36
+    while True:
+        index += length
+        bias = 1 << 29
+        target = cell[20] - bias + (index << cell[21])
+        bias += bias
+        if cell[22] == 0:
+            cell[28] = cell[23]
+            return
+        if target < 0:
+            target = 0
+        if target > cell[22]:
+            target = cell[22]
+        w = cell[25]
+        rate = cell[26]
+        rest = target - cell[27]
+        rounds = 0
+        while True:
+            if rate < 1:  # rounding, where a cell is a few units high
+                rate = 1
+            slope = rate * 5
+            while slope < (1 << 27):
+                slope <<= 1
+                rest <<= 1
+            h = slope >> 14
+            if rest < h and rest > 0 - h:
+                rounds = 13
+                w += ((rest << 12) // (slope >> 15)) << 3
+            else:
+                w += (rest // (slope >> 15)) << 15
+            if w < 0:
+                w = 0
+            if w >= bias:
+                w = bias - 1
+            wh = w >> 15
+            wl = w & _LOW
+            rounds += 1
+            if rounds > 12:
+                break
+            rest = cell[4] - bias
+            rate = cell[9] - bias
+            i = 3
+            while i >= 0:
+                h = rest >> 15
+                rest = h * wh + (((rest & _LOW) * wh + _HALF) >> 15) + ((h * wl) >> 15) + cell[i] - bias
+                h = rate >> 15
+                rate = h * wh + (((rate & _LOW) * wh) >> 15) + ((h * wl) >> 15) + cell[i + 5] - bias
+                i -= 1
+            h = rest >> 15
+            rest = target - h * wh - (((rest & _LOW) * wh + _HALF) >> 15) - ((h * wl) >> 15)
+        rate = cell[9] - bias
+        time = cell[14] - bias
+        slope = cell[19] - bias
+        i = 3
+        while i >= 0:
+            h = rate >> 15
+            rate = h * wh + (((rate & _LOW) * wh) >> 15) + ((h * wl) >> 15) + cell[i + 5] - bias
+            h = time >> 15
+            time = h * wh + (((time & _LOW) * wh + _HALF) >> 15) + ((h * wl) >> 15) + cell[i + 10] - bias
+            h = slope >> 15
+            slope = h * wh + (((slope & _LOW) * wh) >> 15) + ((h * wl) >> 15) + cell[i + 15] - bias
+            i -= 1
+        h = time >> 15
+        cell[where] = h * wh + (((time & _LOW) * wh + _HALF) >> 15) + ((h * wl) >> 15) + cell[23]
+        cell[25] = w
+        cell[26] = rate
+        cell[27] = target
+        # slope of time over angle
+        if rate < 1:
+            rate = 1
+        if slope < 1:
+            slope = 1
+        i = cell[24] - 34
+        while rate < (1 << 29):
+            rate <<= 1
+            i -= 1
+        while slope < (1 << 29):
+            slope <<= 1
+            i += 1
+        if slope >= rate:
+            slope >>= 1
+            i -= 1
+        h = rate >> 15
+        wh = slope // h
+        rest = ((slope - wh * h) << 15) - wh * (rate & _LOW)
+        cell[where + 1] = (wh << 15) + rest // h
+        cell[where + 2] = i if i > 0 else 0  # slower than that no stretch is made
+        where += 8
+        if where != 44:
+            break

@@ -1,6 +1,6 @@
 """The evaluator: from a motion record to step times. What the rest of the board program uses of it.
 
-    Motion ─ Cells (parts that can be solved) ─ Walker (steps of a joint) ─ edge times in the ring
+Motion ─ Cells (parts that can be solved) ─ Walker (steps of a joint) ─ edge times in the ring
 """
 
 from armtempo_board.check import check

@@ -2,8 +2,9 @@
 
 from array import array
 
-from armtempo_board import cell, points
 from micropython import const
+
+from armtempo_board import cell, points
 
 _START_LEVEL = const(4)
 _KEPT = const(3)  # levels between the part and the piece it is halved from

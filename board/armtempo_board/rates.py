@@ -3,10 +3,11 @@
 from array import array
 
 import micropython
-from armtempo_board import cell, points
 from armtempo_shared import codes
 from armtempo_shared.limits import MAX_STEP_RATE_SUM, TICK_HZ
 from micropython import const
+
+from armtempo_board import cell, points
 
 SLOWER = 1
 UNDECIDED = 0

@@ -1,20 +1,32 @@
-"""One joint's motion as a stream of step times: a step wherever the angle passes a half step."""
+"""One joint's motion as a stream of step times: a step wherever the angle passes a half step.
+
+A cell's first step is solved by itself, the others in blocks of two stretches between solved nodes, as long
+as the error bound allows; its last one is held back until it is known not to be half of a graze.
+"""
 
 from array import array
 
 from micropython import const
 
 from armtempo_board import braking, cell, cells, crossing, points, stretch
+from armtempo_board.crossing import DELAY, HELD, A, B, solve
+from armtempo_board.stretch import (
+    BASE_HIGH,
+    HEAD,
+    NEXT_STEPS,
+    ROOM,
+    STEPS,
+    UNTIL_1024,
+    accept,
+    differences,
+    emit,
+)
 
 _BUDGET = const(4)  # parts looked at in one call: bounds its time
-_LARGEST_POWER = const(10)
-_SMALLEST_POWER = const(2)
-_DEVIATION = const(4)  # half ticks: the Hermite cubic over two stretches may miss the middle node by 2 ticks,
-# so that each half is 16 times better by the h**4 law, with a factor of four to spare
-_WHOLE = const((1 << 30) - 1)  # w at a cell's end
+_LARGEST = const(1024)  # steps of a stretch
+_NODES = (A, crossing.MIDDLE, B)
 _FAR = const(1000)  # 4096 ticks: longer than any gap
-_LONG = const(1 << 19)  # 1024 ticks: longer than any stretch
-_NEVER = const(1 << 28)  # in 1024 ticks: 54 minutes
+_NEVER = const(1 << 28)  # 1024 ticks: 54 minutes
 
 
 class Walker:
@@ -26,16 +38,14 @@ class Walker:
 
     def __init__(self):
         self._cells = cells.Cells()
-        self._brake = braking.Brake()
-        self._cell = array("i", bytes(80))
+        self._block = array("i", bytes(4 * crossing.BLOCK_SIZE))
         self._state = array("i", bytes(4 * stretch.STATE_SIZE))
-        self._a = array("i", bytes(4 * crossing.NODE_SIZE))
-        self._middle = array("i", bytes(4 * crossing.NODE_SIZE))
-        self._b = array("i", bytes(4 * crossing.NODE_SIZE))
-        self._nodes = (self._a, self._middle, self._b)
-        self.direction = 1
+        self.direction = self._heading = 1
         self.at_turn = False
         self.ended = True
+        # every attribute from the start, so that none is added while a motion runs
+        self._held = self._released = self._fresh = self._at_once = self._comes = self._braking = False
+        self._held_high = self._held_ticks = self._at = self._last = 0
 
     def load(self, motion, joint, position_steps, pulse_ticks, gap_ticks):
         """Stand at the start of a motion with the joint at ``position_steps``.
@@ -45,17 +55,18 @@ class Walker:
         """
         self._cells.load(motion, joint)
         self._cells.graze_ticks = gap_ticks >> 3
-        self._brake.on = False
+        self._braking = False
         self._state[stretch.PULSE] = pulse_ticks
+        self._state[STEPS] = self._state[NEXT_STEPS] = 0
         self._gap_ticks = gap_ticks
         self._position = position_steps + points.BIAS
         self.direction = 1
         self.at_turn = self.ended = False
         self._held = False  # the last step of a cell waits for what comes after it
-        self._left = 0  # steps of the prepared stretch not written yet
-        self._count = self._index = 0  # steps of the cell; the next of them
-        self._power = 4
-        while not self._left and not self.ended:
+        self._fresh = False  # the cell's first step is solved, but not written
+        self._at = self._last = 0  # node a's step in the cell; the cell's last one
+        self._size = 16
+        while not self._state[STEPS] and not self.ended:
             if not self._prepare() and self.at_turn:
                 self.turn()
 
@@ -66,19 +77,13 @@ class Walker:
         later call, but for a few. Returns how many were written; 0: no room, none until then, at a turn,
         ended, or the search for the next step goes on with the next call.
         """
-        written = 0
-        while written + 2 <= room:
-            if not self._left and not self._prepare():
-                break
-            count = stretch.within(self._state, min(until_1024 - self._base_1024, _LONG))
-            if not count:
-                break
-            at = (head + written) & mask
-            count = min(count, self._left, (room - written) >> 1, (mask + 1 - at) >> 1)
-            stretch.emit(at, ring, self._state, count)
-            self._left -= count
-            written += 2 * count
-        return written
+        state = self._state
+        state[UNTIL_1024] = until_1024
+        state[HEAD] = head
+        state[ROOM] = room
+        while emit(0, ring, state, mask) and self._prepare():
+            pass
+        return room - state[ROOM]
 
     def turn(self):
         """Let the steps in the other direction come."""
@@ -87,177 +92,209 @@ class Walker:
 
     def brake(self, start_ticks, length_ticks):
         """Come to rest along the path from a time on (see braking.py); no step from there on may be written yet."""
-        self._brake.set(start_ticks, length_ticks)
-        self._halves = 0
-        self._known = False
-        if self._left and self._released:
+        braking.set_law(self._block, start_ticks, length_ticks)
+        self._braking = True
+        state = self._state
+        unwritten = state[STEPS] + state[NEXT_STEPS]
+        state[STEPS] = state[NEXT_STEPS] = 0
+        if unwritten and self._released:
             self._held = True
-        else:
-            self._index -= self._left
-        self._left = 0
+        elif unwritten:
+            if self._held:
+                self._held = False
+                unwritten += 1
+            self._at -= unwritten
         if self._held:
             self._brake_held()
-        if 0 < self._index < self._count:
-            self._solve(self._a, self._index - 1, 0)
+        if self._at < 0:
+            self._at = 0
+            self._fresh = True
+        if self._fresh or self._at < self._last:
+            self._comes = self._solve(self._at)
 
     def _brake_held(self):
-        node = self._middle
-        node[crossing.TIME] = self._held_ticks
-        self._held = bool(braking.slow(node, self._brake.law, self._held_high, 0))
-        self._held_ticks = node[crossing.TIME] + node[crossing.DELAY]
+        block = self._block
+        block[HELD] = self._held_ticks
+        self._held = bool(braking.slow(block, HELD, self._held_high, 0))
+        self._held_ticks = block[HELD] + block[HELD + DELAY]
 
     def last_1024(self):
         """Time of the step written last, in 1024 ticks."""
-        return self._base_1024 + stretch.elapsed(self._state, 0)
+        return stretch.elapsed(self._state, 0)
 
     def next_1024(self):
         """Time of the next step to be written, or one before it while it is not known; in 1024 ticks."""
-        if self._left:
-            return self._base_1024 + stretch.elapsed(self._state, 1)
+        if self._state[STEPS] or self._state[NEXT_STEPS]:
+            return stretch.elapsed(self._state, 1)
         if self._held:
             return _in_1024(self._held_high, self._held_ticks)
         if self.at_turn:
-            return _in_1024(self._cells.time[0], self._ticks(self._a))
+            return _in_1024(self._cells.time[0], self._ticks())
         return _in_1024(self._cells.time[0], 0)
 
     def _prepare(self):
         """Make the next stretch ready. False: at a turn, at the end, or not found yet."""
+        if not self._fresh and self._at < self._last:
+            return self._go_on()
         for _ in range(_BUDGET):
             if self.at_turn or self.ended:
                 return False
-            if self._index < self._count:
-                self._in_cell()
+            if self._fresh:
+                self._first()
+            elif self._at < self._last:
+                return self._go_on()
             else:
                 self._next_cell()
-            if self._left:
+            if self._state[STEPS]:
                 return True
         return False
 
     def _next_cell(self):
-        found = self._cells.next(self._position)
-        if found == cells.END or (self._brake.on and self._brake.passed(self._cells.time[0])):
+        walk = self._cells
+        found = walk.next(self._position)
+        if found == cells.END or (self._braking and braking.passed(self._block, walk.time[0])):
             if self._held:
                 self._release()
             else:
                 self.ended = True
             return
-        if self._held and self._since_held(self._cells.time[0], self._cells.time[6] >> 16) > self._gap_ticks:
+        if self._held and self._since_held(walk.time[0], walk.time[6] >> 16) > self._gap_ticks:
             self._release()
         if found != cells.NOTHING:
             self._open(found == cells.AT_ONCE)
 
     def _open(self, at_once):
-        """Take up the steps of the cell that was found."""
-        steps = self._cells.end() - self._position
-        heading = self._cells.heading
+        """Take up the steps of the cell that was found, and solve the first."""
+        walk = self._cells
+        here = self._block
+        steps = walk.end() - self._position
+        heading = walk.heading
         if at_once:
             heading = 1 if steps > 0 else -1
         if steps * heading <= 0:
             return
-        self._heading = heading
-        self._count = steps * heading
-        self._index = 0
-        self._at_once = at_once
-        self._known = False
-        self._halves = 0
-        scale = self._cells.time_local[cell.SCALE] - 12
+        scale = walk.time_local[cell.SCALE] - 12
         self._state[stretch.TIME_SCALE] = scale
-        self._offset = self._cells.time[6] >> (16 - scale)
+        here[crossing.OFFSET] = walk.time[6] >> (16 - scale)
+        here[crossing.RANGE] = 0
         if not at_once:
-            self._straighten(heading)
+            here[crossing.EXPONENT_OFFSET] = scale - walk.angle_local[cell.SCALE] + 64
+            cell.powers(walk.angle_local, here, 0, heading < 0)
+            cell.powers(walk.time_local, here, crossing.TIME_POWERS, False)
+            twice = 2 * (self._position - walk.angle[0]) + heading
+            crossing.aim(here, walk.angle, walk.angle_local, twice)
         self._position += steps
+        self._heading = heading
+        self._last = steps * heading - 1
+        self._at = 0
+        self._at_once = at_once
+        self._fresh = True
+        self._comes = self._solve(0)
 
-    def _straighten(self, heading):
-        """The cell's local polynomials, and its first threshold."""
-        walk = self._cells
-        cell.powers(walk.angle_local, self._cell, 0, heading < 0)
-        cell.powers(walk.time_local, self._cell, 10, False)
-        scale = walk.angle_local[cell.SCALE]
-        self._scale = scale
-        twice = 2 * (self._position - walk.angle[0]) + heading
-        self._target = heading * ((twice << (scale - 1)) - (walk.angle[6] >> (28 - scale)))
-        total = 0
-        for i in range(cell.STEPS, cell.STEPS + 5):
-            total += walk.angle_local[i] - cell.DIFFERENCE_BIAS
-        self._range = total * heading
-        self._a[crossing.W] = 0
-        self._pace = _WHOLE // self._count  # about what a step adds to w
+    def _solve(self, index):
+        """Set node A to the cell's step ``index``; False where braking ends before it."""
+        solve(self._block, index, 0)
+        return not self._braking or self._slow(A)
 
-    def _solve(self, node, index, guess):
-        """Set a node to the cell's step ``index``, its time in ticks * 2**TIME_SCALE from the high word on.
-
-        False: braking ends before it.
-        """
-        target = 0 if self._at_once else self._target + (index << self._scale)
-        if target <= 0:
-            node[crossing.W] = node[crossing.TIME] = 0
-        else:
-            node[crossing.W] = guess
-            crossing.solve(self._cell, node, min(target, self._range))
-        node[crossing.TIME] += self._offset
-        if not self._brake.on:
-            return True
-        return braking.slow(node, self._brake.law, self._cells.time[0], self._state[stretch.TIME_SCALE])
-
-    def _in_cell(self):
-        """Prepare the next step or steps of the cell."""
-        if self._index == 0:
-            self._first()
-            return
-        remaining = self._count - 1 - self._index
-        if self._halves:
-            self._second_half()
-        elif remaining == 0:
-            if self._step():
-                self._hold()
-        elif remaining < 2 << _SMALLEST_POWER or self._at_once or not self._block(remaining):
-            if self._step():
-                self._single()
-
-    def _step(self):
-        """Solve the next step by itself; False where braking ends before it."""
-        comes = self._solve(self._a, self._index, self._ahead(0))
-        self._index += 1
-        self.ended = not comes
-        return comes
-
-    def _ahead(self, power):
-        """About where 2**power steps on from node a lie; in quarters, to stay a small integer."""
-        quarter = (self._a[crossing.W] >> 2) + (self._pace >> 2 << power)
-        return (quarter if quarter < _WHOLE >> 2 else _WHOLE >> 2) << 2
+    def _slow(self, node):
+        """Move a node to real time; False where it never comes."""
+        scale = self._state[stretch.TIME_SCALE]
+        comes = braking.slow(self._block, node, self._cells.time[0], scale)
+        if comes and not self._at_once:
+            braking.steepen(self._block, node)
+        return bool(comes)
 
     def _first(self):
         """The first step of a cell, against the one that was held back before it."""
-        if not self._known:
-            self._comes = self._solve(self._a, 0, 0)
-            self._known = True
-        if not self._comes:
-            if self._held:
-                self._release()
-            else:
-                self.ended = True
-        elif self._held:
+        if self._held:
             opposite = self._heading != self.direction
-            if opposite and self._since_held(self._cells.time[0], self._ticks(self._a)) <= self._gap_ticks:
-                self._held = False  # a graze: neither comes
-                self._index = 1
-                self._known = False
+            close = self._since_held(self._cells.time[0], self._ticks()) <= self._gap_ticks
+            if opposite and close and self._comes:
+                self._held = self._fresh = False  # a graze: neither comes
             else:
                 self._release()
+        elif not self._comes:
+            self.ended = True
         elif self._heading != self.direction:
             self.at_turn = True
         else:
-            self._index = 1
-            self._known = False
-            if self._count == 1:
-                self._hold()
-            else:
-                self._single()
+            self._fresh = False
+            self._single()
+
+    def _go_on(self):
+        """Prepare the next step or steps of the cell; True where some come."""
+        steps = self._last - self._at
+        if steps > 3 and not self._at_once and self._two_stretches(steps):
+            return True
+        if not self._solve(self._at + 1):
+            self.ended = True
+            return False
+        self._at += 1
+        self._single()
+        return not self._held
+
+    def _two_stretches(self, steps):
+        """Prepare two stretches that keep the error bound; False where steps are better solved singly."""
+        block = self._block
+        state = self._state
+        size = self._size
+        length = steps >> 1
+        if length > size:
+            length = steps // (2 * ((steps - 1) // (2 * size) + 1))
+        state[BASE_HIGH] = self._cells.time[0]
+        while length > 1:
+            solve(block, self._at, length)
+            verdict = accept(state, block, length) if not self._braking or self._level() else stretch.REJECTED
+            if verdict != stretch.REJECTED:
+                differences(state, block, length)
+                self._released = False
+                self._at += 2 * length
+                if self._at == self._last:
+                    state[NEXT_STEPS] -= 1
+                    self._hold()
+                if verdict == stretch.EASY and 2 * length > size:
+                    self._size = min(2 * size, _LARGEST)
+                return True
+            length >>= 1
+            self._size = max(length, 2)
+        return False
+
+    def _level(self):
+        """Move the nodes ahead to real time, and let all three count from the same base.
+
+        False where braking ends before, or takes them too far apart.
+        """
+        block = self._block
+        scale = self._state[stretch.TIME_SCALE]
+        if not self._slow(crossing.MIDDLE) or not self._slow(B):
+            return False
+        base = block[A + DELAY] & ~4095
+        if (block[B + DELAY] - base) >> (28 - scale):
+            return False
+        for node in _NODES:
+            block[node] += (block[node + DELAY] - base) << scale
+            block[node + DELAY] = base
+        self._state[BASE_HIGH] = self._cells.time[0] + (base >> 12)
+        return True
+
+    def _single(self):
+        """Prepare the step at node A."""
+        if self._at == self._last:
+            self._hold()
+        else:
+            self._released = False
+            stretch.single(self._state, self._cells.time[0], self._ticks())
 
     def _hold(self):
+        """Hold back the step at node A."""
         self._held = True
         self._held_high = self._cells.time[0]
-        self._held_ticks = self._ticks(self._a)
+        self._held_ticks = self._ticks()
+
+    def _release(self):
+        self._held = False
+        self._released = True
+        stretch.single(self._state, self._held_high, self._held_ticks)
 
     def _since_held(self, high, ticks):
         """Ticks from the step held back to a time; any large number where it is far."""
@@ -266,102 +303,11 @@ class Walker:
             high = _FAR
         return (high << 12) + ticks - self._held_ticks
 
-    def _ticks(self, node):
-        """A node's time in ticks from the high word of the part on."""
+    def _ticks(self):
+        """Time of node A in ticks from the high word of the part on."""
         scale = self._state[stretch.TIME_SCALE]
-        delay = node[crossing.DELAY] if self._brake.on else 0
-        return ((node[crossing.TIME] + (1 << (scale - 1))) >> scale) + delay
-
-    def _release(self):
-        self._held = False
-        self._released = True
-        self._write(self._held_high, self._held_ticks)
-
-    def _single(self):
-        self._released = False
-        self._write(self._cells.time[0], self._ticks(self._a))
-
-    def _write(self, high, ticks):
-        stretch.single(self._state, high, ticks)
-        self._base_1024 = _in_1024(high, ticks)
-        self._left = 1
-
-    def _block(self, remaining):
-        """Find two stretches from node a on that keep the error bound; False where steps are better solved singly."""
-        power = self._power
-        while 2 << power > remaining:
-            power -= 1
-        self._slope(self._a)
-        here = self._index - 1
-        start = self._a[crossing.W]
-        comes = self._solve(self._b, here + (2 << power), self._ahead(power + 1))
-        self._pace = (self._b[crossing.W] - start) >> power + 1
-        self._slope(self._b)
-        while power >= _SMALLEST_POWER:
-            if self._solve(self._middle, here + (1 << power), (start >> 1) + (self._b[crossing.W] >> 1)):
-                self._slope(self._middle)
-                if comes and self._level() and self._accept(power):
-                    self._halves = 2
-                    self._block_power = power
-                    self._second_half()
-                    return True
-                comes = True
-            power -= 1
-            self._power = power
-            self._b, self._middle = self._middle, self._b
-        self._power = _SMALLEST_POWER
-        return False
-
-    def _slope(self, node):
-        crossing.slope(node, self._state[stretch.TIME_SCALE] - self._scale)
-        if self._brake.on:
-            braking.steepen(node)
-
-    def _level(self):
-        """Let the times of the three nodes count from the same base; False where braking takes them too far apart."""
-        high = self._cells.time[0]
-        state = self._state
-        state[stretch.BASE_HIGH] = high
-        if not self._brake.on:
-            return True
-        base = self._a[crossing.DELAY] & ~4095
-        state[stretch.BASE_HIGH] = high + (base >> 12)
-        scale = state[stretch.TIME_SCALE]
-        for node in self._nodes:
-            delay = node[crossing.DELAY] - base
-            if delay >> (28 - scale):
-                return False
-        for node in self._nodes:
-            node[crossing.TIME] += (node[crossing.DELAY] - base) << scale
-            node[crossing.DELAY] = base
-        return True
-
-    def _accept(self, power):
-        """Whether the stretches a-middle and middle-b of 2**power steps keep the error bound."""
-        state = self._state
-        nearest = crossing.EXPONENT
-        exponent = min(self._a[nearest], self._middle[nearest], self._b[nearest])
-        if exponent < power + 3 or exponent + 5 < 3 * power:
-            return False
-        state[stretch.POWER] = power
-        state[stretch.EXPONENT] = exponent
-        limit = _DEVIATION << state[stretch.TIME_SCALE]
-        off = stretch.deviation(state, self._a, self._middle, self._b)
-        if off <= limit >> 6 and power == self._power < _LARGEST_POWER:
-            self._power = power + 1
-        return off <= limit
-
-    def _second_half(self):
-        """Prepare the stretch from node a to the middle; the middle is the next node a."""
-        state = self._state
-        self._released = False
-        state[stretch.POWER] = self._block_power
-        stretch.differences(state, self._a, self._middle)
-        self._base_1024 = _in_1024(state[stretch.BASE_HIGH], self._a[crossing.TIME] >> state[stretch.TIME_SCALE])
-        self._left = 1 << self._block_power
-        self._index += self._left
-        self._halves -= 1
-        self._a, self._middle, self._b = self._middle, self._b, self._a
+        ticks = (self._block[A] + (1 << (scale - 1))) >> scale
+        return ticks + self._block[A + DELAY] if self._braking else ticks
 
 
 def _in_1024(high, ticks):

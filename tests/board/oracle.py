@@ -8,11 +8,10 @@ from fractions import Fraction
 from math import comb
 
 import numpy as np
-from numpy.typing import NDArray
-
 from armtempo_shared import limits
 from armtempo_shared.basis import BASIS, FACTORIAL
 from armtempo_shared.motion import Motion
+from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 

@@ -7,13 +7,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from armtempo_shared.motion import Motion
+
 from tests import interpreters
 from tests.board import motions, oracle, walking
 
 BOARD = interpreters.ROOT / "board" / "armtempo_board"
-MOTION_PATH = ("points", "parts", "cell", "cells", "crossing", "stretch", "walker", "braking", "check", "rates", "ends")
+MOTION_PATH = (
+    "points",
+    "parts",
+    "cell",
+    "cells",
+    "crossing",
+    "stretch",
+    "walker",
+    "braking",
+    "check",
+    "rates",
+    "ends",
+)
 QUICK = next(name for name in ("micropython", "cpython") if name in interpreters.AVAILABLE)
 """The interpreter for the long cases; that all give the same is shown on shorter ones."""
 

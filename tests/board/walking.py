@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
-
 from armtempo_shared import limits
 from armtempo_shared.motion import Motion
+from numpy.typing import NDArray
+
 from tests import interpreters
 from tests.board import oracle
 
