@@ -1,12 +1,13 @@
 """Starts the board program on the hardware: serial port, watchdog, LEDs, button."""
 
 import os
+import sys
 
+import armtempo_shared
 import machine
 import micropython
 import pyb
 from armtempo_shared import codes
-from armtempo_shared.program import program_crc
 from micropython import const
 
 from armtempo_board import points, walker  # noqa: F401  the deepest first: nested imports cost stack
@@ -35,7 +36,7 @@ def main(root: str = ROOT) -> None:
     leds = Leds()
     button = Button()  # before the engine, which may take its pin for a sixth joint
     port = pyb.USB_VCP()
-    app = app or App(port, root, program_crc(*_folders()), _fault_at_start())
+    app = app or _build(port, root)
     app.enter()
     watchdog = Watchdog()
     _detach(port)
@@ -45,6 +46,18 @@ def main(root: str = ROOT) -> None:
         watchdog.leave()
         _attach(port)
     print("armtempo ended; Ctrl-D starts it again")
+
+
+def _build(port: pyb.USB_VCP, root: str) -> App:
+    """The App; what only its making needs is forgotten again, for the sake of the heap."""
+    from armtempo_shared.program import program_crc
+
+    built = App(port, root, program_crc(*_folders()), _fault_at_start())
+    for name in ("table", "program"):
+        sys.modules.pop("armtempo_shared." + name, None)
+        if hasattr(armtempo_shared, name):
+            delattr(armtempo_shared, name)
+    return built
 
 
 def _loop(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
