@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -29,9 +30,9 @@ def write(folders: Sequence[Path], path: Path) -> Path:
 def render(found: dict[str, report.Evaluation], complaints: Sequence[str]) -> str:
     """The page, for evaluations by the name they go under."""
     sheet = page.Page("Runs compared", ", ".join(found))
-    arms = {evaluation.plan.arm.name for evaluation in found.values()}
-    if len(arms) > 1:
-        sheet.note(f"These runs are of different arms: {', '.join(sorted(arms))}.", page.BAD)
+    if len({replace(evaluation.plan.arm, source="") for evaluation in found.values()}) > 1:
+        arms = ", ".join(f"{name} of {evaluation.plan.arm.name}" for name, evaluation in found.items())
+        sheet.note(f"These runs are of different arms (name, geometry, limits or drives): {arms}.", page.BAD)
     for text in complaints:
         sheet.note(text, page.BAD)
     for name, evaluation in found.items():

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
-from armtempo import comparison, report
+from armtempo import comparison, report, separation, trajectory_file
+from armtempo.arm import Driver
 from armtempo.cli import main
 from armtempo.errors import RunFolderError
+from armtempo.plan import Plan
 from click.testing import CliRunner
 
 from tests import browser
@@ -98,6 +104,60 @@ def test_two_runs_are_compared_on_one_page(tmp_path: Path) -> None:
     assert not (tmp_path / "none.html").exists()
 
 
+def test_a_run_cut_short_is_said_and_the_rest_reported(tmp_path: Path) -> None:
+    path = made_runs.make(tmp_path / "run", repetitions=2)
+    meta = json.loads((path / "run.json").read_text())
+    meta["repetitions"][1] |= {"state": "fault", "fault": "following"}
+    (path / "run.json").write_text(json.dumps(meta))
+    samples = path / "samples-02.csv"
+    samples.write_text("".join(samples.read_text().splitlines(keepends=True)[:31]))
+    report.write(path)
+    text = (path / report.PAGE).read_text()
+    assert "samples-02.csv: cut short, ended as fault (following) after 2.9 s" in text
+    assert "1 of 2 repetitions complete" in text
+    assert text.count("<svg") == len(FIGURES)
+
+
+def test_when_the_joints_pass_the_via_points_is_told(folder: Path) -> None:
+    plan = made_runs.shipped_plan()
+    text = (folder / report.PAGE).read_text()
+    times = [joint.via_times_s[2] for joint in plan.trajectory.joints]
+    cells = ("P2", *(f"{time:.3f}" for time in times), f"{max(times) - min(times):.3f}")
+    row = re.search(r"<tr><td>P2.*?</tr>", text)
+    assert row
+    assert tuple(re.findall(r">([^<]+)<", row.group())) == cells
+    assert f"strays up to {separation.tool_stray_mm(plan.arm, plan.trajectory):.1f} mm" in text
+
+
+def test_shared_timing_needs_no_such_section(tmp_path: Path) -> None:
+    path = made_runs.make(tmp_path / "run", repetitions=1)
+    spoil_plan(
+        path, lambda plan: replace(plan, job=replace(plan.job, timing="shared"), notes=("by way of X",))
+    )
+    report.write(path)
+    text = (path / report.PAGE).read_text()
+    assert "Per-joint timing" not in text
+    assert "Note: by way of X" in text
+
+
+def spoil_plan(path: Path, change: Callable[[Plan], Plan]) -> None:
+    """Change the plan in a run folder."""
+    file = path / "trajectory.json"
+    trajectory_file.save(change(trajectory_file.load(file)), file)
+
+
+@pytest.mark.parametrize("changes", [{"name": "another"}, {"driver": Driver(pulse_us=9.0)}])
+def test_runs_of_different_arms_are_told_apart(tmp_path: Path, changes: dict[str, Any]) -> None:
+    runs = [made_runs.make(tmp_path / name, repetitions=1) for name in ("one", "two")]
+    comparison.write(runs, tmp_path / "page.html")
+    assert "different arms" not in (tmp_path / "page.html").read_text()
+    spoil_plan(runs[1], lambda plan: replace(plan, arm=replace(plan.arm, **changes)))
+    comparison.write(runs, tmp_path / "page.html")
+    text = (tmp_path / "page.html").read_text()
+    assert "different arms" in text
+    assert text.count("<svg") == 3
+
+
 def test_in_a_browser(folder: Path, tmp_path: Path) -> None:
     """Wide, on a phone, light and dark: nothing fetched, nothing cut off, all figures there."""
     if browser.BROWSER is None and not os.environ.get("CI"):
@@ -111,8 +171,9 @@ def test_in_a_browser(folder: Path, tmp_path: Path) -> None:
         assert found["overflow"] <= 0
         assert len(found["figures"]) == len(FIGURES)
         assert min(found["figures"]) > 80
-        assert found["tables"] == 4
+        assert found["tables"] == 5
         assert "How to repeat it" in found["text"]
+        assert "Per-joint timing" in found["text"]
     assert phone["width"] <= 500
     assert light["background"] == "rgb(255, 255, 255)"
     assert dark["background"] != light["background"]

@@ -61,7 +61,7 @@ def _unoptimised(made: motions.Plans) -> Plan:
 
 def _replayed(plan: Plan, folder: Path, times: int, progress: Progress | None) -> report.Evaluation:
     motion = pipeline.planned(plan)
-    with open_board(SIM) as board, StopRequest() as stop:
+    with open_board(SIM, arm=motion.arm) as board, StopRequest() as stop:
         operate.configure(board, motion.arm, replace=True)
         pipeline.bring_to_start(board, SIM, motion, stop)
         run_folder = pipeline.new_run(folder, motion, SIM, board)
