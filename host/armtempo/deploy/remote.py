@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+import threading
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,7 +15,8 @@ from typing import Any
 
 from armtempo.errors import LinkError
 
-_TIMEOUT_S = 300.0
+SILENCE_S = 30.0
+"""No step of ours takes longer without a word; mpremote itself would wait for ever."""
 _SURVEY = Path(__file__).with_name("survey.txt")
 
 
@@ -60,11 +62,16 @@ class Remote:
         with _process(arguments) as process:
             assert process.stdout is not None
             said = []
+            watchdog = _Watchdog(process)
             for line in process.stdout:
+                watchdog.feed()
                 said.append(line)
                 yield line
-            if process.wait(_TIMEOUT_S):
-                last = next((text.strip() for text in reversed(said) if text.strip()), "it says nothing")
+            watchdog.stop()
+            if process.wait():
+                last = next(
+                    (text.strip() for text in reversed(said) if text.strip()), "the board fell silent"
+                )
                 raise LinkError(
                     f"mpremote failed on {self.port}: {last}; what was begun is repaired by doing it again"
                 )
@@ -93,6 +100,27 @@ def each(function: str, paths: Iterable[str]) -> list[str]:
 def rename(old: str, new: str) -> list[str]:
     """The command that renames a file of the board."""
     return ["exec", f"import os\nos.rename({old!r}, {new!r})"]
+
+
+class _Watchdog:
+    """Ends a process that has said nothing for SILENCE_S."""
+
+    def __init__(self, process: subprocess.Popen[str]) -> None:
+        self._process = process
+        self._timer: threading.Timer | None = None
+        self.feed()
+
+    def feed(self) -> None:
+        """Begin to count anew."""
+        self.stop()
+        self._timer = threading.Timer(SILENCE_S, self._process.kill)
+        self._timer.daemon = True
+        self._timer.start()
+
+    def stop(self) -> None:
+        """Let it be."""
+        if self._timer is not None:
+            self._timer.cancel()
 
 
 @contextmanager

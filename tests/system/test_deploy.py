@@ -1,0 +1,93 @@
+"""Deploying with the real mpremote to the virtual board's prompt, and what is left when that is cut off."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from armtempo.deploy import deploy, package, remote
+from armtempo.errors import LinkError
+from armtempo.virtual import VirtualBoard, launch
+
+from tests import interpreters
+from tests.system.boards import armtempo, small_plan
+
+SOURCES_BLOCKS = 600
+"""A flash in which the sources have room; the chip takes compiled files."""
+INTERPRETERS = [name for name in interpreters.AVAILABLE if name != "micropython-arm"]
+
+
+def board(name: str, flash: Path, power_cut_at: int = 0) -> VirtualBoard:
+    blocks = SOURCES_BLOCKS if name == "cpython" else None
+    starter = interpreters.starter(name)
+    return launch(flash, interpreter=starter, deployed=True, flash_blocks=blocks, power_cut_at=power_cut_at)
+
+
+def mpremote(port: str, *arguments: str) -> str:
+    command = [sys.executable, "-m", "mpremote", "connect", port, *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.mark.parametrize("name", INTERPRETERS)
+def test_from_an_empty_board_and_back(tmp_path: Path, name: str) -> None:
+    flash = tmp_path / "flash"
+    flash.mkdir()
+    (flash / "main.py").write_text("print('somebody else')\n")
+    with board(name, flash) as found:
+        port = found.port
+        assert "armtempo deploy" in armtempo("status", "--port", port, cwd=tmp_path, code=1)
+        assert "kept as /flash/main.py.before-armtempo" in armtempo("deploy", "--port", port, cwd=tmp_path)
+        assert "unconfigured" in armtempo("status", "--port", port, cwd=tmp_path)
+        assert "up to date" in armtempo("deploy", "--port", port, cwd=tmp_path)
+        damaged = next((flash / "lib" / "armtempo_board").glob("app.*"))
+        damaged.write_bytes(b"")
+        assert "1 files of the library written" in armtempo("deploy", "--port", port, cwd=tmp_path)
+        armtempo("home", "--port", port, cwd=tmp_path)
+        file = small_plan(tmp_path / "small.json")
+        assert "complete" in armtempo("run", file, "--port", port, cwd=tmp_path)
+        assert "boot.py" in mpremote(port, "ls", ":/flash")
+        armtempo("undeploy", "--port", port, cwd=tmp_path)
+        assert "armtempo deploy" in armtempo("status", "--port", port, cwd=tmp_path, code=1)
+    assert (flash / "main.py").read_text() == "print('somebody else')\n"
+    assert not (flash / "boot.py").exists()
+    assert (flash / "armtempo" / "small.atm").exists()
+
+
+@pytest.mark.parametrize("cut", [1, 30, 75, 110])
+def test_cut_off_deployment_is_completed_by_the_next(
+    tmp_path: Path, cut: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(remote, "SILENCE_S", 3.0)
+    with board(INTERPRETERS[-1], tmp_path / "flash", power_cut_at=cut) as found:
+        with pytest.raises(LinkError, match="repaired by doing it again"):
+            deploy(found.port, False, lambda text: None, lambda done, whole: None)
+        assert "armtempo deploy" in armtempo("status", "--port", found.port, cwd=tmp_path, code=1)
+        armtempo("deploy", "--port", found.port, cwd=tmp_path)
+        assert "unconfigured" in armtempo("status", "--port", found.port, cwd=tmp_path)
+
+
+def test_program_that_crashes_at_start_is_replaced(tmp_path: Path) -> None:
+    flash = tmp_path / "flash"
+    name = INTERPRETERS[-1]
+    with board(name, flash) as found:
+        armtempo("deploy", "--port", found.port, cwd=tmp_path)
+    for path in (flash / "lib" / "armtempo_board").glob("app.*"):
+        path.write_bytes(b"nonsense")
+    with board(name, flash) as found:
+        assert "armtempo deploy" in armtempo("status", "--port", found.port, cwd=tmp_path, code=1)
+        armtempo("deploy", "--port", found.port, cwd=tmp_path)
+
+
+def test_mip_installs_the_package(tmp_path: Path) -> None:
+    package.write(tmp_path / "package")
+    with board(INTERPRETERS[-1], tmp_path / "flash") as found:
+        mpremote(
+            found.port, "mip", "install", "--target", "/flash", str(tmp_path / "package" / "package.json")
+        )
+    for path in (tmp_path / "package").rglob("*.mpy"):
+        assert (tmp_path / "flash" / path.relative_to(tmp_path / "package")).read_bytes() == path.read_bytes()
+    assert (tmp_path / "flash" / "main.py").exists()
