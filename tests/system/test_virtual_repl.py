@@ -19,7 +19,9 @@ from tests import interpreters
 def bare(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[VirtualBoard]:
     """A board with an empty flash, under real MicroPython."""
     flash = tmp_path / "flash"
-    with launch(flash, deployed=True, interpreter=interpreters.starter(request.param)) as board:
+    with launch(
+        flash, deployed=True, flash_blocks=190, interpreter=interpreters.starter(request.param)
+    ) as board:
         yield board
 
 
