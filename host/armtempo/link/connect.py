@@ -47,7 +47,8 @@ def open_board(
         board = _greeted(stack, open_transport())
         if not any_program:
             _check_program(board)
-        board.session.reopen = open_transport
+        if not ports.is_sim(port):  # a virtual board does not come back
+            board.session.reopen = open_transport
         yield board
 
 

@@ -1,5 +1,6 @@
 """MicroPython's prompt on the serial port: friendly and raw REPL with raw paste (shared/runtime/pyexec.c)."""
 
+import errno
 import io
 import sys
 
@@ -48,6 +49,8 @@ def traceback(error):
     text = io.StringIO()
     sys.print_exception(error, text)
     lines = text.getvalue().split("\n")
+    if isinstance(error, OSError) and error.errno in errno.errorcode:  # as MicroPython says it on every system
+        lines[-2] = "OSError: [Errno %d] %s" % (error.errno, errno.errorcode[error.errno])
     return "\n".join([line for line in lines if "/simulator/" not in line])
 
 

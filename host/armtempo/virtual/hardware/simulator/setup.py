@@ -42,8 +42,10 @@ def _arm_record():
     arm = the.options["arm"]
     if arm:
         return arm["head"], arm["joints"]
-    from armtempo_shared import armrecord
-
+    try:
+        from armtempo_shared import armrecord
+    except ImportError:  # the program was taken off the board
+        return None
     try:
         with flash.real_open(the.options["flash"] + _ARM_RECORD, "rb") as file:
             head, joints, _ = armrecord.unpack(file.read())
