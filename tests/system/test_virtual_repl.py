@@ -76,6 +76,8 @@ def test_main_starts_with_a_reset_and_is_interrupted(bare: VirtualBoard) -> None
 
 def test_friendly_prompt(bare: VirtualBoard) -> None:
     with serial.Serial(bare.port, timeout=5) as port:
+        port.write(b"print('be' 'gin')\r")
+        port.read_until(b"begin\r\n>>> ")
         port.write(b"\x02")
         assert b"MicroPython" in port.read_until(b">>> ")
         port.write(b"x = 20 + 1\r")

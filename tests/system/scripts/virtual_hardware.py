@@ -31,7 +31,7 @@ STREAM_MODE = 2 << 13 | 2 << 11 | 1 << 10 | 1 << 8 | 1 << 6
 
 
 @micropython.viper
-def put(block: ptr32, word: int, value: int):  # noqa: F821
+def put(block: ptr32, word: int, value: int):
     """Write a register as board code does."""
     block[word] = value
 
