@@ -75,13 +75,13 @@ def curves(repetitions: Sequence[Samples], trajectory: Trajectory) -> Curves:
         raise ValueError("no samples to analyse")
     times = np.arange(count) * SAMPLE_S
     each = np.stack([_differentiated(_on_grid(one, count), one.state == COMPLETE) for one in repetitions])
-    theory = np.stack([trajectory(times, order) for order in range(3)])
+    theory: Array = np.stack([trajectory(times, order) for order in range(3)])
     shown = _differentiated(theory[0], ended=True)
     present = np.sum(~np.isnan(each), axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        mean = np.nansum(each, axis=0) / present
+        mean: Array = np.nansum(each, axis=0) / present
         spread = np.sqrt(np.nansum((each - mean) ** 2, axis=0) / (present - 1))
-        sem = np.where(present > 1, spread / np.sqrt(present), np.nan)
+        sem: Array = np.where(present > 1, spread / np.sqrt(present), np.nan)
     return Curves(times, each, mean, sem, theory, shown)
 
 
