@@ -73,7 +73,7 @@ def curves(repetitions: Sequence[Samples], trajectory: Trajectory) -> Curves:
     count = max((_grid_size(repetition) for repetition in repetitions), default=0)
     if count == 0:
         raise ValueError("no samples to analyse")
-    times = np.arange(count) * SAMPLE_S
+    times: Array = np.arange(count, dtype=np.float64) * SAMPLE_S
     each = np.stack([_differentiated(_on_grid(one, count), one.state == COMPLETE) for one in repetitions])
     theory: Array = np.stack([trajectory(times, order) for order in range(3)])
     shown = _differentiated(theory[0], ended=True)
