@@ -78,7 +78,7 @@ def _soft_reset():
     board = the.board
     for number in board.api:
         at = board.timers[number].at
-        memory.words[at + timers.CR1] = memory.words[at + timers.CCER] = memory.words[at + timers.DIER] = 0
+        memory.words[at + timer_registers.CR1] = memory.words[at + timer_registers.CCER] = memory.words[at + timer_registers.DIER] = 0
     for known in (board.api, board.callbacks, board.extints):
         known.clear()
     board.scheduled = []
@@ -95,3 +95,6 @@ def _forget(before):
     for name in list(sys.modules):
         if name not in before:
             del sys.modules[name]
+    caches = getattr(sys, "path_importer_cache", None)
+    if caches:  # CPython remembers which folders there were
+        caches.clear()
