@@ -92,6 +92,7 @@ class Arm:
         self._record = record
         self._known = None
         self.motors = []
+        self.watches_host = False
         board.follow = self.follow
         board.worlds.append(self)
         self.connect()
