@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armtempo.bench_table import PAPER, Row
-from armtempo.plots import COLOURS, new_figure
+from armtempo.plots import COLOURS, new_figure, theme
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,4 +40,6 @@ def convergence(found: Sequence[Row]) -> Figure:
     for axis in axes.flat[len(populations) :]:
         axis.set_visible(False)
     axes.flat[0].legend(frameon=False)
+    for axis in axes.flat:
+        theme(axis)
     return figure

@@ -35,9 +35,12 @@ class Page:
         self._parts.append(f"<pre>{escape(text)}</pre>")
 
     def table(self, header: Sequence[str], rows: Sequence[Sequence[object]], caption: str = "") -> None:
-        """A table; cells that look like numbers are set flush right, a cell ``(text, kind)`` is coloured."""
-        heads = "".join(f"<th{_align(column)}>{escape(name)}</th>" for name, column in _columns(header, rows))
-        body = "".join("<tr>" + "".join(map(_cell, row)) + "</tr>" for row in rows)
+        """A table; columns of numbers are set flush right, a cell ``(text, kind)`` is coloured."""
+        numeric = [bool(rows) and all(_is_number(row[index]) for row in rows) for index in range(len(header))]
+        heads = "".join(
+            f"<th{_class(number)}>{escape(name)}</th>" for name, number in zip(header, numeric, strict=True)
+        )
+        body = "".join("<tr>" + "".join(map(_cell, row, numeric)) + "</tr>" for row in rows)
         title = f"<caption>{escape(caption)}</caption>" if caption else ""
         self._parts.append(
             f'<div class="scroll"><table>{title}<thead><tr>{heads}</tr></thead>'
@@ -60,21 +63,16 @@ class Page:
         )
 
 
-def _columns(header: Sequence[str], rows: Sequence[Sequence[object]]) -> list[tuple[str, list[object]]]:
-    return [(name, [row[index] for row in rows]) for index, name in enumerate(header)]
-
-
-def _align(column: list[object]) -> str:
-    return ' class="number"' if column and all(map(_is_number, column)) else ""
-
-
 def _is_number(cell: object) -> bool:
     text = str(cell[0] if isinstance(cell, tuple) else cell).strip()
     return text == "–" or text[:1].isdigit() or (text[:1] in ("+", "-", "−", ".") and text[1:2].isdigit())
 
 
-def _cell(cell: object) -> str:
+def _cell(cell: object, number: bool) -> str:
     text, kind = cell if isinstance(cell, tuple) else (cell, "")
-    classes = " ".join(part for part in (kind, "number" if _is_number(text) else "") if part)
-    mark = f' class="{classes}"' if classes else ""
-    return f"<td{mark}>{escape(str(text))}</td>"
+    return f"<td{_class(number, kind)}>{escape(str(text))}</td>"
+
+
+def _class(number: bool, kind: str = "") -> str:
+    names = " ".join(name for name in (kind, "number" if number else "") if name)
+    return f' class="{names}"' if names else ""

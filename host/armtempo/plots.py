@@ -77,8 +77,8 @@ def tracking(found: Curves, trajectory: Trajectory, limits: Sequence[Limits], na
             axis.plot(found.times_s, mean, color=colour, label="measured")
             axis.plot(times, theory[:, joint], ":", color=_PAGE_COLOUR, label="theory")
             _mark_limits(axis, limits[joint], order)
-    _label(axes, names, _LABELS)
     axes[0][0].legend(frameon=False)
+    _label(axes, names, _LABELS)
     return figure
 
 
@@ -114,7 +114,7 @@ def convergence(histories: Mapping[str, Array]) -> Figure:
     axis.set_xlabel("iteration")
     axis.set_ylabel("best fitness (s)")
     axis.legend(frameon=False)
-    _theme(axis)
+    theme(axis)
     return figure
 
 
@@ -152,7 +152,8 @@ def inline_svg(figure: Figure, name: str, description: str) -> str:
     text = _svg(figure)
     text = text[text.index("<svg") :].replace(_PAGE_COLOUR, "currentColor")
     width = re.search(r'width="([\d.]+)pt"', text)
-    style = f"max-width: {float(width.group(1)) * 4 / 3:.0f}px" if width else ""
+    drawn = f"{float(width.group(1)) * 4 / 3:.0f}px" if width else "none"
+    style = f"--drawn: {drawn}; max-width: {drawn}"
     text = re.sub(r'(width|height)="[\d.]+pt" ', "", text, count=2)
     text = re.sub(r'(\bid=")', rf"\g<1>{name}-", text)
     text = re.sub(r'(xlink:href="#|url\(#)', rf"\g<1>{name}-", text)
@@ -188,19 +189,20 @@ def _mark_limits(axis: Axes, limits: Limits, order: int) -> None:
 
 def _label(axes: Any, names: Sequence[str], labels: Sequence[str]) -> None:
     for joint, name in enumerate(names):
-        axes[0][joint].set_title(name, color=_PAGE_COLOUR)
+        axes[0][joint].set_title(name)
         axes[-1][joint].set_xlabel("time (s)")
     for row, label in zip(axes, labels, strict=False):
         row[0].set_ylabel(label)
         for axis in row:
-            _theme(axis)
+            theme(axis)
 
 
-def _theme(axis: Axes) -> None:
+def theme(axis: Axes) -> None:
+    """Give grid, ticks, labels, title and legend of a finished drawing the page's colour."""
     axis.grid(alpha=0.25)
     axis.tick_params(colors=_PAGE_COLOUR)
-    axis.xaxis.label.set_color(_PAGE_COLOUR)
-    axis.yaxis.label.set_color(_PAGE_COLOUR)
+    for label in (axis.title, axis.xaxis.label, axis.yaxis.label):
+        label.set_color(_PAGE_COLOUR)
     for spine in axis.spines.values():
         spine.set_color(_PAGE_COLOUR)
     legend = axis.get_legend()

@@ -15,7 +15,7 @@ from armtempo.interrupt import StopRequest
 from armtempo.link import open_board
 from armtempo.link.board import Progress
 from armtempo.link.ports import SIM
-from armtempo.paper import motions
+from armtempo.paper import motions, printed
 from armtempo.paper.claims import DIFFERS, SAME, Claim
 from armtempo.plan import Plan
 from armtempo.trajectory import Trajectory
@@ -65,6 +65,7 @@ def claims(series: list[Series]) -> list[Claim]:
     return [
         *_coincide(by_name[QUINTIC]),
         *_limits_kept(by_name[QUINTIC]),
+        *_unoptimised_peaks(by_name[UNOPTIMISED]),
         *_rougher_ends(by_name[QUINTIC], by_name[CUBIC]),
     ]
 
@@ -133,17 +134,32 @@ def _limits_kept(found: report.Evaluation) -> list[Claim]:
     return claims
 
 
+def _unoptimised_peaks(found: report.Evaluation) -> list[Claim]:
+    """Joint 1 before optimisation: the peaks of section 2.3, as measured."""
+    checks = analyse.limit_checks(found.curves, found.limits, report.resolutions_deg(found.plan.arm))[0]
+    claims = []
+    for quantity, unit, value, check in zip(
+        ("speed", "acceleration"), ("°/s", "°/s²"), printed.UNOPTIMISED_PEAKS, checks, strict=True
+    ):
+        same = abs(check.peak - value) <= 3.0 * check.sigma
+        because = "" if same else "the highest of many noisy values, and the motor's own swinging"
+        what = f"joint 1 before optimisation, peak {quantity} measured ({unit})"
+        text = f"{check.peak:.2f} ± {check.sigma:.2f}"
+        claims.append(Claim("section 2.3", what, f"{value:.2f}", text, SAME if same else DIFFERS, because))
+    return claims
+
+
 def _rougher_ends(quintic: report.Evaluation, cubic: report.Evaluation) -> list[Claim]:
     """Joint 1 at start and end: how much worse the cubic's speed and acceleration are than the quintic's."""
     claims = []
-    for order, unit, printed in (
+    for order, unit, said in (
         (1, "°/s", "cubic lags evidently, quintic does not"),
         (2, "°/s²", "quintic has less error"),
     ):
         what = f"joint 1, {analyse.ORDERS[order]} off theory in the first and last {_END_S:g} s (RMS)"
         quiet, rough = (_end_error(found, order) for found in (quintic, cubic))
         found = f"cubic {rough:.2f}, quintic {quiet:.2f} {unit}: {rough / quiet:.1f} times"
-        claims.append(Claim("Fig. 12", what, printed, found, SAME if rough > quiet else DIFFERS))
+        claims.append(Claim("Fig. 12", what, said, found, SAME if rough > quiet else DIFFERS))
     return claims
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armtempo import bench_plot, page, plots, reach, report
+from armtempo import bench_plot, page, plan_page, plots, reach, report
 from armtempo.bench_table import Row
 from armtempo.paper import motions
 from armtempo.paper.claims import DIFFERS, Claim
@@ -38,7 +38,20 @@ def render(
     sheet.heading("Figures")
     for name, figure, caption in _figures(made, searched, series):
         sheet.figure(plots.inline_svg(figure, name, caption), caption)
+    sheet.heading("How to repeat it")
+    sheet.code("armtempo paper")
+    plan_page.origin(sheet, made.quintic, _extent(searched, series))
     return sheet.render()
+
+
+def _extent(searched: Sequence[Row], series: Sequence[Series]) -> list[tuple[str, object]]:
+    """How much was computed: ``--quick`` does less."""
+    populations = ", ".join(str(population) for population in sorted({row.population for row in searched}))
+    return [
+        ("populations searched with", populations),
+        ("seeds for each", min(row.seeds for row in searched)),
+        ("replays of each motion", min(len(one.found.run.repetitions) for one in series)),
+    ]
 
 
 def _row(claim: Claim) -> tuple[object, ...]:

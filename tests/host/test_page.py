@@ -1,0 +1,69 @@
+"""Pages and figures: what is a number is aligned as one, and every label takes the page's colour."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from armtempo import analyse, bench_plot, page, plots, reach
+from armtempo.bench import Case, Run
+from armtempo.bench_table import rows
+
+from tests.host.made_runs import shipped_plan
+
+
+def test_a_column_is_aligned_as_a_whole() -> None:
+    sheet = page.Page("t")
+    sheet.table(("n", "what"), [("1.5", "5, per-joint"), ("–", ("word", page.BAD))])
+    cells = re.findall(r"<t[dh](?: [^>]*)?>[^<]*", sheet.render())
+    assert cells == [
+        '<th class="number">n',
+        "<th>what",
+        '<td class="number">1.5',
+        "<td>5, per-joint",
+        '<td class="number">–',
+        '<td class="bad">word',
+    ]
+
+
+def test_text_is_escaped() -> None:
+    sheet = page.Page("a < b", "x & y")
+    sheet.note("<script>")
+    sheet.table(("<i>",), [("<b>",)], "<c>")
+    assert not re.search(r"<(script|i|b|c)>", sheet.render())
+
+
+def figure(name: str) -> str:
+    """One of the figures as it stands in a page."""
+    plan = shipped_plan()
+    names = [joint.name for joint in plan.arm.driven]
+    limits = [joint.limits for joint in plan.arm.driven if joint.limits]
+    times = np.linspace(0.0, plan.trajectory.duration_s, 50)
+    theory = np.stack([plan.trajectory(times, order) for order in range(3)])
+    seen = analyse.Curves(times, theory[None], theory, 0.1 * np.abs(theory), theory, theory)
+    runs = [Run(Case("acs", 10, seed), (), 1, 1.0, ((0, 6.0 + seed),)) for seed in (1, 2)]
+    chains = reach.chains_mm(plan.arm, plan.via_deg)
+    drawn = {
+        "motion": lambda: plots.motion(plan.trajectory, limits, names),
+        "tracking": lambda: plots.tracking(seen, plan.trajectory, limits, names),
+        "errors": lambda: plots.errors(seen, names),
+        "overlay": lambda: plots.overlay({"one": (times, theory[:, :, 0], times)}),
+        "convergence": lambda: plots.convergence({"one": np.arange(9.0)}),
+        "postures": lambda: plots.postures(chains, reach.tool_path_mm(plan.arm, plan.trajectory, times)),
+        "searches": lambda: bench_plot.convergence(rows(runs, 5)),
+    }
+    return plots.inline_svg(drawn[name](), name, "what it shows")
+
+
+@pytest.mark.parametrize(
+    "name", ["motion", "tracking", "errors", "overlay", "convergence", "postures", "searches"]
+)
+def test_every_label_takes_the_colour_of_the_page(name: str) -> None:
+    """Black text, matplotlib's default, would be lost on a dark page."""
+    svg = figure(name)
+    labels = re.findall(r'<text[^>]*style="([^"]*)"', svg)
+    assert labels
+    assert len(labels) == svg.count("<text")
+    assert [label for label in labels if "fill: currentColor" not in label] == []
+    assert 'aria-label="what it shows"' in svg
