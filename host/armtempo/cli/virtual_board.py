@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from armtempo.cli import options
 from armtempo.errors import LinkError
 
 _LOOK_S = 0.5
@@ -32,13 +33,17 @@ _LOOK_S = 0.5
     is_flag=True,
     help="Run what is in the flash ('armtempo deploy' puts it there), not the installed program.",
 )
-@click.option("--seed", default=0, show_default=True, help="Tells one board from another.")
+@options.arm
+@click.option("--ideal", is_flag=True, help="Ideal motors, instead of those that the arm file describes.")
+@click.option("--seed", default=0, show_default=True, help="Tells one board from another, and its scatter.")
 def command(
     flash: Path | None,
     real_time: bool,
     edge_log: Path | None,
     interpreter: str | None,
     deployed: bool,
+    arm_path: Path | None,
+    ideal: bool,
     seed: int,
 ) -> None:
     """Start a virtual board, print its port, and run it until Ctrl-C.
@@ -48,9 +53,14 @@ def command(
     from armtempo.virtual import launch
 
     with launch(
-        flash, virtual_time=not real_time, edge_log=edge_log, interpreter=interpreter, seed=seed,
+        flash,
+        virtual_time=not real_time,
+        edge_log=edge_log,
+        interpreter=interpreter,
+        arm=None if ideal else options.load_arm(arm_path),
+        seed=seed,
         deployed=deployed,
-    ) as board:  # fmt: skip
+    ) as board:
         click.echo(board.port)
         while board.running():
             time.sleep(_LOOK_S)

@@ -7,7 +7,7 @@ on the way, each a little late, as on the chip.
 
 import sys
 
-from simulator import dma, gpio, memory, timers
+from simulator import dma, gpio, memory, timer_registers, timers
 
 TICKS_PER_MS = 84_000
 TICKS_PER_US = 84
@@ -18,7 +18,7 @@ INTERRUPT_TICKS = 160
 """From an event to the first line of its callback: 1.9 us (an empty callback's instructions)."""
 CALLBACK_TICKS = 250
 """What a callback takes on top of its own simulated calls."""
-NEVER = timers.NEVER
+NEVER = timer_registers.NEVER
 _RCC_TIMERS = {1: (17, 0), 8: (17, 1), 2: (16, 0), 3: (16, 1), 4: (16, 2), 5: (16, 3), 6: (16, 4), 7: (16, 5)}
 
 

@@ -49,7 +49,9 @@ def traceback(error):
     text = io.StringIO()
     sys.print_exception(error, text)
     lines = text.getvalue().split("\n")
-    if isinstance(error, OSError) and error.errno in errno.errorcode:  # as MicroPython says it on every system
+    if (
+        isinstance(error, OSError) and error.errno in errno.errorcode
+    ):  # as MicroPython says it on every system
         lines[-2] = "OSError: [Errno %d] %s" % (error.errno, errno.errorcode[error.errno])
     return "\n".join([line for line in lines if "/simulator/" not in line])
 

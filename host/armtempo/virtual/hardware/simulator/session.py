@@ -3,7 +3,7 @@
 import builtins
 import sys
 
-from simulator import memory, setup, the, timers
+from simulator import memory, setup, the, timer_registers
 from simulator.repl import Repl, SoftReset, board_print
 from simulator.reset import PowerOff, Reset
 
@@ -78,7 +78,9 @@ def _soft_reset():
     board = the.board
     for number in board.api:
         at = board.timers[number].at
-        memory.words[at + timer_registers.CR1] = memory.words[at + timer_registers.CCER] = memory.words[at + timer_registers.DIER] = 0
+        memory.words[at + timer_registers.CR1] = memory.words[at + timer_registers.CCER] = memory.words[
+            at + timer_registers.DIER
+        ] = 0
     for known in (board.api, board.callbacks, board.extints):
         known.clear()
     board.scheduled = []

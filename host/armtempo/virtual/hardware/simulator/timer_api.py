@@ -1,6 +1,6 @@
 """``pyb.Timer`` and its channels on the simulated timers, with the firmware's register habits (timer.c)."""
 
-from simulator import gpio, memory, the, timers
+from simulator import gpio, memory, the, timer_registers
 from simulator.board import _RCC_TIMERS, CALL_TICKS
 from simulator.gpio_api import Pin
 
@@ -51,12 +51,12 @@ class Timer:
         register, bit = _RCC_TIMERS[self._number]
         _change(memory.index("RCC") + register, 0, 1 << bit)
         at = self._model.at
-        memory.words[at + timers.PSC] = prescaler & 0xFFFF
-        memory.words[at + timers.ARR] = period & (self._model.full - 1)
-        memory.words[at + timers.CR1] = 0x80
-        memory.words[at + timers.EGR] = 1
+        memory.words[at + timer_registers.PSC] = prescaler & 0xFFFF
+        memory.words[at + timer_registers.ARR] = period & (self._model.full - 1)
+        memory.words[at + timer_registers.CR1] = 0x80
+        memory.words[at + timer_registers.EGR] = 1
         the.board.sync()
-        _change(at + timers.CR1, 1, 1)
+        _change(at + timer_registers.CR1, 1, 1)
         self.callback(callback)
         the.board.spend(20 * CALL_TICKS)
 
@@ -73,8 +73,8 @@ class Timer:
         for channel in self._channels.values():
             channel.callback(None)
         self._channels.clear()
-        memory.words[self._model.at + timers.CCER] = 0
-        memory.words[self._model.at + timers.CR1] = 0
+        memory.words[self._model.at + timer_registers.CCER] = 0
+        memory.words[self._model.at + timer_registers.CR1] = 0
         the.board.wrote()
 
     def source_freq(self):
@@ -89,11 +89,11 @@ class Timer:
         """Set or clear the callback of one interrupt flag."""
         if function is None:
             the.board.callbacks.pop((self._number, flag), None)
-            _change(self._model.at + timers.DIER, 1 << flag, 0)
+            _change(self._model.at + timer_registers.DIER, 1 << flag, 0)
         else:
             the.board.callbacks[(self._number, flag)] = (function, self)
-            _change(self._model.at + timers.SR, 1 << flag, 0)
-            _change(self._model.at + timers.DIER, 0, 1 << flag)
+            _change(self._model.at + timer_registers.SR, 1 << flag, 0)
+            _change(self._model.at + timer_registers.DIER, 0, 1 << flag)
         the.board.wrote()
 
     def register(self, at, value=None):
@@ -109,15 +109,15 @@ class Timer:
 
     def counter(self, value=None):
         """Read or set the counter."""
-        return self.register(timers.CNT, value)
+        return self.register(timer_registers.CNT, value)
 
     def period(self, value=None):
         """Read or set the period register."""
-        return self.register(timers.ARR, value)
+        return self.register(timer_registers.ARR, value)
 
     def prescaler(self, value=None):
         """Read or set the prescaler register."""
-        return self.register(timers.PSC, value)
+        return self.register(timer_registers.PSC, value)
 
     def channel(self, number, mode=None, callback=None, pin=None, compare=0, polarity=0):
         """Set up a channel, or get the one that was."""
@@ -147,7 +147,7 @@ class Timer:
 
     def start(self):
         """Set the counter-enable bit."""
-        _change(self._model.at + timers.CR1, 1, 1)
+        _change(self._model.at + timer_registers.CR1, 1, 1)
 
 
 class TimerChannel:
@@ -160,21 +160,21 @@ class TimerChannel:
 
     def setup_encoder(self, mode):
         """Count the edges of two inputs."""
-        self._timer.register(timers.SMCR, mode)
-        self._timer.register(timers.CCMR1, 0x0101)
-        _change(self._at + timers.CCER, 0xBB, 0x11)
+        self._timer.register(timer_registers.SMCR, mode)
+        self._timer.register(timer_registers.CCMR1, 0x0101)
+        _change(self._at + timer_registers.CCER, 0xBB, 0x11)
         self._timer.start()
 
     def setup_compare(self, mode, compare, polarity, callback):
         """Output compare; as in the firmware this starts the counter."""
         number = self._number - 1
-        _change(self._at + timers.CCER, 3 << 4 * number, polarity << 4 * number)
+        _change(self._at + timer_registers.CCER, 3 << 4 * number, polarity << 4 * number)
         shift = 8 * (number & 1)
-        _change(self._at + timers.CCMR1 + (number >> 1), 0xFF << shift, mode << 4 + shift)
-        memory.words[self._at + timers.CCR1 + number] = compare & memory.MASK
-        _change(self._at + timers.CCER, 0, 1 << 4 * number)
+        _change(self._at + timer_registers.CCMR1 + (number >> 1), 0xFF << shift, mode << 4 + shift)
+        memory.words[self._at + timer_registers.CCR1 + number] = compare & memory.MASK
+        _change(self._at + timer_registers.CCER, 0, 1 << 4 * number)
         if self._timer._number in (1, 8):
-            _change(self._at + 17, 0, 1 << 15)
+            _change(self._at + timer_registers.BDTR, 0, 1 << 15)  # MOE
         self._timer.start()
         if callback:
             self.callback(callback)
@@ -185,7 +185,7 @@ class TimerChannel:
 
     def compare(self, value=None):
         """Read or set the compare register."""
-        return self._timer.register(timers.CCR1 + self._number - 1, value)
+        return self._timer.register(timer_registers.CCR1 + self._number - 1, value)
 
     capture = compare
     pulse_width = compare
