@@ -9,7 +9,7 @@ from pathlib import Path
 
 from armtempo_shared.limits import MAX_NAME, MAX_SEGMENTS
 
-from armtempo import tomlcheck
+from armtempo import pose, tomlcheck
 from armtempo.arm import Arm
 from armtempo.errors import InputError
 from armtempo.tomlcheck import Table
@@ -17,12 +17,14 @@ from armtempo.tomlcheck import Table
 OPTIMISERS = ("acs", "cs", "ga", "iaga", "pso", "hpso")
 """Names of the search algorithms (Table 4)."""
 
+Rows = tuple[tuple[float, ...], ...]
+
 
 @dataclass(frozen=True)
 class Pose:
     """A tool pose to pass: 4 x 4 homogeneous matrix rows, lengths in mm."""
 
-    matrix: tuple[tuple[float, ...], ...]
+    matrix: Rows
     posture_deg: tuple[float, ...] | None = None
     """Which solution to prefer; None: nearest to the one before."""
 
@@ -104,7 +106,8 @@ def _vias(top: Table, arm: Arm) -> tuple[tuple[float, ...] | Pose, ...]:
             _angles(named, f"via_deg[{n}]", arm) for n in range(1, len(rows) + 1)
         ]
     else:
-        vias = [_via(table, arm) for table in top.tables("via")]
+        tables = enumerate(top.tables("via"), 1)
+        vias = [_via(table, f"{top.file}: via[{n}]", arm) for n, table in tables]
     if len(vias) < 2:
         raise InputError(f"{top.file}: {len(vias)} via point is not a motion; at least 2 are needed")
     if len(vias) - 1 > MAX_SEGMENTS:
@@ -112,18 +115,38 @@ def _vias(top: Table, arm: Arm) -> tuple[tuple[float, ...] | Pose, ...]:
     return tuple(vias)
 
 
-def _via(table: Table, arm: Arm) -> tuple[float, ...] | Pose:
-    if table.has("angles_deg"):
+def _via(table: Table, where: str, arm: Arm) -> tuple[float, ...] | Pose:
+    forms = [key for key in ("angles_deg", "matrix", "position_mm") if table.has(key)]
+    if len(forms) != 1:
+        raise InputError(f"{where}: exactly one of angles_deg, matrix and position_mm is needed")
+    if forms == ["angles_deg"]:
         angles = _angles(table, "angles_deg", arm)
         table.done()
         return angles
     posture = table.numbers("posture_deg", len(arm.joints)) if table.has("posture_deg") else None
-    matrix = table.array("matrix", "given where there are no angles_deg: the 4 rows of a pose, lengths in mm")
-    rows = Table({f"row {n}": row for n, row in enumerate(matrix, 1)}, table.file, "matrix ")
-    if len(matrix) != 4:
-        raise table.fail("matrix", "4 rows of 4 numbers")
+    matrix = _matrix(table) if forms == ["matrix"] else _turned(table, where)
     table.done()
-    return Pose(tuple(rows.numbers(f"row {n}", 4) for n in range(1, 5)), posture)
+    return Pose(matrix, posture)
+
+
+def _matrix(table: Table) -> Rows:
+    given = table.array("matrix", "the 4 rows of a pose, lengths in mm")
+    if len(given) != 4:
+        raise table.fail("matrix", "4 rows of 4 numbers")
+    rows = Table({f"row {n}": row for n, row in enumerate(given, 1)}, table.file, "matrix ")
+    return tuple(rows.numbers(f"row {n}", 4) for n in range(1, 5))
+
+
+def _turned(table: Table, where: str) -> Rows:
+    """A pose given as a position with roll, pitch and yaw or with a quaternion."""
+    position = table.numbers("position_mm", 3)
+    if table.has("rpy_deg") == table.has("quaternion"):
+        raise InputError(f"{where}: position_mm goes with one of rpy_deg and quaternion")
+    if table.has("rpy_deg"):
+        found = pose.from_rpy(position, table.numbers("rpy_deg", 3), where)
+    else:
+        found = pose.from_quaternion(position, table.numbers("quaternion", 4), f"{where}.quaternion")
+    return tuple(tuple(row) for row in found.tolist())
 
 
 def _angles(table: Table, key: str, arm: Arm) -> tuple[float, ...]:

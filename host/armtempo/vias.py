@@ -26,9 +26,9 @@ from armtempo.kinematics.branches import Branch, branch_of
 from armtempo.kinematics.choice import Choice, choose
 from armtempo.kinematics.forward import forward
 from armtempo.kinematics.geometry import Array, Geometry
-from armtempo.kinematics.pose import checked
 from armtempo.kinematics.ranges import Ranges
 from armtempo.kinematics.shape import refusals
+from armtempo.pose import checked
 
 MISS_MM = 0.01
 MISS_DEG = 0.01

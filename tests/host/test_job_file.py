@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from armtempo.arm import default_path as arm_path
 from armtempo.arm import load_arm
@@ -49,6 +50,36 @@ def test_poses_and_angles_may_be_mixed(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    "turned", ["rpy_deg = [0, -90, 0]", "quaternion = [0.7071067811865476, 0, -0.7071067811865476, 0]"]
+)
+def test_poses_may_be_positions_that_are_turned(turned: str, tmp_path: Path) -> None:
+    text = f"[[via]]\nangles_deg = [0, -60, 40]\n[[via]]\nposition_mm = [-536.404, 0, 434.698]\n{turned}\n"
+    via = load_job(written(tmp_path, text), ARM).via[1]
+    assert isinstance(via, Pose)
+    wanted = ((0, 0, -1, -536.404), (0, 1, 0, 0), (1, 0, 0, 434.698), (0, 0, 0, 1))
+    np.testing.assert_allclose(via.matrix, wanted, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("via", "said"),
+    [
+        ("position_mm = [1, 2, 3]", "via[1]: position_mm goes with one of rpy_deg and quaternion"),
+        ("position_mm = [1, 2]\nrpy_deg = [0, 0, 0]", "via[1].position_mm = [1, 2]"),
+        ("position_mm = [1, 2, 3]\nrpy_deg = [0, 0, nan]", "via[1].rpy_deg"),
+        ("position_mm = [1, 2, 3]\nquaternion = [1, 1, 0, 0]", "length 1.41421"),
+        ("position_mm = [1, 2, 3]\nrpy_deg = [0, 0, 0]\nangles_deg = [0, 0, 0]", "exactly one of"),
+        ("position_mm = [1, 2, 3]\nrpy_deg = [0, 0, 0]\nrpy = 1", "rpy"),
+        ("posture_deg = [0, 0, 0, 0, 0, 0]", "exactly one of angles_deg, matrix and position_mm"),
+    ],
+)
+def test_what_can_be_wrong_with_a_turned_position(via: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        load_job(written(tmp_path, f"[[via]]\n{via}\n[[via]]\nangles_deg = [0, -60, 40]\n"), ARM)
+    assert said in str(caught.value)
+    assert "job.toml" in str(caught.value)
+
+
+@pytest.mark.parametrize(
     ("text", "said"),
     [
         ("", ["via_deg is missing", "[[via]]"]),
@@ -64,7 +95,7 @@ def test_poses_and_angles_may_be_mixed(tmp_path: Path) -> None:
         (TWO + "bounds_s = [3.0, 0.1]\n", ["bounds_s", "shorter first"]),
         (TWO + "seeds = 3\n", ["seeds: unknown key", "'seed'"]),
         ("[[via]]\nmatrix = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n", ["via[1].matrix", "4 rows of 4 numbers"]),
-        ("[[via]]\nangle = 3\n", ["via[1].matrix is missing"]),
+        ("[[via]]\nangle = 3\n", ["via[1]: exactly one of angles_deg, matrix"]),
     ],
 )
 def test_what_is_wrong_is_said(tmp_path: Path, text: str, said: list[str]) -> None:

@@ -74,7 +74,8 @@ def _targets(
     matrix: str | None, position: Three | None, rpy: Three | None, quaternion: Four | None, poses: Path | None
 ) -> list[Array]:
     """The poses of the options; UsageError where they do not make exactly one of the three forms."""
-    from armtempo.kinematics import pose, pose_file
+    from armtempo import pose
+    from armtempo.kinematics import pose_file
 
     forms = [matrix is not None, position is not None, poses is not None]
     if sum(forms) != 1:

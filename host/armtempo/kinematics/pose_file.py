@@ -9,7 +9,7 @@ import numpy as np
 
 from armtempo.errors import InputError
 from armtempo.kinematics.geometry import Array
-from armtempo.kinematics.pose import checked, from_quaternion, from_rpy
+from armtempo.pose import checked, from_quaternion, from_rpy
 
 FORMS = {
     6: "x y z roll pitch yaw",

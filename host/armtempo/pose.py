@@ -6,10 +6,11 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from armtempo.errors import InputError
-from armtempo.kinematics.geometry import Array
+
+Array = NDArray[np.float64]
 
 ROUNDED = 1e-3
 """How far a rotation or a unit quaternion may be off by rounding of the printed numbers."""
