@@ -12,12 +12,16 @@ from micropython import const
 from armtempo_board import points
 from armtempo_board.crossing import LAW
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from array import array
+
 _LOW = const((1 << 15) - 1)
 _LONGEST = const(1 << 28)
 _FIVE_EIGHTHS = const(5 << 27)
 
 
-def set_law(block, start_ticks, length_ticks):
+def set_law(block: "array[int]", start_ticks: int, length_ticks: int) -> None:
     """Brake from a time on over ``length_ticks`` of real time; more than 2**30 (12.8 s) counts as that.
 
     Written to the block at LAW: length in units of 2**u ticks (28 bits), start in 4096 ticks (+ points.BIAS) and
@@ -33,9 +37,9 @@ def set_law(block, start_ticks, length_ticks):
     block[LAW + 3] = unit
 
 
-def passed(block, high):
+def passed(block: "array[int]", high: int) -> bool:
     """Whether a time (4096 ticks, + points.BIAS) lies behind the end of the way."""
-    return high - block[LAW + 1] > (block[LAW] >> 13) + 1 << block[LAW + 3]
+    return bool(high - block[LAW + 1] > (block[LAW] >> 13) + 1 << block[LAW + 3])
 
 
 @micropython.viper
@@ -148,7 +152,7 @@ def slow(block: ptr32, where: int, high: int, scale: int) -> int:
 
 
 @micropython.viper
-def steepen(block: ptr32, where: int):
+def steepen(block: ptr32, where: int) -> object:
     """Divide the slope of the node at ``where`` by the rate there: ticks of real time per step."""
     node = ptr32(int(block) + 4 * where)
     rate = node[4]

@@ -20,7 +20,7 @@ _D_BIAS = const(1 << 29)
 
 
 @micropython.viper
-def localise(piece: ptr32, local: ptr32):
+def localise(piece: ptr32, local: ptr32) -> object:
     """Measure a piece: differences of its points in units that fill 28 bits, and the hull's positions."""
     least = piece[0]
     most = least
@@ -48,7 +48,7 @@ def localise(piece: ptr32, local: ptr32):
         scale -= 1
     if scale < 13:
         local[0] = 0
-        return
+        return  # type: ignore[return-value]
     local[0] = scale
     first = piece[0]
     last = piece[6] >> (28 - scale)
@@ -70,7 +70,7 @@ def localise(piece: ptr32, local: ptr32):
 
 
 @micropython.viper
-def powers(local: ptr32, cell: ptr32, at: int, falling: int):
+def powers(local: ptr32, cell: ptr32, at: int, falling: int) -> object:
     """Polynomial of a cell over w in [0, 1]: five power coefficients, then five of a fifth of its derivative.
 
     Written at ``cell[at]`` with a bias of 2**30; ``falling`` mirrors it. As the differences of a cell are within

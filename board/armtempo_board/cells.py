@@ -10,6 +10,10 @@ from micropython import const
 from armtempo_board import cell
 from armtempo_board.parts import Parts
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from array import array
+
 # verdicts
 NOTHING = 0  # no step in this part, or it was split: go on
 CELL = 1  # steps in it: see ``heading``
@@ -25,12 +29,12 @@ _DIFFERENCE_BIAS = const(1 << 29)
 class Cells(Parts):
     """Finds the parts that hold steps."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__()
         self.heading = 0
         self.graze_ticks = 0
 
-    def next(self, position):
+    def next(self, position: int) -> int:
         """Look at the next part; ``position`` (+ points.BIAS) is where the steps so far lead. A verdict."""
         if not self.bring():
             return END
@@ -41,7 +45,7 @@ class Cells(Parts):
         self.skip()
         return verdict
 
-    def _judge(self, position):
+    def _judge(self, position: int) -> int:
         local = self.angle_local
         cell.localise(self.angle, local)
         if local[cell.LOWEST] == local[cell.HIGHEST]:
@@ -61,7 +65,7 @@ class Cells(Parts):
         return AT_ONCE if ticks <= _SHORTEST or self.level >= _DEEPEST else -1
 
 
-def heading(local):
+def heading(local: "array[int]") -> int:
     """1 or -1 where all differences are of that sign and within a factor of two; otherwise 0."""
     if not local[cell.SCALE]:
         return 0

@@ -13,6 +13,12 @@ from micropython import const
 from armtempo_board import cell, cells, points, rates
 from armtempo_board.parts import Parts
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from array import array
+
+    from armtempo_shared.motion import Motion
+
 LONGEST_TICKS = 1 << 38
 """A little under an hour: 1024-tick units stay small integers."""
 
@@ -24,10 +30,13 @@ _PASS = const(0)
 _SPLIT = const(-1)
 
 
-def check(motion, joints, gap_ticks=GAP_TICKS):
+def check(
+    motion: "Motion", joints: "list[dict[str, int]]", gap_ticks: int = GAP_TICKS
+) -> "tuple[int, int, int] | None":
     """None, or (code, joint, value) of the first thing wrong.
 
-    ``joints``: the joints' rows of the arm record; ``gap_ticks``: see ``Walker.load``. ``value`` is, by code: time_order, the control point;
+    ``joints``: the joints' rows of the arm record; ``gap_ticks``: see ``Walker.load``.
+    ``value`` is, by code: time_order, the control point;
     too_long, ticks or steps of 2**28; out_of_range, the position in steps; too_fast, steps/s;
     too_abrupt, steps/s**2.
     """
@@ -49,7 +58,7 @@ def check(motion, joints, gap_ticks=GAP_TICKS):
     return rates.check_sum(motion, joints, parts)
 
 
-def _numbers(motion, joint):
+def _numbers(motion: "Motion", joint: int) -> "tuple[int, int] | None":
     """Increasing time control points, and all numbers within what the evaluator can hold."""
     count = motion.degree + 1
     for offset, segments, is_time in (
@@ -74,7 +83,7 @@ def _numbers(motion, joint):
 class Judge:
     """Judges the parts of one joint; ``value`` says how much where one fails."""
 
-    def __init__(self, parts, row, gap_ticks):
+    def __init__(self, parts: "Parts", row: "dict[str, int]", gap_ticks: int) -> None:
         self._parts = parts
         self._gap_ticks = gap_ticks
         self._low = row["min_steps"] + points.BIAS
@@ -83,7 +92,7 @@ class Judge:
         self._mantissa, self._exponent = rates.scaled(self._limit)
         self.value = 0
 
-    def verdict(self):
+    def verdict(self) -> int:
         """A code, _PASS, or _SPLIT where it takes a closer look."""
         parts = self._parts
         cell.localise(parts.angle, parts.angle_local)
@@ -96,15 +105,15 @@ class Judge:
             return _SPLIT
         return self._range() or self._rate() or self._abrupt()
 
-    def _short(self):
+    def _short(self) -> bool:
         return self._parts.time[5] - self._parts.time[0] < 2 and self._parts.ticks() <= _SHORT_TICKS
 
-    def _range(self):
+    def _range(self) -> int:
         local = self._parts.angle_local
         inside = self._low <= local[cell.LOWEST] and local[cell.HIGHEST] <= self._high
         return _PASS if inside or self._short() else _SPLIT
 
-    def _rate(self):
+    def _rate(self) -> int:
         """|angle'| <= rate * time' for all Bezier points of the derivatives proves it for the part."""
         parts = self._parts
         shift = 30 - self._exponent + parts.angle_local[cell.SCALE] - parts.time_local[cell.SCALE] + 12
@@ -116,7 +125,7 @@ class Judge:
         self.value = rates.highest(parts)
         return codes.TOO_FAST
 
-    def _abrupt(self):
+    def _abrupt(self) -> int:
         """Where the joint stands still or turns, acceleration may carry it 0.02 steps in half a gap.
 
         Two opposite steps closer than the gap are left out; acceleration a goes a gap**2 / 8 past a threshold.
@@ -136,7 +145,7 @@ class Judge:
         return codes.TOO_ABRUPT
 
 
-def _acceleration(angle, time):
+def _acceleration(angle: "array[int]", time: "array[int]") -> "tuple[int, int]":
     """A bound of |angle'' / time'**2 - angle' time'' / time'**3| as a fraction of big integers, steps/tick**2."""
     least = time[cell.LEAST] - cell.DIFFERENCE_BIAS
     most = max(
@@ -149,6 +158,6 @@ def _acceleration(angle, time):
     return (bend << scale, per) if scale >= 0 else (bend, per << -scale)
 
 
-def _second(local):
+def _second(local: "array[int]") -> int:
     """Largest second difference of the points."""
     return max([abs(local[cell.STEPS + i + 1] - local[cell.STEPS + i]) for i in range(4)])

@@ -37,7 +37,7 @@ _LOW = const((1 << 15) - 1)
 
 
 @micropython.viper
-def aim(cell: ptr32, angle: ptr32, local: ptr32, twice: int):
+def aim(cell: ptr32, angle: ptr32, local: ptr32, twice: int) -> object:
     """Set the first threshold, ``twice`` / 2 from the high word of the cell's first point."""
     scale = local[0]
     height = 0
@@ -59,7 +59,7 @@ def aim(cell: ptr32, angle: ptr32, local: ptr32, twice: int):
 
 
 @micropython.viper
-def solve(cell: ptr32, index: int, length: int):
+def solve(cell: ptr32, index: int, length: int) -> object:
     """Set node A to the cell's step ``index``, or MIDDLE and B to those ``length`` and twice ``length`` behind it.
 
     Each Newton step leaves at most the square of the relative error; the last one starts below 2**-14. Products
@@ -76,7 +76,7 @@ def solve(cell: ptr32, index: int, length: int):
         bias += bias
         if cell[22] == 0:
             cell[28] = cell[23]
-            return
+            return  # type: ignore[return-value]
         if target < 0:
             target = 0
         if target > cell[22]:

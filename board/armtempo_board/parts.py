@@ -6,6 +6,10 @@ from micropython import const
 
 from armtempo_board import cell, points
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from armtempo_shared.motion import Motion
+
 _START_LEVEL = const(4)
 _KEPT = const(3)  # levels between the part and the piece it is halved from
 
@@ -16,7 +20,7 @@ class Parts:
     ``angle`` and ``time`` are the part's pieces (points.py), ``angle_local`` and ``time_local`` their measures.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._raw = array("i", bytes(48))
         self._segment = array("i", bytes(48))
         self._angle_root = array("i", bytes(48))
@@ -29,7 +33,7 @@ class Parts:
         self.time_local = array("i", bytes(4 * cell.LOCAL_SIZE))
         self.level = 0
 
-    def load(self, motion, joint):
+    def load(self, motion: "Motion", joint: int) -> None:
         """Stand before the first part."""
         self._data = motion.data
         self._weights = points.WEIGHTS[motion.degree]
@@ -42,7 +46,7 @@ class Parts:
         self._index = 0
         self._enter()
 
-    def _enter(self):
+    def _enter(self) -> None:
         """Load the time segment ``_number`` and the part of the angle segment that belongs to it."""
         part = self._number % self._refine
         count = self._weights[0]
@@ -56,8 +60,9 @@ class Parts:
         points.load(self._data, self._time_offset + 8 * self._number, count, self._raw)
         points.combine(self._raw, self._weights, self._time_root)
         self._base_level = -1
+        self._base_index = 0
 
-    def bring(self):
+    def bring(self) -> bool:
         """Compute the part; False: past the end."""
         if self._index >> self.level:
             if self._number + 1 >= self._segments:
@@ -77,26 +82,26 @@ class Parts:
         points.descend(self._time_base, self.time, below, index)
         return True
 
-    def split(self):
+    def split(self) -> None:
         """Go on with the first half of the part."""
         self.level += 1
         self._index <<= 1
 
-    def skip(self):
+    def skip(self) -> None:
         """Go on behind the part, with one twice as long where the grid allows it."""
         self._index += 1
         if self._index & 1 == 0 and self.level > 0 and not self._index >> self.level:
             self._index >>= 1
             self.level -= 1
 
-    def start(self):
+    def start(self) -> int:
         """Position (+ points.BIAS) at the start of the part."""
         return self.angle[0] + (self.angle[6] >> 27)
 
-    def end(self):
+    def end(self) -> int:
         """Position (+ points.BIAS) at the end of the part."""
         return self.angle[5] + (self.angle[11] >> 27)
 
-    def ticks(self):
+    def ticks(self) -> int:
         """Length of a part that is no longer than 2**28 ticks."""
         return ((self.time[5] - self.time[0]) << 12) + ((self.time[11] - self.time[6]) >> 16)

@@ -13,6 +13,10 @@ import micropython
 from armtempo_shared.basis import BASIS, FACTORIAL
 from micropython import const
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from array import array
+
 BIAS = 1 << 28
 LOW_BITS = 28
 _BIAS = const(1 << 28)
@@ -28,7 +32,7 @@ _BINOMIAL = (
 )
 
 
-def _weights(degree):
+def _weights(degree: int) -> bytes:
     """Eq. (15) turned into Bezier points of degree 5: weights of the control points, times 120.
 
     A power coefficient a_j adds C(i, j) / C(5, j) a_j to Bezier point i. First byte: number of control points.
@@ -48,7 +52,7 @@ WEIGHTS = {3: _weights(3), 5: _weights(5)}
 
 
 @micropython.viper
-def load(data: ptr8, offset: int, count: int, raw: ptr32):
+def load(data: ptr8, offset: int, count: int, raw: ptr32) -> object:
     """Read ``count`` <= 6 control points (int64, little endian) at byte ``offset`` into ``raw``."""
     i = 0
     while i < count:
@@ -63,7 +67,7 @@ def load(data: ptr8, offset: int, count: int, raw: ptr32):
 
 
 @micropython.viper
-def combine(raw: ptr32, weights: ptr8, piece: ptr32):
+def combine(raw: ptr32, weights: ptr8, piece: ptr32) -> object:
     """Bezier points of the segment whose control points ``load`` read; rounded to the last bit.
 
     The control points may differ by 2**24 in their high words (16 million steps; 818 s).
@@ -97,7 +101,7 @@ def combine(raw: ptr32, weights: ptr8, piece: ptr32):
 
 
 @micropython.viper
-def copy(source: ptr32, piece: ptr32):
+def copy(source: ptr32, piece: ptr32) -> object:
     """Copy a piece."""
     i = 0
     while i < 12:
@@ -106,7 +110,7 @@ def copy(source: ptr32, piece: ptr32):
 
 
 @micropython.viper
-def _blend(piece: ptr32, i: int, part: int, parts: int):
+def _blend(piece: ptr32, i: int, part: int, parts: int) -> object:
     """Replace point i by point i + (point i+1 - point i) * part / parts; ``parts`` <= 512."""
     high = piece[i + 1] - piece[i]
     low = piece[i + 7] - piece[i + 6]
@@ -126,7 +130,7 @@ def _blend(piece: ptr32, i: int, part: int, parts: int):
     piece[i + 6] = low & _LOW
 
 
-def restrict(piece, part, parts):
+def restrict(piece: "array[int]", part: int, parts: int) -> None:
     """Keep only [part / parts, (part + 1) / parts] of a piece: de Casteljau twice."""
     for level in range(5):
         for i in range(5 - level):
@@ -142,7 +146,7 @@ def restrict(piece, part, parts):
 
 
 @micropython.viper
-def reverse(piece: ptr32):
+def reverse(piece: ptr32) -> object:
     """Run through the piece backwards."""
     i = 0
     while i < 3:
@@ -156,7 +160,7 @@ def reverse(piece: ptr32):
 
 
 @micropython.viper
-def descend(root: ptr32, piece: ptr32, level: int, index: int):
+def descend(root: ptr32, piece: ptr32, level: int, index: int) -> object:
     """Piece ``index`` of the 2**level equal parts of ``root``: halved ``level`` times by de Casteljau."""
     i = 0
     while i < 12:

@@ -9,6 +9,12 @@ from micropython import const
 
 from armtempo_board import cell, points
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from armtempo_shared.motion import Motion
+
+    from armtempo_board.parts import Parts
+
 SLOWER = 1
 UNDECIDED = 0
 FASTER = -1
@@ -16,7 +22,7 @@ _BINS = const(128)
 _D_BIAS = const(1 << 29)
 
 
-def scaled(rate):
+def scaled(rate: int) -> "tuple[int, int]":
     """(mantissa of 30 bits, exponent): ``rate`` steps/s in steps per tick is mantissa / 2**exponent."""
     exponent = 0
     while (rate << exponent) // TICK_HZ < 1 << 29:
@@ -54,17 +60,19 @@ def compare(angle: ptr32, time: ptr32, mantissa: int, shift: int) -> int:
     return found
 
 
-def highest(parts):
+def highest(parts: "Parts") -> int:
     """A bound of the part's rate in steps/s."""
     angle, time = parts.angle_local, parts.time_local
     most = max(abs(angle[cell.LEAST] - _D_BIAS), abs(angle[cell.MOST] - _D_BIAS))
     least = time[cell.LEAST] - _D_BIAS
     if least <= 0:
         return TICK_HZ
-    return min((most * TICK_HZ << time[cell.SCALE] - 12) // (least << angle[cell.SCALE]), TICK_HZ)
+    return int(min((most * TICK_HZ << time[cell.SCALE] - 12) // (least << angle[cell.SCALE]), TICK_HZ))
 
 
-def check_sum(motion, joints, parts):
+def check_sum(
+    motion: "Motion", joints: "list[dict[str, int]]", parts: "Parts"
+) -> "tuple[int, int, int] | None":
     """None, or (too_fast, 255, rate) where all joints together may step too fast in one of many time spans."""
     limit = MAX_STEP_RATE_SUM + MAX_STEP_RATE_SUM // 100
     if sum([row["max_rate"] for row in joints]) <= limit:
@@ -78,16 +86,16 @@ def check_sum(motion, joints, parts):
     return (codes.TOO_FAST, 255, worst) if worst > limit else None
 
 
-def _end_high(motion, joint):
+def _end_high(motion: "Motion", joint: int) -> int:
     parts_end = motion.time_offset(joint) + 8 * (motion.segments * motion.refine + motion.degree) - 1
     data = motion.data
     high = 0
     for i in range(4):
         high = high << 8 | data[parts_end - i]
-    return (high << 4 | data[parts_end - 4] >> 4) + 1
+    return int(high << 4 | data[parts_end - 4] >> 4) + 1
 
 
-def _add(parts, motion, joint, width, sums):
+def _add(parts: "Parts", motion: "Motion", joint: int, width: int, sums: "array[int]") -> None:
     """Add the joint's highest rate in each time span of ``width`` * 4096 ticks."""
     peaks = array("I", bytes(4 * (_BINS + 1)))
     parts.load(motion, joint)

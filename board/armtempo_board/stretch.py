@@ -129,7 +129,7 @@ def emit(now: int, ring: ptr32, state: ptr32, mask: int) -> int:
 
 
 @micropython.viper
-def single(state: ptr32, high: int, ticks: int):
+def single(state: ptr32, high: int, ticks: int) -> object:
     """Prepare one step at ``high`` (4096 ticks, + 2**28) and ``ticks``."""
     state[0] = 0
     state[1] = 0
@@ -224,7 +224,7 @@ def accept(state: ptr32, block: ptr32, steps: int) -> int:
 
 
 @micropython.viper
-def differences(state: ptr32, block: ptr32, steps: int):
+def differences(state: ptr32, block: ptr32, steps: int) -> object:
     """Prepare the ``steps`` from node A (itself already written) to MIDDLE, and those to B, which becomes A.
 
     With K = T - N s_a and D = N (s_b - s_a), the cubic is s_a k + (3 K - D) k**2 / N**2 + (D - 2 K) k**3 / N**3.

@@ -22,6 +22,10 @@ from armtempo_board.stretch import (
     emit,
 )
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from armtempo_shared.motion import Motion
+
 _BUDGET = const(4)  # parts looked at in one call: bounds its time
 _LARGEST = const(1024)  # steps of a stretch
 _NODES = (A, crossing.MIDDLE, B)
@@ -36,7 +40,7 @@ class Walker:
     other way, ``turn`` lets it come. ``ended``: no step is left.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._cells = cells.Cells()
         self._block = array("i", bytes(4 * crossing.BLOCK_SIZE))
         self._state = array("i", bytes(4 * stretch.STATE_SIZE))
@@ -47,7 +51,9 @@ class Walker:
         self._held = self._released = self._fresh = self._at_once = self._comes = self._braking = False
         self._held_high = self._held_ticks = self._at = self._last = 0
 
-    def load(self, motion, joint, position_steps, pulse_ticks, gap_ticks):
+    def load(
+        self, motion: "Motion", joint: int, position_steps: int, pulse_ticks: int, gap_ticks: int
+    ) -> None:
         """Stand at the start of a motion with the joint at ``position_steps``.
 
         ``pulse_ticks``: STEP high time; ``gap_ticks``: least time between steps in opposite directions. Two that
@@ -70,7 +76,7 @@ class Walker:
             if not self._prepare() and self.at_turn:
                 self.turn()
 
-    def fill(self, ring, mask, head, room, until_1024=_NEVER):
+    def fill(self, ring: array, mask: int, head: int, room: int, until_1024: int = _NEVER) -> int:
         """Write up to ``room`` edge times (rise, fall, ...; ticks modulo 2**32) to ``ring`` from ``head`` on.
 
         ``ring``: array('I') of ``mask`` + 1 entries, ``head`` even. Steps after ``until_1024`` (1024 ticks) wait for a
@@ -85,12 +91,12 @@ class Walker:
             pass
         return room - state[ROOM]
 
-    def turn(self):
+    def turn(self) -> None:
         """Let the steps in the other direction come."""
         self.direction = -self.direction
         self.at_turn = False
 
-    def brake(self, start_ticks, length_ticks):
+    def brake(self, start_ticks: int, length_ticks: int) -> None:
         """Come to rest along the path from a time on (see braking.py); no step from there on may be written yet."""
         braking.set_law(self._block, start_ticks, length_ticks)
         self._braking = True
@@ -112,17 +118,17 @@ class Walker:
         if self._fresh or self._at < self._last:
             self._comes = self._solve(self._at)
 
-    def _brake_held(self):
+    def _brake_held(self) -> None:
         block = self._block
         block[HELD] = self._held_ticks
         self._held = bool(braking.slow(block, HELD, self._held_high, 0))
         self._held_ticks = block[HELD] + block[HELD + DELAY]
 
-    def last_1024(self):
+    def last_1024(self) -> int:
         """Time of the step written last, in 1024 ticks."""
         return stretch.elapsed(self._state, 0)
 
-    def next_1024(self):
+    def next_1024(self) -> int:
         """Time of the next step to be written, or one before it while it is not known; in 1024 ticks."""
         if self._state[STEPS] or self._state[NEXT_STEPS]:
             return stretch.elapsed(self._state, 1)
@@ -132,7 +138,7 @@ class Walker:
             return _in_1024(self._cells.time[0], self._ticks())
         return _in_1024(self._cells.time[0], 0)
 
-    def _prepare(self):
+    def _prepare(self) -> bool:
         """Make the next stretch ready. False: at a turn, at the end, or not found yet."""
         if not self._fresh and self._at < self._last:
             return self._go_on()
@@ -149,7 +155,7 @@ class Walker:
                 return True
         return False
 
-    def _next_cell(self):
+    def _next_cell(self) -> None:
         walk = self._cells
         found = walk.next(self._position)
         if found == cells.END or (self._braking and braking.passed(self._block, walk.time[0])):
@@ -163,7 +169,7 @@ class Walker:
         if found != cells.NOTHING:
             self._open(found == cells.AT_ONCE)
 
-    def _open(self, at_once):
+    def _open(self, at_once: bool) -> None:
         """Take up the steps of the cell that was found, and solve the first."""
         walk = self._cells
         here = self._block
@@ -191,12 +197,12 @@ class Walker:
         self._fresh = True
         self._comes = self._solve(0)
 
-    def _solve(self, index):
+    def _solve(self, index: int) -> bool:
         """Set node A to the cell's step ``index``; False where braking ends before it."""
         solve(self._block, index, 0)
         return not self._braking or self._slow(A)
 
-    def _slow(self, node):
+    def _slow(self, node: int) -> bool:
         """Move a node to real time; False where it never comes."""
         scale = self._state[stretch.TIME_SCALE]
         comes = braking.slow(self._block, node, self._cells.time[0], scale)
@@ -204,7 +210,7 @@ class Walker:
             braking.steepen(self._block, node)
         return bool(comes)
 
-    def _first(self):
+    def _first(self) -> None:
         """The first step of a cell, against the one that was held back before it."""
         if self._held:
             opposite = self._heading != self.direction
@@ -221,7 +227,7 @@ class Walker:
             self._fresh = False
             self._single()
 
-    def _go_on(self):
+    def _go_on(self) -> bool:
         """Prepare the next step or steps of the cell; True where some come."""
         steps = self._last - self._at
         if steps > 3 and not self._at_once and self._two_stretches(steps):
@@ -233,7 +239,7 @@ class Walker:
         self._single()
         return not self._held
 
-    def _two_stretches(self, steps):
+    def _two_stretches(self, steps: int) -> bool:
         """Prepare two stretches that keep the error bound; False where steps are better solved singly."""
         block = self._block
         state = self._state
@@ -259,7 +265,7 @@ class Walker:
             self._size = max(length, 2)
         return False
 
-    def _level(self):
+    def _level(self) -> bool:
         """Move the nodes ahead to real time, and let all three count from the same base.
 
         False where braking ends before, or takes them too far apart.
@@ -277,7 +283,7 @@ class Walker:
         self._state[BASE_HIGH] = self._cells.time[0] + (base >> 12)
         return True
 
-    def _single(self):
+    def _single(self) -> None:
         """Prepare the step at node A."""
         if self._at == self._last:
             self._hold()
@@ -285,30 +291,30 @@ class Walker:
             self._released = False
             stretch.single(self._state, self._cells.time[0], self._ticks())
 
-    def _hold(self):
+    def _hold(self) -> None:
         """Hold back the step at node A."""
         self._held = True
         self._held_high = self._cells.time[0]
         self._held_ticks = self._ticks()
 
-    def _release(self):
+    def _release(self) -> None:
         self._held = False
         self._released = True
         stretch.single(self._state, self._held_high, self._held_ticks)
 
-    def _since_held(self, high, ticks):
+    def _since_held(self, high: int, ticks: int) -> int:
         """Ticks from the step held back to a time; any large number where it is far."""
         high -= self._held_high
         if high > _FAR:
             high = _FAR
         return (high << 12) + ticks - self._held_ticks
 
-    def _ticks(self):
+    def _ticks(self) -> int:
         """Time of node A in ticks from the high word of the part on."""
         scale = self._state[stretch.TIME_SCALE]
         ticks = (self._block[A] + (1 << (scale - 1))) >> scale
         return ticks + self._block[A + DELAY] if self._braking else ticks
 
 
-def _in_1024(high, ticks):
+def _in_1024(high: int, ticks: int) -> int:
     return ((high - points.BIAS) << 2) + (ticks >> 10)

@@ -64,6 +64,14 @@ def cruise(rate: float, joints: int = 1, ramp_s: float = 0.5, total_s: float = 2
     return record([via] * joints, [np.full(len(times) - 1, interval)], 5)
 
 
+def steady(rate: float) -> bytes:
+    """One second at about ``rate`` steps/s from beginning to end, for measuring: it does not start from rest."""
+    places = np.arange(15) - 2.0
+    angles = rate / 10 * (places + 0.004 * np.sin(np.arange(15)))
+    times = _fixed(places * limits.TICK_HZ / 10, limits.TICK_FRACTION_BITS)
+    return motion.pack(5, [_fixed(angles, limits.STEP_FRACTION_BITS)], [times], 10, 1, 0, 0)
+
+
 def chance(rng: np.random.Generator) -> bytes:
     """One joint, everything by chance: degree, segments, refinement, distances, speeds, where it begins."""
     degree = int(rng.choice([3, 5]))

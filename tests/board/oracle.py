@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 from math import comb
 
 import numpy as np
@@ -122,7 +123,7 @@ def _piece_crossings(piece: Piece) -> tuple[Array, Array, Array]:
     rate = angle.deriv()
     edges = _breaks(rate)
     places, signs = [], []
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in pairwise(edges):
         thresholds = _between(angle(low), angle(high))
         if len(thresholds):
             places.append(_invert(angle, rate, thresholds, low, high))

@@ -31,4 +31,6 @@ def test_replay_from_the_repl(name: str, tmp_path: Path) -> None:
 
 def _steps(trajectory, paper_arm):
     end = trajectory(trajectory.duration_s)
-    return [round(angle * encode.steps_per_deg(joint)) for angle, joint in zip(end, paper_arm.driven, strict=True)]
+    return [
+        round(angle * encode.steps_per_deg(joint)) for angle, joint in zip(end, paper_arm.driven, strict=True)
+    ]
