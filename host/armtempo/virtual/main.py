@@ -23,6 +23,7 @@ def prepare(options):
     from simulator import modules, session
 
     modules.replace()
+    modules.replace_sys()
     return session
 
 
