@@ -17,7 +17,7 @@ def prepare(options):
     if sys.implementation.name != "micropython":
         folders.append(HERE + "/cpython")
     folders += [options["flash"], options["flash"] + "/lib"]
-    sys.path[0:0] = folders + options["program"]  # MicroPython has no other way
+    sys.path[0:0] = folders + options["program"]
     if sys.implementation.name != "micropython":
         import additions  # noqa: F401
     from simulator import modules, session
