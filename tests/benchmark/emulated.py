@@ -42,7 +42,7 @@ class Machine:
         self.count = 0
         self.calls: Counter[str] = Counter()
         self._spent: Counter[str] = Counter()
-        self._functions: dict[str, tuple[int, list[str]]] = {}
+        self.functions: dict[str, tuple[int, list[str]]] = {}
         self._uc = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
         self._uc.mem_map(0, 0x200000)
         self._next_code = _CODE
@@ -59,7 +59,7 @@ class Machine:
 
     def run(self, name: str, *arguments: int | array[int] | bytes) -> int:
         """Call a function; arrays are written back. Returns its value and counts in ``count``."""
-        entry, kinds = self._functions[name]
+        entry, kinds = self.functions[name]
         self._arguments: list[tuple[int, int]] = []
         places = []
         at = _DATA
@@ -92,6 +92,12 @@ class Machine:
                 argument[:] = array(argument.typecode, bytes(data))
         result = self._result
         return result - (1 << 32) if result >> 31 else result
+
+    def clear(self) -> None:
+        """Count from zero."""
+        self.count = 0
+        self.calls.clear()
+        self._spent.clear()
 
     @property
     def spent(self) -> dict[str, int]:
@@ -139,7 +145,7 @@ class Machine:
                     continue  # takes objects: needs a runtime
                 kinds = [annotation.id for annotation in annotations]  # type: ignore[union-attr]
                 self._uc.mem_write(self._next_code, code)
-                self._functions[node.name] = (self._next_code, kinds)
+                self.functions[node.name] = (self._next_code, kinds)
                 self._next_code += (len(code) + 15) & ~15
 
 
@@ -172,7 +178,7 @@ def _children(data: bytes) -> list[bytes | None]:
             reader.at += (length >> 1) + 1
     for _ in range(objects):
         _skip_object(reader)
-    return [code for code in _raw_code(reader)[1]]
+    return _raw_code(reader)[1]
 
 
 class _Reader:

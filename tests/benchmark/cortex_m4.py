@@ -1,0 +1,181 @@
+"""What a step costs on the STM32F407, counted on an emulated Cortex-M4.
+
+    python tests/benchmark/cortex_m4.py            print the figures
+    python tests/benchmark/cortex_m4.py --store    and keep them in cortex_m4.json, which a test holds changes against
+    python tests/benchmark/cortex_m4.py --verify   hold what the emulated core computes against CPython, call by call
+
+The compiled (viper) functions run as machine code on the emulated core, instruction by instruction; the bytecode
+around them runs on CPython, and its lines are counted. All is deterministic.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from array import array
+from collections import Counter
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+STORED = Path(__file__).with_suffix(".json")
+sys.path[:0] = [str(ROOT)] + [
+    str(ROOT / folder) for folder in ("board", "shared", "host/armtempo/virtual/cpython", "host")
+]
+
+import micropython  # noqa: E402, F401  (puts ptr32 and its like into place)
+from armtempo_board import cell, cells, crossing, parts, points, stretch, walker  # noqa: E402
+from armtempo_shared.motion import Motion  # noqa: E402
+
+from tests.benchmark.emulated import Machine  # noqa: E402
+from tests.board import motions, oracle  # noqa: E402
+
+CORE_HZ = 168_000_000
+CYCLES = 1.3
+"""Cycles an instruction (RM0090's flash accelerator keeps most wait states away); not measured on a board."""
+
+LINE = 800
+"""Instructions of a line of bytecode. Counted on the 32-bit Arm interpreter under an emulator (all executed
+instructions of a run less those of the compiled functions, per line): 770 in the cruise, 770 in the shipped motion."""
+
+COMPILED = (points, cell, crossing, stretch)
+ALL = (*COMPILED, parts, cells, walker)
+
+
+class Count:
+    """Runs walkers with their compiled functions on the emulated core, and counts."""
+
+    def __init__(self) -> None:
+        folder = ROOT / "board" / "armtempo_board"
+        self.machine = Machine(*(folder / f"{module.__name__.split('.')[1]}.py" for module in COMPILED))
+        self.on = False
+        self.verify = False
+        self.lines: Counter[str] = Counter()
+        for name in self.machine.functions:
+            home = next(module for module in COMPILED if hasattr(module, name))
+            replaced = self._either(name, getattr(home, name))
+            for module in ALL:
+                if hasattr(module, name):
+                    setattr(module, name, replaced)
+
+    def _either(self, name: str, original: Any) -> Any:
+        def call(*arguments: Any) -> Any:
+            if not self.on:
+                return original(*arguments)
+            if not self.verify:
+                return self.machine.run(name, *arguments)
+            copies = [argument[:] if isinstance(argument, array) else argument for argument in arguments]
+            values = original(*copies), self.machine.run(name, *arguments)
+            assert copies == list(arguments), name
+            assert values[0] is None or values[0] == values[1], name
+            return values[0]
+
+        return call
+
+    def walk(self, record: bytes, joint: int, skip: int, steps: int, batch: int = 512) -> dict[str, float]:
+        """Instructions per step of ``steps`` steps behind the first ``skip``, in batches of entries."""
+        motion = Motion(record)
+        subject = walker.Walker()
+        ring = array("I", bytes(4096))
+        subject.load(motion, joint, oracle.start_steps(motion, joint), 168, 20_000)
+        head = self._fill(subject, ring, 0, skip, batch)
+        self.machine.clear()
+        self.lines.clear()
+        self.on = True
+        sys.settrace(self._trace)
+        try:
+            end = self._fill(subject, ring, head, steps, batch)
+        finally:
+            sys.settrace(None)
+            self.on = False
+        done = (end - head) // 2
+        compiled = self.machine.count / done
+        lines = self.lines.total() / done
+        return {"steps": done, "compiled": compiled, "lines": lines, "all": compiled + LINE * lines}
+
+    def _fill(self, subject: walker.Walker, ring: array[int], head: int, steps: int, batch: int) -> int:
+        end = head + 2 * steps
+        while head < end and not subject.ended:
+            if subject.at_turn:
+                subject.turn()
+            head += subject.fill(ring, 1023, head, batch)
+        return head
+
+    def _trace(self, frame: FrameType, event: str, _: Any) -> Any:
+        if "armtempo_board" not in frame.f_code.co_filename:
+            return None
+        if event == "line":
+            self.lines[frame.f_code.co_name] += 1
+        return self._trace
+
+    def kernel(self) -> float:
+        """Instructions of the loop that writes a step's two entries, groups of 16 steps."""
+        counts = []
+        for steps in (128, 384):
+            state = array("i", bytes(4 * stretch.STATE_SIZE))
+            settings = {
+                stretch.FIRST: 252 << 22, stretch.SECOND: 1 << 29, stretch.THIRD: 1 << 29, stretch.POWER: 9,
+                stretch.SHIFT: 13, stretch.GROUP: 16, stretch.CARRY: 5, stretch.STEPS: steps,
+                stretch.UNTIL_1024: 1 << 28, stretch.ROOM: 1022, stretch.PULSE: 168,
+            }  # fmt: skip
+            for place, value in settings.items():
+                state[place] = value
+            self.machine.clear()
+            self.machine.run("emit", 0, array("I", bytes(4096)), state, 1023)
+            counts.append(self.machine.count)
+        return (counts[1] - counts[0]) / 256
+
+
+def measure() -> dict[str, dict[str, float]]:
+    """All figures by case."""
+    count = Count()
+    cruise = motions.steady(333_000)
+    figures = {"kernel": {"compiled": count.kernel()}}
+    figures["cruise"] = count.walk(cruise, 0, 3_000, 33_400)
+    figures["cruise"]["stretches"] = sum(count.machine.calls[name] for name in ("differences",)) * 2
+    figures["ramp"] = count.walk(motions.cruise(333_000), 0, 10_000, 10_000)
+    for joint in range(3):
+        figures[f"shipped joint {joint + 1}"] = count.walk(motions.feeding(), joint, 0, 20_000, 128)
+    return {case: {name: round(value, 3) for name, value in row.items()} for case, row in figures.items()}
+
+
+def report(figures: dict[str, dict[str, float]]) -> str:
+    """The figures as text."""
+    lines = [f"{'per step':<18} {'compiled':>9} {'bytecode':>9} {'together':>9}  instructions"]
+    for case, row in figures.items():
+        rest = f"{LINE * row['lines']:9.1f} {row['all']:9.1f}" if "lines" in row else ""
+        lines.append(f"{case:<18} {row['compiled']:9.1f} {rest}")
+    whole = figures["cruise"]["all"]
+    lines.append(
+        f"\nhighest rates, all joints alike ({CORE_HZ / 1e6:.0f} MHz, {CYCLES} cycles an instruction)"
+    )
+    for joints, peer in ((1, "3652 k"), (3, "820 k"), (6, "")):
+        rate = CORE_HZ / CYCLES / whole / joints
+        lines.append(
+            f"{joints} joints: {rate / 1e3:7.0f} k steps/s each"
+            + (f"; Klipper, in C: {peer}" if peer else "")
+        )
+    load = 999_000 * whole * CYCLES / CORE_HZ
+    lines.append(f"3 joints at 333 k steps/s each take {100 * load:.0f} % of the processor")
+    seconds = sum(motions.INTERVALS_S[2])
+    spent = sum(row["steps"] * row["all"] for case, row in figures.items() if case.startswith("shipped"))
+    lines.append(f"the shipped motion takes {100 * spent * CYCLES / CORE_HZ / seconds:.1f} % on average")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    if "--verify" in sys.argv:
+        machine = Count()
+        machine.verify = True
+        for number in range(3):
+            machine.walk(motions.feeding(degree=3 + 2 * (number % 2)), number, 0, 400)
+        print("the same")
+        sys.exit()
+    found = measure()
+    if "--json" in sys.argv:
+        print(json.dumps(found))
+    else:
+        print(report(found))
+    if "--store" in sys.argv:
+        STORED.write_text(json.dumps(found, indent=1) + "\n")

@@ -1,0 +1,38 @@
+"""What a step costs on the chip must not grow: the benchmark's figures against those stored with it."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from tests import interpreters
+
+BENCHMARK = interpreters.ROOT / "tests" / "benchmark" / "cortex_m4.py"
+
+
+@pytest.fixture(scope="module")
+def figures() -> dict[str, dict[str, float]]:
+    """Measured now."""
+    found: dict[str, dict[str, float]] = json.loads(interpreters.run("cpython", BENCHMARK, "--json"))
+    return found
+
+
+def test_steps_cost_what_is_stored(figures: dict[str, dict[str, float]]) -> None:
+    stored = json.loads(BENCHMARK.with_suffix(".json").read_text())
+    assert figures.keys() == stored.keys()
+    for case, row in figures.items():
+        for name, value in row.items():
+            slack = 1.05 if name in ("lines", "all") else 1.01  # Python's versions do not count lines alike
+            assert stored[case][name] / slack <= value <= stored[case][name] * slack, (
+                f"{case}: {name} was {stored[case][name]}, is {value}; where that is better or has to be, run "
+                "'python tests/benchmark/cortex_m4.py --store'"
+            )
+
+
+def test_a_million_steps_a_second_leave_time_to_spare(figures: dict[str, dict[str, float]]) -> None:
+    assert 999_000 * figures["cruise"]["all"] * 1.3 < 0.9 * 168e6
+
+
+def test_the_machine_code_computes_what_cpython_does() -> None:
+    assert interpreters.run("cpython", BENCHMARK, "--verify") == "the same\n"
