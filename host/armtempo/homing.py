@@ -18,6 +18,8 @@ from armtempo.link import Board
 
 FAST, SLOW = 0.2, 0.04
 """Shares of the joint's limits in the first and in the second approach."""
+_STEP_DEG = 0.1
+"""So close to the end of a way counts as there; a step is less."""
 BACK_DEG = 3.0
 """How far a joint backs off from its switch."""
 
@@ -68,13 +70,17 @@ def _home_joint(board: Board, arm: Arm, index: int, stop: StopRequest) -> None:
     joint = arm.driven[index]
     switch = _switch(joint)
     assert switch is not None
-    edge_deg = switch.edge_deg
-    back_deg = edge_deg - switch.side * BACK_DEG
-    if _move(board, arm, index, (switch.far_deg, edge_deg), FAST, stop):
+    edge_deg, back_deg = switch.edge_deg, -switch.side * BACK_DEG
+    if abs(_move(board, arm, index, (switch.far_deg, edge_deg), FAST, stop) - edge_deg) <= _STEP_DEG:
         raise LinkError(f"{joint.name}: its limit switch did not trip over the whole range; check its wiring")
-    _move(board, arm, index, (edge_deg, back_deg), FAST, stop)
-    if _move(board, arm, index, (edge_deg - 2 * switch.side * BACK_DEG, edge_deg), SLOW, stop):
-        raise LinkError(f"{joint.name}: its limit switch did not trip a second time; check its wiring")
+    _move(board, arm, index, (edge_deg, edge_deg + back_deg), FAST, stop)
+    before_deg = edge_deg + 2 * back_deg
+    way_deg = abs(_move(board, arm, index, (before_deg, edge_deg), SLOW, stop) - before_deg)
+    if not 0.5 * BACK_DEG < way_deg < 1.5 * BACK_DEG:
+        raise LinkError(
+            f"{joint.name}: its limit switch tripped {way_deg:.2f} degrees after it had been left by {BACK_DEG:g}; "
+            "check its wiring"
+        )
     outside_deg = max(0.0, switch.side * (switch.trip_deg - edge_deg))
     away_deg = switch.side * (BACK_DEG + outside_deg)
     _move(board, arm, index, (edge_deg, edge_deg - away_deg), FAST, stop)
@@ -85,8 +91,8 @@ def _home_joint(board: Board, arm: Arm, index: int, stop: StopRequest) -> None:
 
 def _move(
     board: Board, arm: Arm, index: int, way_deg: tuple[float, float], share: float, stop: StopRequest
-) -> bool:
-    """Move one joint; whether it got to the end, that is, no switch tripped."""
+) -> float:
+    """Move one joint along a way of its own; gives where on it the joint came to rest, degrees."""
     start_deg = _posture_deg(board, arm)
     end_deg = list(start_deg)
     start_deg[index], end_deg[index] = way_deg
@@ -97,8 +103,7 @@ def _move(
     operate.raise_fault(end)
     if stop.wanted:
         raise KeyboardInterrupt
-    target_steps = way_deg[1] * encode.steps_per_deg(arm.driven[index])
-    return abs(end.stand.commanded_steps[index] - target_steps) <= 1.0
+    return end.stand.commanded_steps[index] / encode.steps_per_deg(arm.driven[index])
 
 
 def _posture_deg(board: Board, arm: Arm) -> list[float]:
