@@ -77,7 +77,7 @@ def _sizes(ctx: click.Context, parameter: click.Parameter, value: str) -> list[i
 def command(
     ctx: click.Context, /, out: Path, workers: int | None, scheduler: str | None, plot: bool, **chosen: Any
 ) -> None:
-    """Compare the search algorithms as Table 4 and Fig. 6 of the paper do."""
+    """Compare the search algorithms as the paper does in Table 4 and Fig. 6."""
     from armtempo import bench, bench_table, bench_workers
     from armtempo import job as jobs
     from armtempo.bench_store import Store
