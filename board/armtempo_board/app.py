@@ -156,6 +156,11 @@ class App:
         if self._failures >= _MOST_FAILURES:
             raise error
 
+    def halt(self) -> None:
+        """Freeze what still moves; the position stays known."""
+        if self.engine and self.engine.moving:
+            self.engine.freeze()
+
     # what commands and the button ask for
 
     def configure(self) -> None:

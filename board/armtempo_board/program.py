@@ -41,14 +41,14 @@ def main(root: str = ROOT) -> None:
     watchdog = Watchdog()
     _detach(port)
     try:
-        _loop(leds, button, watchdog)
+        run(leds, button, watchdog)
     finally:
         watchdog.leave()
         _attach(port)
     print("armtempo ended; Ctrl-D starts it again")
 
 
-def _build(port: pyb.USB_VCP, root: str) -> App:
+def _build(port: "pyb.USB_VCP", root: str) -> App:
     """The App; what only its making needs is forgotten again, for the sake of the heap."""
     from armtempo_shared.program import program_crc
 
@@ -60,16 +60,20 @@ def _build(port: pyb.USB_VCP, root: str) -> App:
     return built
 
 
-def _loop(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
-    while not app.left():
-        app.turn()
-        leds.show(app.state())
-        watchdog.feed()
-        if app.moving():
-            continue
-        if button.pressed():
-            _replay_default()
-        machine.idle()
+def run(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
+    """Turn until somebody asks for the REPL; whatever ends the loop, nothing goes on moving without it."""
+    try:
+        while not app.left():
+            app.turn()
+            leds.show(app.state())
+            watchdog.feed()
+            if app.moving():
+                continue
+            if button.pressed():
+                _replay_default()
+            machine.idle()
+    finally:
+        app.halt()
 
 
 def _fault_at_start() -> int:

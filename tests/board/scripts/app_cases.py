@@ -334,6 +334,35 @@ def case_endless_exceptions_end_the_program():
     raise AssertionError("went on")
 
 
+def case_whatever_ends_the_loop_freezes_what_moves():
+    app, host = connected()
+    app.halt()
+    assert "freeze" not in app.engine.calls
+    start(host)
+    app.halt()
+    assert app.engine.calls[-1] == "freeze"
+    assert not app.moving()
+
+
+class Failing:
+    def show(self, state):
+        raise ValueError("deliberate")
+
+
+def case_a_failing_led_freezes_what_moves():
+    from armtempo_board import program
+
+    app, host = connected()
+    start(host)
+    program.app = app
+    try:
+        program.run(Failing(), None, None)
+    except ValueError:
+        assert app.engine.calls[-1] == "freeze"
+        return
+    raise AssertionError("went on")
+
+
 def case_watchdog_bite_is_reported():
     _, host = connected(homed=False, fault=45)
     assert host.ask("status")[1][1] == 45
