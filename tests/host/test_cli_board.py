@@ -79,7 +79,7 @@ def test_store_commands(run: Run, file: str) -> None:
 
 def test_run_writes_a_folder(run: Run, file: str, pipe: Pipe) -> None:
     assert "armtempo home" in run("run", file, code=1).output
-    assert "0.00, -60.00, 40.00 degrees" in run("home", "P0").output
+    assert "stands at 0.00, -60.00, 39.99 degrees" in run("home", "P0").output  # the nearest step
     output = run("run", file).output
     assert "samples-01.csv: complete" in output
     assert "12 samples" in output
