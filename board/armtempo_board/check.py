@@ -122,7 +122,7 @@ class Judge:
             return _PASS
         if found == rates.UNDECIDED and not self._short():
             return _SPLIT
-        self.value = rates.highest(parts)
+        self.value = rates.at_ends(parts) if found == rates.FASTER else rates.highest(parts)
         return codes.TOO_FAST
 
     def _abrupt(self) -> int:

@@ -64,10 +64,23 @@ def highest(parts: "Parts") -> int:
     """A bound of the part's rate in steps/s."""
     angle, time = parts.angle_local, parts.time_local
     most = max(abs(angle[cell.LEAST] - _D_BIAS), abs(angle[cell.MOST] - _D_BIAS))
-    least = time[cell.LEAST] - _D_BIAS
-    if least <= 0:
+    return _rate(parts, most, time[cell.LEAST] - _D_BIAS)
+
+
+def at_ends(parts: "Parts") -> int:
+    """The greater of the part's rates at its two ends, in steps/s."""
+    angle, time = parts.angle_local, parts.time_local
+    return max(
+        [_rate(parts, abs(angle[i] - _D_BIAS), time[i] - _D_BIAS) for i in (cell.STEPS, cell.STEPS + 4)]
+    )
+
+
+def _rate(parts: "Parts", steps: int, ticks: int) -> int:
+    """Differences of angle and time, in their local units, as steps/s."""
+    if ticks <= 0:
         return TICK_HZ
-    return int(min((most * TICK_HZ << time[cell.SCALE] - 12) // (least << angle[cell.SCALE]), TICK_HZ))
+    up = parts.time_local[cell.SCALE] - 12
+    return min((steps * TICK_HZ << up) // (ticks << parts.angle_local[cell.SCALE]), TICK_HZ)
 
 
 def check_sum(

@@ -1,0 +1,18 @@
+"""Print what the check says of motion records; arguments: lowest and highest position, rate, gap, records."""
+
+import sys
+
+from armtempo_board.evaluator import check
+from armtempo_shared.motion import Motion
+
+
+def main(low, high, rate, gap, *records):
+    """A line for each record."""
+    row = {"min_steps": int(low), "max_steps": int(high), "max_rate": int(rate)}
+    for record in records:
+        with open(record, "rb") as file:
+            motion = Motion(file.read())
+        print(check(motion, [row] * motion.joints, int(gap)))
+
+
+main(*sys.argv[1:])

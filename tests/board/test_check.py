@@ -1,0 +1,110 @@
+"""The board's own check of a motion: it passes what is fit to run, up to its limits, and nothing else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from armtempo_shared import codes, limits, motion
+
+from tests import interpreters
+from tests.board import motions, walking
+
+SCRIPT = Path(__file__).parent / "scripts" / "judge.py"
+FAR = 10_000_000
+Verdict = tuple[int, int, int] | None
+
+
+def judge(
+    interpreter: str, folder: Path, *records: bytes, low: int = -FAR, high: int = FAR, rate: int = 336_330
+) -> list[Verdict]:
+    paths = [folder / f"{number}.atm" for number in range(len(records))]
+    for path, record in zip(paths, records, strict=True):
+        path.write_bytes(record)
+    words = [str(word) for word in (low, high, rate, walking.GAP_TICKS, *paths)]
+    return [eval(line) for line in interpreters.run(interpreter, SCRIPT, *words).splitlines()]
+
+
+def straight(times_s: list[float], angles: list[float]) -> bytes:
+    """A cubic from control points."""
+    return motion.pack(
+        3,
+        [[round(angle * 2**limits.STEP_FRACTION_BITS) for angle in angles]],
+        [[round(time * limits.TICK_HZ * 2**limits.TICK_FRACTION_BITS) for time in times_s]],
+        len(angles) - 3,
+        1,
+        0,
+        0,
+    )
+
+
+def test_range(interpreter: str, tmp_path: Path) -> None:
+    record = motions.feeding()  # joint 1 goes from 0 to 6400, joint 2 lower than its via points
+    assert judge(interpreter, tmp_path, record) == [None]
+    assert judge(interpreter, tmp_path, record, high=6400) == [None]
+    assert judge(interpreter, tmp_path, record, high=6399) == [(codes.OUT_OF_RANGE, 0, 6400)]
+    lowest = -9808  # a little beyond the via point at -9777.8
+    code, joint, position = judge(interpreter, tmp_path, record, low=lowest + 40)[0] or (0, 0, 0)
+    assert (code, joint) == (codes.OUT_OF_RANGE, 1)
+    assert lowest - 5 < position < lowest + 40
+
+
+@pytest.mark.parametrize("name", ["feeding", "cubic", "refined"])
+def test_rate(interpreter: str, name: str, tmp_path: Path) -> None:
+    record = motions.feeding(degree=3 if name == "cubic" else 5, refine=8 if name == "refined" else 1)
+    peak = walking.peak_rate(record)
+    assert judge(interpreter, tmp_path, record, rate=int(peak * 1.0005) + 1) == [None]
+    verdict = judge(interpreter, tmp_path, record, rate=int(peak * 0.9995))[0]
+    assert verdict is not None
+    assert verdict[0] == codes.TOO_FAST
+    assert 0.999 * peak <= verdict[2] <= 1.01 * peak
+
+
+def test_the_boards_own_highest_rate(interpreter: str, tmp_path: Path) -> None:
+    fit, fast = motions.cruise(332_000), motions.cruise(340_000)
+    verdicts = judge(interpreter, tmp_path, fit, fast, rate=1_000_000)
+    assert verdicts[0] is None
+    assert verdicts[1] is not None
+    assert verdicts[1][0] == codes.TOO_FAST
+
+
+def test_sum_of_rates(interpreter: str, tmp_path: Path) -> None:
+    fit, fast = motions.cruise(165_000, joints=6), motions.cruise(175_000, joints=6)
+    verdicts = judge(interpreter, tmp_path, fit, fast)
+    assert verdicts[0] is None
+    assert verdicts[1] is not None
+    assert verdicts[1][:2] == (codes.TOO_FAST, 255)
+
+
+def test_order_of_times(interpreter: str, tmp_path: Path) -> None:
+    angles = [0.0, 0.0, 1.0, 2.0, 2.0]
+    fit = straight([-0.1, 0.0, 0.1, 0.2, 0.3], angles)
+    same = straight([-0.1, 0.0, 0.1, 0.1, 0.3], angles)
+    back = straight([-0.1, 0.0, 0.1, 0.2, 0.15], angles)
+    assert judge(interpreter, tmp_path, fit, same, back) == [
+        None,
+        (codes.TIME_ORDER, 0, 3),
+        (codes.TIME_ORDER, 0, 4),
+    ]
+
+
+def test_longer_than_the_board_can_hold(interpreter: str, tmp_path: Path) -> None:
+    angles = [0.0, 0.0, 1.0, 2.0, 2.0]
+    slow = straight([-300.0, 0.0, 300.0, 600.0, 900.0], angles)
+    far = straight([-0.1, 0.0, 0.1, 0.2, 0.3], [0.0, 0.0, 2e7, 4e7, 4e7])
+    for verdict in judge(interpreter, tmp_path, slow, far):
+        assert verdict is not None
+        assert verdict[0] == codes.TOO_LONG
+
+
+def test_reversal_that_the_driver_cannot_follow(interpreter: str, tmp_path: Path) -> None:
+    def there_and_back(seconds: float) -> bytes:
+        return motions.record([np.array([0.0, 1000.5, 0.0])], [np.full(2, seconds)], 5)
+
+    fit, abrupt = there_and_back(0.1), there_and_back(0.02)
+    verdicts = judge(interpreter, tmp_path, fit, abrupt)
+    assert verdicts[0] is None
+    assert verdicts[1] is not None
+    assert verdicts[1][0] == codes.TOO_ABRUPT
+    assert verdicts[1][2] > 0.16 * (limits.TICK_HZ / walking.GAP_TICKS) ** 2
