@@ -67,3 +67,10 @@ def test_every_label_takes_the_colour_of_the_page(name: str) -> None:
     assert len(labels) == svg.count("<text")
     assert [label for label in labels if "fill: currentColor" not in label] == []
     assert 'aria-label="what it shows"' in svg
+
+
+def test_figures_are_no_larger_than_they_must_be() -> None:
+    """Coordinates finer than a hundredth of a point would only fill the page."""
+    paths = re.findall(r' d="([^"]*)"', figure("searches"))
+    assert paths
+    assert not any(re.search(r"\.\d{3}", path) for path in paths)
