@@ -34,16 +34,14 @@ IDR = const(4)
 ODR = const(5)
 BSRR = const(6)
 
-RING = const(1024)  # entries of a ring; a power of two, so that an index is a mask away
-MASK = const(1023)
-
 # words of a ring's state
 MADE = const(0)  # entries written since the stream was started
 LOADS = const(1)  # words that the stream has handed on since; as many matches have been
 FIRST = const(2)  # NDTR right after the start
 LAST = const(3)  # time of the last entry written
 FAR = const(4)  # the far-away entry behind it
-STATE_WORDS = const(5)
+MASK = const(5)  # entries of the ring less 1; they are a power of two, so that an index is a mask away
+STATE_WORDS = const(6)
 
 # words of the block
 NEXT = const(0)  # time of the next sample
@@ -142,10 +140,10 @@ def until_k(timer: ptr32, words: ptr32, at: int) -> int:
 def advance(state: ptr32, ndtr: int) -> int:
     """Count the stream's loads up to a reading of NDTR; entries that have not matched yet.
 
-    At most RING - 1 loads can have come since the last count, so the difference is unambiguous.
+    Fewer loads than the ring has entries can have come since the last count, so the difference is unambiguous.
     """
     loads = state[LOADS]
-    loads += (state[FIRST] - ndtr - loads) & MASK
+    loads += (state[FIRST] - ndtr - loads) & state[MASK]
     state[LOADS] = loads
     return state[MADE] - loads
 
@@ -167,14 +165,15 @@ def seal(state: ptr32, ring: ptr32, count: int) -> object:
     """Take ``count`` new entries in and write the far-away entry behind them.
 
     Entry 0 goes into the compare register by hand, so the stream begins with entry 1 and runs over the
-    words 1 to RING: word 0 is repeated behind the end.
+    words behind it: word 0 is repeated behind the end.
     """
+    mask = state[MASK]
     made = state[MADE] + count
-    last = ring[(made - 1) & MASK]
+    last = ring[(made - 1) & mask]
     half = 1
     far = last + (half << 31)
-    ring[made & MASK] = far
-    ring[RING] = ring[0]
+    ring[made & mask] = far
+    ring[mask + 1] = ring[0]
     state[MADE] = made
     state[LAST] = last
     state[FAR] = far

@@ -9,7 +9,7 @@ from micropython import const
 from pyb import Pin
 
 from armtempo_board import access, pins
-from armtempo_board.ring import Ring
+from armtempo_board.ring import Ring, size
 from armtempo_board.sampler import Sampler
 from armtempo_board.walker import Walker
 
@@ -28,7 +28,7 @@ class Joint:
         self._sampler = sampler
         self._block = sampler.block
         self._at = sampler.joint_at(number)
-        self.ring = Ring(row["channel"], self._block, self._at)
+        self.ring = Ring(row["channel"], self._block, self._at, size(row["max_rate"]))
         self.walker = Walker()
         self._inverted = row["dir_inverted"]
         self._pulse = head["pulse_ticks"]
@@ -107,7 +107,7 @@ class Joint:
         if self.walker.at_turn and not self._turn():
             return 0
         made = ring.made()
-        count = self.walker.fill(ring.words, access.MASK, made, room, now_k + LOOKAHEAD_K)
+        count = self.walker.fill(ring.words, ring.entries - 1, made, room, now_k + LOOKAHEAD_K)
         if count:
             late = ring.last_k() < self._pulse_k
             ring.seal(count)
@@ -139,7 +139,7 @@ class Joint:
             return 0
         if ring.made():
             self._rewind()
-        count = self.walker.fill(ring.words, access.MASK, 0, ring.room(0), now_k + LOOKAHEAD_K)
+        count = self.walker.fill(ring.words, ring.entries - 1, 0, ring.room(0), now_k + LOOKAHEAD_K)
         if not count:
             return 0
         ring.seal(count)

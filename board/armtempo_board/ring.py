@@ -17,16 +17,34 @@ from pyb import Pin
 from armtempo_board import access, pins, registers
 
 _SPARE = const(8)  # entries behind the matched one that stay readable, and the far-away entry
-_RESET_NDTR = access.RING
+_LASTS_MS = const(15)
+_LEAST, _MOST = const(64), const(1024)
+
+
+def size(rate: int) -> int:
+    """Entries for a joint of at most ``rate`` steps/s: a power of two; full they last 15 ms, if 1024 can.
+
+    The main loop must come back to a ring before that, less the 195 us in which nothing is added.
+    """
+    wanted = 2 * rate * _LASTS_MS // 1000 + _SPARE
+    entries = _LEAST
+    while entries < min(wanted, _MOST):
+        entries *= 2
+    return entries
 
 
 class Ring:
-    """``channel`` indexes ``pins.STEP``; ``block`` and ``at``: the interrupt's memory, the place in it."""
+    """``channel`` indexes ``pins.STEP``; ``block`` and ``at``: the interrupt's memory, the place in it.
 
-    def __init__(self, channel: int, block: "array[int]", at: int) -> None:
+    ``entries``: see ``size``.
+    """
+
+    def __init__(self, channel: int, block: "array[int]", at: int, entries: int) -> None:
         pin, timer, compare, alternate, stream, dma_channel, _ = pins.STEP[channel]
-        self.words = array("I", bytearray(4 * access.RING + 4))
+        self.entries = entries
+        self.words = array("I", bytearray(4 * entries + 4))
         self.state = array("I", bytearray(4 * access.STATE_WORDS))
+        self.state[access.MASK] = entries - 1
         self._fed = memoryview(self.words)[1:]  # what the stream runs over
         self._block = block
         self._at = at
@@ -63,7 +81,7 @@ class Ring:
 
     def room(self, left: int) -> int:
         """Entries that may be added."""
-        return access.RING - _SPARE - left
+        return self.entries - _SPARE - left
 
     def made(self) -> int:
         """Entries written since the stream was started."""
@@ -89,10 +107,10 @@ class Ring:
         """Switch the stream off, ready to be filled from entry 0."""
         mem32[self._registers] = self._mode
         mem32[self._flags] = self._all_flags
-        mem32[self._ndtr] = _RESET_NDTR
+        mem32[self._ndtr] = self.entries
         self.state[access.MADE] = 0
         self.state[access.LOADS] = 0
-        self.state[access.FIRST] = _RESET_NDTR
+        self.state[access.FIRST] = self.entries
 
     def run(self) -> int:
         """Switch the stream on and let the output toggle; False where its first entry came too late."""

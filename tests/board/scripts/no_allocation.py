@@ -38,12 +38,13 @@ class Streams:
         timer = stm.BLOCKS["TIM5" if ring.timer == stm.TIM5 else "TIM2"]
         if not dma[at - 1] & 1 or not timer[access.DIER] >> (8 + ring._compare - access.CCR1 + 1) & 1:
             return
-        loads = (access.RING - dma[at]) % access.RING
+        entries = ring.entries
+        loads = (entries - dma[at]) % entries
         while (now - timer[ring._compare]) & 0xFFFFFFFF < 1 << 31:
             loads += 1
-            timer[ring._compare] = ring.words[(loads - 1) % access.RING + 1]
+            timer[ring._compare] = ring.words[(loads - 1) % entries + 1]
             self.matched += 1
-        dma[at] = (access.RING - loads) % access.RING or access.RING
+        dma[at] = (entries - loads) % entries or entries
 
 
 def move_to(now, streams):

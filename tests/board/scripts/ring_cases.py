@@ -5,6 +5,7 @@ from array import array
 import simulator.standalone  # noqa: F401
 import uctypes
 from armtempo_board import access
+from armtempo_board.ring import size
 from engine_rig import cases
 
 BLOCK = access.BLOCK_HEAD + 6 * access.JOINT_WORDS
@@ -14,35 +15,54 @@ def words(count):
     return array("I", bytearray(4 * count))
 
 
+def ring_state(entries):
+    """The state of a ring with so many entries."""
+    state = words(access.STATE_WORDS)
+    state[access.MASK] = entries - 1
+    return state
+
+
 def counting_loads():
     """NDTR counts down and starts again; every load is counted whatever the number since the last look."""
-    for first in (access.RING, access.RING - 1):
-        state = words(access.STATE_WORDS)
+    for entries, first in ((1024, 1024), (1024, 1023), (64, 64), (128, 127)):
+        state = ring_state(entries)
         state[access.FIRST] = first
         state[access.MADE] = 1 << 29
         total = 0
-        for jump in (0, 1, 2, 1023, 0, 511, 1023, 1000, 7) * 3:
+        for jump in (0, 1, 2, entries - 1, 0, entries // 2 - 1, entries - 1, entries - 24, 7) * 3:
             total += jump
-            ndtr = (first - total) % access.RING or access.RING
+            ndtr = (first - total) % entries or entries
             assert access.advance(state, ndtr) == (1 << 29) - total
             assert state[access.LOADS] == total
 
 
 def seal_and_wrap():
     """The far-away entry stands behind the newest, and the first word is repeated behind the end."""
-    state = words(access.STATE_WORDS)
-    ring = words(access.RING + 1)
-    made = 0
-    for count in (2, 1000, 20, 2, 0x3F0, 16, 2):
-        for n in range(count):
-            ring[(made + n) & access.MASK] = (made + n) * 3_000_000 & 0xFFFFFFFF
-        access.seal(state, ring, count)
-        made += count
-        last = (made - 1) * 3_000_000 & 0xFFFFFFFF
-        assert state[access.MADE] == made
-        assert state[access.LAST] == last
-        assert ring[made & access.MASK] == last ^ 0x80000000 == state[access.FAR]
-        assert ring[access.RING] == ring[0]
+    for entries in (64, 256, 1024):
+        state = ring_state(entries)
+        ring = words(entries + 1)
+        made = 0
+        for count in (2, entries - 24, 20, 2, entries - 16, 16, 2):
+            for n in range(count):
+                ring[(made + n) % entries] = (made + n) * 3_000_000 & 0xFFFFFFFF
+            access.seal(state, ring, count)
+            made += count
+            last = (made - 1) * 3_000_000 & 0xFFFFFFFF
+            assert state[access.MADE] == made
+            assert state[access.LAST] == last
+            assert ring[made % entries] == last ^ 0x80000000 == state[access.FAR]
+            assert ring[entries] == ring[0]
+
+
+def sizes():
+    """A ring lasts at least 15 ms at a joint's highest rate, or is of the largest size."""
+    previous = 64
+    for rate in (0, 1, 1796, 1900, 3592, 4100, 8000, 20_000, 34_000, 333_000):
+        entries = size(rate)
+        assert entries in (64, 128, 256, 512, 1024) and entries >= previous
+        assert entries == 1024 or (entries - 8) * 1000 >= 2 * rate * 15, rate
+        previous = entries
+    assert (size(0), size(3592), size(333_000)) == (64, 128, 1024)
 
 
 def times_across_the_wrap():
@@ -129,7 +149,7 @@ def sample_times():
 
 def late_first_step():
     """A channel is armed only while its first edge lies ahead, and behind a DIR turn and its set-up."""
-    block, timer, ring = words(BLOCK), words(18), words(access.RING + 1)
+    block, timer, ring = words(BLOCK), words(18), words(1)
     at = access.BLOCK_HEAD
     block[at + access.CCR_AT] = access.CCR1 + 1
     block[at + access.CCMR_AT] = access.CCMR1
@@ -190,6 +210,7 @@ cases(
     (
         counting_loads,
         seal_and_wrap,
+    sizes,
         times_across_the_wrap,
         due_or_not,
         turn_queue,
