@@ -27,6 +27,11 @@ def test_board_command_is_described(name: str) -> None:
             assert option.lstrip("-").upper() in PAGE.upper(), f"{name}: {option}"
 
 
+@pytest.mark.parametrize("name", main.list_commands(click.Context(main)))
+def test_no_command_is_left_out(name: str) -> None:
+    assert f"`{name}" in PAGE
+
+
 def test_examples_are_commands() -> None:
     for line in PAGE.splitlines():
         words = line.split()
