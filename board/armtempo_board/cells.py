@@ -1,7 +1,7 @@
 """The cells of one joint's motion: parts short and straight enough to be solved.
 
 A cell's angle is monotone, its speed and that of time vary by no more than a factor of two, and it lasts at most
-2**22 ticks. Parts without a threshold in their hull are passed over whole. No crossing can be missed: the
+2**23 ticks. Parts without a threshold in their hull are passed over whole. No crossing can be missed: the
 hull of the Bezier points holds the curve, and differences of one sign prove it monotone.
 """
 
@@ -21,7 +21,7 @@ AT_ONCE = 2  # steps at its start
 END = 3
 
 _DEEPEST = const(27)
-_TIME_SCALE = const(18)  # least scale of a cell's time: 2**22 ticks fill 28 bits
+_TIME_SCALE = const(17)  # least scale of a cell's time: 2**23 ticks fill 28 bits
 _SHORTEST = const(2)  # ticks
 _DIFFERENCE_BIAS = const(1 << 29)
 
