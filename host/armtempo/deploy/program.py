@@ -70,11 +70,28 @@ def _compiled(mpy: int) -> dict[str, bytes]:
     compiler, architecture = _compiler(mpy)
     result = {}
     with tempfile.TemporaryDirectory() as folder:
-        target = Path(folder) / "module.mpy"
+        source, target = Path(folder) / "module.py", Path(folder) / "module.mpy"
         for name, path in modules().items():
-            _run(compiler, f"-march={architecture}", "-O3", "-s", name, "-o", str(target), str(path))
+            source.write_text(_slim(path.read_text(encoding="utf-8")), encoding="utf-8")
+            _run(compiler, f"-march={architecture}", "-O3", "-s", path.name, "-o", str(target), str(source))
             result[name] = target.read_bytes()
     return result
+
+
+def _slim(source: str) -> str:
+    """The source without what only type checkers read; every line keeps its number."""
+    lines = source.split("\n")
+    for node in ast.parse(source).body:
+        head = (
+            node.test
+            if isinstance(node, ast.If)
+            else node.targets[0]
+            if isinstance(node, ast.Assign)
+            else None
+        )
+        if isinstance(head, ast.Name) and head.id == "TYPE_CHECKING":
+            lines[node.lineno - 1 : node.end_lineno] = [""] * len(lines[node.lineno - 1 : node.end_lineno])
+    return "\n".join(lines)
 
 
 def _compiler(mpy: int) -> tuple[str, str]:
