@@ -14,7 +14,7 @@ demo: $(VENV)/demo
 
 test: $(VENV)/test
 	"$(BIN)/python" .ci/get_micropython.py
-	"$(BIN)/python" -m pytest $(PYTEST_ARGS)
+	"$(BIN)/python" -m pytest -n auto $(PYTEST_ARGS)
 
 check: $(VENV)/test .cache/typings
 	"$(BIN)/ruff" check .
