@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 _BUDGET = const(4)  # parts looked at in one call: bounds its time
 _LARGEST = const(1024)  # steps of a stretch
 _NODES = (A, crossing.MIDDLE, B)
-_FAR = const(1000)  # 4096 ticks: longer than any gap
+_FAR = const(1 << 16)  # 4096 ticks: longer than any cell and gap, and still a small integer in ticks
 _NEVER = const(1 << 28)  # 1024 ticks: 54 minutes
 
 
