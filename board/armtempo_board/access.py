@@ -29,6 +29,7 @@ STREAM_NDTR = const(1)
 STREAM_PAR = const(2)
 STREAM_M0AR = const(3)
 STREAM_FCR = const(5)
+STREAM_ON = const(1)
 # GPIO: RM0090 8.4.11
 IDR = const(4)
 ODR = const(5)

@@ -18,8 +18,6 @@ from array import array
 
 import machine
 from armtempo_shared import codes
-from armtempo_shared.armrecord import FLAG_STOP_ON_LINK_LOSS, ArmRecordError
-from armtempo_shared.armrecord import unpack as unpack_arm
 from armtempo_shared.limits import MAX_JOINTS
 from armtempo_shared.messages import SAMPLE_BRAKING, START_HOMING, STATES
 from armtempo_shared.motion import Motion, MotionError
@@ -29,6 +27,7 @@ from armtempo_board import evaluator, store
 from armtempo_board.commands import Commands
 from armtempo_board.engine import Engine
 from armtempo_board.events import Events
+from armtempo_board.forget import forget
 from armtempo_board.link import Link
 from armtempo_board.octets import places, spread
 from armtempo_board.refusal import Refused
@@ -68,6 +67,7 @@ class App:
         self.duration = 0
         self._leaving = False
         self._head: "dict[str, int]" = {}
+        self._needs_link = False
         self._arm_joints: "list[dict[str, int]]" = []
         self._raw = array("i", [0] * 2)
         self._fault = fault
@@ -127,7 +127,7 @@ class App:
 
     def _watch_link(self) -> None:
         silent_ms = time.ticks_diff(time.ticks_ms(), self.link.heard_ms)
-        if silent_ms > self._head["link_timeout_ms"] and self._head["flags"] & FLAG_STOP_ON_LINK_LOSS:
+        if silent_ms > self._head["link_timeout_ms"] and self._needs_link:
             self._fault = codes.LINK_LOST
             self.stop(0)
 
@@ -165,9 +165,11 @@ class App:
 
     def configure(self) -> None:
         """Take the stored arm record; without one the board stays unconfigured."""
+        from armtempo_shared import armrecord  # here, so that it can be forgotten
+
         try:
-            head, joints, crc = unpack_arm(self.store.read(store.ARM))
-        except (Refused, ArmRecordError):
+            head, joints, crc = armrecord.unpack(self.store.read(store.ARM))
+        except (Refused, armrecord.ArmRecordError):
             return
         if crc == self.arm_crc:
             return
@@ -175,6 +177,7 @@ class App:
             self.engine.close()
         self.engine = Engine(head, joints)
         self._head = head
+        self._needs_link = bool(head["flags"] & armrecord.FLAG_STOP_ON_LINK_LOSS)
         self._arm_joints = joints
         self.joints = len(joints)
         self.arm_crc = crc
@@ -217,6 +220,7 @@ class App:
         self._by_host = crc is not None
         self._braking = False
         self._brakes = motion.brake_ticks > 0
+        forget()
         gc.collect()
         self._running = True
         self.engine.start(homing)

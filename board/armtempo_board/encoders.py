@@ -3,7 +3,7 @@
 import stm
 from pyb import Pin
 
-from armtempo_board import access, pins, registers
+from armtempo_board import access, pins
 
 
 class Encoder:
@@ -14,6 +14,8 @@ class Encoder:
     """
 
     def __init__(self, channel: int, inverted: int) -> None:
+        from armtempo_board import registers  # here, so that it can be forgotten
+
         timer, first, second, alternate = pins.ENCODER[channel]
         for name in (first, second):
             Pin(name, Pin.AF_PP, pull=Pin.PULL_UP, alt=alternate)

@@ -19,13 +19,13 @@ import time
 from array import array
 
 import stm
-from armtempo_shared import armrecord, codes
+from armtempo_shared import codes
 from armtempo_shared.limits import TICK_HZ
 from armtempo_shared.motion import Motion
 from machine import mem32
 from micropython import const
 
-from armtempo_board import access, evaluator, registers
+from armtempo_board import access, evaluator
 from armtempo_board.encoders import Encoder, NoEncoder
 from armtempo_board.following import Following
 from armtempo_board.inputs import Inputs
@@ -46,6 +46,10 @@ class Engine:
     """``head`` and ``joints`` as ``armrecord.unpack`` gives them. Nothing moves, drivers are off."""
 
     def __init__(self, head: "dict[str, int]", joints: "list[dict[str, int]]") -> None:
+        from armtempo_shared import armrecord  # here, so that they can be forgotten
+
+        from armtempo_board import registers
+
         rows = [row for row in joints if row["encoder"] != armrecord.NONE]
         fitted = [Encoder(row["encoder"], row["encoder_inverted"]) for row in rows]
         self._sampler = Sampler(len(joints), tuple([encoder.address for encoder in fitted]))
@@ -104,12 +108,14 @@ class Engine:
         return None
 
     def _refusal(self, motion: Motion) -> "tuple[int, int, int] | None":
+        from armtempo_board.check import check  # here, so that it can be forgotten
+
         if self.moving:
             return codes.BUSY, NO_JOINT, 0
         self._look()
         if self.fault:
             return codes.FAULT_PENDING, self.fault_joint, self.fault
-        refused = evaluator.check(motion, self._arm, self._joints[0].gap_ticks)
+        refused = check(motion, self._arm, self._joints[0].gap_ticks)
         if refused:
             return refused
         self.duration_ticks = evaluator.duration_ticks(motion)
@@ -323,7 +329,8 @@ class Engine:
         return int((epoch << 32) + counter)
 
     def _set_clock(self, ticks: int) -> None:
-        registers.set_counters(ticks & 0xFFFFFFFF)
+        mem32[stm.TIM2 + 4 * access.CNT] = ticks & 0xFFFFFFFF
+        mem32[stm.TIM5 + 4 * access.CNT] = ticks & 0xFFFFFFFF
         self._epoch = ticks >> 32
         self._low = access.clock_k(stm.TIM2)
 

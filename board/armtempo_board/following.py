@@ -1,12 +1,12 @@
 """What an encoder should show, and how far it is off."""
 
-from armtempo_shared import armrecord
-
 
 class Following:
     """``row``: the joint's part of the arm record."""
 
     def __init__(self, row: "dict[str, int]") -> None:
+        from armtempo_shared import armrecord  # here, so that it can be forgotten
+
         numerator, denominator = row["counts_num"], row["counts_den"]
         common = _common_divisor(abs(numerator), denominator) or 1
         self._numerator = numerator // common

@@ -8,12 +8,12 @@ from array import array
 
 import micropython
 import stm
-from armtempo_shared import armrecord, codes
+from armtempo_shared import codes
 from machine import disable_irq, enable_irq
 from micropython import const
 from pyb import ExtInt, Pin
 
-from armtempo_board import access, pins, registers
+from armtempo_board import access, pins
 from armtempo_board.sampler import Sampler
 
 _NOBODY = const(255)
@@ -26,6 +26,10 @@ class Inputs:
     """``sampler`` lends its block; ``head`` and ``joints`` are the arm record's."""
 
     def __init__(self, head: "dict[str, int]", joints: "list[dict[str, int]]", sampler: Sampler) -> None:
+        from armtempo_shared import armrecord  # here, so that they can be forgotten
+
+        from armtempo_board import registers
+
         flags = head["flags"]
         self._block = sampler.block
         self._timer2, self._timer5, self._port = stm.TIM2, stm.TIM5, stm.GPIOE
@@ -41,7 +45,7 @@ class Inputs:
         if flags & armrecord.FLAG_ESTOP_FITTED:
             self._estop_level = 1 if flags & armrecord.FLAG_ESTOP_ACTIVE_HIGH else 0
             self._estop = self._hook(pins.ESTOP, self._estop_level, self._on_estop)  # type: ignore[arg-type]
-        self._add_limits()
+        self._add_limits(armrecord.NONE)
         registers.apply(registers.PRIORITIES)
 
     def _hook(self, name: str, level: int, callback: "Callable[[int], None]") -> Pin:
@@ -52,12 +56,12 @@ class Inputs:
         ExtInt(pin, mode, pull, callback)
         return pin
 
-    def _add_limits(self) -> None:
+    def _add_limits(self, none: int) -> None:
         fitted = {}
         for number, joint in enumerate(self._joints):
             for side, positive in (("limit_low", 0), ("limit_high", 1)):
                 switch = joint[side]
-                if switch == armrecord.NONE:
+                if switch == none:
                     continue
                 fitted[switch] = joint["limit_active_high"]
                 self._add_pair(number, joint, int(pins.LIMIT[switch][1:]), positive)

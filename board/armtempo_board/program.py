@@ -1,9 +1,7 @@
 """Starts the board program on the hardware: serial port, watchdog, LEDs, button."""
 
 import os
-import sys
 
-import armtempo_shared
 import machine
 import micropython
 import pyb
@@ -13,6 +11,7 @@ from micropython import const
 from armtempo_board import points, walker  # noqa: F401  the deepest first: nested imports cost stack
 from armtempo_board.app import App
 from armtempo_board.button import Button
+from armtempo_board.forget import forget
 from armtempo_board.leds import Leds
 from armtempo_board.refusal import Refused
 from armtempo_board.watchdog import Watchdog, bit
@@ -53,10 +52,7 @@ def _build(port: "pyb.USB_VCP", root: str) -> App:
     from armtempo_shared.program import program_crc
 
     built = App(port, root, program_crc(*_folders()), _fault_at_start())
-    for name in ("table", "program"):
-        sys.modules.pop("armtempo_shared." + name, None)
-        if hasattr(armtempo_shared, name):
-            delattr(armtempo_shared, name)
+    forget()
     return built
 
 

@@ -12,7 +12,6 @@ from armtempo_board.access import (
     CCER,
     CCMR1,
     CCR1,
-    CNT,
     CR1,
     CR2,
     DIER,
@@ -65,7 +64,6 @@ PRIORITIES = (
 )
 _NVIC_IPR = 0xE000E400  # not in MicroPython's table of addresses
 ENCODER_CLOCK = {1: (_APB2ENR, 0), 8: (_APB2ENR, 1), 3: (_APB1ENR, 1), 4: (_APB1ENR, 2)}
-STREAM_ON = 1
 _STREAM_MODE = 3 << 16 | 2 << 13 | 2 << 11 | 1 << 10 | 1 << 8 | 1 << 6
 _FLAG_SHIFT = (0, 6, 16, 22)
 
@@ -133,9 +131,3 @@ def apply(rows: "tuple[tuple[str, int, int, int, str, str], ...]") -> None:
             mem32[address] = value
         else:
             mem32[address] = mem32[address] & ~clear | value
-
-
-def set_counters(ticks: int) -> None:
-    """Give both counters the same value; they stand still."""
-    mem32[stm.TIM2 + 4 * CNT] = ticks
-    mem32[stm.TIM5 + 4 * CNT] = ticks

@@ -14,7 +14,7 @@ from machine import disable_irq, enable_irq, mem32
 from micropython import const
 from pyb import Pin
 
-from armtempo_board import access, pins, registers
+from armtempo_board import access, pins
 
 _SPARE = const(8)  # entries behind the matched one that stay readable, and the far-away entry
 _LASTS_MS = const(15)
@@ -40,6 +40,8 @@ class Ring:
     """
 
     def __init__(self, channel: int, block: "array[int]", at: int, entries: int) -> None:
+        from armtempo_board import registers  # here, so that it can be forgotten
+
         pin, timer, compare, alternate, stream, dma_channel, _ = pins.STEP[channel]
         self.entries = entries
         self.words = array("I", bytearray(4 * entries + 4))
@@ -114,7 +116,7 @@ class Ring:
 
     def run(self) -> int:
         """Switch the stream on and let the output toggle; False where its first entry came too late."""
-        mem32[self._registers] = self._mode | registers.STREAM_ON
+        mem32[self._registers] = self._mode | access.STREAM_ON
         self.state[access.FIRST] = mem32[self._ndtr] & 0xFFFF
         before = disable_irq()
         in_time = access.arm_channel(self._block, self.timer, self.words, self._at)

@@ -8,8 +8,6 @@ import os
 from binascii import crc32
 
 from armtempo_shared import codes
-from armtempo_shared.armrecord import ArmRecordError
-from armtempo_shared.armrecord import unpack as unpack_arm
 from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_NAME
 from armtempo_shared.motion import Motion, MotionError
 from micropython import const
@@ -54,9 +52,11 @@ def _whole(file_name: str, data: bytes) -> bool:
             return False
         return True
     if file_name == ARM:
+        from armtempo_shared import armrecord  # here, so that it can be forgotten
+
         try:
-            unpack_arm(data)
-        except ArmRecordError:
+            armrecord.unpack(data)
+        except armrecord.ArmRecordError:
             return False
         return True
     return data.endswith(b"\n")

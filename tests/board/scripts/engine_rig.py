@@ -200,6 +200,7 @@ class Rig:
         self.board = standalone.start()
         self.board.worlds.append(self)
         self._zero = 0
+        import armtempo_board.check
         import armtempo_board.engine
         import armtempo_board.joint
         from armtempo_board import pins
@@ -207,6 +208,7 @@ class Rig:
         if planned:
             armtempo_board.joint.Walker = Walker
             armtempo_board.engine.evaluator = Evaluator
+            armtempo_board.check.check = Evaluator.check
         self.arm = the.arm = motors.Arm(self.board, pins, lambda: (self.head, joints), 1, ())
         self.pins = pins
         self.pulses = [

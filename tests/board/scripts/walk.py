@@ -10,7 +10,7 @@ import sys
 from array import array
 
 import micropython
-from armtempo_board.evaluator import check
+from armtempo_board.check import check
 from armtempo_board.walker import Walker
 from armtempo_shared.motion import Motion
 
