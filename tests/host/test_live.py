@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from armtempo import record
 from armtempo.cli.live import Live
+from armtempo.cli.progress import Progress
 from armtempo.link.messages import Sample, Stand
 from armtempo.liveplot import LivePlot
 from armtempo.pipeline import planned
@@ -70,3 +71,19 @@ def test_the_command_line_loads_no_plotting_by_itself() -> None:
         "import sys, armtempo.cli.run; assert 'matplotlib' not in sys.modules and 'scipy' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize("columns", [60, 80, 200])
+def test_the_bar_never_wraps(
+    columns: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(columns))
+    monkeypatch.setattr(Progress, "_wanted", lambda self: True)
+    monkeypatch.setattr("click._termui_impl.isatty", lambda stream: True)
+    with Progress("moving") as progress:
+        for done in range(9):
+            progress(done, 9, "12 s  " + "-123.4° (+0.12)  " * 6)
+    lines = capsys.readouterr().err.replace("\x1b[?25l", "").replace("\x1b[?25h", "").split("\r")
+    assert len(lines) > 5
+    assert any("[" in line for line in lines)
+    assert max(len(line.rstrip("\n")) for line in lines) <= columns

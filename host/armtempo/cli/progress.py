@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 import time
 from contextlib import ExitStack
@@ -11,6 +12,8 @@ from typing import Any, Self
 import click
 
 _PATIENCE_S = 1.0
+_BAR_COLUMNS = 24
+"""Frame, percentage and remaining time: the note leaves room for them, so that no line wraps."""
 
 
 class Progress:
@@ -27,10 +30,11 @@ class Progress:
         """Show how far the work is, with a note before the bar."""
         if self._bar is None and done < whole and self._wanted():
             self._bar = self._stack.enter_context(
-                click.progressbar(length=1000, label=self._label, file=sys.stderr)
+                click.progressbar(length=1000, label=self._label, file=sys.stderr, width=0)
             )
         if self._bar is not None:
-            self._bar.label = f"{self._label} {note}".rstrip()
+            room = max(shutil.get_terminal_size().columns - len(self._label) - _BAR_COLUMNS, 0)
+            self._bar.label = f"{self._label} {note[:room]}".rstrip()
             now = int(1000 * done / whole)
             self._bar.update(now - self._shown)
             self._shown = now
