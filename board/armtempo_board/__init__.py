@@ -9,3 +9,21 @@ def replay(name: str = "") -> None:
     from armtempo_board import standalone
 
     standalone.replay(name)
+
+
+def forget() -> None:
+    """Let the next collection have the modules that only set-up or the start of a motion needs.
+
+    They are imported inside of functions, never at the head of a module, and never while a motion runs.
+    """
+    import sys
+
+    import armtempo_shared
+
+    here = sys.modules[__name__]
+    passing = ((here, ("registers", "check", "rates")), (armtempo_shared, ("armrecord", "table", "program")))
+    for package, names in passing:
+        for name in names:
+            sys.modules.pop(package.__name__ + "." + name, None)
+            if hasattr(package, name):
+                delattr(package, name)

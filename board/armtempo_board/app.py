@@ -23,11 +23,10 @@ from armtempo_shared.messages import SAMPLE_BRAKING, START_HOMING, STATES
 from armtempo_shared.motion import Motion, MotionError
 from micropython import const
 
-from armtempo_board import evaluator, store
+from armtempo_board import evaluator, forget, store
 from armtempo_board.commands import Commands
 from armtempo_board.engine import Engine
 from armtempo_board.events import Events
-from armtempo_board.forget import forget
 from armtempo_board.link import Link
 from armtempo_board.octets import places, spread
 from armtempo_board.refusal import Refused

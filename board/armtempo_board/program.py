@@ -8,10 +8,9 @@ import pyb
 from armtempo_shared import codes
 from micropython import const
 
-from armtempo_board import points, walker  # noqa: F401  the deepest first: nested imports cost stack
+from armtempo_board import forget, points, walker  # noqa: F401  the deepest first: nested imports cost stack
 from armtempo_board.app import App
 from armtempo_board.button import Button
-from armtempo_board.forget import forget
 from armtempo_board.leds import Leds
 from armtempo_board.refusal import Refused
 from armtempo_board.watchdog import Watchdog, bit

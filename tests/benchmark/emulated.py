@@ -169,6 +169,12 @@ def _compile(module: Path) -> bytes:
 
 def _children(data: bytes) -> list[bytes | None]:
     """Machine code of the module's functions in order of definition; None for those in bytecode."""
+    reader = _at_code(data)
+    return _raw_code(reader)[1]
+
+
+def _at_code(data: bytes) -> _Reader:
+    """A reader that stands behind names and constants."""
     reader = _Reader(data)
     reader.at = 4
     qstrs, objects = reader.number(), reader.number()
@@ -178,7 +184,7 @@ def _children(data: bytes) -> list[bytes | None]:
             reader.at += (length >> 1) + 1
     for _ in range(objects):
         _skip_object(reader)
-    return _raw_code(reader)[1]
+    return reader
 
 
 class _Reader:
@@ -222,3 +228,19 @@ def _raw_code(reader: _Reader) -> tuple[bytes | None, list[bytes | None]]:
         assert reader.number() & 0x70 == 0, "relocations are not handled"
     children = [_raw_code(reader)[0] for _ in range(reader.number())] if has_children else []
     return (data if kind == 2 else None), children
+
+
+def machine_code_bytes(data: bytes) -> int:
+    """Bytes of machine code in a compiled file."""
+    reader = _at_code(data)
+    return _machine_code(reader)
+
+
+def _machine_code(reader: _Reader) -> int:
+    head = reader.number()
+    kind, has_children, length = head & 3, head & 4, head >> 3
+    reader.at += length
+    if kind:
+        reader.number()
+    below = sum(_machine_code(reader) for _ in range(reader.number())) if has_children else 0
+    return below + (length if kind else 0)

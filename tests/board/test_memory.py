@@ -1,0 +1,16 @@
+"""What the board program keeps in its heap: it must not grow unnoticed (board/docs/memory.md)."""
+
+from __future__ import annotations
+
+from tests.benchmark import memory
+
+HEAP = 92_500
+MACHINE_CODE = 24_500
+
+
+def test_heap_of_the_compiled_program() -> None:
+    """Measured on 32-bit MicroPython with the shipped arm; machine code is counted apart."""
+    stages = memory.measure()
+    assert stages["motion"] <= HEAP, stages
+    assert stages["machine code"] <= MACHINE_CODE, stages
+    assert stages["turns"] - stages["motion"] <= 512, stages
