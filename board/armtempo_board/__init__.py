@@ -20,10 +20,10 @@ def forget() -> None:
 
     import armtempo_shared
 
-    here = sys.modules[__name__]
-    passing = ((here, ("registers", "check", "rates")), (armtempo_shared, ("armrecord", "table", "program")))
-    for package, names in passing:
-        for name in names:
-            sys.modules.pop(package.__name__ + "." + name, None)
-            if hasattr(package, name):
-                delattr(package, name)
+    for name in ("registers", "check", "rates"):
+        sys.modules.pop("armtempo_board." + name, None)
+        globals().pop(name, None)
+    for name in ("armrecord", "table", "program"):
+        sys.modules.pop("armtempo_shared." + name, None)
+        if hasattr(armtempo_shared, name):
+            delattr(armtempo_shared, name)
