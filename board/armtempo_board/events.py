@@ -48,9 +48,9 @@ class Events:
             self._fault = code != 0
 
     def note(self, text: str) -> None:
-        """Keep words for the host; the first ones where more come than go."""
+        """Keep words for the host; the last ones, which say what is wrong, where more come than go."""
         if not self._notice:
-            self._notice = text.encode()[:MAX_PAYLOAD]
+            self._notice = text.encode()[-MAX_PAYLOAD:]
 
     def push(self) -> None:
         """Hand the link what is waiting and has room."""

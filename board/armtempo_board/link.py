@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 PAYLOAD = const(5)  # index of the payload in a frame
-_OUT_SIZE = const(1200)
+_OUT_SIZE = const(700)
 _ESCAPE_QUIET_MS = const(50)
 _CTRL_C = const(3)
 _CONTROLS = b"\r\x03"

@@ -2,7 +2,7 @@
 
 PROTOCOL_VERSION = 1
 SYNC = 0xA5
-MAX_PAYLOAD = 512
+MAX_PAYLOAD = 256
 OVERHEAD = 9
 """Bytes of a frame besides its payload: SYNC, length H, sequence B, message id B, crc32 I."""
 

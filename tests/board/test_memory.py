@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tests.benchmark import memory
 
-HEAP = 92_500
+HEAP = 92_000
 MACHINE_CODE = 24_500
 
 
