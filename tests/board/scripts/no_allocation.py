@@ -15,8 +15,9 @@ from array import array
 import pyb
 import stm
 from arm_rows import HEAD, arm
-from armtempo_board import access
+from armtempo_board import access, check, registers  # noqa: F401  they are forgotten again: not counted
 from armtempo_board.engine import Engine
+from armtempo_shared import armrecord  # noqa: F401
 from brake_motion import BRAKE_TICKS, record
 
 STEP_TICKS = 30_000
