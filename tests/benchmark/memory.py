@@ -51,9 +51,7 @@ def _fill_store(folder: Path) -> list[str]:
 def _run(folder: Path, starts: list[str]) -> str:
     command = [interpreters.starter(INTERPRETER), "-X", "heapsize=2M", str(SCRIPT), str(folder), *starts]
     environment = {**os.environ, "MICROPYPATH": f"{folder / 'lib'}{os.pathsep}.frozen"}
-    done = subprocess.run(
-        command, env=environment, capture_output=True, text=True, timeout=100, check=False
-    )
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=100, check=False)
     assert done.returncode == 0, done.stderr
     return done.stdout
 

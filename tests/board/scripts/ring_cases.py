@@ -210,7 +210,7 @@ cases(
     (
         counting_loads,
         seal_and_wrap,
-    sizes,
+        sizes,
         times_across_the_wrap,
         due_or_not,
         turn_queue,
