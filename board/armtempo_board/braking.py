@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 _LOW = const((1 << 15) - 1)
 _LONGEST = const(1 << 28)
+_MOST = const((1 << 30) - 1)
 _FIVE_EIGHTHS = const(5 << 27)
 
 
@@ -167,5 +168,6 @@ def steepen(block: ptr32, where: int) -> object:
     digit = rate >> 15
     first = time // digit
     rest = ((time - first * digit) << 15) - first * (rate & _LOW)
-    node[1] = (first << 15) + rest // digit
+    rest = (first << 15) + rest // digit
+    node[1] = rest if rest >> 30 == 0 else _MOST
     node[2] = exponent if exponent > 0 else 0

@@ -1,6 +1,5 @@
-"""A cell: a piece short and straight enough to be solved in single words.
+"""Measures a piece in a block scale of its own, in single words.
 
-``localise`` measures a piece in a block scale of its own; ``powers`` makes the local polynomial of a cell.
 Signed values in arrays are stored with a bias, see points.py.
 """
 
@@ -20,8 +19,11 @@ _D_BIAS = const(1 << 29)
 
 
 @micropython.viper
-def localise(piece: ptr32, local: ptr32) -> object:
-    """Measure a piece: differences of its points in units that fill 28 bits, and the hull's positions."""
+def localise(piece: ptr32, local: ptr32) -> int:
+    """Measure a piece: differences of its points in units that fill 28 bits, and the hull's positions.
+
+    Gives 1 or -1 where all differences are of that sign and within a factor of two; otherwise 0.
+    """
     least = piece[0]
     most = least
     lowest = least + (piece[6] >> 27)
@@ -48,7 +50,7 @@ def localise(piece: ptr32, local: ptr32) -> object:
         scale -= 1
     if scale < 13:
         local[0] = 0
-        return  # type: ignore[return-value]
+        return 0
     local[0] = scale
     first = piece[0]
     last = piece[6] >> (28 - scale)
@@ -67,36 +69,8 @@ def localise(piece: ptr32, local: ptr32) -> object:
         i += 1
     local[6] = least + _D_BIAS
     local[7] = most + _D_BIAS
-
-
-@micropython.viper
-def powers(local: ptr32, cell: ptr32, at: int, falling: int) -> object:
-    """Polynomial of a cell over w in [0, 1]: five power coefficients, then five of a fifth of its derivative.
-
-    Written at ``cell[at]`` with a bias of 2**30; ``falling`` mirrors it. As the differences of a cell are within
-    a factor of two, no coefficient exceeds four times the range, below 2**30.
-    """
-    bias = 1 << 29
-    sign = 1
-    if falling:
-        sign = -1
-    a = (local[1] - bias) * sign
-    b = (local[2] - bias) * sign
-    c = (local[3] - bias) * sign
-    d = (local[4] - bias) * sign
-    e = (local[5] - bias) * sign
-    bias += bias
-    e += 6 * c - 4 * d - 4 * b + a
-    d += 3 * b - 3 * c - a
-    c += a - 2 * b
-    b -= a
-    cell[at] = 5 * a + bias
-    cell[at + 1] = 10 * b + bias
-    cell[at + 2] = 10 * c + bias
-    cell[at + 3] = 5 * d + bias
-    cell[at + 4] = e + bias
-    cell[at + 5] = a + bias
-    cell[at + 6] = 4 * b + bias
-    cell[at + 7] = 6 * c + bias
-    cell[at + 8] = 4 * d + bias
-    cell[at + 9] = e + bias
+    if least > 0 and most <= 2 * least:
+        return 1
+    if most < 0 and least >= 2 * most:
+        return -1
+    return 0

@@ -10,10 +10,6 @@ from micropython import const
 from armtempo_board import cell
 from armtempo_board.parts import Parts
 
-TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from array import array
-
 # verdicts
 NOTHING = 0  # no step in this part, or it was split: go on
 CELL = 1  # steps in it: see ``heading``
@@ -23,7 +19,6 @@ END = 3
 _DEEPEST = const(27)
 _TIME_SCALE = const(17)  # least scale of a cell's time: 2**23 ticks fill 28 bits
 _SHORTEST = const(2)  # ticks
-_DIFFERENCE_BIAS = const(1 << 29)
 
 
 class Cells(Parts):
@@ -36,43 +31,30 @@ class Cells(Parts):
 
     def next(self, position: int) -> int:
         """Look at the next part; ``position`` (+ points.BIAS) is where the steps so far lead. A verdict."""
+        if self.page():
+            return NOTHING  # enough for one call
         if not self.bring():
             return END
         verdict = self._judge(position)
-        if verdict < 0:
-            self.split()
-            return NOTHING
-        self.skip()
-        return verdict
+        if verdict >= 0:
+            self.skip()
+            return verdict
+        self.split()
+        return NOTHING
 
     def _judge(self, position: int) -> int:
         local = self.angle_local
-        cell.localise(self.angle, local)
+        self.heading = cell.localise(self.angle, local)
+        even = cell.localise(self.time, self.time_local)
         if local[cell.LOWEST] == local[cell.HIGHEST]:
             if local[cell.LOWEST] == position:
                 return NOTHING
-            cell.localise(self.time, self.time_local)
             return AT_ONCE if self.time_local[cell.SCALE] else -1
-        cell.localise(self.time, self.time_local)
         if self.time_local[cell.SCALE] < _TIME_SCALE:
             return -1
-        self.heading = heading(local)
-        if self.heading and heading(self.time_local) > 0:
+        if self.heading and even > 0:
             return CELL
         ticks = self.ticks()
         if ticks <= self.graze_ticks and self.start() == self.end() == position:
             return NOTHING
         return AT_ONCE if ticks <= _SHORTEST or self.level >= _DEEPEST else -1
-
-
-def heading(local: "array[int]") -> int:
-    """1 or -1 where all differences are of that sign and within a factor of two; otherwise 0."""
-    if not local[cell.SCALE]:
-        return 0
-    least = local[cell.LEAST] - _DIFFERENCE_BIAS
-    most = local[cell.MOST] - _DIFFERENCE_BIAS
-    if least > 0 and most <= 2 * least:
-        return 1
-    if most < 0 and least >= 2 * most:
-        return -1
-    return 0

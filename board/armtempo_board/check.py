@@ -10,7 +10,7 @@ from armtempo_shared import codes
 from armtempo_shared.limits import MAX_STEP_RATE, TICK_FRACTION_BITS, TICK_HZ
 from micropython import const
 
-from armtempo_board import cell, cells, points, rates
+from armtempo_board import cell, points, rates
 from armtempo_board.parts import Parts
 
 TYPE_CHECKING = False
@@ -90,13 +90,14 @@ class Judge:
         self._high = row["max_steps"] + points.BIAS
         self._limit = min(row["max_rate"], MAX_STEP_RATE + MAX_STEP_RATE // 100)
         self._mantissa, self._exponent = rates.scaled(self._limit)
+        self._heading = self._even = 0
         self.value = 0
 
     def verdict(self) -> int:
         """A code, _PASS, or _SPLIT where it takes a closer look."""
         parts = self._parts
-        cell.localise(parts.angle, parts.angle_local)
-        cell.localise(parts.time, parts.time_local)
+        self._heading = cell.localise(parts.angle, parts.angle_local)
+        self._even = cell.localise(parts.time, parts.time_local)
         for position in (parts.start(), parts.end()):
             if not self._low <= position <= self._high:
                 self.value = position - points.BIAS
@@ -132,9 +133,9 @@ class Judge:
         """
         parts = self._parts
         local = parts.angle_local
-        if cells.heading(local):
+        if self._heading:
             return _PASS
-        if cells.heading(parts.time_local) <= 0:
+        if self._even <= 0:
             return _SPLIT
         bend, per = _acceleration(local, parts.time_local)
         if bend * self._gap_ticks**2 * 100 <= per * 16:

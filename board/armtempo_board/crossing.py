@@ -1,14 +1,13 @@
 """Where a cell passes its thresholds: Newton on the local polynomials.
 
-What belongs to a cell stands in one block, array('i'): the polynomials that ``cell.powers`` wrote for the angle (10
-words) and for the time (10 words), the words named here, and nodes. A node is where one of the cell's steps is.
+What belongs to a cell stands in one block, array('i'): the polynomials of the angle (10 words) and of the time
+(10 words), the words named here, and nodes. A node is where one of the cell's steps is.
 """
 
 import micropython
 from micropython import const
 
 # block
-TIME_POWERS = 10
 TARGET = 20  # the first threshold in local angle units, + 2**29
 SCALE = 21  # fraction bits of local angle units
 RANGE = 22  # angle at the cell's end; 0: all steps come at its start
@@ -37,25 +36,52 @@ _LOW = const((1 << 15) - 1)
 
 
 @micropython.viper
-def aim(cell: ptr32, angle: ptr32, local: ptr32, twice: int) -> object:
-    """Set the first threshold, ``twice`` / 2 from the high word of the cell's first point."""
-    scale = local[0]
-    height = 0
-    i = 1
-    while i < 6:
-        height += local[i] - _BIAS
-        i += 1
+def enter(cell: ptr32, angle: ptr32, angle_local: ptr32, time_local: ptr32) -> object:
+    """Take up a cell: its polynomials over w in [0, 1], mirrored where it falls, and its first threshold.
+
+    Each is five power coefficients, then five of a fifth of its derivative, with a bias of 2**30. As the differences
+    are within a factor of two, none exceeds four times the range, below 2**30. ``cell[TARGET]`` holds twice the
+    threshold, from the high word of the first point, with a bias of 2**28.
+    """
+    scale = angle_local[0]
     sign = 1
-    if height < 0:
+    if angle_local[1] < _BIAS:
         sign = -1
-    cell[20] = ((twice << (scale - 1)) - (angle[6] >> (28 - scale))) * sign + _BIAS
+    cell[20] = (((cell[20] - (1 << 28)) << (scale - 1)) - (angle[6] >> (28 - scale))) * sign + _BIAS
     cell[21] = scale
-    cell[22] = height * sign
-    cell[25] = 0
-    bias = _BIAS
-    bias += _BIAS
-    cell[26] = cell[5] - bias
-    cell[27] = 0
+    cell[24] = time_local[0] - 12 - scale + 64
+    local = angle_local
+    at = 0
+    while at < 20:
+        bias = 1 << 29
+        a = (local[1] - bias) * sign
+        b = (local[2] - bias) * sign
+        c = (local[3] - bias) * sign
+        d = (local[4] - bias) * sign
+        e = (local[5] - bias) * sign
+        bias += bias
+        if at == 0:
+            cell[22] = a + b + c + d + e
+            cell[25] = 0
+            cell[26] = a
+            cell[27] = 0
+        e += 6 * c - 4 * d - 4 * b + a
+        d += 3 * b - 3 * c - a
+        c += a - 2 * b
+        b -= a
+        cell[at] = 5 * a + bias
+        cell[at + 1] = 10 * b + bias
+        cell[at + 2] = 10 * c + bias
+        cell[at + 3] = 5 * d + bias
+        cell[at + 4] = e + bias
+        cell[at + 5] = a + bias
+        cell[at + 6] = 4 * b + bias
+        cell[at + 7] = 6 * c + bias
+        cell[at + 8] = 4 * d + bias
+        cell[at + 9] = e + bias
+        at += 10
+        sign = 1
+        local = time_local
 
 
 @micropython.viper
@@ -153,7 +179,8 @@ def solve(cell: ptr32, index: int, length: int) -> object:
         h = rate >> 15
         wh = slope // h
         rest = ((slope - wh * h) << 15) - wh * (rate & _LOW)
-        cell[where + 1] = (wh << 15) + rest // h
+        rest = (wh << 15) + rest // h
+        cell[where + 1] = rest if rest < bias else bias - 1  # still a small integer
         cell[where + 2] = i if i > 0 else 0  # slower than that no stretch is made
         where += 8
         if where != 44:

@@ -62,14 +62,19 @@ class Parts:
         self._base_level = -1
         self._base_index = 0
 
+    def page(self) -> bool:
+        """Go on to the next segment where the last part ended one; True where it did."""
+        if not self._index >> self.level or self._number + 1 >= self._segments:
+            return False
+        self._number += 1
+        self._index = 0
+        self._enter()
+        return True
+
     def bring(self) -> bool:
         """Compute the part; False: past the end."""
-        if self._index >> self.level:
-            if self._number + 1 >= self._segments:
-                return False
-            self._number += 1
-            self._index = 0
-            self._enter()
+        if self._index >> self.level and not self.page():
+            return False
         below = self.level - self._base_level
         if self._base_level < 0 or below < 0 or self._index >> below != self._base_index:
             below = min(self.level, _KEPT)

@@ -26,6 +26,7 @@ NEXT = 16
 NEXT_STEPS = 27
 PULSE = 29  # ticks
 STEP = 30  # time of one step of the group, ticks * 2**SHIFT
+LAST_1024 = 31  # time of the step written last, 1024 ticks
 # what ``emit`` is told
 HEAD = 32  # entry to be written next; not masked
 ROOM = 33  # entries that may be written
@@ -50,9 +51,11 @@ def emit(now: int, ring: ptr32, state: ptr32, mask: int) -> int:
     start = int(ring)
     pulse = state[29]
     while True:
+        if state[33] < 2:
+            return 0
         if state[11] == 0:
             if state[27] == 0:
-                return 1 if state[33] > 1 else 0
+                return 1
             n = 0
             while n < 13:
                 state[n] = state[n + 16]
@@ -126,37 +129,37 @@ def emit(now: int, ring: ptr32, state: ptr32, mask: int) -> int:
                 ring = ptr32(int(ring) + 8)
                 n -= 1
         state[0] = now
+        state[31] = state[12] + (now >> (shift + 10))
 
 
 @micropython.viper
-def single(state: ptr32, high: int, ticks: int) -> object:
-    """Prepare one step at ``high`` (4096 ticks, + 2**28) and ``ticks``."""
-    state[0] = 0
-    state[1] = 0
-    state[2] = _BIAS
-    state[3] = _BIAS
-    state[4] = 0
-    state[5] = 0
+def single(state: ptr32, to: int, high: int, ticks: int) -> object:
+    """Prepare one step at ``high`` (4096 ticks, + 2**28) and ``ticks``: as the stretch at ``state[to]``, 0 or NEXT."""
+    out = ptr32(int(state) + 4 * to)
+    out[0] = 0
+    out[1] = 0
+    out[2] = _BIAS
+    out[3] = _BIAS
+    out[4] = 0
+    out[5] = 0
     high -= _HIGH_BIAS
-    state[6] = (high << 12) + ticks
-    state[7] = 0
-    state[8] = 0
-    state[9] = 1
-    state[10] = 0
-    state[11] = 1
-    state[27] = 0
-    state[12] = (high << 2) + (ticks >> 10)
+    out[6] = (high << 12) + ticks
+    out[7] = 0
+    out[8] = 0
+    out[9] = 1
+    out[10] = 0
+    out[11] = 1
+    out[12] = (high << 2) + (ticks >> 10)
 
 
 @micropython.viper
-def elapsed(state: ptr32, ahead: int) -> int:
-    """Time of the step written last, or (``ahead`` = 1) of the next one of the stretch, in 1024 ticks."""
+def upcoming(state: ptr32) -> int:
+    """Time of the next step of the stretch, in 1024 ticks."""
     now = state[0]
-    if ahead:
-        if state[8]:
-            now += state[30]
-        else:
-            now += state[1] >> state[4]
+    if state[8]:
+        now += state[30]
+    else:
+        now += state[1] >> state[4]
     return state[12] + (now >> (state[5] + 10))
 
 

@@ -28,6 +28,10 @@ if TYPE_CHECKING:
 
 _BUDGET = const(4)  # parts looked at in one call: bounds its time
 _LARGEST = const(1024)  # steps of a stretch
+# where the prepared steps come from: see ``brake``
+_CELL = const(0)
+_RELEASED = const(1)
+_AHEAD = const(2)
 _NODES = (A, crossing.MIDDLE, B)
 _FAR = const(1 << 16)  # 4096 ticks: longer than any cell and gap, and still a small integer in ticks
 _NEVER = const(1 << 28)  # 1024 ticks: 54 minutes
@@ -48,8 +52,10 @@ class Walker:
         self.at_turn = False
         self.ended = True
         # every attribute from the start, so that none is added while a motion runs
-        self._held = self._released = self._fresh = self._at_once = self._comes = self._braking = False
-        self._held_high = self._held_ticks = self._at = self._last = 0
+        self._held = self._fresh = self._at_once = self._comes = self._braking = False
+        self._held_high = self._held_ticks = self._at = self._last = self._high = 0
+        self._found = cells.NOTHING
+        self._origin = _CELL
 
     def load(
         self, motion: "Motion", joint: int, position_steps: int, pulse_ticks: int, gap_ticks: int
@@ -63,13 +69,14 @@ class Walker:
         self._cells.graze_ticks = gap_ticks >> 3
         self._braking = False
         self._state[stretch.PULSE] = pulse_ticks
-        self._state[STEPS] = self._state[NEXT_STEPS] = 0
+        self._state[STEPS] = self._state[NEXT_STEPS] = self._state[stretch.LAST_1024] = 0
         self._gap_ticks = gap_ticks
         self._position = position_steps + points.BIAS
         self.direction = 1
         self.at_turn = self.ended = False
         self._held = False  # the last step of a cell waits for what comes after it
         self._fresh = False  # the cell's first step is solved, but not written
+        self._found = cells.NOTHING  # what is known of the next part
         self._at = self._last = 0  # node a's step in the cell; the cell's last one
         self._size = 16
         while not self._state[STEPS] and not self.ended:
@@ -87,9 +94,36 @@ class Walker:
         state[UNTIL_1024] = until_1024
         state[HEAD] = head
         state[ROOM] = room
-        while emit(0, ring, state, mask) and self._prepare():
-            pass
+        if emit(0, ring, state, mask):
+            while self._prepare() and emit(0, ring, state, mask):
+                pass
+        elif self._at == self._last or not self._found:
+            self._look_ahead(until_1024)
         return room - state[ROOM]
+
+    def _look_ahead(self, until_1024: int) -> None:
+        """While the ring is full: find the next cell, and take it up once the last steps before it are prepared.
+
+        Only where nothing can come between: it goes on in the same direction, and begins before ``until_1024``.
+        """
+        walk = self._cells
+        state = self._state
+        if self._found == cells.NOTHING:
+            self._found = walk.next(self._position)
+        elif (
+            self._found == cells.CELL
+            and self._at == self._last
+            and state[STEPS]
+            and not (state[NEXT_STEPS] or self._held or self._fresh or self._braking)
+            and (walk.end() - self._position) * self.direction > 1
+            and _in_1024(walk.time[0], 0) < until_1024
+        ):
+            self._found = cells.NOTHING
+            self._open(False)
+            if self._fresh and self._last:
+                self._fresh = False
+                self._origin = _AHEAD
+                stretch.single(state, stretch.NEXT, self._high, self._ticks())
 
     def turn(self) -> None:
         """Let the steps in the other direction come."""
@@ -97,15 +131,22 @@ class Walker:
         self.at_turn = False
 
     def brake(self, start_ticks: int, length_ticks: int) -> None:
-        """Come to rest along the path from a time on (see braking.py); no step from there on may be written yet."""
+        """Come to rest along the path from a time on (see braking.py).
+
+        It must not lie before any ``until_1024`` that ``fill`` was given, nor before any step written.
+        """
         braking.set_law(self._block, start_ticks, length_ticks)
         self._braking = True
         state = self._state
         unwritten = state[STEPS] + state[NEXT_STEPS]
-        state[STEPS] = state[NEXT_STEPS] = 0
-        if unwritten and self._released:
+        if self._origin == _AHEAD and state[NEXT_STEPS]:
+            self._at = -1  # what is left of the cell before comes before braking
+        else:
+            state[STEPS] = 0
+        state[NEXT_STEPS] = 0
+        if unwritten and self._origin == _RELEASED:
             self._held = True
-        elif unwritten:
+        elif unwritten and self._at >= 0:
             if self._held:
                 self._held = False
                 unwritten += 1
@@ -126,17 +167,19 @@ class Walker:
 
     def last_1024(self) -> int:
         """Time of the step written last, in 1024 ticks."""
-        return stretch.elapsed(self._state, 0)
+        return self._state[stretch.LAST_1024]
 
     def next_1024(self) -> int:
         """Time of the next step to be written, or one before it while it is not known; in 1024 ticks."""
-        if self._state[STEPS] or self._state[NEXT_STEPS]:
-            return stretch.elapsed(self._state, 1)
+        if self._state[STEPS]:
+            return stretch.upcoming(self._state)
+        if self._state[NEXT_STEPS]:
+            return self._state[stretch.NEXT + stretch.BASE_1024]
         if self._held:
             return _in_1024(self._held_high, self._held_ticks)
-        if self.at_turn:
-            return _in_1024(self._cells.time[0], self._ticks())
-        return _in_1024(self._cells.time[0], 0)
+        if self._fresh:
+            return _in_1024(self._high, self._ticks())
+        return _in_1024(self._high if self._at < self._last else self._cells.time[0], 0)
 
     def _prepare(self) -> bool:
         """Make the next stretch ready. False: at a turn, at the end, or not found yet."""
@@ -157,38 +200,37 @@ class Walker:
 
     def _next_cell(self) -> None:
         walk = self._cells
-        found = walk.next(self._position)
+        if self._found == cells.NOTHING:
+            self._found = walk.next(self._position)
+        found = self._found
         if found == cells.END or (self._braking and braking.passed(self._block, walk.time[0])):
             if self._held:
                 self._release()
             else:
                 self.ended = True
-            return
-        if self._held and self._since_held(walk.time[0], walk.time[6] >> 16) > self._gap_ticks:
+        elif self._held and self._since_held(walk.time[0], walk.time[6] >> 16) > self._gap_ticks:
             self._release()
-        if found != cells.NOTHING:
+        elif found != cells.NOTHING:
+            self._found = cells.NOTHING
             self._open(found == cells.AT_ONCE)
 
     def _open(self, at_once: bool) -> None:
         """Take up the steps of the cell that was found, and solve the first."""
         walk = self._cells
-        here = self._block
+        block = self._block
         steps = walk.end() - self._position
-        heading = walk.heading
-        if at_once:
-            heading = 1 if steps > 0 else -1
-        if steps * heading <= 0:
+        heading = 1 if steps > 0 else -1
+        if not steps or (heading != walk.heading and not at_once):
             return
         scale = walk.time_local[cell.SCALE] - 12
         self._state[stretch.TIME_SCALE] = scale
-        here[crossing.OFFSET] = walk.time[6] >> (16 - scale)
-        here[crossing.RANGE] = 0
-        if not at_once:
-            here[crossing.EXPONENT_OFFSET] = scale - walk.angle_local[cell.SCALE] + 64
-            cell.powers(walk.angle_local, here, 0, heading < 0)
-            cell.powers(walk.time_local, here, crossing.TIME_POWERS, False)
-            twice = 2 * (self._position - walk.angle[0]) + heading
-            crossing.aim(here, walk.angle, walk.angle_local, twice)
+        self._high = walk.time[0]
+        block[crossing.OFFSET] = walk.time[6] >> (16 - scale)
+        if at_once:
+            block[crossing.RANGE] = 0
+        else:
+            block[crossing.TARGET] = 2 * (self._position - walk.angle[0]) + heading + points.BIAS
+            crossing.enter(block, walk.angle, walk.angle_local, walk.time_local)
         self._position += steps
         self._heading = heading
         self._last = steps * heading - 1
@@ -205,7 +247,7 @@ class Walker:
     def _slow(self, node: int) -> bool:
         """Move a node to real time; False where it never comes."""
         scale = self._state[stretch.TIME_SCALE]
-        comes = braking.slow(self._block, node, self._cells.time[0], scale)
+        comes = braking.slow(self._block, node, self._high, scale)
         if comes and not self._at_once:
             braking.steepen(self._block, node)
         return bool(comes)
@@ -214,7 +256,7 @@ class Walker:
         """The first step of a cell, against the one that was held back before it."""
         if self._held:
             opposite = self._heading != self.direction
-            close = self._since_held(self._cells.time[0], self._ticks()) <= self._gap_ticks
+            close = self._since_held(self._high, self._ticks()) <= self._gap_ticks
             if opposite and close and self._comes:
                 self._held = self._fresh = False  # a graze: neither comes
             else:
@@ -230,7 +272,9 @@ class Walker:
     def _go_on(self) -> bool:
         """Prepare the next step or steps of the cell; True where some come."""
         steps = self._last - self._at
-        if steps > 3 and not self._at_once and self._two_stretches(steps):
+        # an odd one out comes first, so that the cell ends with a stretch, and time to look ahead
+        odd = steps & 1 and steps < 2 * self._size
+        if steps > 3 and not odd and not self._at_once and self._two_stretches(steps):
             return True
         if not self._solve(self._at + 1):
             self.ended = True
@@ -247,15 +291,15 @@ class Walker:
         length = steps >> 1
         if length > size:
             length = steps // (2 * ((steps - 1) // (2 * size) + 1))
-        state[BASE_HIGH] = self._cells.time[0]
+        state[BASE_HIGH] = self._high
         while length > 1:
             solve(block, self._at, length)
             verdict = accept(state, block, length) if not self._braking or self._level() else stretch.REJECTED
             if verdict != stretch.REJECTED:
                 differences(state, block, length)
-                self._released = False
+                self._origin = _CELL
                 self._at += 2 * length
-                if self._at == self._last:
+                if self._at == self._last and self._slowly():
                     state[NEXT_STEPS] -= 1
                     self._hold()
                 if verdict == stretch.EASY and 2 * length > size:
@@ -280,27 +324,36 @@ class Walker:
         for node in _NODES:
             block[node] += (block[node + DELAY] - base) << scale
             block[node + DELAY] = base
-        self._state[BASE_HIGH] = self._cells.time[0] + (base >> 12)
+        self._state[BASE_HIGH] = self._high + (base >> 12)
         return True
 
     def _single(self) -> None:
         """Prepare the step at node A."""
-        if self._at == self._last:
+        if self._at == self._last and self._slowly():
             self._hold()
         else:
-            self._released = False
-            stretch.single(self._state, self._cells.time[0], self._ticks())
+            self._origin = _CELL
+            stretch.single(self._state, 0, self._high, self._ticks())
 
     def _hold(self) -> None:
         """Hold back the step at node A."""
         self._held = True
-        self._held_high = self._cells.time[0]
+        self._held_high = self._high
         self._held_ticks = self._ticks()
+
+    def _slowly(self) -> bool:
+        """Whether the step at node A may be half of a graze.
+
+        Acceleration near standstill is at most 0.16 steps / gap**2 (see check.py), so a joint that takes less than
+        12 gaps for a step is not back within a gap; held against 4 of them.
+        """
+        ticks = self._block[A + crossing.MANTISSA] >> self._block[A + crossing.EXPONENT]
+        return self._at_once or ticks > 4 * self._gap_ticks
 
     def _release(self) -> None:
         self._held = False
-        self._released = True
-        stretch.single(self._state, self._held_high, self._held_ticks)
+        self._origin = _RELEASED
+        stretch.single(self._state, 0, self._held_high, self._held_ticks)
 
     def _since_held(self, high: int, ticks: int) -> int:
         """Ticks from the step held back to a time; any large number where it is far."""

@@ -52,6 +52,7 @@ class Count:
         self.on = False
         self.verify = False
         self.lines: Counter[str] = Counter()
+        self.longest = 0.0
         for name in self.machine.functions:
             home = next(module for module in COMPILED if hasattr(module, name))
             replaced = self._either(name, getattr(home, name))
@@ -92,14 +93,23 @@ class Count:
         done = (end - head) // 2
         compiled = self.machine.count / done
         lines = self.lines.total() / done
-        return {"steps": done, "compiled": compiled, "lines": lines, "all": compiled + LINE * lines}
+        return {
+            "steps": done,
+            "compiled": compiled,
+            "lines": lines,
+            "all": compiled + LINE * lines,
+            "longest": self.longest,
+        }
 
     def _fill(self, subject: walker.Walker, ring: array[int], head: int, steps: int, batch: int) -> int:
         end = head + 2 * steps
+        self.longest = 0.0
         while head < end and not subject.ended:
             if subject.at_turn:
                 subject.turn()
+            before = self.machine.count + LINE * self.lines.total()
             head += subject.fill(ring, 1023, head, batch)
+            self.longest = max(self.longest, self.machine.count + LINE * self.lines.total() - before)
         return head
 
     def _trace(self, frame: FrameType, event: str, _: Any) -> Any:
@@ -133,7 +143,7 @@ def measure() -> dict[str, dict[str, float]]:
     cruise = motions.steady(333_000)
     figures = {"kernel": {"compiled": count.kernel()}}
     figures["cruise"] = count.walk(cruise, 0, 3_000, 33_400)
-    figures["cruise"]["stretches"] = sum(count.machine.calls[name] for name in ("differences",)) * 2
+    figures["cruise"]["stretches"] = 2 * count.machine.calls["differences"]
     figures["ramp"] = count.walk(motions.cruise(333_000), 0, 10_000, 10_000)
     for joint in range(3):
         figures[f"shipped joint {joint + 1}"] = count.walk(motions.feeding(), joint, 0, 20_000, 128)
@@ -160,6 +170,10 @@ def report(figures: dict[str, dict[str, float]]) -> str:
     lines.append(f"3 joints at 333 k steps/s each take {100 * load:.0f} % of the processor")
     seconds = sum(motions.INTERVALS_S[2])
     spent = sum(row["steps"] * row["all"] for case, row in figures.items() if case.startswith("shipped"))
+    longest = figures["cruise"]["longest"] * CYCLES / CORE_HZ
+    lines.append(
+        f"the longest call of fill() in the cruise takes {1e6 * longest:.0f} us, 256 steps {256e6 / 333e3:.0f} us"
+    )
     lines.append(f"the shipped motion takes {100 * spent * CYCLES / CORE_HZ / seconds:.1f} % on average")
     return "\n".join(lines)
 
