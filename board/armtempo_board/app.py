@@ -23,7 +23,7 @@ from armtempo_shared.messages import SAMPLE_BRAKING, START_HOMING, STATES
 from armtempo_shared.motion import Motion, MotionError
 from micropython import const
 
-from armtempo_board import evaluator, forget, store
+from armtempo_board import ends, forget, store
 from armtempo_board.commands import Commands
 from armtempo_board.engine import Engine
 from armtempo_board.events import Events
@@ -228,9 +228,9 @@ class App:
         """A homing motion may begin anywhere; joints that are not known to stand there are unknown after it."""
         self.engine.snapshot(self._raw)
         for joint in range(self.joints):
-            if evaluator.start_offset(motion, joint, self._raw[2 + joint]):
+            if ends.start_offset(motion, joint, self._raw[2 + joint]):
                 mask |= 1 << joint
-        self.home(mask, [evaluator.start_offset(motion, joint, 0) for joint in range(self.joints)])
+        self.home(mask, [ends.start_offset(motion, joint, 0) for joint in range(self.joints)])
         self._assumed = mask
 
     def _forget(self) -> None:

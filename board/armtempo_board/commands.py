@@ -11,7 +11,7 @@ from armtempo_shared.messages import ARM_RECORD_NAME, MAX_PAYLOAD, PROTOCOL_VERS
 from armtempo_shared.motion import Motion, MotionError
 from micropython import const
 
-from armtempo_board import evaluator, store
+from armtempo_board import ends, store
 from armtempo_board.link import PAYLOAD
 from armtempo_board.octets import u32
 from armtempo_board.refusal import Refused
@@ -183,7 +183,7 @@ class Commands:
         data = self._app.store.read(name + store.MOTION)
         try:
             motion = Motion(data)
-            crc, duration, joints = u32(data, len(data) - 4), evaluator.duration_ticks(motion), motion.joints
+            crc, duration, joints = u32(data, len(data) - 4), ends.duration_ticks(motion), motion.joints
         except MotionError:
             crc = duration = joints = 0
         default = name == self._app.store.default()

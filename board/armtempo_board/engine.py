@@ -25,7 +25,7 @@ from armtempo_shared.motion import Motion
 from machine import mem32
 from micropython import const
 
-from armtempo_board import access, evaluator
+from armtempo_board import access, ends
 from armtempo_board.encoders import Encoder, NoEncoder
 from armtempo_board.following import Following
 from armtempo_board.inputs import Inputs
@@ -118,11 +118,11 @@ class Engine:
         refused = check(motion, self._arm, self._joints[0].gap_ticks)
         if refused:
             return refused
-        self.duration_ticks = evaluator.duration_ticks(motion)
+        self.duration_ticks = ends.duration_ticks(motion)
         for number, joint in enumerate(self._joints):
             if not self.known >> number & 1:
                 return codes.UNHOMED, number, 0
-            off = evaluator.start_offset(motion, number, joint.position())
+            off = ends.start_offset(motion, number, joint.position())
             if off:
                 return codes.WRONG_START, number, off
         return None

@@ -3,7 +3,7 @@
 from armtempo_shared import codes
 from micropython import const
 
-from armtempo_board import evaluator, program
+from armtempo_board import ends, program
 from armtempo_board.app import App
 from armtempo_board.refusal import Refused
 from armtempo_board.watchdog import Watchdog
@@ -50,7 +50,7 @@ def _begin(app: "App", name: str) -> None:
         unknown = app.everyone() & ~app.known()
         if unknown:
             print("taking the posture of the arm as the start of", name)
-            starts = [evaluator.start_offset(motion, joint, 0) for joint in range(app.joints)]
+            starts = [ends.start_offset(motion, joint, 0) for joint in range(app.joints)]
             app.home(unknown, starts)
     app.begin(name, 0)
 

@@ -4,15 +4,15 @@ import micropython
 from micropython import const
 
 # state: what ``emit`` runs on
-TIME = 0  # since the base, ticks * 2**SHIFT
+_TIME = const(0)  # since the base, ticks * 2**SHIFT
 FIRST = 1  # first difference over a group, ticks * 2**(SHIFT + POWER) / steps of a group
 SECOND = 2  # the second, + 2**29
 THIRD = 3  # the third, + 2**29
 POWER = 4
 SHIFT = 5
-BASE = 6  # ticks, modulo 2**32
-REST = 7  # of the time of a group what its steps have left over
-LEFT = 8  # steps left in the group
+_BASE = const(6)  # ticks, modulo 2**32
+_REST = const(7)  # of the time of a group what its steps have left over
+_LEFT = const(8)  # steps left in the group
 GROUP = 9  # steps in a group
 CARRY = 10  # REST / 2**CARRY is in units of TIME
 STEPS = 11  # steps of the stretch not written yet
@@ -25,7 +25,7 @@ BASE_HIGH = 15  # what the nodes' times count from: 4096 ticks, + 2**28
 NEXT = 16
 NEXT_STEPS = 27
 PULSE = 29  # ticks
-STEP = 30  # time of one step of the group, ticks * 2**SHIFT
+_STEP = const(30)  # time of one step of the group, ticks * 2**SHIFT
 LAST_1024 = 31  # time of the step written last, 1024 ticks
 # what ``emit`` is told
 HEAD = 32  # entry to be written next; not masked

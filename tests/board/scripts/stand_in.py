@@ -47,13 +47,13 @@ def install():
     pyb.Pin = Pin
     engine = Module()
     engine.Engine = Engine
-    evaluator = Module()
-    evaluator.duration_ticks = lambda motion: 84000
-    evaluator.start_offset = lambda motion, joint, position: 7 - position
+    ends = Module()
+    ends.duration_ticks = lambda motion: 84000
+    ends.start_offset = lambda motion, joint, position: 7 - position
     sys.modules["machine"] = machine
     sys.modules["pyb"] = pyb
     sys.modules["armtempo_board.engine"] = engine
-    sys.modules["armtempo_board.evaluator"] = evaluator
+    sys.modules["armtempo_board.ends"] = ends
     sys.modules["time"] = _install_time()
     if not hasattr(sys, "print_exception"):
         sys.print_exception = lambda error, file: file.write(repr(error))
