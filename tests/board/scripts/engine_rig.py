@@ -207,7 +207,7 @@ class Rig:
 
         if planned:
             armtempo_board.joint.Walker = Walker
-            armtempo_board.engine.evaluator = Evaluator
+            armtempo_board.engine.ends = Evaluator
             armtempo_board.check.check = Evaluator.check
         self.arm = the.arm = motors.Arm(self.board, pins, lambda: (self.head, joints), 1, ())
         self.pins = pins
