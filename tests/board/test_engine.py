@@ -30,8 +30,7 @@ def test_nothing_is_allocated_while_a_motion_runs(name: str) -> None:
     output = interpreters.run(name, SCRIPTS / "no_allocation.py", heap=HEAP[name]).splitlines()
     three, six = map(int, output[0].split())
     if name == "micropython-arm":
-        # The collector is conservative: what is left on the stack keeps a few kilobytes alive, more or less.
-        assert three < 29_000, three
-        assert six < 47_000, six
+        assert three < 22_000, three
+        assert six < 42_000, six
     assert output[1].startswith("13 [3000, 700, 2]")
     assert len(output) == 3
