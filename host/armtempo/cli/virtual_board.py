@@ -33,6 +33,19 @@ _LOOK_S = 0.5
     is_flag=True,
     help="Run what is in the flash ('armtempo deploy' puts it there), not the installed program.",
 )
+@click.option(
+    "--hold-button",
+    type=click.FloatRange(0.0, 60.0),
+    default=0.0,
+    metavar="SECONDS",
+    help="Hold the user button for so long from power-up on: 0.9 starts in safe mode.",
+)
+@click.option(
+    "--sd-card",
+    type=click.Path(exists=True, file_okay=False, path_type=Path),
+    metavar="FOLDER",
+    help="Folder that is an SD card in the board.",
+)
 @options.arm
 @click.option("--ideal", is_flag=True, help="Ideal motors, instead of those that the arm file describes.")
 @click.option("--seed", default=0, show_default=True, help="Tells one board from another, and its scatter.")
@@ -42,6 +55,8 @@ def command(
     edge_log: Path | None,
     interpreter: str | None,
     deployed: bool,
+    hold_button: float,
+    sd_card: Path | None,
     arm_path: Path | None,
     ideal: bool,
     seed: int,
@@ -60,6 +75,8 @@ def command(
         arm=None if ideal else options.load_arm(arm_path),
         seed=seed,
         deployed=deployed,
+        button_s=hold_button,
+        sd_card=sd_card,
     ) as board:
         click.echo(board.port)
         while board.running():

@@ -7,7 +7,6 @@ import pty
 import shutil
 import subprocess
 import sys
-import tempfile
 import time
 import tty
 from collections.abc import Sequence
@@ -17,6 +16,7 @@ from types import TracebackType
 from armtempo.arm import Arm
 from armtempo.errors import LinkError
 from armtempo.virtual.describe import describe
+from armtempo.virtual.folder import Folder
 from armtempo.virtual.options import Fault, Options, unique_id
 
 INTERPRETER_VARIABLE = "ARMTEMPO_MICROPYTHON"
@@ -33,9 +33,9 @@ class VirtualBoard:
     ``port`` can be opened like a serial device, again and again, until then.
     """
 
-    def __init__(self, command: list[str], folder: Path, flash: Path) -> None:
+    def __init__(self, command: list[str], folder: Folder, flash: Path) -> None:
         self.flash_dir = flash
-        self.log_path = folder / "board.log"
+        self.log_path = folder.path / "board.log"
         self._folder = folder
         master, self._slave = pty.openpty()
         try:
@@ -45,7 +45,13 @@ class VirtualBoard:
             with self.log_path.open("wb") as log:
                 # in a session of its own: a Ctrl-C in the terminal is the launcher's to act on
                 self._process = subprocess.Popen(
-                    command, stdin=master, stdout=master, stderr=log, cwd=flash, start_new_session=True
+                    command,
+                    stdin=master,
+                    stdout=master,
+                    stderr=log,
+                    cwd=flash,
+                    start_new_session=True,
+                    pass_fds=(folder.lock,),
                 )
         except OSError as error:
             os.close(self._slave)
@@ -69,7 +75,7 @@ class VirtualBoard:
     def wait_until_up(self) -> None:
         """Wait until the board program has started; LinkError where the process ends instead."""
         limit = time.monotonic() + _START_S
-        while not (self._folder / "up").exists():
+        while not (self._folder.path / "up").exists():
             if not self.running() or time.monotonic() > limit:
                 tail = self.log().strip().splitlines()[-1:] or ["it says nothing"]
                 raise LinkError(f"the virtual board did not start: {tail[0]}")
@@ -102,7 +108,7 @@ class VirtualBoard:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.stop()
-        shutil.rmtree(self._folder, ignore_errors=True)
+        self._folder.remove()
 
 
 def launch(
@@ -117,6 +123,10 @@ def launch(
     power_cut_at: int = 0,
     deployed: bool = False,
     flash_blocks: int | None = None,
+    button_s: float = 0.0,
+    sd_card: Path | str | None = None,
+    damage: str = "",
+    machine: str = Options.machine,
 ) -> VirtualBoard:
     """Start a virtual board; use it as a context manager.
 
@@ -127,10 +137,13 @@ def launch(
     up for. ``start_deg`` (J,): where the arm stands at power-up, else at home. ``deployed``: run the program
     in the flash (``armtempo deploy`` puts it there) instead of the installed one. ``flash_blocks``: size of
     the flash; None: the chip's, and with ``deployed`` more, as compiled files for this machine's processor
-    are larger than for the chip's. Raises LinkError where it does not start.
+    are larger than for the chip's. ``button_s``: how long the user button is held from power-up on: safe mode
+    from 0.6 to 1.2, a fresh file system from 1.2 to 1.8. ``sd_card``: folder that is an SD card in the board.
+    ``damage``: ``"no file system"`` or ``"unreadable"``, what has befallen the flash. ``machine``: what the
+    firmware was built for. Raises LinkError where it does not start.
     """
-    folder = Path(tempfile.mkdtemp(prefix="armtempo-virtual-"))
-    flash = Path(flash_dir).resolve() if flash_dir else folder / "flash"
+    folder = Folder()
+    flash = Path(flash_dir).resolve() if flash_dir else folder.path / "flash"
     try:
         flash.mkdir(parents=True, exist_ok=True)
         options = Options(
@@ -144,12 +157,16 @@ def launch(
             power_cut_at=power_cut_at,
             seed=seed,
             faults=list(faults),
-            up=str(folder / "up"),
+            up=str(folder.path / "up"),
+            button_ms=1000 * button_s,
+            sd_card=str(Path(sd_card).resolve()) if sd_card else None,
+            damage=damage,
+            machine=machine,
         )
-        options.write(folder / "options.json")
-        board = VirtualBoard(_command(interpreter, folder / "options.json"), folder, flash)
+        options.write(folder.path / "options.json")
+        board = VirtualBoard(_command(interpreter, folder.path / "options.json"), folder, flash)
     except BaseException:
-        shutil.rmtree(folder, ignore_errors=True)
+        folder.remove()
         raise
     try:
         board.wait_until_up()

@@ -11,27 +11,29 @@ import sys
 HERE = sys.argv[0].rsplit("/", 1)[0]
 
 
-def prepare(options):
-    """Make the simulated modules importable; returns the simulator's ``session`` module."""
+def prepare():
+    """Make the simulated modules importable; returns the simulator's ``session`` module and their folders."""
     folders = [HERE + "/hardware"]
     if sys.implementation.name != "micropython":
         folders.append(HERE + "/cpython")
-    folders += [options["flash"], options["flash"] + "/lib"]
-    sys.path[0:0] = folders + options["program"]
+    path = list(sys.path)
+    sys.path[0:0] = folders
     if sys.implementation.name != "micropython":
         import additions  # noqa: F401
     from simulator import modules, session
 
     modules.replace()
     modules.replace_sys()
-    return session
+    sys.path[:] = path
+    return session, folders
 
 
 def main():
     """Run until the launcher goes."""
     with open(sys.argv[1]) as file:
         options = json.load(file)
-    prepare(options).run(options)
+    session, folders = prepare()
+    session.run(options, folders)
 
 
 main()

@@ -49,6 +49,14 @@ class Options:
     """DMA streams fetch one word ahead, as the chip's do in direct mode (RM0090 10.3.12)."""
     power_cut_at: int = 0
     """The power fails during this flash operation, counted from 1; 0: never."""
+    button_ms: float = 0.0
+    """The user button is held for so long from power-up on."""
+    sd_card: str | None = None
+    """Folder that is an SD card in the board's slot."""
+    damage: str = ""
+    """What the flash has suffered: a kind of ``hardware/simulator/flash.py``."""
+    machine: str = "STM32F4DISC with STM32F407"
+    """What the firmware says it was built for."""
     turn_us: int = 1000
     """What a turn of the program's main loop takes on the chip beyond its simulated calls."""
     arm: dict[str, Any] | None = None

@@ -5,8 +5,6 @@ import os as _own
 from simulator import flash as _flash
 from simulator import the
 
-_NAME = ("pyboard", "pyboard", "1.25.0", "virtual board", "STM32F4DISC with STM32F407")
-
 
 def getcwd():
     """Current folder."""
@@ -24,14 +22,15 @@ def chdir(path):
 def listdir(path=""):
     """Names in a folder."""
     if the.flash.absolute(path) == "/":
-        return ["flash"]
+        return [point[1:] for point in the.flash.mounts]
     return sorted(_own.listdir(the.flash.real(path)))
 
 
 def ilistdir(path=""):
     """(name, type, inode 0, size) of each entry."""
     if the.flash.absolute(path) == "/":
-        yield ("flash", 0x4000, 0, 0)
+        for name in listdir("/"):
+            yield (name, 0x4000, 0, 0)
         return
     real = the.flash.real(path)
     for name in listdir(path):
@@ -50,6 +49,7 @@ def stat(path):
 
 def statvfs(path):
     """Block size, fragment size, blocks, free blocks, …"""
+    the.flash.real(path)
     free = the.flash.free_blocks()
     return (_flash.BLOCK, _flash.BLOCK, the.flash.size, free, free, 0, 0, 0, 0, 255)
 
@@ -82,6 +82,25 @@ def sync():
     the.board.spend(100)
 
 
+class VfsFat:
+    """The kind of file system that the flash has."""
+
+    @staticmethod
+    def mkfs(device):
+        """Make a fresh one, without files."""
+        the.flash.format()
+
+
+def mount(device, point):
+    """Mount the flash."""
+    the.flash.mount(point)
+
+
+def umount(point):
+    """Unmount a file system."""
+    the.flash.umount(point)
+
+
 def dupterm(stream, index=0):
     """Attach the REPL to the serial port, or with None detach it; returns what was attached."""
     before = the.port if the.serial.attached else None
@@ -96,4 +115,4 @@ def urandom(count):
 
 def uname():
     """What runs where."""
-    return _NAME
+    return ("pyboard", "pyboard", "1.25.0", "virtual board", the.options["machine"])

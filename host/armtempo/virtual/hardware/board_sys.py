@@ -13,9 +13,12 @@ class _Implementation(tuple):
 
     name = "micropython"
     version = tuple(_own.implementation.version[:3]) + ("",)
-    _machine = "STM32F4DISC with STM32F407"
     _build = "STM32F4DISC"
     _mpy = getattr(_own.implementation, "_mpy", 0)
+
+    @property
+    def _machine(self):
+        return _the.options["machine"]
 
 
 implementation = _Implementation()

@@ -50,6 +50,13 @@ class Switch:
         self._extint = ExtInt(self._pin, ExtInt.IRQ_RISING, Pin.PULL_NONE, callback)
 
 
+class Flash:
+    """The flash as a block device, for ``os.mount`` and ``os.VfsFat.mkfs``."""
+
+    def __init__(self, *, start=-1, len=-1):
+        """There is one file system, in all of it."""
+
+
 def usb_mode(mode=None, *args, **kwargs):
     """Read or set what the USB port shows itself as."""
     if mode is None:

@@ -1,5 +1,7 @@
 """The board's flash: a folder of the host, seen as ``/flash``, with the chip's size, slowness and dangers.
 
+A second folder may be an SD card, seen as ``/sd``: as large as it needs to be, and safe.
+
 Each change (a file opened for writing, a piece written, a close, a rename, a removal, a new folder) is one
 flash operation. A power cut can be injected at the n-th of them: it leaves that operation half done (a
 piece of the data written; a rename over an existing file stopped after the old one is gone, as FAT does it),
@@ -13,19 +15,25 @@ from simulator.reset import Reset
 BLOCK = 512
 _WRITE_MS = 1
 _CLOSE_MS = 60
+_FORMAT_MS = 2000
 _POWER_ON = 1
 _DIRECTORY = 0x4000
-_ENOENT, _EEXIST, _EISDIR, _ENOSPC = 2, 17, 21, 28
+_EPERM, _ENOENT, _EIO, _EEXIST, _EISDIR, _EINVAL, _ENOSPC = 1, 2, 5, 17, 21, 22, 28
+NO_FILE_SYSTEM, UNREADABLE = "no file system", "unreadable"
+"""Kinds of damage: the firmware finds no file system; it mounts one in which nothing can be read or written."""
 
 
 class Flash:
     """The folder ``root`` of ``size`` blocks; ``stall(ms)`` lets time pass while the flash is busy.
 
     ``programs``: folders of the host that hold a program which is not deployed to the flash; read only.
+    ``damage``: a kind of damage, or "". ``mounts``: folder of the host by mount point.
     """
 
-    def __init__(self, root, size, programs, stall, cut_at=0):
+    def __init__(self, root, size, programs, stall, cut_at=0, damage=""):
         self.root = root
+        self.damage = damage
+        self.mounts = {"/flash": root}
         self.size = size
         self._programs = programs
         self.cwd = "/flash"
@@ -36,20 +44,24 @@ class Flash:
         self.renamed = None
 
     def real(self, path):
-        """Where a path of the board is on the host; OSError where it is outside ``/flash``."""
+        """Where a path of the board is on the host; OSError where nothing is mounted, or can be read."""
         for program in self._programs:
             if path.startswith(program):
                 return path
         path = self.absolute(path)
-        if path != "/flash" and not path.startswith("/flash/"):
+        point = path[: (path + "/").find("/", 1)]
+        if point not in self.mounts:
             raise OSError(_ENOENT)
-        return self.root + path[6:]
+        if self.damage and point == "/flash":
+            raise OSError(_EIO)
+        return self.mounts[point] + path[len(point) :]
 
     def absolute(self, path):
         """A path of the board, without dots, from its root."""
         parts = []
-        if path.startswith(self.root + "/"):  # a module's __file__
-            path = "/flash" + path[len(self.root) :]
+        for point, root in self.mounts.items():
+            if path.startswith(root + "/"):  # a module's __file__
+                path = point + path[len(root) :]
         whole = path if path.startswith("/") else self.cwd + "/" + path
         for part in whole.split("/"):
             if part == "..":
@@ -80,6 +92,26 @@ class Flash:
     def free_blocks(self):
         """Blocks that are free."""
         return max(0, self.size + 1 - self.blocks(self.root))
+
+    def mount(self, point):
+        """Mount the flash there."""
+        if point in self.mounts:
+            raise OSError(_EPERM)
+        self.mounts[point] = self.root
+
+    def umount(self, point):
+        """Unmount what is there."""
+        if point not in self.mounts:
+            raise OSError(_EINVAL)
+        del self.mounts[point]
+        self.cwd = "/"
+
+    def format(self):
+        """Make a fresh, empty file system."""
+        self._stall(_FORMAT_MS)
+        self.damage = ""
+        for name in os.listdir(self.root):
+            remove_all(self.root + "/" + name)
 
     def open(self, path, mode="r", **options):
         """As the built-in ``open``."""
@@ -140,7 +172,8 @@ class Written:
             self._flash.power_fails()
         self._file.flush()
         size = os.stat(self._path)[6]
-        if -(-(size + len(data)) // BLOCK) - -(-size // BLOCK) > self._flash.free_blocks():
+        needed = -(-(size + len(data)) // BLOCK) - -(-size // BLOCK)
+        if self._path.startswith(self._flash.root + "/") and needed > self._flash.free_blocks():
             raise OSError(_ENOSPC)
         return self._file.write(data)
 
@@ -179,3 +212,13 @@ def exists(path):
     except OSError:
         return False
     return True
+
+
+def remove_all(path):
+    """Remove a file, or a folder with all that is in it, of the host."""
+    if is_folder(path):
+        for name in os.listdir(path):
+            remove_all(path + "/" + name)
+        os.rmdir(path)
+    else:
+        os.remove(path)

@@ -85,8 +85,8 @@ class Repl:
             send("MPY: sync filesystems\r\nMPY: soft reboot\r\n")
 
     def execute(self, text, name="<stdin>", log=False):
-        """Run code; an exception is shown to the host. SoftReset where the code asks to leave."""
-        self._run(lambda: exec(compile(text, name, "exec"), self.names), log)
+        """Run code; False where it raises, which is shown to the host. SoftReset where it asks to leave."""
+        return self._run(lambda: exec(compile(text, name, "exec"), self.names), log)
 
     def _run(self, action, log=False):
         """Run something with Ctrl-C on; True where it raised nothing."""

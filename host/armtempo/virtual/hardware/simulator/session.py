@@ -3,23 +3,24 @@
 import builtins
 import sys
 
-from simulator import memory, setup, the, timer_registers
+from simulator import firmware, memory, setup, the, timer_registers
 from simulator.repl import Repl, SoftReset, board_print
 from simulator.reset import PowerOff, Reset
 
 _POWER_ON, _SOFT = 1, 0
 
 
-def run(options):
-    """Run the board until the launcher goes."""
+def run(options, hardware):
+    """Run the board until the launcher goes; ``hardware``: the folders of its built-in modules."""
+    path = hardware, options["program"] + sys.path
     before = list(sys.modules)
     builtins.print = board_print
     cause = _POWER_ON
     while True:
-        setup.power_up(options, cause)
+        mode = setup.power_up(options, cause)
         builtins.open = the.flash.open
         try:
-            _live(options, before)
+            _live(options, before, mode, path)
         except Reset as reset:
             cause = reset.cause
             _forget(before)
@@ -29,21 +30,22 @@ def run(options):
         the.edges.flush()
 
 
-def _live(options, before):
-    """Run the program, then the prompt, again after each soft reset."""
+def _live(options, before, mode, path):
+    """Run the program, then the prompt, again after each soft reset, which ends the safe mode."""
     raw = False
     while True:
+        firmware.mount(mode, path)
         if the.arm is None or the.arm.board is not the.board:
             _connect()
         repl = Repl(raw)
         try:
-            _execute(options, repl, "boot.py")
-            if not raw:
-                _execute(options, repl, "main.py")
+            if mode != firmware.SAFE:
+                _start(options, repl)
         except SoftReset:
             pass
         repl.run()
         raw = repl.raw
+        mode = firmware.NORMAL
         _soft_reset()
         _forget(before)
 
@@ -60,17 +62,25 @@ def _connect():
         sys.stderr.write("no arm on the pins: %r\n" % error)
 
 
+def _start(options, repl):
+    """boot.py, and where that went well main.py, unless the host talks to the raw REPL."""
+    if not _execute(options, repl, "boot.py"):
+        firmware.flash_error(firmware.BOOT_ERROR)
+    elif not repl.raw and not _execute(options, repl, "main.py"):
+        firmware.flash_error(firmware.MAIN_ERROR)
+
+
 def _execute(options, repl, name):
-    """Run a file of the flash, or of the program that is not deployed."""
-    folders = ["/flash"] + [folder + "/armtempo_board" for folder in options["program"]]
+    """Run a file of flash or card, or of the program that is not deployed; False where it raises."""
+    folders = [the.flash.cwd] + [folder + "/armtempo_board" for folder in options["program"]]
     for folder in folders:
         try:
             with the.flash.open(folder + "/" + name) as file:
                 text = file.read()
         except OSError:
             continue
-        repl.execute(text, name, log=True)
-        return
+        return repl.execute(text, name, log=True)
+    return True
 
 
 def _soft_reset():

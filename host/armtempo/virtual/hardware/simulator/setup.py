@@ -2,30 +2,38 @@
 
 from binascii import unhexlify
 
-from simulator import edgelog, faults, flash, pace, serial, the
+from simulator import edgelog, faults, firmware, flash, pace, serial, the
 from simulator.board import TICKS_PER_MS, Board
 
 _ARM_RECORD = "/armtempo/arm.ata"
 
 
 def power_up(options, cause):
-    """A new board; the flash's folder, the serial line and the edge log's file outlive it."""
+    """A new board; the flash's folder, the serial line and the edge log's file outlive it.
+
+    Returns the mode of ``firmware`` in which it starts.
+    """
+    first = the.flash is None
     the.options = options
     the.settings = {"reset_cause": cause, "unique_id": unhexlify(options["unique_id"])}
     board = Board(options["dma_preload"])
     the.board = board
+    if options["edge_log"]:
+        if the.edges is None:
+            the.edges = edgelog.EdgeLog(options["edge_log"])
+        the.edges.listen(board)
+    mode = firmware.choose_mode(board, options["button_ms"] if first else 0)
     if the.serial is None:
         the.serial = serial.Serial()
     the.serial.reset()
     the.pace = pace.Pace(board, the.serial, options["speed"])
     the.port = serial.USB_VCP()
-    cut_at = options["power_cut_at"] if the.flash is None else 0  # the power fails once
-    the.flash = flash.Flash(options["flash"], options["flash_blocks"], options["program"], _stall, cut_at)
+    cut_at = options["power_cut_at"] if first else 0  # the power fails once
+    damage = options["damage"] if first else the.flash.damage
+    root, blocks, programs = options["flash"], options["flash_blocks"], options["program"]
+    the.flash = flash.Flash(root, blocks, programs, _stall, cut_at, damage)
     faults.Faults(board, options["faults"])
-    if options["edge_log"]:
-        if the.edges is None:
-            the.edges = edgelog.EdgeLog(options["edge_log"])
-        the.edges.listen(board)
+    return mode
 
 
 def connect(pins):
