@@ -16,7 +16,7 @@ _ROWS = (
     ("not_found", "no trajectory of this name is stored", "see 'armtempo list'"),
     ("bad_name", "the name is empty, too long or has other characters than a-z A-Z 0-9 - _", "rename it"),
     ("flash_full", "the flash has no room; what was stored is kept", "'armtempo remove' something"),
-    ("flash_error", "the flash could not be written or read", "see the recovery steps in the docs"),
+    ("flash_error", "the flash could not be written or read", "see host/docs/recovery.md"),
     ("bad_record", "the record is damaged or of an unknown kind", "upload it again"),
     ("bad_offset", "a piece of the upload is out of order", "upload it again"),
     ("bad_checksum", "the upload does not match its checksum", "upload it again"),

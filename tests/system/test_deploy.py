@@ -70,18 +70,6 @@ def test_cut_off_deployment_is_completed_by_the_next(
         assert "unconfigured" in armtempo("status", "--port", found.port, cwd=tmp_path)
 
 
-def test_program_that_crashes_at_start_is_replaced(tmp_path: Path) -> None:
-    flash = tmp_path / "flash"
-    name = INTERPRETERS[-1]
-    with board(name, flash) as found:
-        armtempo("deploy", "--port", found.port, cwd=tmp_path)
-    for path in (flash / "lib" / "armtempo_board").glob("app.*"):
-        path.write_bytes(b"nonsense")
-    with board(name, flash) as found:
-        assert "armtempo deploy" in armtempo("status", "--port", found.port, cwd=tmp_path, code=1)
-        armtempo("deploy", "--port", found.port, cwd=tmp_path)
-
-
 def test_mip_installs_the_package(tmp_path: Path) -> None:
     package.write(tmp_path / "package")
     with board(INTERPRETERS[-1], tmp_path / "flash") as found:

@@ -14,10 +14,11 @@ from pathlib import Path
 
 from armtempo.deploy import program
 from armtempo.deploy.changes import Tell, check_suitable, choose, difference, is_complete, ours
-from armtempo.deploy.remote import Remote, Survey, each, rename
+from armtempo.deploy.remote import RECOVERY, Remote, Survey, each, rename
 from armtempo.errors import InputError, LinkError
 from armtempo.link import open_board
 from armtempo.link.board import Progress
+from armtempo.link.diagnose import Prompt
 from armtempo.link.ports import is_sim
 
 KEPT_ASIDE = ".before-armtempo"
@@ -25,6 +26,8 @@ KEPT_ASIDE = ".before-armtempo"
 _START_S = 20.0
 """A board starts the program within this time after a reset."""
 _LOOK_S = 0.5
+_PROMPTS = 2
+"""Once the prompt may be the one from before the reset."""
 
 
 def deploy(port: str, mpy: bool, tell: Tell, progress: Progress) -> None:
@@ -134,13 +137,15 @@ def _verify(remote: Remote, library: Mapping[str, bytes]) -> None:
 def _confirm(port: str) -> None:
     """Wait until the board has started the program; LinkError where it does not."""
     limit = time.monotonic() + _START_S
+    prompts = 0
     while True:
         try:
             with open_board(port):
                 return
         except (LinkError, InputError) as error:
-            if time.monotonic() > limit:
+            prompts += isinstance(error, Prompt)
+            if prompts >= _PROMPTS or time.monotonic() > limit:
                 raise LinkError(
-                    f"the files are on the board, but the program does not start: {error}"
+                    f"the files are on the board, but the program does not start: {error}; {RECOVERY}"
                 ) from None
             time.sleep(_LOOK_S)

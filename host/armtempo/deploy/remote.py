@@ -17,6 +17,7 @@ from armtempo.errors import LinkError
 
 SILENCE_S = 30.0
 """No step of ours takes longer without a word; mpremote itself would wait for ever."""
+RECOVERY = "see host/docs/recovery.md"
 _SURVEY = Path(__file__).with_name("survey.txt")
 
 
@@ -73,7 +74,8 @@ class Remote:
                     (text.strip() for text in reversed(said) if text.strip()), "the board fell silent"
                 )
                 raise LinkError(
-                    f"mpremote failed on {self.port}: {last}; what was begun is repaired by doing it again"
+                    f"mpremote failed on {self.port}: {last}; what was begun is repaired by doing it again; "
+                    f"where that fails too: {RECOVERY}"
                 )
 
     def survey(self) -> Survey:

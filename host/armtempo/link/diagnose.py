@@ -13,6 +13,10 @@ _NUDGE = b"\r\x02\r"
 """Ends a line, leaves a raw REPL, asks for a prompt; without meaning to the board program."""
 
 
+class Prompt(LinkError):
+    """MicroPython's prompt answers."""
+
+
 class Garbled(LinkError):
     """Pieces of frames arrive, but none whole: worth another try."""
 
@@ -23,7 +27,7 @@ def explain(transport: Transport, heard: bytes) -> LinkError:
     heard += _listen(transport)
     where = f"the board on {transport.name}"
     if any(sign in heard for sign in _REPL_SIGNS):
-        return LinkError(
+        return Prompt(
             f"{where} runs MicroPython but not the armtempo program; install it with 'armtempo deploy'"
         )
     if SYNC in heard:

@@ -49,7 +49,8 @@ def stat(path):
 
 def statvfs(path):
     """Block size, fragment size, blocks, free blocks, …"""
-    the.flash.real(path)
+    if the.flash.absolute(path) != "/":
+        the.flash.real(path)
     free = the.flash.free_blocks()
     return (_flash.BLOCK, _flash.BLOCK, the.flash.size, free, free, 0, 0, 0, 0, 255)
 
