@@ -10,7 +10,7 @@ import numpy as np
 
 from armtempo import analyse, page, plots, report
 from armtempo.errors import RunFolderError
-from armtempo.record import replace_text
+from armtempo.files import replace_text
 
 PAGE = "comparison.html"
 

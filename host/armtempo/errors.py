@@ -6,7 +6,7 @@
     ├── InputError               the user's file, option or argument is wrong (exit code 2)
     ├── PlanError                no plan under these limits, or no posture for this pose
     ├── MissingPackageError      an optional package is not installed
-    ├── RunFolderError           a recorded run cannot be read or is not whole
+    ├── RunFolderError           a recorded run cannot be read, is not whole, or cannot be written
     └── LinkError                the board cannot be reached or stopped answering
         └── BoardError           the board answered, and refused; carries its code
 
@@ -37,7 +37,7 @@ class MissingPackageError(ArmtempoError):
 
 
 class RunFolderError(ArmtempoError):
-    """A run folder is incomplete or contradicts itself."""
+    """A run folder is incomplete, contradicts itself, or cannot be written."""
 
 
 class LinkError(ArmtempoError):

@@ -80,8 +80,12 @@ def replay(
 ) -> RunEnd:
     """Start a stored motion and follow it to its end; a stop request makes the board brake.
 
-    Whatever fails here stops the board. Raises BoardError where the board refuses to start.
+    Whatever fails here stops the board. Raises BoardError where the board refuses to start, KeyboardInterrupt
+    where the stop request was there before.
     """
+    board.session.hurried = lambda: stop.wanted
+    if stop.wanted:
+        raise KeyboardInterrupt
     run, duration_s = board.start(motion.name, motion.crc, flags)
     follower = Follower(board, run)
     braking = _Brake(board, stop)

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from armtempo_shared.limits import MAX_NAME
+from armtempo_shared.wire import record_crc
 
 from armtempo import decode, encode, moves, operate, record, trajectory_file
 from armtempo.arm import Arm
@@ -41,6 +42,11 @@ class Motion:
     data: bytes
     plan: Plan | None
     """How it was planned, where that is known."""
+
+    @property
+    def stored(self) -> operate.Stored:
+        """What the board knows it by."""
+        return operate.Stored(self.name, record_crc(self.data))
 
     @property
     def start_deg(self) -> Array:
@@ -69,11 +75,13 @@ def from_board(board: Board, name: str, arm: Arm) -> Motion:
     return Motion(name, arm, decode.trajectory(data, arm, name), data, None)
 
 
-def bring_to_start(board: Board, port: str, motion: Motion, stop: StopRequest) -> None:
-    """Home a virtual board and move it to the motion's start; a real arm must stand there already.
+def prepare(board: Board, port: str, motion: Motion, stop: StopRequest) -> None:
+    """Upload the motion; home a virtual board and move it to the start; a real arm must stand there already.
 
-    Raises LinkError, with what to do, where it does not.
+    Raises BoardError where the board does not take it, LinkError, with what to do, where the arm stands
+    elsewhere.
     """
+    operate.store(board, motion.name, motion.data)
     if is_sim(port):
         operate.home(board, motion.arm)
         operate.go_to(board, motion.arm, motion.start_deg, stop)
@@ -93,7 +101,7 @@ def new_run(parent: Path, motion: Motion, port: str, board: Board) -> RunFolder:
         "motion_crc": motion.data[-4:][::-1].hex(),
     }
     folder = RunFolder(record.new_folder(parent, motion.name), motion.name, record.scales(motion.arm), origin)
-    (folder.path / record.MOTION).write_bytes(motion.data)
+    folder.write_motion(motion.data)
     if motion.plan is not None:
         trajectory_file.save(motion.plan, folder.path / record.TRAJECTORY)
     folder.write()
@@ -108,19 +116,18 @@ def repeat(
     stop: StopRequest,
     watch: operate.Take = lambda *_: None,
 ) -> Iterator[Repetition]:
-    """Upload the motion and replay it ``times`` times, with the motion backwards in between.
+    """Replay a motion that has been prepared ``times`` times, with the motion backwards in between.
 
     ``watch`` sees each sample. Gives each repetition when it has ended; a fault or a stop request ends the
     series.
     """
-    stored = operate.store(board, motion.name, motion.data)
     back = moves.backwards(motion.trajectory, operate.TEMPORARY + "back")
     for number in range(times):
         if number:
             operate.move_once(board, motion.arm, back, stop)
         if stop.wanted:
             return
-        end = operate.replay_recorded(board, motion=stored, folder=folder, stop=stop, watch=watch)
+        end = operate.replay_recorded(board, motion=motion.stored, folder=folder, stop=stop, watch=watch)
         yield folder.repetitions[-1]
         operate.raise_fault(end)
 

@@ -15,8 +15,8 @@ from __future__ import annotations
 
 import csv
 import json
-import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -28,7 +28,8 @@ from armtempo_shared import limits
 from armtempo import __version__
 from armtempo.arm import Arm
 from armtempo.encode import counts_per_deg, steps_per_deg
-from armtempo.errors import InputError
+from armtempo.errors import InputError, RunFolderError
+from armtempo.files import replace_text
 from armtempo.link.messages import Sample, Stand
 
 FORMAT = "armtempo run"
@@ -136,6 +137,11 @@ class RunFolder:
         }
         replace_text(self.path / META, json.dumps(meta, indent=2, ensure_ascii=False) + "\n")
 
+    def write_motion(self, data: bytes) -> None:
+        """Keep the record that the board replays; RunFolderError where it cannot be written."""
+        with _writing(self.path / MOTION):
+            (self.path / MOTION).write_bytes(data)
+
     def begin_repetition(self) -> SampleFile:
         """A new sample file; it must be used as a context."""
         repetition = Repetition(f"samples-{len(self.repetitions) + 1:02d}.csv")
@@ -150,18 +156,21 @@ class SampleFile:
     def __init__(self, folder: RunFolder, repetition: Repetition) -> None:
         self.repetition = repetition
         self._folder = folder
-        self._file = (folder.path / repetition.file).open("x", newline="", encoding="utf-8")
+        self._path = folder.path / repetition.file
+        with _writing(self._path):
+            self._file = self._path.open("x", newline="", encoding="utf-8")
         self._csv = csv.writer(self._file, lineterminator="\n")
         self._line(list(columns(folder.joints)))
 
     def append(self, sample: Sample) -> None:
-        """Add one sample."""
+        """Add one sample; RunFolderError where it cannot be written."""
         self._line(row(sample, self._folder.joints))
         self.repetition.samples += 1
 
     def _line(self, cells: list[str]) -> None:
-        self._csv.writerow(cells)
-        self._file.flush()
+        with _writing(self._path):
+            self._csv.writerow(cells)
+            self._file.flush()
 
     def __enter__(self) -> Self:
         return self
@@ -169,10 +178,15 @@ class SampleFile:
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._file.close()
+        with suppress(OSError):  # what could not be written has been said
+            self._file.close()
         if self.repetition.state == RUNNING:
             self.repetition.state = INTERRUPTED if kind is KeyboardInterrupt else BROKEN
-        self._folder.write()
+        try:
+            self._folder.write()
+        except InputError:
+            if value is None:  # else the first error says more
+                raise
 
 
 def new_folder(parent: Path, name: str) -> Path:
@@ -180,7 +194,7 @@ def new_folder(parent: Path, name: str) -> Path:
     try:
         for number in range(1, 10_000):
             path = parent / f"{name}-{number:03d}"
-            if not path.exists():
+            with suppress(FileExistsError):  # another run may be making it at this moment
                 path.mkdir(parents=True)
                 return path
     except OSError as error:
@@ -188,11 +202,14 @@ def new_folder(parent: Path, name: str) -> Path:
     raise InputError(f"{parent} holds 9999 runs of {name!r}; move some away")
 
 
-def replace_text(path: Path, text: str) -> None:
-    """Write a file aside and put it in place of the old one, so that it is never half there."""
-    aside = path.with_name(path.name + ".new")
-    aside.write_text(text, encoding="utf-8")
-    os.replace(aside, path)
+@contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise RunFolderError(
+            f"{path}: cannot be written: {error.strerror}; what came before is kept; make room, then run again"
+        ) from None
 
 
 def _now() -> str:

@@ -13,8 +13,9 @@ from armtempo import analyse, page, plan_page, plots, reach, runs, trajectory_fi
 from armtempo.arm import Arm, Limits
 from armtempo.encode import counts_per_deg
 from armtempo.errors import RunFolderError
+from armtempo.files import replace_text
 from armtempo.plan import Plan
-from armtempo.record import COMPLETE, replace_text
+from armtempo.record import COMPLETE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

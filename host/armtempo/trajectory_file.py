@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ from armtempo_shared.basis import BASIS
 
 from armtempo import strictjson
 from armtempo.errors import InputError
+from armtempo.files import replace_text
 from armtempo.plan import Plan
 from armtempo.trajectory import JointSpline
 
@@ -20,20 +20,13 @@ VERSION = 1
 
 
 def save(plan: Plan, path: Path | str) -> None:
-    """Writes the plan aside and renames it, so that no half file is ever seen.
+    """Writes the plan whole or not at all.
 
     Raises InputError where the file cannot be written.
     """
     content = {"format": FORMAT, "version": VERSION, "plan": strictjson.encode(plan)}
     text = json.dumps(content, indent=1, allow_nan=False)
-    target = Path(path)
-    aside = target.with_name(f".{target.name}.{os.getpid()}.new")
-    try:
-        aside.write_text(text + "\n", encoding="utf-8")
-        os.replace(aside, target)
-    except OSError as error:
-        aside.unlink(missing_ok=True)
-        raise InputError(f"{path}: cannot be written: {error.strerror}; choose another place") from None
+    replace_text(Path(path), text + "\n")
 
 
 def load(path: Path | str) -> Plan:

@@ -282,8 +282,8 @@ def test_found_ports_put_boards_first() -> None:
 def test_recorded_traffic_replays(tmp_path: Path) -> None:
     path = tmp_path / "traffic.log"
     pipe = Pipe(tmp_path / "flash")
-    with path.open("w", encoding="utf-8") as file:
-        logged = traffic.LoggedTransport(pipe, traffic.writer(file))
+    with traffic.LogFile(path) as log:
+        logged = traffic.LoggedTransport(pipe, log)
         seen = [Board(Session(logged, pipe.clock), 1).hello()]
     path.write_text(path.read_text(encoding="utf-8") + "0.1\t<\tcut", encoding="utf-8")
     replayed = Board(Session(ReplayTransport(traffic.read_log(path))), 1)
@@ -332,3 +332,52 @@ def test_a_board_that_does_not_stop_is_given_up(tmp_path: Path, monkeypatch: pyt
     with pytest.raises(LinkError, match="does not; switch off"):
         operate.stop(board, now=False)
     assert pipe.clock() - begin_s < 15.0
+
+
+def test_a_cable_that_is_out_does_not_keep_who_wants_an_end(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, data = ready(pipe)
+    stop = StopRequest()
+    ended_s = [0.0]
+
+    def unplug(sample: Sample, duration_s: float) -> None:
+        pipe.unplug_for(1000.0)
+        stop.wanted = True
+        ended_s[0] = pipe.clock()
+
+    with pytest.raises(LinkError, match="could not be told to stop"):
+        operate.replay(board, operate.Stored("feed", wire.record_crc(data)), stop, unplug)
+    assert pipe.clock() - ended_s[0] < 10.0
+
+
+def test_what_was_to_stop_before_does_not_start(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, data = ready(pipe)
+    stop = StopRequest()
+    stop.wanted = True
+    with pytest.raises(KeyboardInterrupt):
+        operate.replay(board, operate.Stored("feed", wire.record_crc(data)), stop)
+    assert pipe.app.engine.calls.count("start") == 0
+
+
+def test_a_log_on_a_full_disk_is_cut_short_and_the_traffic_goes_on(tmp_path: Path) -> None:
+    full = Path("/dev/full")
+    if not full.exists():  # not on every system
+        return
+    pipe = Pipe(tmp_path / "flash")
+    with pytest.raises(InputError, match="cut short: No space left"), traffic.LogFile(full) as log:  # noqa: PT012
+        board = Board(Session(traffic.LoggedTransport(pipe, log), pipe.clock), 1)
+        board.hello()
+        board.status()
+    with pytest.raises(InputError, match="cannot be written"):
+        traffic.LogFile(tmp_path)
+
+
+def test_what_is_no_serial_port_is_said_to_be_none(tmp_path: Path) -> None:
+    for path in (tmp_path, Path("/dev/null"), tmp_path / "file"):
+        if path.name == "file":
+            path.write_text("")
+        with pytest.raises(InputError, match=f"{path} is not a serial port"):
+            SerialTransport(str(path))
+    with pytest.raises(InputError, match="names no folder"):
+        ports.sim_flash("sim:")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from pathlib import Path
 
@@ -99,3 +100,29 @@ def test_damaged_folders_are_named(tmp_path: Path) -> None:
     meta_path.write_text("{")
     with pytest.raises(RunFolderError, match="damaged"):
         runs.load(run.path)
+
+
+def test_full_disk_is_said_and_what_came_before_is_kept(tmp_path: Path) -> None:
+    full = Path("/dev/full")
+    if not full.exists():  # not on every system
+        return
+    run = folder(tmp_path)
+    with (  # noqa: PT012
+        pytest.raises(RunFolderError, match=r"samples-01\.csv: cannot be written: No space"),
+        run.begin_repetition() as file,
+    ):
+        file.append(sample(0))
+        file._file.close()
+        file._file = full.open("w", encoding="utf-8", newline="")
+        file._csv = csv.writer(file._file)
+        file.append(sample(1))
+    found = runs.load(run.path).repetitions[0]
+    assert (found.state, found.index.tolist()) == (record.BROKEN, [0])
+
+
+def test_two_runs_at_once_get_folders_of_their_own(tmp_path: Path) -> None:
+    (tmp_path / "feed-001").symlink_to(tmp_path / "nowhere")  # as if it came into being after a look
+    assert record.new_folder(tmp_path, "feed").name == "feed-002"
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="the run folder cannot be made"):
+        record.new_folder(tmp_path / "file", "feed")

@@ -87,7 +87,7 @@ def replay(trajectory: Path, interpreter: str, folder: Path) -> Replay:
         StopRequest() as stop,
     ):
         operate.configure(board, motion.arm, replace=True)
-        pipeline.bring_to_start(board, "sim", motion, stop)
+        pipeline.prepare(board, "sim", motion, stop)
         run = pipeline.new_run(folder, motion, "sim", board)
         assert len(list(pipeline.repeat(board, motion, run, 1, stop))) == 1
     recorded = runs.load(run.path)

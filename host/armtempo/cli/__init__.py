@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from importlib import import_module
 from keyword import iskeyword
@@ -68,9 +69,20 @@ class LazyGroup(click.Group):
         except ArmtempoError as error:
             click.echo(f"armtempo: {error}", err=True)
             ctx.exit(error.exit_code)
+        except OSError as error:
+            if error.errno == errno.EPIPE:  # whoever read the output has gone: click ends quietly
+                raise
+            click.echo(f"armtempo: {_of_file(error)}", err=True)
+            ctx.exit(1)
         except KeyboardInterrupt:
             click.echo("armtempo: interrupted", err=True)
             ctx.exit(INTERRUPTED)
+
+
+def _of_file(error: OSError) -> str:
+    """What the system says of a file, in words."""
+    where = f"{error.filename}: " if error.filename else ""
+    return f"{where}{error.strerror or error}; look after the path, its permissions and the room on the disk"
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})

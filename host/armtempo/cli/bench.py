@@ -123,7 +123,7 @@ def _run(
 def _write(out: Path, found: Sequence[Row], with_paper: bool, plot: bool) -> None:
     """Table and curves to the terminal and to files."""
     from armtempo import bench_table
-    from armtempo.record import replace_text
+    from armtempo.files import replace_text
 
     for line in bench_table.text(found, with_paper):
         click.echo(line)

@@ -37,10 +37,11 @@ def command(
         raise click.UsageError("give either WHERE or --switches")
     arm = options.load_arm(arm_path)
     angles_deg = operate.home_deg(arm) if where is None else posture.parse(where, arm, job_path)
-    with options.board(port, log_traffic, arm) as board, StopRequest() as stop:
+    with options.board(port, log_traffic, arm) as board:
         operate.configure(board, arm, replace=arm_path is not None)
         if switches:
-            homing.home_to_switches(board, arm, stop)
+            with StopRequest() as stop:
+                homing.home_to_switches(board, arm, stop)
         else:
             operate.home(board, arm, angles_deg)
         stands_deg = operate.posture_deg(board, arm)

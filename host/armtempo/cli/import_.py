@@ -27,8 +27,8 @@ def command(table: Path, arm_path: Path | None, name: str | None, radians: bool,
 
     from armtempo import exchange
     from armtempo.errors import InputError
+    from armtempo.files import replace_text
     from armtempo.job import load_job
-    from armtempo.record import replace_text
 
     arm = options.load_arm(arm_path)
     title = name or table.stem

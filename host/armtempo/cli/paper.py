@@ -28,8 +28,8 @@ def command(quick: bool, out: Path) -> None:
 
     The replays run on the virtual board.
     """
+    from armtempo.files import replace_text
     from armtempo.paper import experiment, motions, postures, searches, sheet
-    from armtempo.record import replace_text
 
     made = motions.plans()
     with Progress("searching") as progress:

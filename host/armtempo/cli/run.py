@@ -55,13 +55,13 @@ def _told(done: Repetition) -> str:
 
 
 def replay(board: Board, port: str, motion: Motion, repeat: int, out: Path, live: bool = False) -> Path:
-    """Bring the arm to the start, replay, record, tell; gives the run folder."""
+    """Upload, bring the arm to the start, replay, record, tell; gives the run folder."""
     from armtempo import pipeline
     from armtempo.cli.live import Live
     from armtempo.interrupt import StopRequest
 
     with StopRequest() as stop:
-        pipeline.bring_to_start(board, port, motion, stop)
+        pipeline.prepare(board, port, motion, stop)
         folder = pipeline.new_run(out, motion, port, board)
         click.echo(f"{motion.name}: {motion.trajectory.duration_s:.3f} s, into {folder.path}")
         with Live(motion, window=live) as watch:

@@ -8,7 +8,7 @@ from pathlib import Path
 from armtempo import __version__
 from armtempo.deploy import program
 from armtempo.errors import InputError
-from armtempo.record import replace_text
+from armtempo.files import replace_text
 
 PACKAGE = "package.json"
 STM32F4 = 6 | 3 << 8 | 7 << 10

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from armtempo.arm import Arm
 from armtempo.boardfiles import own_crc
-from armtempo.errors import BoardError, InputError, LinkError
+from armtempo.errors import BoardError, LinkError
 from armtempo.link import diagnose, ports, traffic
 from armtempo.link.board import Board
 from armtempo.link.session import NoAnswer, Session
@@ -36,7 +36,9 @@ def open_board(
     """
     with ExitStack() as stack:
         device = stack.enter_context(_virtual_port(port, arm)) if ports.is_sim(port) else port
-        sinks = _sinks(stack, log_traffic, sink)
+        sinks = [] if sink is None else [sink]
+        if log_traffic is not None:
+            sinks.append(stack.enter_context(traffic.LogFile(log_traffic)))
 
         def open_transport() -> Transport:
             transport: Transport = SerialTransport(device)
@@ -98,13 +100,3 @@ def _virtual_port(port: str, arm: Arm | None) -> Iterator[str]:
             if isinstance(error, BoardError) or not words:
                 raise
             raise LinkError(f"{error}; the virtual board says: {words[0]}") from error
-
-
-def _sinks(stack: ExitStack, path: Path | None, sink: traffic.Sink | None) -> list[traffic.Sink]:
-    found = [] if sink is None else [sink]
-    if path is not None:
-        try:
-            found.append(traffic.writer(stack.enter_context(path.open("w", encoding="utf-8"))))
-        except OSError as error:
-            raise InputError(f"{path}: the traffic log cannot be written: {error.strerror}") from error
-    return found

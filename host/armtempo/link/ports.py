@@ -8,6 +8,8 @@ from pathlib import Path
 from serial.tools import list_ports
 from serial.tools.list_ports_common import ListPortInfo
 
+from armtempo.errors import InputError
+
 SIM = "sim"
 """The port name that stands for a virtual board; ``sim:FOLDER`` for one whose flash is that folder."""
 _VENDOR = 0xF055
@@ -31,8 +33,15 @@ def is_sim(port: str) -> bool:
 
 
 def sim_flash(port: str) -> Path | None:
-    """The folder that is the virtual board's flash; None: a new one that goes with the board."""
-    return Path(port[len(SIM) + 1 :]) if port.startswith(SIM + ":") else None
+    """The folder that is the virtual board's flash; None: a new one that goes with the board.
+
+    Raises InputError where the folder is not named.
+    """
+    if port == SIM:
+        return None
+    if port == SIM + ":":
+        raise InputError(f"port '{port}' names no folder; 'sim:FOLDER' keeps the flash there, 'sim' nowhere")
+    return Path(port[len(SIM) + 1 :])
 
 
 def find_ports() -> list[Port]:

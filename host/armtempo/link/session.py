@@ -28,6 +28,8 @@ QUIET_S = 0.05
 """Half a frame, then nothing for so long: its rest is not coming."""
 RECONNECT_S = 60.0
 """A port that broke is waited for so long."""
+HURRY_S = 5.0
+"""The same where somebody wants an end: long enough to tell the board once the plug is in again."""
 RETRY_S = 0.2
 """Between two attempts to open it."""
 RECENT = 512
@@ -55,6 +57,8 @@ class Session:
         self.reopen: Callable[[], Transport] | None = None
         self.tell: Callable[[str], None] = lambda text: None
         """Gets what a user should know while it happens."""
+        self.hurried: Callable[[], bool] = lambda: False
+        """Whether somebody wants an end: then a port that broke is waited for only HURRY_S."""
         self.events: deque[messages.Event] = deque()
         self.recent = bytearray()
         self.repeats = 0
@@ -168,11 +172,21 @@ class Session:
                 self.transport = self.reopen()
                 break
             except ArmtempoError:
+                if self.hurried():
+                    limit_s = min(limit_s, self.clock() + HURRY_S)
                 if self.clock() >= limit_s:
-                    raise reason from None
+                    raise self._gone(reason) from None
                 self.sleep(RETRY_S)
         self._heard_s = self.clock()
         self.tell(f"connected to {self.transport.name} again")
+
+    def _gone(self, reason: LinkError) -> LinkError:
+        if not self.hurried():
+            return reason
+        return LinkError(
+            f"{reason}; it could not be told to stop: what was moving may move on, see 'armtempo status' once it is "
+            "back"
+        )
 
     def _next_frame(self) -> messages.Frame | None:
         frame: messages.Frame | None = self._parser.next()

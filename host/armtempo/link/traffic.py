@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TextIO
+from types import TracebackType
+from typing import Any, Self
 
 from armtempo_shared import wire
 
@@ -111,15 +113,43 @@ class LoggedTransport:
         self._sink(chunk, self._decoder.feed(direction, data))
 
 
-def writer(file: TextIO) -> Sink:
-    """A sink that writes a log; each line is flushed, so that a killed program leaves a readable log."""
-    print(HEADER, file=file, flush=True)
+class LogFile:
+    """A sink that writes a log; used as a context. InputError where the file cannot be opened.
 
-    def write(chunk: Chunk, words: list[str]) -> None:
-        fields = (f"{chunk.time_s:.4f}", chunk.direction, chunk.data.hex(), "; ".join(words))
-        print("\t".join(fields), file=file, flush=True)
+    Each line is flushed, so that a killed program leaves a readable log. Where the disk fills up the log ends
+    and the traffic goes on; InputError says so when the context is left without another error.
+    """
 
-    return write
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._failed: OSError | None = None
+        try:
+            self._file = path.open("w", encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"{path}: the traffic log cannot be written: {error.strerror}") from error
+        self._line(HEADER)
+
+    def __call__(self, chunk: Chunk, words: list[str]) -> None:
+        """Write one chunk."""
+        self._line("\t".join((f"{chunk.time_s:.4f}", chunk.direction, chunk.data.hex(), "; ".join(words))))
+
+    def _line(self, text: str) -> None:
+        if self._failed is None:
+            try:
+                print(text, file=self._file, flush=True)
+            except OSError as error:
+                self._failed = error
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        with suppress(OSError):
+            self._file.close()
+        if self._failed is not None and value is None:
+            raise InputError(f"{self._path}: the traffic log is cut short: {self._failed.strerror}")
 
 
 def read_log(path: Path) -> Iterator[Chunk]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 from typing import Protocol
 
 import serial
@@ -78,7 +79,9 @@ def _open_error(port: str, error: Exception) -> LinkError | InputError:
     number = getattr(error, "errno", None)
     text = str(error)
     if number == errno.ENOENT or "FileNotFoundError" in text:
-        return InputError(f"there is no port {port}; {_ADVICE}")
+        return InputError(f"there is no port {port or chr(39) * 2}; {_ADVICE}")
+    if number in (errno.EISDIR, errno.ENOTTY) or os.strerror(errno.ENOTTY) in text:
+        return InputError(f"{port} is not a serial port; {_ADVICE}")
     if number in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in text:
         return LinkError(f"port {port} is in use by another program; close it and try again")
     if number == errno.EACCES or "PermissionError" in text:

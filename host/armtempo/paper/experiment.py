@@ -87,7 +87,7 @@ def _replayed(plan: Plan, folder: Path, times: int, stop: StopRequest, tell: Cal
     motion = pipeline.planned(plan)
     with open_board(SIM, arm=motion.arm) as board:
         operate.configure(board, motion.arm, replace=True)
-        pipeline.bring_to_start(board, SIM, motion, stop)
+        pipeline.prepare(board, SIM, motion, stop)
         run_folder = pipeline.new_run(folder, motion, SIM, board)
         for number, _ in enumerate(pipeline.repeat(board, motion, run_folder, times, stop), 1):
             tell(number / times)
@@ -95,7 +95,7 @@ def _replayed(plan: Plan, folder: Path, times: int, stop: StopRequest, tell: Cal
 
 
 def _failed(replay: Future[Path]) -> bool:
-    return replay.done() and replay.exception() is not None
+    return replay.done() and not isinstance(replay.exception(), KeyboardInterrupt | None)
 
 
 def _coincide(found: report.Evaluation) -> list[Claim]:

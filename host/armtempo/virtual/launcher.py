@@ -14,7 +14,7 @@ from pathlib import Path
 from types import TracebackType
 
 from armtempo.arm import Arm
-from armtempo.errors import LinkError
+from armtempo.errors import InputError, LinkError
 from armtempo.virtual.describe import describe
 from armtempo.virtual.folder import Folder
 from armtempo.virtual.options import Fault, Options, unique_id
@@ -140,12 +140,13 @@ def launch(
     are larger than for the chip's. ``button_s``: how long the user button is held from power-up on: safe mode
     from 0.6 to 1.2, a fresh file system from 1.2 to 1.8. ``sd_card``: folder that is an SD card in the board.
     ``damage``: ``"no file system"`` or ``"unreadable"``, what has befallen the flash. ``machine``: what the
-    firmware was built for. Raises LinkError where it does not start.
+    firmware was built for. Raises InputError where ``flash_dir`` cannot be made, LinkError where the board does
+    not start.
     """
     folder = Folder()
     flash = Path(flash_dir).resolve() if flash_dir else folder.path / "flash"
     try:
-        flash.mkdir(parents=True, exist_ok=True)
+        _make(flash)
         options = Options(
             flash=str(flash),
             program=[] if deployed else program_folders(),
@@ -174,6 +175,15 @@ def launch(
         board.__exit__(None, None, None)
         raise
     return board
+
+
+def _make(flash: Path) -> None:
+    try:
+        flash.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"{flash}: the virtual board's flash cannot be made there: {error.strerror}"
+        ) from None
 
 
 def program_folders() -> list[str]:
