@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 from armtempo_shared import motion
-from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS, MAX_STEP_RATE, MAX_STEP_RATE_SUM
+from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS, MAX_STEP_RATE, MAX_STEP_RATE_SUM, TICK_HZ
 
 from armtempo import extremes, optimise, spline
 from armtempo.arm import Arm, Joint, Limits
@@ -14,9 +14,15 @@ from armtempo.errors import InputError, PlanError
 from armtempo.extremes import Extremes
 from armtempo.job import Job
 from armtempo.spline import Array
+from armtempo.trajectory import JointSpline, Trajectory
 
 TOLERANCE = 1e-9
 """What rounding may leave: largest excess over a limit, relative, and over a range, in degrees."""
+
+LONGEST_TICKS, LONGEST_SPAN_TICKS = 1 << 38, 1 << 36
+MOST_STEPS, MOST_SPAN_STEPS = 1 << 27, 1 << 24
+"""What the board's evaluator can hold: largest control point, and span of the degree + 1 of one segment
+(the same bounds stand in ``armtempo_board/check.py``; a test compares them)."""
 
 FITNESS = ("stretched", "penalised")
 """Values of the job's parameter ``fitness``: ``stretched`` scales each candidate until it just keeps its
@@ -123,3 +129,36 @@ def check_reached(arm: Arm, reached: tuple[Extremes, ...]) -> None:
             f"the joints together could need {rates:.0f} steps/s, the board does {MAX_STEP_RATE_SUM} at "
             "most; lower the speed limits or use fewer microsteps"
         )
+
+
+def check_held(trajectory: Trajectory, arm: Arm) -> None:
+    """Raises PlanError where a control point is beyond what the board's evaluator can hold."""
+    for joint_spline, joint in zip(trajectory.joints, arm.driven, strict=True):
+        where = f"trajectory {trajectory.name!r}, {joint.name}"
+        _check_times(where, joint_spline)
+        assert joint.motor is not None
+        steps = joint_spline.angle_points_deg * joint.motor.steps_per_deg
+        if np.max(np.abs(steps)) >= MOST_STEPS or _span(steps, joint_spline.degree) >= MOST_SPAN_STEPS:
+            raise PlanError(f"{where}: more steps than the board can count; use fewer microsteps")
+
+
+def _check_times(where: str, joint_spline: JointSpline) -> None:
+    ticks = joint_spline.time_points_s * TICK_HZ
+    if np.max(np.abs(ticks)) >= LONGEST_TICKS:
+        raise PlanError(
+            f"{where}: lasts {joint_spline.duration_s:.0f} s, the board counts to "
+            f"{LONGEST_TICKS / TICK_HZ:.0f} s; split it"
+        )
+    span = _span(ticks, joint_spline.degree)
+    if span >= LONGEST_SPAN_TICKS:
+        raise PlanError(
+            f"{where}: its time segments are so long that {joint_spline.degree} of them span "
+            f"{span / TICK_HZ:.0f} s, the board holds {LONGEST_SPAN_TICKS / TICK_HZ:.0f} s; raise refine or add "
+            "via points"
+        )
+
+
+def _span(points: Array, degree: int) -> float:
+    """Largest distance among the degree + 1 control points of one segment."""
+    segments = np.lib.stride_tricks.sliding_window_view(points, degree + 1)
+    return float(np.max(np.ptp(segments, axis=1)))

@@ -9,6 +9,7 @@ import numpy as np
 from armtempo_shared import armrecord, limits, motion
 from numpy.typing import NDArray
 
+from armtempo import checks
 from armtempo.arm import Arm, Joint
 from armtempo.errors import InputError
 from armtempo.trajectory import Trajectory
@@ -28,7 +29,8 @@ def motion_record(trajectory: Trajectory, arm: Arm, brake_s: float = 0.0) -> byt
     """What the board replays (layout: ``armtempo_shared.motion``), tied to the arm by its crc.
 
     ``brake_s``: time in which the motion may brake to rest anywhere (0: not at all).
-    Raises InputError where trajectory and arm do not fit each other or the record's number range.
+    Raises InputError where trajectory and arm do not fit each other or the record's number range, PlanError
+    where the board could not hold the numbers.
     """
     if len(trajectory.joints) != len(arm.driven):
         raise InputError(
@@ -41,6 +43,7 @@ def motion_record(trajectory: Trajectory, arm: Arm, brake_s: float = 0.0) -> byt
     ]
     axes = trajectory.joints[:1] if trajectory.shared else trajectory.joints
     times = [_fixed(spline.time_points_s * limits.TICK_HZ, limits.TICK_FRACTION_BITS) for spline in axes]
+    checks.check_held(trajectory, arm)
     first = trajectory.joints[0]
     segments = len(first.angle_points_deg) - first.degree
     brake_ticks = round(brake_s * limits.TICK_HZ)

@@ -11,6 +11,7 @@ import numpy as np
 
 from armtempo.arm import Arm
 from armtempo.errors import InputError
+from armtempo.files import why
 from armtempo.plan import Plan
 from armtempo.spline import Array
 
@@ -79,7 +80,7 @@ def via_from_csv(path: Path, arm: Arm, radians: bool = False) -> Array:
                 (number, row) for number, row in enumerate(csv.reader(file), 1) if any(map(str.strip, row))
             ]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+        raise InputError(f"{path}: cannot be read: {why(error)}") from None
     columns = list(range(len(arm.driven)))
     if rows and not all(map(_is_number, rows[0][1])):
         columns = _columns(path, rows.pop(0)[1], arm)

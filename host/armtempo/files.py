@@ -20,7 +20,12 @@ def replace_text(path: Path, text: str) -> None:
         else:
             _replace(path.resolve(), text)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}; choose another place") from None
+        raise InputError(f"{path}: cannot be written: {why(error)}; choose another place") from None
+
+
+def why(error: Exception) -> str:
+    """What the system or a decoder says, without the path that the caller names."""
+    return getattr(error, "strerror", None) or str(error)
 
 
 def _replace(path: Path, text: str) -> None:

@@ -55,7 +55,9 @@ class Motion:
 
 
 def planned(plan: Plan, name: str | None = None) -> Motion:
-    """The motion of a plan; ``name`` for the board, else made of the job's."""
+    """The motion of a plan; ``name`` for the board, else made of the job's. InputError for a wrong one."""
+    if name is not None and not re.fullmatch(f"[A-Za-z0-9_-]{{1,{MAX_NAME}}}", name):
+        raise InputError(f"{name!r} is no name for the board: 1 to {MAX_NAME} characters of a-z A-Z 0-9 - _")
     board_name = name or re.sub(r"[^A-Za-z0-9_-]", "-", plan.job.name)[:MAX_NAME]
     data = operate.motion_data(plan.trajectory, plan.arm)
     return Motion(board_name, plan.arm, plan.trajectory, data, plan)

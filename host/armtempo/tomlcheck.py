@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from armtempo.errors import InputError
+from armtempo.files import why
 
 _REQUIRED: Any = object()
 
@@ -24,7 +25,7 @@ def read(path: Path | str) -> Table:
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file") from None
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from None
+        raise InputError(f"{path}: cannot be read: {why(error)}") from None
     try:
         return Table(tomllib.loads(text), str(path))
     except tomllib.TOMLDecodeError as error:

@@ -11,7 +11,7 @@ from armtempo_shared.basis import BASIS
 
 from armtempo import strictjson
 from armtempo.errors import InputError
-from armtempo.files import replace_text
+from armtempo.files import replace_text, why
 from armtempo.plan import Plan
 from armtempo.trajectory import JointSpline
 
@@ -56,7 +56,7 @@ def _read(path: Path | str) -> Any:
     except FileNotFoundError:
         raise InputError(f"{path}: no such file") from None
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from None
+        raise InputError(f"{path}: cannot be read: {why(error)}") from None
     try:
         return json.loads(text, parse_constant=_refuse)
     except (ValueError, RecursionError) as error:

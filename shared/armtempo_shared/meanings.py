@@ -20,7 +20,7 @@ _ROWS = (
     ("bad_record", "the record is damaged or of an unknown kind", "upload it again"),
     ("bad_offset", "a piece of the upload is out of order", "upload it again"),
     ("bad_checksum", "the upload does not match its checksum", "upload it again"),
-    ("exists", "this name is taken", "remove it first"),
+    ("exists", "this name is taken, perhaps in other letter case", "remove or rename the other"),
     ("wrong_joints", "the motion has another number of joints than the arm", "plan it for this arm"),
     ("time_order", "the time control points do not increase", "plan it again"),
     ("out_of_range", "the motion leaves the joint's range", "check the via points or the range"),

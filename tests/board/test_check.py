@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from armtempo import checks
 from armtempo_shared import codes, limits, motion
 
 from tests import interpreters
@@ -108,3 +109,29 @@ def test_reversal_that_the_driver_cannot_follow(interpreter: str, tmp_path: Path
     assert verdicts[1] is not None
     assert verdicts[1][0] == codes.TOO_ABRUPT
     assert verdicts[1][2] > 0.16 * (limits.TICK_HZ / walking.GAP_TICKS) ** 2
+
+
+def test_numbers_beyond_the_evaluator(interpreter: str, tmp_path: Path) -> None:
+    """The bounds are those by which the host refuses a plan."""
+    span_s, most_s = (ticks / limits.TICK_HZ for ticks in (checks.LONGEST_SPAN_TICKS, checks.LONGEST_TICKS))
+    span_steps, segments = float(checks.MOST_SPAN_STEPS), 100
+    spread = [most_s * part / (segments + 2) for part in range(segments + 3)]
+    flat = [0.0] * (segments + 3)
+    verdicts = judge(
+        interpreter,
+        tmp_path,
+        straight([0.0, span_s / 3, 2 * span_s / 3, span_s], [0.0] * 4),
+        straight([0.0, span_s / 3, 2 * span_s / 3, span_s - 1e-3], [0.0] * 4),
+        straight(spread, flat),
+        straight([*spread[:-1], most_s - 1e-3], flat),
+        straight([0.0, 1.0, 2.0, 3.0], [0.0, 0.0, 0.0, span_steps]),
+        low=-(1 << 26),
+        high=1 << 26,
+    )
+    assert [verdict[0] if verdict else 0 for verdict in verdicts] == [
+        codes.TOO_LONG,
+        0,
+        codes.TOO_LONG,
+        0,
+        codes.TOO_LONG,
+    ]

@@ -74,7 +74,8 @@ def test_store_commands(run: Run, file: str) -> None:
     run("remove", "small-2")
     assert "small" not in run("list").output
     assert "no trajectory of this name" in run("remove", "small", code=1).output
-    assert "empty, too long or has other characters" in run("upload", file, "--name", "a b", code=1).output
+    assert "is no name for the board" in run("upload", file, "--name", "a b", code=2).output
+    assert "empty, too long or has other characters" in run("rename", "x", "a b", code=1).output
 
 
 def test_run_writes_a_folder(run: Run, file: str, pipe: Pipe) -> None:

@@ -7,9 +7,9 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from armtempo import encode
+from armtempo import checks, encode
 from armtempo.arm import Limits, default_path, load_arm
-from armtempo.errors import InputError
+from armtempo.errors import InputError, PlanError
 from armtempo.trajectory import JointSpline, Trajectory
 from armtempo_shared import armrecord, limits, motion
 
@@ -78,3 +78,25 @@ def test_numbers_the_record_cannot_hold_are_refused() -> None:
     huge = replace(first, angle_points_deg=first.angle_points_deg * 1e12)
     with pytest.raises(InputError, match="too large"):
         encode.motion_record(replace(trajectory(False), joints=(huge, *others)), ARM)
+
+
+def spread(seconds: float, deg: float = 10.0, segments: int = 4) -> Trajectory:
+    """Straight lines to ``deg`` in ``seconds``."""
+    joints = tuple(
+        JointSpline(5, 1, np.linspace(0.0, deg, segments + 5), np.linspace(0.0, seconds, segments + 5))
+        for _ in ARM.driven
+    )
+    return Trajectory("t", joints, shared=False)
+
+
+def test_numbers_that_the_board_cannot_hold_are_refused_as_it_does() -> None:
+    span_s, most_s = checks.LONGEST_SPAN_TICKS / limits.TICK_HZ, checks.LONGEST_TICKS / limits.TICK_HZ
+    for made, words in (
+        (spread(span_s * 8 / 5), "raise refine or add via points"),
+        (spread(most_s, segments=100), "split it"),
+        (spread(1.0, 1e6), "more steps than the board can count"),
+    ):
+        with pytest.raises(PlanError, match=words):
+            encode.motion_record(made, ARM)
+    for made in (spread(span_s * 8 / 5 - 1), spread(most_s - 1, segments=100)):
+        encode.motion_record(made, ARM)

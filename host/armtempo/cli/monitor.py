@@ -24,9 +24,7 @@ def command(file: Path | None, port: str, log_traffic: Path | None) -> None:
     if file is not None:
         _show_file(file)
         return
-    from armtempo.link import open_board
-
-    with open_board(port, log_traffic, _show) as board:
+    with options.board(port, log_traffic, any_program=True, sink=_show) as board:
         while True:
             board.status()
             board.session.poll(_EVERY_S)

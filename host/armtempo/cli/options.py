@@ -12,6 +12,7 @@ import click
 if TYPE_CHECKING:
     from armtempo.arm import Arm
     from armtempo.link import Board
+    from armtempo.link.traffic import Sink
 
 port = click.option(
     "--port",
@@ -37,6 +38,16 @@ arm = click.option(
     type=click.Path(path_type=Path),
     metavar="FILE",
     help="Arm file (TOML); without it the paper's 1:5 arm.",
+)
+arm_of_file = click.option(
+    "--arm",
+    "arm_path",
+    envvar="ARMTEMPO_ARM",
+    show_envvar=True,
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Arm file (TOML), which a trajectory file must fit; without it the one in that file, else the paper's "
+    "1:5 arm.",
 )
 job = click.option(
     "--job",
@@ -64,11 +75,15 @@ def load_arm(path: Path | None) -> Arm:
 
 @contextmanager
 def board(
-    port: str, log_traffic: Path | None = None, arm: Arm | None = None, any_program: bool = False
+    port: str,
+    log_traffic: Path | None = None,
+    arm: Arm | None = None,
+    any_program: bool = False,
+    sink: Sink | None = None,
 ) -> Iterator[Board]:
-    """The board of ``--port``, greeted; a virtual one moves ``arm``."""
+    """The board of ``--port``, greeted; a virtual one moves ``arm``; ``sink`` takes the traffic."""
     from armtempo.link import open_board
 
-    with open_board(port, log_traffic, arm=arm, any_program=any_program) as found:
+    with open_board(port, log_traffic, sink, arm, any_program) as found:
         found.session.tell = lambda text: click.echo(text, err=True)
         yield found

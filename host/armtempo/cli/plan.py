@@ -37,8 +37,9 @@ def command(job_path: Path | None, arm_path: Path | None, output: Path | None, *
     """Plan a job and write its trajectory file."""
     from dataclasses import replace
 
+    from armtempo import checks, planner, summary, trajectory_file
     from armtempo import job as jobs
-    from armtempo import planner, summary, trajectory_file
+    from armtempo.errors import PlanError
 
     arm = options.load_arm(arm_path)
     job = jobs.load_job(job_path or jobs.default_path(), arm)
@@ -53,3 +54,7 @@ def command(job_path: Path | None, arm_path: Path | None, output: Path | None, *
     for line in summary.lines(plan):
         click.echo(line)
     click.echo(f"written: {target}")
+    try:
+        checks.check_held(plan.trajectory, arm)
+    except PlanError as error:
+        click.echo(f"not for a board as it is: {error}", err=True)

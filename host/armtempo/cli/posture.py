@@ -18,16 +18,16 @@ if TYPE_CHECKING:
 def parse(text: str, arm: Arm, job_path: Path | None) -> Array:
     """Angles in degrees (J,): of '0,-60,40', of 'P3' in the job, or of the start of 'file.json'.
 
-    Raises InputError where the text is none of these.
+    Raises InputError where the text is none of these, or does not fit the arm.
     """
     from armtempo import moves
 
     if re.fullmatch(r"[Pp]\d+", text):
         return _via(int(text[1:]), arm, job_path)
     if text.endswith(".json"):
-        from armtempo import trajectory_file
+        from armtempo import pipeline
 
-        return trajectory_file.load(text).trajectory(0.0)
+        return pipeline.from_file(Path(text), arm).start_deg
     try:
         angles_deg = [float(cell) for cell in text.split(",")]
     except ValueError:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @click.option("--repeat", type=click.IntRange(1, 99), default=1, show_default=True, help="Repetitions.")
 @click.option("--live", is_flag=True, help="Open a window that follows the run (matplotlib and a display).")
 @options.out
-@options.arm
+@options.arm_of_file
 @options.port
 @options.log_traffic
 def command(
@@ -44,7 +44,7 @@ def command(
 
 def _file(what: str) -> Path | None:
     path = Path(what)
-    return path if path.suffix == ".json" or path.exists() else None
+    return path if path.suffix == ".json" or path.is_file() else None
 
 
 def _told(done: Repetition) -> str:

@@ -14,7 +14,7 @@ from armtempo.cli.progress import Progress
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--name", metavar="NAME", help="Name on the board; without it the job's name.")
 @click.option("--default", "as_default", is_flag=True, help="Let the board's button start it.")
-@options.arm
+@options.arm_of_file
 @options.port
 @options.log_traffic
 def command(

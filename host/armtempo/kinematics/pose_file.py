@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from armtempo.errors import InputError
+from armtempo.files import why
 from armtempo.kinematics.geometry import Array
 from armtempo.pose import checked, from_quaternion, from_rpy
 
@@ -25,7 +26,7 @@ def read(path: Path | str) -> list[Array]:
     try:
         text = Path(path).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as text ({error})") from error
+        raise InputError(f"{path}: cannot be read as text ({why(error)})") from error
     poses = []
     for number, line in enumerate(text.splitlines(), 1):
         content = line.split("#")[0]

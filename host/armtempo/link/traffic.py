@@ -18,6 +18,7 @@ from typing import Any, Self
 from armtempo_shared import wire
 
 from armtempo.errors import InputError
+from armtempo.files import why
 from armtempo.link.transport import Transport
 
 HEADER = "# armtempo traffic 1"
@@ -157,7 +158,7 @@ def read_log(path: Path) -> Iterator[Chunk]:
     try:
         lines = path.read_text(encoding="utf-8").split("\n")
     except (OSError, UnicodeError) as error:
-        raise InputError(f"{path}: the traffic log cannot be read: {error}") from error
+        raise InputError(f"{path}: the traffic log cannot be read: {why(error)}") from error
     if lines[0] != HEADER:
         raise InputError(f"{path}: not a traffic log of armtempo (its first line should be {HEADER!r})")
     for number, line in enumerate(lines[1:-1], start=2):
