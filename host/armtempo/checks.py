@@ -80,7 +80,7 @@ def check_job(arm: Arm, job: Job) -> None:
     kind = job.parameters.get("fitness", FITNESS[0])
     if kind not in FITNESS:
         raise InputError(f"job {job.name!r}: fitness {kind!r} must be one of {', '.join(FITNESS)}")
-    optimise.defaults(job.optimiser)
+    optimise.parameters(job.optimiser)
 
 
 def check_via(arm: Arm, job: Job, via_deg: Array) -> None:

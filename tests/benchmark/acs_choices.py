@@ -92,7 +92,7 @@ FORMS: dict[str, tuple[type[acs.Nests], str, dict[str, float]]] = {
 def totals(form: str, joint: int, seeds: int, population: int, iterations: int) -> Array:
     """Planned motion times over the seeds, in percent above the best known: (seeds,)."""
     kind, fitness, parameters = FORMS[form]
-    acs.VARIANTS["measured"] = kind
+    acs.VARIANTS["differences"] = kind
     points = spline.fit(np.array(FEEDING.job.via), 5)[:, [joint]]
     limits = FEEDING.arm.driven[joint].limits
     assert limits is not None
@@ -106,7 +106,6 @@ def totals(form: str, joint: int, seeds: int, population: int, iterations: int) 
             np.random.default_rng([seed, joint]),
             population,
             iterations,
-            variant="measured",
             **parameters,
         )
         assert best.evaluations <= 2 * population * iterations

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
 from armtempo import optimise
 from armtempo.errors import InputError
 from armtempo.optimise import genes, iaga, levy, swarm
-from armtempo.optimise.tracker import Array, Tracker
+from armtempo.optimise.parameters import Number
+from armtempo.optimise.tracker import Array, Task
 
 BOUNDS = np.array([[-1.0, 2.0], [0.5, 3.0], [-4.0, -1.0]])
 CENTRE = np.array([0.3, 1.7, -1.2])
@@ -123,9 +125,24 @@ def test_unknown_and_unfit_parameters_are_refused(algorithm: str) -> None:
     run = (Bowl(), BOUNDS, np.random.default_rng(1), 8, 2, algorithm)
     with pytest.raises(InputError, match="wingspan"):
         optimise.minimise(*run, wingspan=3.0)
-    name = next(iter(optimise.defaults(algorithm)))
-    with pytest.raises(InputError, match=name):
-        optimise.minimise(*run, **{name: [1]})  # type: ignore[arg-type]
+    for name, parameter in optimise.parameters(algorithm).items():
+        for value in ([1], True, "x", math.nan, -math.inf, 1e9, 10**400, None):
+            with pytest.raises(InputError, match=rf"{name} = .* must be {re.escape(parameter.allowed)}"):
+                optimise.minimise(*run, **{name: value})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("algorithm", EVERY)
+def test_every_parameter_may_go_to_its_ends(algorithm: str) -> None:
+    known = optimise.parameters(algorithm)
+    numbers = {name: p for name, p in known.items() if isinstance(p, Number)}
+    for ends in ("least", "most"):
+        values = {name: getattr(p, ends) for name, p in numbers.items()}
+        variants = known["variant"].words if "variant" in known else (None,)
+        for variant in variants:
+            more = {"variant": variant} if variant else {}
+            with np.errstate(all="raise", under="ignore"):
+                found = _search(algorithm, Bowl(), iterations=5, **values, **more)
+            assert math.isfinite(found.value)
 
 
 def test_decoding_spreads_over_the_bounds() -> None:
@@ -178,7 +195,7 @@ def test_adaptive_rate_protects_the_best() -> None:
 
 def test_selection_keeps_the_better_half_and_the_memories() -> None:
     bowl = Bowl()
-    moved = swarm.Swarm(Tracker(bowl, 1, None), BOUNDS, np.random.default_rng(2), 8, 0.2)
+    moved = swarm.Swarm(Task(bowl, BOUNDS, np.random.default_rng(2), 8, 1), 0.2)
     before = moved.values.copy()
     places = moved.positions[before.argmin()].copy()
     moved.select(rivals=2000)  # with that many rivals the score is the rank

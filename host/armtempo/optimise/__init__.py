@@ -2,8 +2,8 @@
 
 Each algorithm is a module of this package with
 
-- ``PARAMETERS``: its own parameters by name, with their defaults (number, string or bool), and
-- ``search(function, bounds, rng, population, iterations, progress, **parameters) -> Result``.
+- ``PARAMETERS``: its own parameters by name, each with its default and what it may be, and
+- ``search(task, *, ...) -> Result``, which takes the ``Task`` and a value for each of them.
 """
 
 from __future__ import annotations
@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armtempo.errors import InputError
-from armtempo.optimise.tracker import Array, Function, Progress, Result, Tracker
+from armtempo.optimise.parameters import Parameter, Value
+from armtempo.optimise.tracker import Array, Function, Progress, Result, Task
 
-__all__ = ["ALGORITHMS", "Function", "Progress", "Result", "Tracker", "defaults", "minimise"]
+__all__ = ["ALGORITHMS", "Function", "Progress", "Result", "minimise", "parameters"]
 
 ALGORITHMS = {
     "acs": "armtempo.optimise.acs",
@@ -31,10 +32,10 @@ ALGORITHMS = {
 """Name of an algorithm: the module that holds it."""
 
 
-def defaults(algorithm: str) -> Mapping[str, float | str | bool]:
-    """The parameters of an algorithm and their defaults. Raises InputError for an unknown name."""
-    parameters: Mapping[str, float | str | bool] = _module(algorithm).PARAMETERS
-    return parameters
+def parameters(algorithm: str) -> Mapping[str, Parameter]:
+    """The parameters of an algorithm by name. Raises InputError for an unknown algorithm."""
+    known: Mapping[str, Parameter] = _module(algorithm).PARAMETERS
+    return known
 
 
 def minimise(
@@ -45,24 +46,26 @@ def minimise(
     iterations: int,
     algorithm: str = "acs",
     progress: Progress | None = None,
-    **parameters: float | str | bool,
+    **given: Value,
 ) -> Result:
     """Smallest value of ``function`` found inside ``bounds``.
 
     ``function`` takes points (N, d) and returns their values (N,), one call for a whole population;
     a value that is not a number counts as infinitely bad. ``bounds`` is (d, 2): lowest and highest
-    value of each variable. ``progress(done, iterations)`` is called after each iteration. The same
-    ``rng`` state gives the same result. Raises InputError for an unknown algorithm or parameter, a
-    population below 4, no iterations, or bounds that leave no room.
+    value of each variable. ``progress(done, iterations)`` is called after each iteration; ``given`` are
+    parameters of the algorithm. The same ``rng`` state gives the same result. Raises InputError for an unknown
+    algorithm or parameter, a value out of its range, a population below 4, no iterations, or bounds that are
+    not pairs (lowest, highest).
     """
-    module = _module(algorithm)
+    known = parameters(algorithm)
     box = _checked_bounds(bounds)
     if population < 4 or iterations < 1:
         raise InputError(
             f"optimiser: population {population} must be at least 4, iterations {iterations} at least 1"
         )
-    known = _checked_parameters(algorithm, module.PARAMETERS, parameters)
-    result: Result = module.search(function, box, rng, population, iterations, progress, **known)
+    defaults = {name: parameter.default for name, parameter in known.items()}
+    task = Task(function, box, rng, population, iterations, progress)
+    result: Result = _module(algorithm).search(task, **{**defaults, **_checked(algorithm, known, given)})
     return result
 
 
@@ -79,24 +82,15 @@ def _checked_bounds(bounds: ArrayLike) -> Array:
     return box
 
 
-def _checked_parameters(
-    algorithm: str, known: Mapping[str, float | str | bool], given: Mapping[str, float | str | bool]
-) -> dict[str, float | str | bool]:
-    """``known`` with the ``given`` values put in; each must be of its default's kind."""
+def _checked(
+    algorithm: str, known: Mapping[str, Parameter], given: Mapping[str, Value]
+) -> Mapping[str, Value]:
+    """``given``, each a known parameter with a value that it admits."""
     for name, value in given.items():
         if name not in known:
             raise InputError(
-                f"optimiser {algorithm!r} has no parameter {name!r}; "
-                f"it has {', '.join(sorted(known)) or 'none'}"
+                f"optimiser {algorithm!r} has no parameter {name!r}; it has {', '.join(sorted(known))}"
             )
-        if not _same_kind(known[name], value):
-            raise InputError(
-                f"optimiser {algorithm!r}: {name} = {value!r} must be of the kind of {known[name]!r}"
-            )
-    return {**known, **given}
-
-
-def _same_kind(default: float | str | bool, value: float | str | bool) -> bool:
-    if isinstance(default, (bool, str)):
-        return type(value) is type(default)
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and bool(np.isfinite(value))
+        if not known[name].admits(value):
+            raise InputError(f"optimiser {algorithm!r}: {name} = {value!r} must be {known[name].allowed}")
+    return given

@@ -21,72 +21,24 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from armtempo.errors import InputError
-from armtempo.optimise.levy import levy_scale
-from armtempo.optimise.tracker import Array, Function, Progress, Result, Tracker
-
-PARAMETERS: dict[str, float | str | bool] = {
-    "a": 0.7,
-    "b": 0.5,
-    "pa": 0.25,
-    "beta": 1.5,
-    "variant": "differences",
-}
-
-
-def search(
-    function: Function,
-    bounds: Array,
-    rng: np.random.Generator,
-    population: int,
-    iterations: int,
-    progress: Progress | None = None,
-    *,
-    a: float = 0.7,
-    b: float = 0.5,
-    pa: float = 0.25,
-    beta: float = 1.5,
-    variant: str = "differences",
-) -> Result:
-    """Minimises ``function`` in at most 2 * population * iterations evaluations.
-
-    ``a``, ``b`` of Eq. (25), ``pa`` the part abandoned, ``beta`` of Eq. (23). Raises InputError for an
-    unknown ``variant``.
-    """
-    if variant not in VARIANTS:
-        raise InputError(f"optimiser 'acs': variant {variant!r} must be one of {', '.join(VARIANTS)}")
-    if not (0 < pa <= 1 and 1 <= beta < 2):
-        raise InputError(
-            f"optimiser 'acs': needs 0 < pa <= 1 and 1 <= beta < 2, not pa = {pa}, beta = {beta}"
-        )
-    nests = VARIANTS[variant](
-        Tracker(function, iterations, progress), bounds, rng, population, (a, b, pa, beta)
-    )
-    for iteration in range(1, iterations + 1):
-        nests.iterate(iteration / iterations)
-    return nests.tracker.result()
+from armtempo.optimise.levy import BETA, levy_scale
+from armtempo.optimise.parameters import Choice, Number, Parameter
+from armtempo.optimise.tracker import Array, Result, Task, Tracker
 
 
 class Nests:
     """Points and their values; a new point replaces its nest where it is better."""
 
-    def __init__(
-        self,
-        tracker: Tracker,
-        bounds: Array,
-        rng: np.random.Generator,
-        population: int,
-        parameters: tuple[float, float, float, float],
-    ) -> None:
-        self.tracker = tracker
-        self.low, self.high = bounds.T
-        self.rng = rng
-        self.a, self.b, self.pa, self.beta = parameters
-        self.size = population
-        self.gamma = levy_scale(self.beta)
-        self.x = rng.uniform(self.low, self.high, (population, len(self.low)))
-        self.values = tracker.evaluate(self.x)
-        tracker.iteration_done()
+    def __init__(self, task: Task, a: float, b: float, pa: float, beta: float) -> None:
+        self.tracker = Tracker(task)
+        self.low, self.high = task.bounds.T
+        self.rng = task.rng
+        self.a, self.b, self.pa, self.beta = a, b, pa, beta
+        self.size = task.population
+        self.gamma = levy_scale(beta)
+        self.x = self.rng.uniform(self.low, self.high, (self.size, len(self.low)))
+        self.values = self.tracker.evaluate(self.x)
+        self.tracker.iteration_done()
 
     def iterate(self, part: float) -> None:
         """One iteration (steps 2 and 3 of the paper); ``part`` of all of them is then done."""
@@ -138,4 +90,23 @@ class Differences(Nests):
 
 
 VARIANTS: dict[str, type[Nests]] = {"differences": Differences, "paper": Paper}
-"""Values of the parameter ``variant``."""
+
+PARAMETERS: dict[str, Parameter] = {
+    "a": Number(0.7, 0.0, 100.0),
+    "b": Number(0.5, -5.0, 5.0),
+    "pa": Number(0.25, 0.001, 1.0),
+    "beta": BETA,
+    "variant": Choice("differences", tuple(VARIANTS)),
+}
+
+
+def search(task: Task, *, a: float, b: float, pa: float, beta: float, variant: str) -> Result:
+    """Minimises in as many evaluations as the table above says, and N for the first population.
+
+    ``a``, ``b`` of Eq. (25), ``pa`` the part abandoned, ``beta`` of Eq. (23). The variant "differences" has its
+    first population paid for by its last iteration: 2 N evaluations for each iteration in all.
+    """
+    nests = VARIANTS[variant](task, a, b, pa, beta)
+    for iteration in range(1, task.iterations + 1):
+        nests.iterate(iteration / task.iterations)
+    return nests.tracker.result()

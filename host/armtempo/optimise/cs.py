@@ -9,38 +9,32 @@ from __future__ import annotations
 
 import numpy as np
 
-from armtempo.optimise.levy import levy_steps
-from armtempo.optimise.tracker import Array, Function, Progress, Result, Tracker
+from armtempo.optimise.levy import BETA, levy_steps
+from armtempo.optimise.parameters import Number, Parameter
+from armtempo.optimise.tracker import Array, Result, Task, Tracker
 
-PARAMETERS: dict[str, float | str | bool] = {"alpha": 0.01, "pa": 0.25, "beta": 1.5}
+PARAMETERS: dict[str, Parameter] = {
+    "alpha": Number(0.01, 0.0, 100.0),
+    "pa": Number(0.25, 0.0, 1.0),
+    "beta": BETA,
+}
 
 
-def search(
-    function: Function,
-    bounds: Array,
-    rng: np.random.Generator,
-    population: int,
-    iterations: int,
-    progress: Progress | None = None,
-    *,
-    alpha: float = 0.01,
-    pa: float = 0.25,
-    beta: float = 1.5,
-) -> Result:
-    """Minimises ``function``: N evaluations of Lévy flights and at most N of new nests an iteration.
+def search(task: Task, *, alpha: float, pa: float, beta: float) -> Result:
+    """Minimises by N evaluations of Lévy flights and at most N of new nests an iteration.
 
     ``alpha`` scales the flights, ``pa`` is the chance that a coordinate is abandoned, ``beta`` the
     index of the Lévy distribution. A nest without an abandoned coordinate is not evaluated again.
     """
-    low, high = bounds.T
-    tracker = Tracker(function, iterations, progress)
-    nests = rng.uniform(low, high, (population, len(low)))
+    rng, tracker = task.rng, Tracker(task)
+    low, high = task.bounds.T
+    nests = rng.uniform(low, high, (task.population, len(low)))
     values = tracker.evaluate(nests)
     tracker.iteration_done()
-    for _ in range(iterations):
+    for _ in range(task.iterations):
         flights = alpha * levy_steps(rng, nests.shape, beta) * rng.standard_normal(nests.shape)
         eggs = np.clip(nests + flights * (nests - tracker.x), low, high)
-        _keep_better(nests, values, eggs, tracker.evaluate(eggs), np.arange(population))
+        _keep_better(nests, values, eggs, tracker.evaluate(eggs), np.arange(task.population))
         eggs, changed = _new_nests(nests, rng, pa)
         eggs = np.clip(eggs, low, high)
         if changed.size:

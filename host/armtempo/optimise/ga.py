@@ -6,38 +6,30 @@ one-point crossover, bit mutation, children replace their parents; nobody surviv
 
 from __future__ import annotations
 
-import numpy as np
+from armtempo.optimise.genes import BITS, crossover, decode, merits, mutate, random_bits, roulette
+from armtempo.optimise.parameters import Number, Parameter
+from armtempo.optimise.tracker import Result, Task, Tracker
 
-from armtempo.optimise.genes import crossover, decode, merits, mutate, random_bits, roulette
-from armtempo.optimise.tracker import Array, Function, Progress, Result, Tracker
+PARAMETERS: dict[str, Parameter] = {
+    "bits": BITS,
+    "crossover_rate": Number(0.6, 0.0, 1.0),
+    "mutation_rate": Number(0.01, 0.0, 1.0),
+}
 
-PARAMETERS: dict[str, float | str | bool] = {"bits": 16, "crossover_rate": 0.6, "mutation_rate": 0.01}
 
-
-def search(
-    function: Function,
-    bounds: Array,
-    rng: np.random.Generator,
-    population: int,
-    iterations: int,
-    progress: Progress | None = None,
-    *,
-    bits: float = 16,
-    crossover_rate: float = 0.6,
-    mutation_rate: float = 0.01,
-) -> Result:
-    """Minimises ``function`` by N evaluations an iteration.
+def search(task: Task, *, bits: int, crossover_rate: float, mutation_rate: float) -> Result:
+    """Minimises by N evaluations an iteration.
 
     ``bits`` code a variable, ``crossover_rate`` is the chance of a pair to be crossed,
     ``mutation_rate`` that of a bit to flip.
     """
-    tracker = Tracker(function, iterations, progress)
-    genes = random_bits(rng, population, len(bounds), int(bits))
-    values = tracker.evaluate(decode(genes, bounds))
+    rng, tracker = task.rng, Tracker(task)
+    genes = random_bits(rng, task.population, len(task.bounds), bits)
+    values = tracker.evaluate(decode(genes, task.bounds))
     tracker.iteration_done()
-    for _ in range(iterations):
+    for _ in range(task.iterations):
         parents = genes[roulette(merits(values), rng)]
         genes = mutate(crossover(parents, rng, crossover_rate), rng, mutation_rate)
-        values = tracker.evaluate(decode(genes, bounds))
+        values = tracker.evaluate(decode(genes, task.bounds))
         tracker.iteration_done()
     return tracker.result()

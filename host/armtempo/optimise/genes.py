@@ -5,10 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from armtempo.optimise.parameters import Number
 from armtempo.optimise.tracker import Array
 
 Bits = NDArray[np.bool_]
 """A population: individuals × variables × bits, the first bit of a variable counting most."""
+
+BITS = Number(16, 2, 52)
+"""Bits that code a variable; a double has 52 behind its point."""
 
 
 def random_bits(rng: np.random.Generator, population: int, variables: int, bits: int) -> Bits:

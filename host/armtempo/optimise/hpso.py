@@ -8,44 +8,31 @@ from __future__ import annotations
 
 import numpy as np
 
-from armtempo.optimise.swarm import Swarm
-from armtempo.optimise.tracker import Array, Function, Progress, Result, Tracker
+from armtempo.optimise import swarm
+from armtempo.optimise.parameters import Number
+from armtempo.optimise.tracker import Result, Task
 
-PARAMETERS: dict[str, float | str | bool] = {
-    "inertia_start": 0.9,
-    "inertia_end": 0.4,
-    "own": 2.0,
-    "common": 2.0,
-    "top_speed": 0.2,
-    "rivals": 5,
-}
+PARAMETERS = {**swarm.PARAMETERS, "rivals": Number(5, 1, 1000)}
 
 
 def search(
-    function: Function,
-    bounds: Array,
-    rng: np.random.Generator,
-    population: int,
-    iterations: int,
-    progress: Progress | None = None,
+    task: Task,
     *,
-    inertia_start: float = 0.9,
-    inertia_end: float = 0.4,
-    own: float = 2.0,
-    common: float = 2.0,
-    top_speed: float = 0.2,
-    rivals: float = 5,
+    inertia_start: float,
+    inertia_end: float,
+    own: float,
+    common: float,
+    top_speed: float,
+    rivals: int,
 ) -> Result:
-    """Minimises ``function``; the swarm moves twice an iteration: 2 N evaluations, as in the paper.
+    """Minimises; the swarm moves twice an iteration: 2 N evaluations, as in the paper.
 
     Each particle scores against ``rivals`` others drawn at random; the rest as in ``pso``.
     """
-    tracker = Tracker(function, iterations, progress)
-    swarm = Swarm(tracker, bounds, rng, population, top_speed)
-    tracker.iteration_done()
-    for inertia in np.linspace(inertia_start, inertia_end, iterations):
+    particles = swarm.Swarm(task, top_speed)
+    for inertia in np.linspace(inertia_start, inertia_end, task.iterations):
         for _ in range(2):
-            swarm.select(int(rivals))
-            swarm.move(inertia, own, common)
-        tracker.iteration_done()
-    return tracker.result()
+            particles.select(rivals)
+            particles.move(inertia, own, common)
+        particles.tracker.iteration_done()
+    return particles.tracker.result()

@@ -8,51 +8,40 @@ from __future__ import annotations
 
 import numpy as np
 
-from armtempo.optimise.genes import crossover, decode, merits, mutate, random_bits, roulette
-from armtempo.optimise.tracker import Array, Function, Progress, Result, Tracker
+from armtempo.optimise.genes import BITS, crossover, decode, merits, mutate, random_bits, roulette
+from armtempo.optimise.parameters import Number, Parameter
+from armtempo.optimise.tracker import Array, Result, Task, Tracker
 
-PARAMETERS: dict[str, float | str | bool] = {
-    "bits": 16,
-    "k1": 1.0,
-    "k2": 0.5,
-    "k3": 1.0,
-    "k4": 0.5,
-    "least_mutation": 0.005,
+PARAMETERS: dict[str, Parameter] = {
+    "bits": BITS,
+    "k1": Number(1.0, 0.0, 1.0),
+    "k2": Number(0.5, 0.0, 1.0),
+    "k3": Number(1.0, 0.0, 1.0),
+    "k4": Number(0.5, 0.0, 1.0),
+    "least_mutation": Number(0.005, 0.0, 1.0),
 }
 
 
 def search(
-    function: Function,
-    bounds: Array,
-    rng: np.random.Generator,
-    population: int,
-    iterations: int,
-    progress: Progress | None = None,
-    *,
-    bits: float = 16,
-    k1: float = 1.0,
-    k2: float = 0.5,
-    k3: float = 1.0,
-    k4: float = 0.5,
-    least_mutation: float = 0.005,
+    task: Task, *, bits: int, k1: float, k2: float, k3: float, k4: float, least_mutation: float
 ) -> Result:
-    """Minimises ``function`` by N evaluations an iteration.
+    """Minimises by N evaluations an iteration.
 
     ``k1`` and ``k3`` scale the chance of crossover above and below the mean fitness, ``k2`` and ``k4``
     that of mutation; ``least_mutation`` is added to the latter for everybody (section IV of the source).
     """
-    tracker = Tracker(function, iterations, progress)
-    genes = random_bits(rng, population, len(bounds), int(bits))
-    values = tracker.evaluate(decode(genes, bounds))
+    rng, tracker = task.rng, Tracker(task)
+    genes = random_bits(rng, task.population, len(task.bounds), bits)
+    values = tracker.evaluate(decode(genes, task.bounds))
     tracker.iteration_done()
-    for _ in range(iterations):
+    for _ in range(task.iterations):
         merit = merits(values)
         chosen = roulette(merit, rng)
         rate = np.minimum(adaptive_rate(merit[chosen], merit, k2, k4) + least_mutation, 1.0)
-        pairs = merit[chosen][: population // 2 * 2].reshape(-1, 2).max(axis=1)
+        pairs = merit[chosen][: task.population // 2 * 2].reshape(-1, 2).max(axis=1)
         children = crossover(genes[chosen], rng, adaptive_rate(pairs, merit, k1, k3))
         genes = mutate(children, rng, rate)
-        values = tracker.evaluate(decode(genes, bounds))
+        values = tracker.evaluate(decode(genes, task.bounds))
         tracker.iteration_done()
     return tracker.result()
 

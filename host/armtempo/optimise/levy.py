@@ -6,11 +6,16 @@ import math
 
 import numpy as np
 
+from armtempo.optimise.parameters import Number
 from armtempo.optimise.tracker import Array
+
+BETA = Number(1.5, 0.3, 1.99)
+"""The index of the distribution, in the range that Mantegna gives for his method (Physical Review E 49 (5),
+1994, pp. 4677-4683)."""
 
 
 def levy_steps(rng: np.random.Generator, shape: tuple[int, ...], beta: float) -> Array:
-    """Symmetric Lévy-stable steps of index ``beta``, 0 < beta <= 2, by Mantegna's method, Eq. (23)."""
+    """Symmetric Lévy-stable steps of index ``beta``, within BETA, by Mantegna's method, Eq. (23)."""
     steps: Array = levy_scale(beta) * rng.standard_normal(shape)
     steps /= np.abs(rng.standard_normal(shape)) ** (1.0 / beta)
     return steps

@@ -4,34 +4,44 @@ from __future__ import annotations
 
 import numpy as np
 
-from armtempo.optimise.tracker import Array, Tracker
+from armtempo.optimise.parameters import Number, Parameter
+from armtempo.optimise.tracker import Task, Tracker
+
+PARAMETERS: dict[str, Parameter] = {
+    "inertia_start": Number(0.9, 0.0, 2.0),
+    "inertia_end": Number(0.4, 0.0, 2.0),
+    "own": Number(2.0, 0.0, 10.0),
+    "common": Number(2.0, 0.0, 10.0),
+    "top_speed": Number(0.2, 0.001, 1.0),
+}
+"""Of every swarm: ``inertia_start`` falls to ``inertia_end`` over the run, ``own`` and ``common`` pull towards a
+particle's own best point and the best of all, ``top_speed`` is the longest move as a part of the bounds' width."""
 
 
 class Swarm:
-    """Positions, velocities, values and memories of N particles, started at random in ``bounds`` (d, 2)."""
+    """Positions, velocities, values and memories of the particles, started at random in the task's bounds."""
 
-    def __init__(
-        self, tracker: Tracker, bounds: Array, rng: np.random.Generator, population: int, top_speed: float
-    ) -> None:
-        self._tracker = tracker
-        self._rng = rng
-        self._low, self._high = bounds.T
+    def __init__(self, task: Task, top_speed: float) -> None:
+        self.tracker = Tracker(task)
+        self._rng = task.rng
+        self._low, self._high = task.bounds.T
         self._top_speed = top_speed * (self._high - self._low)
-        self.positions = rng.uniform(self._low, self._high, (population, len(bounds)))
-        self.velocities = rng.uniform(-self._top_speed, self._top_speed, self.positions.shape)
-        self.values = tracker.evaluate(self.positions)
+        self.positions = self._rng.uniform(self._low, self._high, (task.population, len(task.bounds)))
+        self.velocities = self._rng.uniform(-self._top_speed, self._top_speed, self.positions.shape)
+        self.values = self.tracker.evaluate(self.positions)
         self._seen, self._seen_values = self.positions.copy(), self.values.copy()
+        self.tracker.iteration_done()
 
     def move(self, inertia: float, own: float, common: float) -> None:
         """One move of everybody and its N evaluations; who hits a bound stops there."""
         own_pull = own * self._rng.random(self.positions.shape) * (self._seen - self.positions)
-        common_pull = common * self._rng.random(self.positions.shape) * (self._tracker.x - self.positions)
+        common_pull = common * self._rng.random(self.positions.shape) * (self.tracker.x - self.positions)
         velocities = inertia * self.velocities + own_pull + common_pull
         self.velocities = np.clip(velocities, -self._top_speed, self._top_speed)
         target = self.positions + self.velocities
         self.positions = np.clip(target, self._low, self._high)
         self.velocities[target != self.positions] = 0.0
-        self.values = self._tracker.evaluate(self.positions)
+        self.values = self.tracker.evaluate(self.positions)
         better = self.values < self._seen_values
         self._seen[better], self._seen_values[better] = self.positions[better], self.values[better]
 

@@ -1,4 +1,4 @@
-"""What every search needs: a counted function, the best point so far, and its history."""
+"""What every search is given and keeps: its task, a counted function, the best point so far, its history."""
 
 from __future__ import annotations
 
@@ -13,6 +13,19 @@ Function = Callable[[Array], Array]
 """Values (N,) of points (N, d)."""
 Progress = Callable[[int, int], None]
 """Called with the iterations done and their number."""
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What a search has to do, whatever the algorithm."""
+
+    function: Function
+    bounds: Array
+    """(d, 2): lowest and highest value of each variable."""
+    rng: np.random.Generator
+    population: int
+    iterations: int
+    progress: Progress | None = None
 
 
 @dataclass(frozen=True)
@@ -35,10 +48,8 @@ class Tracker:
     each iteration, ``result`` at the end.
     """
 
-    def __init__(self, function: Function, iterations: int, progress: Progress | None) -> None:
-        self._function = function
-        self._iterations = iterations
-        self._progress = progress
+    def __init__(self, task: Task) -> None:
+        self._task = task
         self._history: list[float] = []
         self._x: Array = np.empty(0)
         self.value = float("inf")
@@ -52,7 +63,7 @@ class Tracker:
 
     def evaluate(self, points: Array) -> Array:
         """Values (N,) of ``points`` (N, d); not-a-number comes back as infinity."""
-        values = self._function(points)
+        values = self._task.function(points)
         self.evaluations += len(points)
         if np.isnan(values.min(initial=np.inf)):
             values = np.where(np.isnan(values), np.inf, values)
@@ -65,8 +76,8 @@ class Tracker:
     def iteration_done(self) -> None:
         """Closes the first population (first call) or an iteration (later calls)."""
         self._history.append(self.value)
-        if self._progress is not None and len(self._history) > 1:
-            self._progress(len(self._history) - 1, self._iterations)
+        if self._task.progress is not None and len(self._history) > 1:
+            self._task.progress(len(self._history) - 1, self._task.iterations)
 
     def result(self) -> Result:
         """The best point found, with the history as far as it went."""
