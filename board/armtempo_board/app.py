@@ -75,6 +75,7 @@ class App:
         self._brakes = False  # the motion can come to rest along its path
         self._by_host = False  # the run was started by a command
         self._assumed = 0  # joints whose position a homing motion took for granted
+        self._turns = self._failed = 0  # turns of the loop, and the last of them that failed
         self._failures = 0
         self.commands = Commands(self, rows)
         self.events = Events(self, rows)
@@ -94,11 +95,11 @@ class App:
 
     def turn(self) -> None:
         """One turn of the loop; an exception in it becomes a fault."""
+        self._turns = (self._turns + 1) & 0xFFFF
         try:
             self._turn()
-            self._failures = 0
         except Exception as error:
-            self._fail(error)
+            self.fail(error)
 
     def _turn(self) -> None:
         if self.link.poll():
@@ -145,11 +146,15 @@ class App:
         if not self.fault():
             self.events.note_done()
 
-    def _fail(self, error: "BaseException") -> None:
-        self._failures += 1
+    def fail(self, error: "BaseException") -> None:
+        """Freeze and keep the fault; raises where one turn after the other fails."""
+        again = (self._turns - self._failed) & 0xFFFF <= 1
+        self._failures = self._failures + 1 if again else 1
+        self._failed = self._turns
         self._fault = codes.INTERNAL
         if self.engine:
             self.engine.freeze()
+            self._forget()
         self.events.note(_traceback(error))
         self.events.note_fault(codes.INTERNAL)
         if self._failures >= _MOST_FAILURES:

@@ -11,6 +11,7 @@ underrun               the same: the ring stalls, nothing wrong is stepped
 E-stop                 known, but unknown where the arm record releases the drivers
 following error        unknown for the joint that was lost
 DIR turned too late    unknown for all joints
+exception in service   unknown for all joints
 =====================  =============================================================
 """
 
@@ -71,6 +72,7 @@ class Engine:
         self._homing = False
         self._brake_ticks = 0
         self._braked = self._end_moves = False
+        self._halfway = False  # service() did not come to its end
         self.moving = False
         self.finished = False
         self.fault = 0
@@ -148,7 +150,12 @@ class Engine:
     # while it moves
 
     def service(self) -> None:
-        """Refill the rings, convert samples, look for faults."""
+        """Refill the rings, convert samples, look for faults. What it raises leaves the position unknown."""
+        self._halfway = True
+        self._service()
+        self._halfway = False
+
+    def _service(self) -> None:
         if not self.moving:
             self._look()
             return
@@ -159,6 +166,8 @@ class Engine:
             return
         self._inputs.poll()
         self._follow()
+        if self._sampler.overdue(self._watched):
+            self._block[access.LATE] = 1
         if self._block[access.LATE]:
             self._fail(codes.INTERNAL, NO_JOINT)
         elif self._over():
@@ -209,6 +218,9 @@ class Engine:
     def freeze(self) -> None:
         """Stop all outputs now; not a fault."""
         self._inputs.freeze()
+        if self._halfway:
+            self._halfway = False
+            self.known = 0
         if self.moving:
             self._stopped()
 

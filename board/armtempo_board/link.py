@@ -64,6 +64,7 @@ class Link:
 
     def answer(self, number: int, size: int) -> None:
         """Send the reply whose payload of ``size`` bytes stands in ``reply``."""
+        self._reply_size = 0  # should this fail, the host's repeat is acted on
         self._remember()
         self._reply_size = self._finish(self.reply, 0, self._request[0], number, size)
         self._reply_waits = True
@@ -148,6 +149,7 @@ class Link:
             self._count_control(byte, quiet)
         if self._controls >= needed and self._interrupt and not self.fresh:
             self.escape = True
+            self._controls = -1  # said once: asking while it moves is not kept for later
 
     def _count_control(self, byte: int, quiet: bool) -> None:
         if byte not in _CONTROLS:

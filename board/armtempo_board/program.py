@@ -58,17 +58,27 @@ def _build(port: "pyb.USB_VCP", root: str) -> App:
 def run(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
     """Turn until somebody asks for the REPL; whatever ends the loop, nothing goes on moving without it."""
     try:
-        while not app.left():
+        while True:
             app.turn()
-            leds.show(app.state())
-            watchdog.feed()
-            if app.moving():
-                continue
-            if button.pressed():
-                _replay_default()
-            machine.idle()
+            try:
+                if app.left():
+                    break
+                _look_around(leds, button, watchdog)
+            except Exception as error:
+                app.fail(error)
     finally:
         app.halt()
+
+
+def _look_around(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
+    leds.show(app.state())
+    watchdog.feed()
+    pressed = button.pressed()  # a press while something moves is over and done with
+    if app.moving():
+        return
+    if pressed:
+        _replay_default()
+    machine.idle()
 
 
 def _fault_at_start() -> int:

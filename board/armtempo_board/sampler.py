@@ -16,6 +16,7 @@ from armtempo_board import access
 
 _LOW32 = 0xFFFFFFFF
 _QUIET_K = const(80)  # 1 ms
+_DEAD_K = const(-40)  # 0.5 ms ago
 
 
 class Sampler:
@@ -84,6 +85,16 @@ class Sampler:
         if block[access.TAKEN] != block[access.READ]:
             return False
         return block[access.DONE] != 0 or access.until_k(self._timer2, block, access.NEXT) >= _QUIET_K
+
+    def overdue(self, joint: int) -> bool:
+        """Whether a sample or a turn of the joint was due long ago: the interrupt comes no more."""
+        block = self.block
+        at = self.joint_at(joint)
+        out = block[at + access.TURNS_OUT]
+        turn = at + access.TURN_TIMES + (out & (access.TURN_ROOM - 1))
+        if out != block[at + access.TURNS_IN] and access.until_k(self._timer2, block, turn) < _DEAD_K:
+            return True
+        return block[access.DONE] == 0 and access.until_k(self._timer2, block, access.NEXT) < _DEAD_K
 
     def done(self) -> bool:
         """Whether the last sample has been taken and converted."""

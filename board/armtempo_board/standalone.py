@@ -1,5 +1,7 @@
 """``armtempo_board.replay("feed")``: one stored motion from the REPL, without a host."""
 
+import micropython
+import pyb
 from armtempo_shared import codes
 from micropython import const
 
@@ -9,6 +11,7 @@ from armtempo_board.refusal import Refused
 from armtempo_board.watchdog import Watchdog
 
 _NO_JOINT = const(255)
+_CTRL_C = const(3)
 
 
 class _Nobody:
@@ -31,6 +34,7 @@ def replay(name: str = "", root: str = program.ROOT) -> None:
     program.app = app
     port, app.link.stream = app.link.stream, _Nobody()
     watchdog = Watchdog()
+    micropython.kbd_intr(-1)  # KeyboardInterrupt could come in the midst of anything
     try:
         _begin(app, name or app.store.default())
         _follow(app, watchdog)
@@ -40,6 +44,8 @@ def replay(name: str = "", root: str = program.ROOT) -> None:
         where = "" if refused.joint == _NO_JOINT else "joint %d" % (refused.joint + 1)
         print("refused:", _name(refused.code), where, refused.value or "")
     finally:
+        app.halt()
+        micropython.kbd_intr(_CTRL_C)
         watchdog.leave()
         app.link.stream = port
 
@@ -56,12 +62,13 @@ def _begin(app: "App", name: str) -> None:
 
 
 def _follow(app: "App", watchdog: "Watchdog") -> None:
+    port = pyb.USB_VCP()
+    byte = bytearray(1)
     presses = 0
     while app.moving():
-        try:
-            app.turn()
-            watchdog.feed()
-        except KeyboardInterrupt:
+        app.turn()
+        watchdog.feed()
+        if port.readinto(byte) and byte[0] == _CTRL_C and app.moving():
             app.stop(presses)
             presses = 1
     app.turn()

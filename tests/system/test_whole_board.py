@@ -1,0 +1,73 @@
+"""Whole virtual boards in one process with a scripted host and world: see ``scripts/whole_board.py``."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from armtempo import arm as arms
+from armtempo import encode, operate, planner
+from armtempo.job import Job
+
+from tests import interpreters
+
+SCRIPTS = Path(__file__).parent / "scripts"
+PROGRAM = f"{interpreters.ROOT / 'board'}:{interpreters.ROOT / 'shared'}"
+HEAP = {"cpython": "", "micropython": "16M", "micropython-arm": "6M"}
+ARM = arms.load_arm(arms.default_path())
+HOME_DEG = operate.home_deg(ARM)
+HOME_STEPS = [
+    round(angle * encode.steps_per_deg(joint)) for angle, joint in zip(HOME_DEG, ARM.driven, strict=True)
+]
+AWAY_DEG = ([3.0, 2.0, -2.0], [-1.0, 1.0, 2.0])
+FEWER = {"micropython": 2, "cpython": 10, "micropython-arm": 12}
+"""What the moments are divided by; each interpreter has others."""
+ON_ARM = {
+    "standalone_cases": [
+        "case_button_starts_the_default_and_a_host_fetches_its_samples",
+        "case_level_present_at_power_up",
+    ],
+    "prompt_cases": ["case_replay_typed_at_the_prompt"],
+    "fault_cases": ["case_interrupt_dies", "case_stop", "case_underrun"],
+}
+"""The emulated interpreter is slow: what it is to run."""
+
+
+@pytest.fixture(scope="session")
+def flashes(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Flashes of boards for the shipped arm, ``finish`` and ``stop`` being what it does without its host.
+
+    ``broken`` has a main.py that raises. ``go`` leaves home with all joints, turns, and comes back within 2.3 s.
+    """
+    folder = tmp_path_factory.mktemp("flashes")
+    postures = (HOME_DEG, *(HOME_DEG + np.array(away) for away in AWAY_DEG), HOME_DEG)
+    job = Job("go", tuple(tuple(map(float, posture)) for posture in postures), population=5, iterations=20)
+    trajectory = planner.plan(ARM, job).trajectory
+    for name in ("finish", "stop"):
+        arm = replace(ARM, safety=replace(ARM.safety, on_link_loss=name))
+        (folder / name / "armtempo").mkdir(parents=True)
+        (folder / name / "armtempo" / "arm.ata").write_bytes(encode.arm_record(arm))
+        (folder / name / "armtempo" / "go.atm").write_bytes(operate.motion_data(trajectory, arm))
+    shutil.copytree(folder / "finish", folder / "broken")
+    (folder / "broken" / "main.py").write_text("raise ValueError('broken')\n")
+    return folder
+
+
+@pytest.mark.parametrize("script", ["standalone_cases", "fault_cases", "prompt_cases"])
+def test_cases(interpreter: str, script: str, flashes: Path, tmp_path: Path) -> None:
+    """Each case asserts by itself and prints its name when it holds."""
+    copied = shutil.copytree(flashes, tmp_path / "flashes")
+    path = SCRIPTS / f"{script}.py"
+    cases = sorted(re.findall(r"def (case_\w+)", path.read_text()))
+    if interpreter == "micropython-arm":
+        cases = ON_ARM[script]
+    home = ",".join(map(str, HOME_STEPS))
+    fewer = [str(FEWER[interpreter])] if script == "fault_cases" else []
+    output = interpreters.run(
+        interpreter, path, str(copied), PROGRAM, home, *cases, *fewer, heap=HEAP[interpreter]
+    )
+    assert [line.split()[0] for line in output.splitlines()] == cases
