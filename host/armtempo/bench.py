@@ -105,7 +105,7 @@ def solve(problem: Problem, case: Case) -> Run:
     start = time.thread_time()
     found = optimise.minimise(function, bounds, rng, case.population, problem.iterations, case.algorithm)
     seconds = time.thread_time() - start
-    better = np.flatnonzero(np.diff(found.history, prepend=np.inf) < 0)
+    better = [0, *(np.flatnonzero(np.diff(found.history) < 0) + 1)]
     improvements = tuple((int(at), float(found.history[at])) for at in better)
     return Run(case, tuple(float(x) for x in found.x), found.evaluations, seconds, improvements)
 

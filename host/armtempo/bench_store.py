@@ -75,12 +75,13 @@ class Store:
 
 
 def _run(content: dict[str, Any]) -> Run:
+    (first, best), *rest = content["improvements"]
     return Run(
         Case(**content["case"]),
         tuple(content["intervals_s"]),
-        content["evaluations"],
-        content["seconds"],
-        tuple((iteration, value) for iteration, value in content["improvements"]),
+        int(content["evaluations"]),
+        float(content["seconds"]),
+        tuple((int(iteration), float(value)) for iteration, value in [(first, best), *rest]),
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.metadata
 import multiprocessing
 import os
+import re
 import signal
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
@@ -40,9 +41,11 @@ def local(workers: int | None = None) -> Iterator[Executor]:
 def cluster(address: str) -> Iterator[Executor]:
     """The workers of the Dask scheduler at ``address``.
 
-    Raises MissingPackageError where the extra ``cluster`` is not installed, InputError where no scheduler
-    answers, ArmtempoError where a worker has no armtempo or another version.
+    Raises MissingPackageError where the extra ``cluster`` is not installed, InputError where the address is none
+    or no scheduler answers, ArmtempoError where a worker has no armtempo or another version.
     """
+    if not re.fullmatch(r"\w+://.+:\d+", address):  # distributed would hang on it, and complain at the end
+        raise InputError(f"--scheduler {address!r} is no address; it is written like tcp://127.0.0.1:8786")
     try:
         distributed: Any = import_module("distributed")
     except ImportError:

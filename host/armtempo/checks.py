@@ -12,7 +12,7 @@ from armtempo import extremes, optimise, spline
 from armtempo.arm import Arm, Joint, Limits
 from armtempo.errors import InputError, PlanError
 from armtempo.extremes import Extremes
-from armtempo.job import Job
+from armtempo.job import ITERATIONS, POPULATION, REFINE, Job
 from armtempo.spline import Array
 from armtempo.trajectory import JointSpline, Trajectory
 
@@ -65,8 +65,13 @@ def check_job(arm: Arm, job: Job) -> None:
     """Raises InputError for settings that the planner does not know or the board cannot hold."""
     if job.timing not in ("per-joint", "shared"):
         raise InputError(f"job {job.name!r}: timing {job.timing!r} must be 'per-joint' or 'shared'")
+    for name, (least, most) in (("refine", REFINE), ("population", POPULATION), ("iterations", ITERATIONS)):
+        if not least <= getattr(job, name) <= most:
+            raise InputError(
+                f"job {job.name!r}: {name} {getattr(job, name)} must be a whole number from {least} to {most}"
+            )
     segments = len(job.via) - 1
-    if job.refine < 1 or segments * job.refine > MAX_SEGMENTS:
+    if segments * job.refine > MAX_SEGMENTS:
         raise InputError(
             f"job {job.name!r}: {segments} segments with refine {job.refine} make more than the board's "
             f"{MAX_SEGMENTS}; lower refine or use fewer via points"

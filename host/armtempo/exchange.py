@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import math
 from pathlib import Path
 
@@ -28,7 +29,7 @@ def times_s(duration_s: float, rate_hz: float) -> Array:
         raise InputError(
             f"a rate of {rate_hz:g} Hz is not allowed; it must be above 0, at most {MAX_RATE_HZ:g}"
         )
-    count = math.ceil(duration_s * rate_hz - 1e-9)
+    count = max(math.ceil(duration_s * rate_hz - 1e-9), 1)
     return np.append(np.arange(count) / rate_hz, duration_s)
 
 
@@ -71,7 +72,7 @@ def to_ros(plan: Plan, rate_hz: float, frame_id: str = "") -> str:
 def via_from_csv(path: Path, arm: Arm, radians: bool = False) -> Array:
     """Via points (n, J) in degrees from a CSV file: a line a point, a column a driven joint.
 
-    A first line that is not numbers is a header; where it names the joints (``joint 1``, or ``j1_angle_deg``
+    A first line with a word in it is a header; where it names the joints (``joint 1``, or ``j1_angle_deg``
     as ``to_csv`` writes), the columns are found by name. Raises InputError with line and value.
     """
     try:
@@ -82,7 +83,7 @@ def via_from_csv(path: Path, arm: Arm, radians: bool = False) -> Array:
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: cannot be read: {why(error)}") from None
     columns = list(range(len(arm.driven)))
-    if rows and not all(map(_is_number, rows[0][1])):
+    if rows and not all(map(_is_float, rows[0][1])):
         columns = _columns(path, rows.pop(0)[1], arm)
     points = np.array([_point(path, number, row, columns) for number, row in rows]).reshape(-1, len(columns))
     if len(points) < 2:
@@ -93,7 +94,7 @@ def via_from_csv(path: Path, arm: Arm, radians: bool = False) -> Array:
 def job_text(name: str, via_deg: Array) -> str:
     """A job file through these via points, everything else as it is by default."""
     rows = "".join(f"    [{', '.join(f'{angle:.10g}' for angle in row)}],\n" for row in via_deg)
-    return f'name = "{name}"\nvia_deg = [\n{rows}]\n'
+    return f"name = {json.dumps(name)}\nvia_deg = [\n{rows}]\n"
 
 
 def _columns(path: Path, header: list[str], arm: Arm) -> list[int]:
@@ -121,10 +122,16 @@ def _point(path: Path, number: int, row: list[str], columns: list[int]) -> list[
 
 
 def _is_number(text: str) -> bool:
+    return _is_float(text) and math.isfinite(float(text))
+
+
+def _is_float(text: str) -> bool:
+    """Whether ``text`` is a number, finite or not."""
     try:
-        return math.isfinite(float(text))
+        float(text)
     except ValueError:
         return False
+    return True
 
 
 def _numbers(values: Array) -> str:

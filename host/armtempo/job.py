@@ -17,6 +17,9 @@ from armtempo.tomlcheck import Table
 OPTIMISERS = ("acs", "cs", "ga", "iaga", "pso", "hpso")
 """Names of the search algorithms (Table 4)."""
 
+REFINE, POPULATION, ITERATIONS = (1, 64), (4, 100_000), (1, 1_000_000)
+"""Least and most of these settings."""
+
 Rows = tuple[tuple[float, ...], ...]
 
 
@@ -63,7 +66,11 @@ def load_job(path: Path | str, arm: Arm) -> Job:
 
     Raises InputError, naming file, key and value, for anything missing, unknown or not allowed.
     """
-    top = tomlcheck.read(path)
+    return of_table(tomlcheck.read(path), arm)
+
+
+def of_table(top: Table, arm: Arm) -> Job:
+    """The job described by the top table of a TOML file; errors as in ``load_job``."""
     low, high = top.numbers("bounds_s", 2, Job.bounds_s)
     if not 0.0 < low < high:
         raise top.fail("bounds_s", "two times in seconds above 0, the shorter first")
@@ -73,15 +80,15 @@ def load_job(path: Path | str, arm: Arm) -> Job:
         via=_vias(top, arm),
         degree=top.choice("degree", (3, 5), Job.degree),
         timing=top.choice("timing", ("per-joint", "shared"), Job.timing),
-        refine=top.integer("refine", Job.refine, least=1, most=64),
+        refine=top.integer("refine", Job.refine, least=REFINE[0], most=REFINE[1]),
         optimiser=top.choice("optimiser", OPTIMISERS, Job.optimiser),
-        population=top.integer("population", Job.population, least=4, most=100_000),
-        iterations=top.integer("iterations", Job.iterations, least=1, most=1_000_000),
+        population=top.integer("population", Job.population, least=POPULATION[0], most=POPULATION[1]),
+        iterations=top.integer("iterations", Job.iterations, least=ITERATIONS[0], most=ITERATIONS[1]),
         parameters=parameters.rest() if parameters else {},
         seed=top.integer("seed", Job.seed, least=0, most=2**63 - 1),
         bounds_s=(low, high),
         polish=top.boolean("polish", Job.polish),
-        source=str(path),
+        source=top.file,
     )
     top.done()
     return job

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import difflib
 import math
+import reprlib
+import sys
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -21,15 +23,20 @@ def read(path: Path | str) -> Table:
     Raises InputError where the file is missing, unreadable or not TOML.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        text = Path(path).read_text(encoding="utf-8-sig")  # some editors begin a file with a mark
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read: {why(error)}") from None
+    return parse(text, str(path))
+
+
+def parse(text: str, file: str) -> Table:
+    """The top table of TOML text; ``file`` names it in messages. Raises InputError where it is not TOML."""
     try:
-        return Table(tomllib.loads(text), str(path))
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: not valid TOML: {error}") from None
+        return Table(tomllib.loads(text), file)
+    except (ValueError, RecursionError) as error:  # not all of tomllib's are its own: numbers of 5000 digits
+        raise InputError(f"{file}: not valid TOML: {error}") from None
 
 
 class Table:
@@ -46,7 +53,8 @@ class Table:
         name = f"{self._place}{key}"
         if key not in self._values:
             return InputError(f"{self.file}: {name} is missing; it must be {allowed}")
-        return InputError(f"{self.file}: {name} = {self._values[key]!r} is not allowed; it must be {allowed}")
+        value = reprlib.repr(self._values[key])
+        return InputError(f"{self.file}: {name} = {value} is not allowed; it must be {allowed}")
 
     def has(self, key: str) -> bool:
         """Whether the key is given."""
@@ -151,7 +159,10 @@ class Table:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    """A finite number, and no whole one beyond the largest double."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return abs(value) <= sys.float_info.max
 
 
 def _range_text(above: float, least: float, most: float) -> str:

@@ -92,6 +92,8 @@ def test_no_scheduler_and_no_workers_are_said(tmp_path: Path, monkeypatch: pytes
     monkeypatch.setattr(bench_workers, "_CONNECT_S", 0.3)
     with pytest.raises(InputError, match="no Dask scheduler"), bench_workers.cluster("tcp://127.0.0.1:9"):
         pass
+    with pytest.raises(InputError, match="is no address"), bench_workers.cluster("nonsense"):
+        pass
     with pytest.raises(InputError, match="no workers"):
         bench_workers._check_workers("tcp://there", {})
     with pytest.raises(ArmtempoError, match="no armtempo"):
@@ -155,6 +157,15 @@ def test_runs_of_another_problem_and_other_files_are_refused(tmp_path: Path, pro
     (tmp_path / bench_store.FILE).write_text("a shopping list\n")
     with pytest.raises(InputError, match="not a file of runs"):
         bench_store.Store(tmp_path, problem)
+    (tmp_path / bench_store.FILE).unlink()
+    store = bench_store.Store(tmp_path, problem)
+    head = store.path.read_text()
+    for improvements in ([], [["a", "b"]], [[0]]):
+        case = {"algorithm": "acs", "population": 4, "seed": 1}
+        run = {"case": case, "intervals_s": [], "evaluations": 1, "seconds": 0, "improvements": improvements}
+        store.path.write_text(f"{head}{json.dumps(run)}\n")
+        with pytest.raises(InputError, match="not a file of runs"):
+            bench_store.Store(tmp_path, problem)
     (tmp_path / "flat").write_text("")
     with pytest.raises(InputError, match="cannot be used"):
         bench_store.Store(tmp_path / "flat", problem)
@@ -212,7 +223,8 @@ def test_without_matplotlib_the_tables_stand(tmp_path: Path, monkeypatch: pytest
     [
         (["--algorithms", "acs,moth"], "'moth' is not one of"),
         (["--populations", "10,many"], "whole numbers"),
-        (["--populations", "3"], "at least 4"),
+        (["--populations", "3"], "from 4 to 100000"),
+        (["--populations", "10,1000000000"], "from 4 to 100000"),
         (["--joint", "7"], "joints 1 to 3"),
     ],
 )

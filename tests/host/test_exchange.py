@@ -43,6 +43,10 @@ def test_ros_points_are_in_radians_and_in_order() -> None:
     assert "time_from_start: {sec: 0, nanosec: 100000000}" in text
 
 
+def test_the_start_is_there_at_any_rate() -> None:
+    assert exchange.times_s(7.0, 1e-300).tolist() == [0.0, 7.0]
+
+
 @pytest.mark.parametrize("rate", [0.0, -1.0, float("nan"), 1e9])
 def test_an_impossible_rate_is_refused(rate: float) -> None:
     with pytest.raises(InputError, match="not allowed"):
@@ -75,6 +79,7 @@ def test_via_points_come_from_any_sensible_table(tmp_path: Path, text: str, radi
         ("0,-60,40\n20,-75\n", "line 2: 2 values"),
         ("0,-60,40\n20,x,50\n", "line 2: 'x' is not a finite number"),
         ("0,-60,40\n20,nan,50\n", "line 2: 'nan'"),
+        ("0,-60,inf\n20,-75,50\n", "line 1: 'inf'"),
         ("joint 1,joint 2\n1,2\n", "line 1: the header must name"),
     ],
 )
@@ -100,5 +105,8 @@ def test_the_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Path("out.csv").write_text("0,-60,40\n900,0,0\n")
     outside = run(main, ["import", "out.csv"])
     assert outside.exit_code == 2
+    assert "out.csv: via_deg[2] = [900, 0, 0]" in outside.output
     assert "range of joint 1" in outside.output
+    named = run(main, ["import", "feed.csv", "--name", 'a"b'])
+    assert """feed.csv: name = 'a"b' is not allowed""" in named.output
     assert not Path("out.toml").exists()

@@ -95,6 +95,9 @@ def test_what_can_be_wrong_with_a_turned_position(via: str, said: str, tmp_path:
         (TWO + "bounds_s = [3.0, 0.1]\n", ["bounds_s", "shorter first"]),
         (TWO + "seeds = 3\n", ["seeds: unknown key", "'seed'"]),
         ("[[via]]\nmatrix = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n", ["via[1].matrix", "4 rows of 4 numbers"]),
+        (f"via_deg = [[0, -60, 1{'0' * 400}], [20, -75, 50]]\n", ["via_deg[1]", "list of 3 numbers"]),
+        (f"seed = 1{'0' * 5000}\n", ["not valid TOML"]),
+        ("via_deg = " + "[" * 5000 + "]" * 5000, ["not valid TOML"]),
         ("[[via]]\nangle = 3\n", ["via[1]: exactly one of angles_deg, matrix"]),
     ],
 )
@@ -104,6 +107,12 @@ def test_what_is_wrong_is_said(tmp_path: Path, text: str, said: list[str]) -> No
         load_job(path, ARM)
     for part in [str(path), *said]:
         assert part in str(error.value)
+
+
+def test_a_mark_at_the_start_of_the_file_is_passed_over(tmp_path: Path) -> None:
+    path = tmp_path / "job.toml"
+    path.write_text('name = "marked"\n' + TWO, encoding="utf-8-sig")
+    assert load_job(path, ARM).name == "marked"
 
 
 def test_a_name_the_board_cannot_store(tmp_path: Path) -> None:

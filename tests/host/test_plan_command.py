@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from armtempo import trajectory_file
+from armtempo import planner, trajectory_file
 from armtempo.cli import main
 from click.testing import CliRunner, Result
 
@@ -74,6 +74,25 @@ def test_says_what_is_wrong_with_a_job(change: str, message: str) -> None:
     assert message in result.output
     assert "Traceback" not in result.output
     assert not Path("move.json").exists()
+
+
+def test_a_setting_beyond_its_range_is_refused_before_it_fills_the_memory() -> None:
+    for option, value in (("--population", "1000000000"), ("--iterations", "10000000")):
+        result = run("--job", "move.toml", option, value)
+        assert result.exit_code == 2
+        assert f"{option[2:]} {value} must be a whole number from" in result.output
+
+
+def test_too_little_memory_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise MemoryError("Unable to allocate 44.7 GiB")
+
+    monkeypatch.setattr(planner, "plan", full)
+    result = run("--job", "move.toml")
+    assert (result.exit_code, result.output) == (
+        1,
+        "armtempo: this takes more memory than there is: Unable to allocate 44.7 GiB\n",
+    )
 
 
 def test_says_why_there_is_no_plan() -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import errno
+import io
 import os
+import sys
 from importlib import import_module
 from keyword import iskeyword
 from typing import Any
@@ -62,6 +64,9 @@ class LazyGroup(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; what the user can mend is said in one message, without a traceback."""
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, io.TextIOWrapper):
+                stream.reconfigure(errors="replace")  # a ² in a code page that has none ends no command
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads only cost time on matrices this small
         try:
             with terminate_as_interrupt():
@@ -73,6 +78,9 @@ class LazyGroup(click.Group):
             if error.errno == errno.EPIPE:  # whoever read the output has gone: click ends quietly
                 raise
             click.echo(f"armtempo: {_of_file(error)}", err=True)
+            ctx.exit(1)
+        except MemoryError as error:
+            click.echo(f"armtempo: this takes more memory than there is: {error}".rstrip(": "), err=True)
             ctx.exit(1)
         except KeyboardInterrupt:
             click.echo("armtempo: interrupted", err=True)

@@ -34,12 +34,15 @@ def _names(ctx: click.Context, parameter: click.Parameter, value: str) -> list[s
 
 def _sizes(ctx: click.Context, parameter: click.Parameter, value: str) -> list[int]:
     """Populations, separated by commas."""
+    from armtempo.job import POPULATION
+
     try:
         sizes = [int(size) for size in value.split(",")]
     except ValueError:
         raise click.BadParameter(f"{value!r} must be whole numbers separated by commas") from None
-    if min(sizes) < 4:
-        raise click.BadParameter("a population is at least 4")
+    least, most = POPULATION
+    if min(sizes) < least or max(sizes) > most:
+        raise click.BadParameter(f"a population is from {least} to {most}")
     return sizes
 
 

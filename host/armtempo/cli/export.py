@@ -34,7 +34,7 @@ def command(trajectory: Path, kind: str, rate: float, frame_id: str, output: Pat
     plan = trajectory_file.load(trajectory)
     text = exchange.to_csv(plan, rate) if kind == "csv" else exchange.to_ros(plan, rate, frame_id)
     if output is None:
-        click.echo(text, nl=False)
+        click.echo(text.encode(), nl=False)  # UTF-8 as in a file, whatever the terminal
     else:
         replace_text(output, text)
         click.echo(f"written: {output}")
