@@ -82,6 +82,7 @@ class Pipe:
         self._queues: tuple[deque[tuple[float, bytes]], ...] = (deque(), deque())
         self._sample_s = 0.0
         self._plugged_s = 0.0
+        self._silent_s = 0.0
         self.round_trips = 0
         self.bytes_sent = 0
         self.run_samples = 70
@@ -145,12 +146,22 @@ class Pipe:
         """Pull the cable and put it back in later."""
         self._plugged_s = self.clock() + seconds
 
+    def silence_for(self, seconds: float) -> None:
+        """The port is there, but nothing comes through."""
+        self._silent_s = self.clock() + seconds
+
+    def swap_board(self, board_id: bytes) -> None:
+        """Another board at the same port, which some host has greeted before."""
+        self.start_board()
+        self.app.board_id = board_id
+        self.app.commands.greeted = True
+
     def _check(self) -> None:
         if not self.connected():
             raise LinkError("the connection to pipe broke: unplugged")
 
     def _send(self, way: int, data: bytes) -> None:
-        if self.connected():
+        if self.connected() and self.clock() >= self._silent_s:
             arrives, delay_s = self._ways[way](data)
             self._queues[way].append((self.clock() + delay_s, arrives))
 

@@ -17,7 +17,7 @@ from armtempo.link import Board
 from armtempo.link.board import Progress
 from armtempo.link.follow import CHECK_S, Follower, RunEnd
 from armtempo.link.messages import Sample
-from armtempo.link.session import RECONNECT_S, NoAnswer, refusal
+from armtempo.link.session import RECONNECT_S, NoAnswer, OtherBoard, refusal
 from armtempo.record import COMPLETE, FAULT, INTERRUPTED, RunFolder
 from armtempo.spline import Array
 from armtempo.trajectory import Trajectory
@@ -80,8 +80,8 @@ def replay(
 ) -> RunEnd:
     """Start a stored motion and follow it to its end; a stop request makes the board brake.
 
-    Whatever fails here stops the board. Raises BoardError where the board refuses to start, KeyboardInterrupt
-    where the stop request was there before.
+    Whatever fails here stops the board. Raises BoardError where the board refuses to start, LinkError where it
+    cannot be reached any more, KeyboardInterrupt where the stop request was there before.
     """
     board.session.hurried = lambda: stop.wanted
     if stop.wanted:
@@ -89,16 +89,26 @@ def replay(
     run, duration_s = board.start(motion.name, motion.crc, flags)
     follower = Follower(board, run)
     braking = _Brake(board, stop)
+    try:
+        return _follow(board, follower, braking, take, duration_s)
+    except OtherBoard as error:
+        raise LinkError(f"{error}; what came after the last sample cannot be known") from error
+
+
+def _follow(board: Board, follower: Follower, braking: _Brake, take: Take, duration_s: float) -> RunEnd:
     heard_s = board.session.clock()
     while follower.end is None:
         try:
             for sample in follower.samples(braking):
                 heard_s = board.session.clock()
                 take(sample, duration_s)
+        except OtherBoard:
+            raise
         except NoAnswer as error:  # silent, though its port is there: as if the cable were out
-            if board.session.clock() - heard_s > RECONNECT_S:
-                raise
-            board.session.reconnect(error)
+            if not board.session.hurried():  # else the stop goes on, until it is given up
+                if board.session.clock() - heard_s > RECONNECT_S:
+                    raise
+                board.session.reconnect(error)
         except BaseException as error:
             _stop_after(board, error)
             raise

@@ -10,7 +10,7 @@ from armtempo_shared.messages import MAX_PAYLOAD
 
 from armtempo.errors import BoardError
 from armtempo.link import messages
-from armtempo.link.session import PATIENCE_S, NoAnswer, Session
+from armtempo.link.session import PATIENCE_S, NoAnswer, OtherBoard, Session
 
 SLOW_S = 30.0
 """Silence allowed where the board erases flash or checks a whole motion before it answers."""
@@ -33,6 +33,7 @@ class Board:
         self._number = secrets.randbits(32) if session_number is None else session_number
         self._piece = LARGEST_PIECE
         self.info: messages.Hello | None = None
+        session.greet = self._greet_again
 
     def hello(self) -> messages.Hello:
         """Begin a session; NoAnswer within about a second and a half where nobody speaks the protocol."""
@@ -43,6 +44,17 @@ class Board:
         fields[3] = messages.state_name(values[3])
         self.info = messages.Hello(*fields)
         return self.info
+
+    def _greet_again(self) -> None:
+        before = self.info
+        now = self.hello()
+        if before is None or (now.board_id, now.boot) == (before.board_id, before.boot):
+            return
+        self.info = before
+        where = self.session.transport.name
+        if now.board_id != before.board_id:
+            raise OtherBoard(f"another board is on {where} now ({now.board_id}, before {before.board_id})")
+        raise OtherBoard(f"the board on {where} has started anew: positions are unknown, 'armtempo home'")
 
     def status(self) -> messages.Status:
         """What the board is doing and where the joints stand."""

@@ -44,17 +44,25 @@ class NoAnswer(LinkError):
     """The board did not answer a command in time."""
 
 
+class OtherBoard(LinkError):
+    """The board that answers is not the one that was there before, or was started anew since."""
+
+
 class Session:
     """The host's end of the protocol; ``clock`` gives seconds and is replaced in tests.
 
-    Where the port breaks, ``reopen`` (if set) is tried until it gives a new transport, and all goes on: the
-    command under way is sent again, and what was lost meanwhile is asked for again by those who need it.
+    Where the port breaks, ``reopen`` (if set) is tried until it gives a new transport behind which ``greet``
+    finds the same board, and all goes on: the command under way is sent again, and what was lost meanwhile is
+    asked for again by those who need it. The greeting makes the board forget its last answer; where just that
+    was lost, the board may refuse what it has done already.
     """
 
     def __init__(self, transport: Transport, clock: Callable[[], float] = time.monotonic) -> None:
         self.transport = transport
         self.clock = clock
         self.reopen: Callable[[], Transport] | None = None
+        self.greet: Callable[[], None] = lambda: None
+        """Raises OtherBoard where another one answers, or the same one started anew."""
         self.tell: Callable[[str], None] = lambda text: None
         """Gets what a user should know while it happens."""
         self.hurried: Callable[[], bool] = lambda: False
@@ -87,12 +95,12 @@ class Session:
         ``patience_s`` without an answer, LinkError where the port breaks.
         """
         number = wire.COMMAND[name][1]
-        self._sequence = (self._sequence + 1) % 256
-        data = wire.frame(self._sequence, number, wire.encode(wire.COMMAND[name], values, tail))
+        self._sequence = sequence = (self._sequence + 1) % 256
+        data = wire.frame(sequence, number, wire.encode(wire.COMMAND[name], values, tail))
         begin_s = self._heard_s = self.clock()
         while True:
             self._write(data)
-            reply = self._reply(self.clock() + REPEAT_S, number)
+            reply = self._reply(self.clock() + REPEAT_S, sequence, number)
             if reply is not None:
                 return _answer(name, *reply)
             now_s = self.clock()
@@ -121,13 +129,13 @@ class Session:
             return f"{what}; {self.frames_bad} damaged stretches received: check the cable"
         return f"{what}; check the cable and that the board is powered"
 
-    def _reply(self, deadline_s: float, number: int) -> messages.Frame | None:
+    def _reply(self, deadline_s: float, sequence: int, number: int) -> messages.Frame | None:
         while (left_s := deadline_s - self.clock()) > 0:
             frame = self._frame(left_s)
             if frame is None:
                 continue
             if frame[1] in _REPLY_IDS:
-                if frame[0] == self._sequence and frame[2][:1] == bytes((number,)):
+                if frame[0] == sequence and frame[2][:1] == bytes((number,)):
                     return frame
             else:
                 self._keep_event(frame)
@@ -160,23 +168,21 @@ class Session:
             return b""
 
     def reconnect(self, reason: LinkError) -> None:
-        """Close the port and open it again, for up to RECONNECT_S; ``reason`` is raised where that fails."""
+        """Close the port and open it again until the board answers, for up to RECONNECT_S.
+
+        Raises ``reason`` where that fails, OtherBoard where another board answers.
+        """
         if self.reopen is None:
             raise reason
         self.tell(f"{reason}; waiting for it to come back")
         self.transport.close()
-        self._parser = wire.Parser()
         limit_s = self.clock() + RECONNECT_S
-        while True:
-            try:
-                self.transport = self.reopen()
-                break
-            except ArmtempoError:
-                if self.hurried():
-                    limit_s = min(limit_s, self.clock() + HURRY_S)
-                if self.clock() >= limit_s:
-                    raise self._gone(reason) from None
-                self.sleep(RETRY_S)
+        while not self._found_again(self.reopen):
+            if self.hurried():
+                limit_s = min(limit_s, self.clock() + HURRY_S)
+            if self.clock() >= limit_s:
+                raise self._gone(reason)
+            self.sleep(RETRY_S)
         self._heard_s = self.clock()
         self.tell(f"connected to {self.transport.name} again")
 
@@ -187,6 +193,22 @@ class Session:
             f"{reason}; it could not be told to stop: what was moving may move on, see 'armtempo status' once it is "
             "back"
         )
+
+    def _found_again(self, reopen: Callable[[], Transport]) -> bool:
+        """Open the port and greet the board; False where that fails."""
+        self._parser = wire.Parser()
+        self.reopen = None  # what breaks meanwhile is tried again by the caller
+        try:
+            self.transport = reopen()
+            self.greet()
+            return True
+        except OtherBoard:
+            raise
+        except ArmtempoError:
+            self.transport.close()
+            return False
+        finally:
+            self.reopen = reopen
 
     def _next_frame(self) -> messages.Frame | None:
         frame: messages.Frame | None = self._parser.next()
