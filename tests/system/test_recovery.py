@@ -159,6 +159,12 @@ def module(bench: Bench, name: str, text: str) -> None:
     (bench.flash / "lib" / "armtempo_board" / f"{name}.py").write_text(text)
 
 
+def damage_largest(bench: Bench) -> None:
+    """Cut the largest file of the program off behind its first bytes."""
+    largest = max((bench.flash / "lib").rglob("*.*"), key=lambda path: path.stat().st_size)
+    largest.write_bytes(largest.read_bytes()[:10])
+
+
 def file(bench: Bench, name: str, text: str) -> None:
     (bench.flash / name).write_text(text)
 
@@ -193,14 +199,14 @@ def damaged(kind: str) -> Callable[[Bench], None]:
 
 STATES: dict[str, dict[str, Callable[[Bench], None]]] = {
     "The program does not start": {
-        "syntax error": lambda bench: module(bench, "app", "def turn(:\n"),
-        "damaged compiled file": lambda bench: next(bench.flash.rglob("app.*")).write_bytes(b"M\6") and None,
+        "syntax error": lambda bench: module(bench, "program", "def turn(:\n"),
+        "damaged file": damage_largest,
         "exception in main.py": lambda bench: file(bench, "main.py", "1 / 0\n"),
         "exception in boot.py": lambda bench: file(bench, "boot.py", "1 / 0\n"),
         "half deployed": half_deployed,
     },
     "The board hangs": {
-        "program": lambda bench: module(bench, "leds", HANG),
+        "program": lambda bench: module(bench, "program", HANG),
         "watchdog": lambda bench: file(bench, "main.py", WATCHDOG),
     },
     "boot.py does not end": {"boot.py": lambda bench: file(bench, "boot.py", HANG)},

@@ -36,7 +36,7 @@ def deploy(port: str, mpy: bool, tell: Tell, progress: Progress) -> None:
     ``mpy``: compiled; also done where the sources do not fit. Raises LinkError where the board is moving,
     unsuitable or stops answering, InputError where mpy-cross is needed and missing.
     """
-    end_program(port)
+    end_program(port, tell)
     remote = Remote(port)
     found = remote.survey()
     check_suitable(found)
@@ -57,7 +57,7 @@ def deploy(port: str, mpy: bool, tell: Tell, progress: Progress) -> None:
 
 def undeploy(port: str, tell: Tell) -> None:
     """Take the program off the board; stored motions stay, and what ``deploy`` kept aside comes back."""
-    end_program(port)
+    end_program(port, tell)
     remote = Remote(port)
     found = remote.survey()
     files = ours(found)
@@ -73,7 +73,7 @@ def undeploy(port: str, tell: Tell) -> None:
     tell(f"{len(files)} files of the library removed; stored motions are kept")
 
 
-def end_program(port: str) -> None:
+def end_program(port: str, tell: Tell) -> None:
     """Ask a program that runs for the REPL; LinkError where it is moving."""
     if is_sim(port):
         raise InputError(
@@ -85,6 +85,7 @@ def end_program(port: str) -> None:
             board = stack.enter_context(open_board(port, any_program=True))
         except LinkError:
             return  # the REPL, or a program that cannot be talked to: mpremote interrupts it
+        board.session.tell = tell
         if board.status().moving:
             raise LinkError("the board is moving; wait for the end of the motion, or 'armtempo stop'")
         board.leave()
