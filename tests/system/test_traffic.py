@@ -1,0 +1,232 @@
+"""A whole recorded session, replayed both ways: the host's bytes to a board, the board's bytes to the host."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from armtempo import encode, moves, operate
+from armtempo.errors import BoardError
+from armtempo.interrupt import StopRequest
+from armtempo.link import open_board, traffic
+from armtempo.link.messages import Done, Event, Sample
+from armtempo.link.replay import ReplayTransport
+from armtempo.link.session import Session
+from armtempo.link.traffic import FROM_BOARD, TO_BOARD, Chunk
+from armtempo.link.transport import SerialTransport
+from armtempo.virtual import launch
+from armtempo_shared import limits, wire
+
+from tests import interpreters
+from tests.system import boards
+
+AWAY_DEG = np.array([20.0, -10.0, 15.0])
+INTERPRETERS = [name for name in interpreters.AVAILABLE if name != "micropython-arm"]
+WAIT_S = 60.0
+LATE_TICKS = round(20e-6 * limits.TICK_HZ)
+"""How late the sample interrupt may read the clock, so how far two recordings may differ."""
+PASSING = {
+    "hello": {"free_flash", "free_heap", "boot", "_tail"},
+    "status": {"ticks"},
+    "samples": {"first", "count"},
+}
+"""What may differ in an answer between two boards that did the same: times and memory."""
+
+
+@dataclass
+class Recording:
+    """A traffic log, and what its host had of it."""
+
+    path: Path
+    samples: list[Sample] = field(default_factory=list)
+
+    def chunks(self) -> list[Chunk]:
+        """The log's lines."""
+        return list(traffic.read_log(self.path))
+
+    def data(self, direction: str) -> bytes:
+        """All bytes of one direction."""
+        return b"".join(chunk.data for chunk in self.chunks() if chunk.direction == direction)
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    """Greeting, arm, home, upload, a refusal, a run, status, the store's commands; as ``--log-traffic`` writes it."""
+    made = Recording(tmp_path_factory.mktemp("traffic") / "traffic.log")
+    home_deg = operate.home_deg(boards.ARM)
+    data = encode.motion_record(moves.straight("go", home_deg, home_deg + AWAY_DEG, boards.ARM), boards.ARM)
+    starter = interpreters.starter(INTERPRETERS[-1])
+    with launch(interpreter=starter) as process, open_board(process.port, made.path) as board:
+        operate.configure(board, boards.ARM, replace=True)
+        operate.home(board, boards.ARM)
+        stored = operate.store(board, "go", data)
+        with StopRequest() as stop:
+            operate.replay(board, stored, stop, lambda sample, _: made.samples.append(sample))
+        board.status()
+        board.rename("go", "gone")
+        assert [entry.name for entry in board.stored()] == ["gone"]
+        assert board.fetch("gone") == data
+        board.remove("gone")
+        operate.stop_moving(board)  # refused: nothing moves
+    return made
+
+
+def frames(data: bytes) -> Iterator[tuple[int, int, bytes]]:
+    """All frames of one direction; there must be nothing else."""
+    parser = wire.Parser()
+    parser.feed(data)
+    while (frame := parser.next()) is not None:
+        yield frame
+    assert parser.bad == 0
+
+
+def decoded(frame: tuple[int, int, bytes]) -> tuple[str, dict[str, Any]]:
+    """Name of a reply or event and its fields: for an answer its command's name and its own fields."""
+    entry = wire.EVENT_BY_ID[frame[1]]
+    values, tail = wire.decode(entry, frame[2])
+    name = entry[0]
+    if name == "ok":
+        entry = wire.ANSWER_BY_ID[values[0]]
+        name = entry[0]
+        values, tail = wire.decode(entry, tail)
+    return name, {**dict(zip(entry[3], values, strict=True)), "_tail": tail}
+
+
+REPLIES = tuple(wire.EVENT[name][1] for name in ("ok", "error"))
+DONE = wire.EVENT["done"][1]
+
+
+def count(data: bytes) -> tuple[int, int]:
+    """How many replies and ends of a run these bytes of the board hold."""
+    numbers = [number for _, number, _ in frames(data)]
+    return sum(number in REPLIES for number in numbers), numbers.count(DONE)
+
+
+def say_again(chunks: list[Chunk], port: str) -> bytes:
+    """Say to a board what the host said, each word when as much has been answered; gives what it answers."""
+    transport = SerialTransport(port)
+    recorded, heard = b"", b""
+    try:
+        for chunk in [*chunks, Chunk(0.0, TO_BOARD, b"")]:
+            if chunk.direction == FROM_BOARD:
+                recorded += chunk.data
+                continue
+            limit_s = time.monotonic() + WAIT_S
+            while any(have < wanted for have, wanted in zip(count(heard), count(recorded), strict=True)):
+                assert time.monotonic() < limit_s, chunk
+                heard += transport.read(0.05)
+            transport.write(chunk.data)
+        return heard
+    finally:
+        transport.close()
+
+
+@pytest.mark.parametrize("name", INTERPRETERS)
+def test_a_board_answers_the_host_s_bytes_in_the_same_way(recording: Recording, name: str) -> None:
+    with launch(interpreter=interpreters.starter(name)) as process:
+        answers = say_again(recording.chunks(), process.port)
+    recorded, again = (list(frames(data)) for data in (recording.data(FROM_BOARD), answers))
+    pairs = zip(
+        *([frame for frame in found if frame[1] in REPLIES] for found in (recorded, again)), strict=True
+    )
+    for one, other in pairs:
+        assert one[0] == other[0]
+        _compare(decoded(one), decoded(other))
+    samples, others = (_samples(found) for found in (recorded, again))
+    assert list(samples) == list(others) == list(range(len(recording.samples)))
+    for index, sample in samples.items():
+        assert abs(sample["ticks"] - others[index]["ticks"]) <= LATE_TICKS
+        assert np.max(np.abs(_stand(sample) - _stand(others[index]))) <= 1
+
+
+def _compare(one: tuple[str, dict[str, Any]], other: tuple[str, dict[str, Any]]) -> None:
+    name, fields = one
+    assert name == other[0]
+    moving = name == "status" and wire.STATES[fields["state"]] in ("moving", "braking")
+    passing = set(fields) if moving else PASSING.get(name, set())
+    for key, value in fields.items():
+        assert key in passing or value == other[1][key], (name, key)
+
+
+def _samples(found: list[tuple[int, int, bytes]]) -> dict[int, dict[str, Any]]:
+    samples = [fields for name, fields in map(decoded, found) if name == "sample"]
+    return {fields["index"]: fields for fields in samples}
+
+
+def _stand(sample: dict[str, Any]) -> np.ndarray:
+    return np.frombuffer(sample["_tail"], "<i4")
+
+
+def test_the_host_takes_the_board_s_bytes_in_the_same_way(recording: Recording) -> None:
+    """The host's own link says the recorded words again, byte for byte, and understands the same."""
+    chunks = recording.chunks()
+    session = Session(ReplayTransport(chunks))
+    events: list[Event] = []
+    said = 0
+    for _, number, payload in _without_repeats(recording.data(TO_BOARD)):
+        entry = wire.COMMAND_BY_ID[number]
+        values, tail = wire.decode(entry, payload)
+        for _ in chunks:  # each look takes one of them or less; the host's next word drops the rest
+            event = session.poll(0.0)
+            events += [event] if event else []
+        with suppress(BoardError):  # the board refuses again what it refused
+            session.command(entry[0], values, tail)
+        said += 1
+    events.extend(session.events)
+    assert said >= 18
+    assert session.frames_bad == 0
+    assert [event for event in events if isinstance(event, Sample)] == recording.samples
+    (done,) = (event for event in events if isinstance(event, Done))
+    assert done.stand == recording.samples[-1].stand
+
+
+def _without_repeats(data: bytes) -> list[tuple[int, int, bytes]]:
+    found: list[tuple[int, int, bytes]] = []
+    for frame in frames(data):
+        if not found or found[-1] != frame:
+            found.append(frame)
+    return found
+
+
+@pytest.mark.parametrize("piece", [1, 7, 1 << 20])
+def test_the_decoder_says_the_same_however_the_bytes_are_cut(recording: Recording, piece: int) -> None:
+    wanted = [line.split("\t")[3] for line in recording.path.read_text().splitlines()[1:]]
+    for direction in (TO_BOARD, FROM_BOARD):
+        decoder = traffic.Decoder()
+        data = recording.data(direction)
+        words = [
+            line
+            for at in range(0, len(data), piece)
+            for line in decoder.feed(direction, data[at : at + piece])
+        ]
+        chunks = zip(recording.chunks(), wanted, strict=True)
+        told = [text for chunk, text in chunks if chunk.direction == direction and text]
+        assert "; ".join(words) == "; ".join(told)
+
+
+def test_monitor_shows_what_was_written(recording: Recording, tmp_path: Path) -> None:
+    shown = boards.armtempo("monitor", recording.path, cwd=tmp_path).splitlines()
+    lines = [line.split("\t") for line in recording.path.read_text().splitlines()[1:]]
+    assert "; ".join(line[13:] for line in shown) == "; ".join(words for *_, words in lines if words)
+    when = dict.fromkeys(
+        f"{float(seconds):10.4f} {direction} " for seconds, direction, _, words in lines if words
+    )
+    assert list(dict.fromkeys(line[:13] for line in shown)) == list(when)
+    text = "\n".join(shown)
+    for word in (
+        "hello",
+        "put_begin",
+        "home",
+        "start",
+        "sample run=1 index=0",
+        "done run=1",
+        "ok status",
+        "error stop",
+    ):
+        assert word in text
