@@ -1,0 +1,125 @@
+"""The real mpremote against a virtual board whose program is running."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from armtempo import encode, moves, operate
+from armtempo.errors import LinkError
+from armtempo.link import Board, open_board
+from armtempo.virtual import edgelog, launch
+from mpremote.transport import TransportError
+from mpremote.transport_serial import SerialTransport
+
+from tests import interpreters
+from tests.system import boards, commandline
+
+INTERPRETER = interpreters.starter("micropython" if "micropython" in interpreters.AVAILABLE else "cpython")
+HOME_DEG = operate.home_deg(boards.ARM)
+AWAY_DEG = HOME_DEG + np.array([40.0, -10.0, 15.0])
+REPLAY = "import armtempo_board; armtempo_board.replay('go')"
+
+
+@pytest.fixture
+def flash(tmp_path: Path) -> Path:
+    """A flash with the shipped arm and the motion ``go`` from home to AWAY_DEG."""
+    folder = tmp_path / "flash" / "armtempo"
+    folder.mkdir(parents=True)
+    (folder / "arm.ata").write_bytes(encode.arm_record(boards.ARM))
+    (folder / "go.atm").write_bytes(
+        operate.motion_data(moves.straight("go", HOME_DEG, AWAY_DEG, boards.ARM), boards.ARM)
+    )
+    return tmp_path / "flash"
+
+
+def mpremote(port: str, *arguments: str) -> str:
+    """What mpremote prints."""
+    command = [sys.executable, "-m", "mpremote", "connect", port, *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, (done.stdout, done.stderr)
+    return done.stdout
+
+
+def steps(angles_deg: np.ndarray) -> list[int]:
+    """Of postures, degrees to steps."""
+    return [
+        round(angle * encode.steps_per_deg(joint))
+        for angle, joint in zip(angles_deg, boards.ARM.driven, strict=True)
+    ]
+
+
+def state(port: str) -> str:
+    """Of the board, or why nothing answers for it."""
+    try:
+        with open_board(port) as board:
+            return board.status().state
+    except LinkError as error:
+        return str(error)
+
+
+def test_replay_from_the_prompt(flash: Path, tmp_path: Path) -> None:
+    """A soft reset comes first, so the posture is taken for the start; ``resume`` does without, and knows it."""
+    log = tmp_path / "edges"
+    with launch(flash, interpreter=INTERPRETER, edge_log=log) as process:
+        with open_board(process.port) as board:
+            operate.home(board, boards.ARM)
+        said = mpremote(process.port, "resume", "exec", REPLAY)
+        assert said.splitlines() == [f"done at steps {steps(AWAY_DEG)}"]
+        assert mpremote(process.port, "resume", "exec", REPLAY).startswith("refused: wrong_start joint 1")
+        said = mpremote(process.port, "exec", REPLAY)
+        assert said.splitlines()[0] == "taking the posture of the arm as the start of go"
+        assert said.splitlines()[1] == f"done at steps {steps(AWAY_DEG)}"
+        mpremote(process.port, "reset")
+        commandline.wait_for(lambda: state(process.port) == "unhomed", "the program")
+    session = edgelog.read(log)[0]
+    rises = [int(np.sum(session.pins[pin][1] == 1)) for pin in ("A15", "A1", "B10")]
+    assert rises == [
+        2 * abs(there - here) for there, here in zip(steps(AWAY_DEG), steps(HOME_DEG), strict=True)
+    ]
+
+
+def test_files_while_the_program_runs(flash: Path) -> None:
+    with launch(flash, interpreter=INTERPRETER) as process:
+        assert state(process.port) == "unhomed"
+        assert "go.atm" in mpremote(process.port, "ls", "armtempo")
+        assert mpremote(process.port, "exec", "print(6 * 7)") == "42\n"
+        assert "runs MicroPython" in state(process.port)
+        mpremote(process.port, "reset")
+        commandline.wait_for(lambda: state(process.port) == "unhomed", "the program")
+
+
+def test_while_it_moves_nobody_gets_in(flash: Path) -> None:
+    """mpremote gives up; the motion comes to its end, where it should; then mpremote is let in."""
+    with launch(flash, interpreter=INTERPRETER, virtual_time=False) as process:
+        with open_board(process.port) as board:
+            operate.home(board, boards.ARM)
+            run, duration_s = _start(board)
+            begun_s = time.monotonic()
+        port = SerialTransport(
+            process.port, timeout=0.05
+        )  # a pseudo terminal: without one its read waits for ever
+        with pytest.raises(TransportError, match="could not enter raw repl"):
+            port.enter_raw_repl(timeout_overall=duration_s / 2)
+        port.close()
+        with open_board(process.port) as board:
+            still_moving = time.monotonic() - begun_s < duration_s - 0.2
+            assert board.status().moving or not still_moving
+            commandline.wait_for(lambda: not board.status().moving, "the end of the motion")
+            status = board.status()
+        assert (status.state, status.run, list(status.stand.commanded_steps)) == (
+            "idle",
+            run,
+            steps(AWAY_DEG),
+        )
+        assert mpremote(process.port, "resume", "exec", "print('in')") == "in\n"
+
+
+def _start(board: Board) -> tuple[int, float]:
+    stored = board.find("go")
+    assert stored is not None
+    return board.start("go", stored.crc)
