@@ -51,7 +51,10 @@ class Deviation:
 
 @dataclass(frozen=True)
 class LimitCheck:
-    """A measured peak beside its limit; ``sigma`` is the peak's uncertainty from encoder rounding."""
+    """A measured peak beside its limit; ``sigma`` is the peak's uncertainty from encoder rounding.
+
+    NaN for a joint without an encoder.
+    """
 
     peak: float
     limit: float
@@ -59,7 +62,9 @@ class LimitCheck:
 
     @property
     def verdict(self) -> str:
-        """``"kept"``, ``"kept within uncertainty"`` (3 sigma) or ``"exceeded"``."""
+        """``"kept"``, ``"kept within uncertainty"`` (3 sigma), ``"exceeded"``, or ``"not measured"``."""
+        if np.isnan(self.peak):
+            return "not measured"
         if self.peak <= self.limit:
             return "kept"
         return "kept within uncertainty" if self.peak <= self.limit + 3.0 * self.sigma else "exceeded"
@@ -113,7 +118,7 @@ def limit_checks(
         checks.append(
             [
                 LimitCheck(
-                    float(np.nanmax(np.abs(found.mean[order, :, joint]))),
+                    _peak(found.mean[order, :, joint]),
                     allowed[order - 1],
                     noise(order, SAMPLE_S, float(sigma)),
                 )
@@ -138,6 +143,12 @@ def lags_s(found: Curves, trajectory: Trajectory) -> Array:
             if slope @ slope > 0.0:
                 lags[row, joint] = -(error @ slope) / (slope @ slope)
     return lags
+
+
+def _peak(values: Array) -> float:
+    """Largest magnitude of what was measured; NaN where nothing was."""
+    known = np.abs(values[~np.isnan(values)])
+    return float(known.max()) if known.size else np.nan
 
 
 def _deviation(error: Array) -> Deviation:

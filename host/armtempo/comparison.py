@@ -74,9 +74,8 @@ def _table(sheet: page.Page, found: dict[str, report.Evaluation]) -> None:
                     evaluation.names[joint],
                     str(spline.degree),
                     f"{spline.duration_s:.3f}",
-                    *(f"{deviation[order][joint].rms:.3f}" for order in range(3)),
-                    f"{1000 * lags[0, joint]:+.0f}",
-                    f"{1000 * lags[1, joint]:+.0f}",
+                    *(page.number(deviation[order][joint].rms, ".3f") for order in range(3)),
+                    *(page.number(1000 * lags[end, joint], "+.0f") for end in (0, 1)),
                 ]
             )
     header = (

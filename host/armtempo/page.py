@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
@@ -61,6 +62,11 @@ class Page:
             f"<title>{escape(self._title)}</title>\n<style>\n{style}</style>\n</head>\n"
             f"<body>\n{body}\n</body>\n</html>\n"
         )
+
+
+def number(value: float, form: str) -> str:
+    """A value as ``form`` has it; a dash where there is none (NaN)."""
+    return "–" if math.isnan(value) else f"{value:{form}}"
 
 
 def _is_number(cell: object) -> bool:

@@ -55,6 +55,11 @@ def evaluate(folder: Path) -> Evaluation:
     if run.trajectory_path is None:
         raise RunFolderError(f"{folder}: has no trajectory.json, so there is no theory to compare with")
     plan = trajectory_file.load(run.trajectory_path)
+    if len(run.joints) != len(plan.arm.driven):
+        raise RunFolderError(
+            f"{folder}: run.json tells of {len(run.joints)} joints, trajectory.json of {len(plan.arm.driven)}; "
+            "they are not of one run"
+        )
     usable = [repetition for repetition in run.repetitions if len(repetition.time_s)]
     if not usable:
         raise RunFolderError(f"{folder}: holds no sample; run it again")
@@ -174,13 +179,13 @@ def _result_tables(sheet: page.Page, found: Evaluation) -> None:
     rows = [
         [
             name,
-            f"{deviation[0][joint].rms:.3f}",
-            f"{deviation[0][joint].largest:.3f}",
-            f"{finals[joint]:+.3f}",
-            f"{deviation[1][joint].rms:.2f}",
-            f"{deviation[2][joint].rms:.2f}",
-            f"{1000 * lags[0, joint]:+.0f}",
-            f"{1000 * lags[1, joint]:+.0f}",
+            page.number(deviation[0][joint].rms, ".3f"),
+            page.number(deviation[0][joint].largest, ".3f"),
+            page.number(finals[joint], "+.3f"),
+            page.number(deviation[1][joint].rms, ".2f"),
+            page.number(deviation[2][joint].rms, ".2f"),
+            page.number(1000 * lags[0, joint], "+.0f"),
+            page.number(1000 * lags[1, joint], "+.0f"),
         ]
         for joint, name in enumerate(found.names)
     ]
@@ -206,9 +211,10 @@ def _limit_table(sheet: page.Page, found: Evaluation) -> None:
         found.names, analyse.limit_checks(found.curves, found.limits, resolutions), strict=True
     ):
         for quantity, unit, check in zip(("speed", "acceleration"), ("°/s", "°/s²"), checks, strict=True):
-            kind = page.BAD if check.verdict == "exceeded" else page.GOOD
+            kind = {"exceeded": page.BAD, "not measured": ""}.get(check.verdict, page.GOOD)
             peak = f"{check.peak:.2f} ± {check.sigma:.2f}"
-            rows.append((name, quantity, peak, f"{check.limit:g}", unit, (check.verdict, kind)))
+            measured = "–" if np.isnan(check.peak) else peak
+            rows.append((name, quantity, measured, f"{check.limit:g}", unit, (check.verdict, kind)))
     caption = "Measured peaks beside the limits; ± one standard deviation from the encoder's rounding"
     sheet.table(("joint", "quantity", "peak", "limit", "unit", "verdict"), rows, caption)
 

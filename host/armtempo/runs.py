@@ -16,6 +16,11 @@ from armtempo.record import FORMAT, META, TRAJECTORY, VERSION, JointScale
 
 Array = NDArray[np.float64]
 
+_LARGEST = 2.0**53
+"""Beyond it a column of whole numbers is not exact."""
+_LONGEST_S = 86_400.0
+"""A day; no motion lasts that long on the board."""
+
 
 @dataclass(frozen=True)
 class Samples:
@@ -61,11 +66,16 @@ def load(path: Path) -> Run:
     """
     meta = _meta(path / META)
     try:
-        joints = tuple(JointScale(**joint) for joint in meta["joints"])
+        joints = tuple(_scale(**joint) for joint in meta["joints"])
         entries = [(str(entry["file"]), str(entry["state"])) for entry in meta["repetitions"]]
-    except (KeyError, TypeError) as error:
+        meta |= {key: str(meta[key]) for key in ("name", "started")}
+    except (KeyError, TypeError, ValueError) as error:
         raise RunFolderError(f"{path / META}: {error} is missing or wrong; the folder is damaged") from error
     return Run(path, meta, joints, tuple(_samples(path / file, state, joints) for file, state in entries))
+
+
+def _scale(name: str, steps_per_deg: float, counts_per_deg: float) -> JointScale:
+    return JointScale(str(name), float(steps_per_deg), float(counts_per_deg))
 
 
 def _meta(path: Path) -> dict[str, Any]:
@@ -93,23 +103,33 @@ def _samples(path: Path, state: str, joints: tuple[JointScale, ...]) -> Samples:
 
 
 def _parsed(path: Path, state: str, joints: tuple[JointScale, ...], rows: list[dict[str, str]]) -> Samples:
-    """The samples in the rows of a file; ValueError where a value is missing or not a number."""
+    """The samples in the rows of a file; ValueError where a value is missing, no number, or beyond reason."""
     table = {name: [row[name] or "" for row in rows] for name in (rows[0] if rows else ())}
-    numbers = range(1, len(joints) + 1)
+
+    def column(name: str, largest: float) -> Array:
+        if rows and name not in table:
+            raise ValueError(f"column {name} is missing")
+        values = np.array(table.get(name, []), dtype=float)
+        if not np.all(np.abs(values) <= largest):
+            raise ValueError(f"column {name} holds what no run can give")
+        return values
 
     def joint_columns(name: str) -> Array:
-        empty = ["nan"] * len(rows)
-        cells = [table.get(f"j{number}_{name}", empty) for number in numbers]
-        return np.array(cells, dtype=float).reshape(len(joints), len(rows)).T
+        cells = [column(f"j{number}_{name}", _LARGEST) for number in range(1, len(joints) + 1)]
+        return np.array(cells).reshape(len(joints), len(rows)).T
 
+    angle_deg = np.full((len(rows), len(joints)), np.nan)
+    for number, joint in enumerate(joints):
+        if joint.counts_per_deg:
+            angle_deg[:, number] = column(f"j{number + 1}_angle_deg", _LARGEST)
     return Samples(
         path.name,
         state,
-        np.array(table.get("index", []), dtype=np.int64),
-        np.array(table.get("time_s", []), dtype=float),
+        column("index", _LARGEST).astype(np.int64),
+        column("time_s", _LONGEST_S),
         joint_columns("commanded_steps").astype(np.int64),
         joint_columns("commanded_deg"),
-        joint_columns("angle_deg"),
+        angle_deg,
     )
 
 

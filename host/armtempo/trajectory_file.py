@@ -10,6 +10,7 @@ import numpy as np
 from armtempo_shared.basis import BASIS
 
 from armtempo import strictjson
+from armtempo.arm import Joint
 from armtempo.errors import InputError
 from armtempo.files import replace_text, why
 from armtempo.plan import Plan
@@ -70,10 +71,29 @@ def _refuse(name: str) -> None:
 def _check(plan: Plan, path: Path | str) -> None:
     """What the types cannot say: shapes, time that runs forward, one joint for each drive."""
     joints, driven = plan.trajectory.joints, plan.arm.driven
-    if not joints or len(joints) != len(driven) or plan.via_deg.shape[1:] != (len(driven),):
+    if not joints or len(joints) != len(driven):
         raise InputError(f"{path}: {len(joints)} joints in the trajectory, the arm drives {len(driven)}")
-    for number, joint in enumerate(joints, 1):
+    if plan.via_deg.shape[1:] != (len(driven),) or len(plan.extremes) != len(driven):
+        raise InputError(f"{path}: via_deg and extremes must have an entry for each of {len(driven)} joints")
+    for number, (joint, drive) in enumerate(zip(joints, driven, strict=True), 1):
         _check_joint(joint, len(plan.via_deg) - 1, f"{path}: trajectory joint {number}")
+        _check_drive(drive, f"{path}: arm: {drive.name}")
+    if plan.trajectory.shared and any(
+        not np.array_equal(joint.time_points_s, joints[0].time_points_s) for joint in joints
+    ):
+        raise InputError(f"{path}: shared timing, but the joints' time control points differ")
+    if any(not 0 <= index < len(joints) for search in plan.searches for index in search.joints):
+        raise InputError(f"{path}: searches name a joint that there is not")
+
+
+def _check_drive(drive: Joint, where: str) -> None:
+    motor, encoder = drive.motor, drive.encoder
+    if drive.limits is None or min(drive.limits.values) <= 0:
+        raise InputError(f"{where}: has no limits above 0")
+    if motor is None or min(motor.steps_per_rev, motor.microsteps, motor.gear_ratio) <= 0:
+        raise InputError(f"{where}: its motor's figures must be above 0")
+    if encoder is not None and encoder.counts_per_rev <= 0:
+        raise InputError(f"{where}: its encoder's counts_per_rev must be above 0")
 
 
 def _check_joint(joint: JointSpline, segments: int, where: str) -> None:

@@ -68,12 +68,48 @@ def test_a_reset_in_the_middle_is_said(tmp_path: Path) -> None:
     assert any("starts again" in text for text in report.evaluate(path).complaints)
 
 
+def describe(path: Path, **changes: object) -> None:
+    """Change run.json; None takes a key away."""
+    meta = json.loads((path / "run.json").read_text()) | changes
+    kept = {key: value for key, value in meta.items() if value is not None}
+    (path / "run.json").write_text(json.dumps(kept))
+
+
+@pytest.mark.parametrize(
+    ("cell", "value"),
+    [(0, "9" * 20), (0, "x"), (2, "1e12"), (2, "nan"), (3, "1e30"), (3, "nan"), (4, "inf"), (6, "")],
+)
+def test_a_cell_beyond_reason_makes_the_file_damaged(tmp_path: Path, cell: int, value: str) -> None:
+    path = made_runs.make(tmp_path / "run", repetitions=2) / "samples-01.csv"
+    lines = [line.split(",") for line in path.read_text().splitlines()]
+    lines[5][cell] = value
+    path.write_text("\n".join(map(",".join, lines)) + "\n")
+    found = report.evaluate(path.parent)
+    assert found.complaints[0].startswith("samples-01.csv: damaged (")
+    assert len(found.curves.each) == 1
+
+
+def test_a_joint_without_an_encoder_is_not_judged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = made_runs.shipped_plan()
+    joints = list(whole.arm.joints)
+    joints[1] = replace(joints[1], encoder=None)
+    blind = replace(whole, arm=replace(whole.arm, joints=tuple(joints)))
+    monkeypatch.setattr(made_runs, "shipped_plan", lambda: blind)
+    page = report.write(made_runs.make(tmp_path / "run")).read_text()
+    assert page.count("not measured") == 2
+    assert "nan" not in re.sub("<svg.*?</svg>", "", page, flags=re.DOTALL)
+
+
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
         (lambda path: (path / "run.json").unlink(), "not a run folder"),
         (lambda path: (path / "run.json").write_text("{"), "damaged"),
         (lambda path: (path / "trajectory.json").unlink(), "no trajectory.json"),
+        (lambda path: describe(path, name=None), "'name' is missing"),
+        (lambda path: describe(path, started=None), "'started' is missing"),
+        (lambda path: describe(path, joints=[]), "run.json tells of 0 joints, trajectory.json of 3"),
+        (lambda path: describe(path, joints=[{"name": "a"}]), "is missing or wrong"),
         (lambda path: [file.write_text("") for file in path.glob("samples-*")], "no sample"),
     ],
 )

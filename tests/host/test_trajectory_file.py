@@ -106,6 +106,14 @@ def edited(path: Path, edit: Callable[[Any], None]) -> Path:
         (lambda c: c["plan"].update(via_deg=[[1.0, 2.0], [3.0]]), "differ in length"),
         (lambda c: c["plan"].update(via_deg=["a"]), "finite numbers"),
         (lambda c: c["plan"].update(searches={}), "should be a list"),
+        (lambda c: c["plan"].update(via_deg=[]), "via_deg and extremes"),
+        (lambda c: c["plan"].update(extremes=[]), "via_deg and extremes"),
+        (lambda c: c["plan"]["trajectory"].update(shared=True), "time control points differ"),
+        (lambda c: c["plan"]["searches"][0].update(joints=[7]), "a joint that there is not"),
+        (lambda c: c["plan"]["arm"]["joints"][0].update(limits=None), "joint 1: has no limits"),
+        (lambda c: c["plan"]["arm"]["joints"][0]["motor"].update(gear_ratio=0), "motor's figures"),
+        (lambda c: c["plan"]["arm"]["joints"][0]["encoder"].update(counts_per_rev=0), "counts_per_rev"),
+        (lambda c: c["plan"]["arm"]["joints"][0].update(d_mm=10**400), "d_mm: 1000"),
     ],
 )
 def test_refuses_what_it_does_not_understand(path: Path, edit: Callable[[Any], None], message: str) -> None:
