@@ -11,6 +11,7 @@ from armtempo.virtual import launch
 
 from tests.inprocess import Noise, clean
 from tests.system.boards import TIMEOUT_S, armtempo, small_plan, start
+from tests.system.commandline import wait_for
 from tests.system.relay import Relay
 
 
@@ -48,6 +49,22 @@ def test_cable_pulled_during_a_run_and_put_back(tmp_path: Path) -> None:
     samples = runs.load(tmp_path / "runs" / "small-001").repetitions[0]
     assert samples.index.tolist() == list(range(len(samples.index)))
     assert samples.time_s[-1] > 3.0
+
+
+def test_cable_put_into_another_board_during_a_run(tmp_path: Path) -> None:
+    file = small_plan(tmp_path / "small.json", (90.0, -75.0, 50.0))
+    path = tmp_path / "runs" / "small-001" / "samples-01.csv"
+    with launch(virtual_time=False) as board, launch(seed=1) as other:
+        armtempo("home", "--port", other.port, cwd=tmp_path)
+        with Relay(board.port, tmp_path / "port", clean, clean) as relay:
+            armtempo("home", "--port", relay.port, cwd=tmp_path)
+            process = start("run", file, "--port", relay.port, cwd=tmp_path)
+            wait_for(lambda: path.is_file() and path.read_text().count("\n") > 4, "the first samples")
+        with Relay(other.port, tmp_path / "port", clean, clean):
+            out, error = process.communicate(timeout=TIMEOUT_S)
+    assert process.returncode == 1, out + error
+    assert error.count("waiting for it to come back") == 1
+    assert "another board is on" in error
 
 
 def test_interrupt_while_the_cable_is_out(tmp_path: Path) -> None:

@@ -83,8 +83,11 @@ def end_program(port: str, tell: Tell) -> None:
     with ExitStack() as stack:
         try:
             board = stack.enter_context(open_board(port, any_program=True))
+        except Prompt:
+            return
         except LinkError:
-            return  # the REPL, or a program that cannot be talked to: mpremote interrupts it
+            tell("no armtempo program answers; mpremote tries to interrupt what runs there")
+            return
         board.session.tell = tell
         if board.status().moving:
             raise LinkError("the board is moving; wait for the end of the motion, or 'armtempo stop'")
