@@ -88,6 +88,10 @@ class Pipe:
         self.run_samples = 70
         self.start_board()
 
+    def disturb(self, to_board: Any, from_board: Any) -> None:
+        """Change the line's quality from here on."""
+        self._ways = (to_board, from_board)
+
     def start_board(self) -> None:
         """Power up: a new program on the same flash."""
         with board_modules():

@@ -1,18 +1,31 @@
-"""Figures of the link: ``python -m tests.benchmark.link``.
+"""Figures of the link: ``python -m tests.benchmark.link`` prints all of them.
 
-Bytes, round trips and time per upload over lines of different quality, and what a run loses; the board's own
-link and store in this process, its time simulated (a flash that writes at once, USB without delay).
+Bytes, round trips and time per upload over lines of different quality, what a run loses under each kind of
+fault, the longest pause that costs no sample: the board's own link and store in this process, time simulated
+(a flash that writes at once, USB without delay). Upload to ready: on a virtual board in real time, whose flash
+is as slow as the chip's. Frames fuzzed and power cuts: the counts of the tests that do it, done again.
 """
 
 from __future__ import annotations
 
 import random
+import subprocess
+import sys
 import tempfile
+import time
 from pathlib import Path
 
+from armtempo import arm as arms
+from armtempo import job as jobs
+from armtempo import operate, pipeline, planner, trajectory_file
+from armtempo.errors import LinkError
+from armtempo.link import Board, open_board
 from armtempo.link.follow import Follower
+from armtempo.virtual import launch
 from armtempo_shared import armrecord, motion, wire
 
+from tests import interpreters
+from tests.board import test_fuzz, test_store
 from tests.board.scripts import stand_in
 from tests.inprocess import FAULTS, Noise, Pipe, connect
 
@@ -21,10 +34,21 @@ UPLOADS = 50
 RUNS = 10
 
 
-def motion_record(numbers: random.Random, segments: int = 6) -> bytes:
+def motion_record(numbers: random.Random, arm: bytes = ARM, segments: int = 6) -> bytes:
     """A record of the shipped job's size: three joints, six segments, quintic."""
-    points = [[numbers.randrange(2**40) for _ in range(segments + 5)] for _ in range(3)]
-    return motion.pack(5, points, points, segments, 1, 0, armrecord.unpack(ARM)[2])
+    _, joints, crc = armrecord.unpack(arm)
+    points = [[numbers.randrange(2**40) for _ in range(segments + 5)] for _ in joints]
+    return motion.pack(5, points, points, segments, 1, 0, crc)
+
+
+def ready(pipe: Pipe, arm: bytes = ARM) -> tuple[Board, int]:
+    """A board with arm, motion ``feed`` and known positions, and that motion's checksum."""
+    board = connect(pipe)
+    board.upload(wire.ARM_RECORD_NAME, arm)
+    data = motion_record(random.Random(1), arm)
+    board.upload("feed", data)
+    board.home([0] * len(armrecord.unpack(arm)[1]))
+    return board, wire.record_crc(data)
 
 
 def uploads(folder: Path, rate: float, kinds: tuple[str, ...]) -> str:
@@ -41,40 +65,71 @@ def uploads(folder: Path, rate: float, kinds: tuple[str, ...]) -> str:
     return f"{pipe.bytes_sent / UPLOADS:8.0f}{pipe.round_trips / UPLOADS:14.1f}{seconds:10.2f}"
 
 
-def runs(folder: Path, rate: float, kinds: tuple[str, ...]) -> str:
-    """One line of the second table: samples taken and samples lost in RUNS runs."""
-    pipe = Pipe(folder, Noise("to", rate, kinds), Noise("from", rate, kinds))
-    board = connect(pipe)
-    board.upload(wire.ARM_RECORD_NAME, ARM)
-    data = motion_record(random.Random(1))
-    board.upload("feed", data)
-    board.home([0, 0, 0])
-    received = lost = 0
-    for _ in range(RUNS):
-        run, _ = board.start("feed", wire.record_crc(data))
-        follower = Follower(board, run)
-        received += len(list(follower.samples()))
-        lost += follower.end.samples_lost if follower.end else 0
-    return f"{received:8}{lost:8}"
+def upload_to_ready_s() -> tuple[float, float]:
+    """Seconds from the first byte of an upload until its motion may be started, and of the whole command."""
+    arm = arms.load_arm(arms.default_path())
+    plan = planner.plan(arm, jobs.load_job(jobs.default_path(), arm))
+    with tempfile.TemporaryDirectory() as name, launch() as process:
+        file = Path(name) / "feed.json"
+        trajectory_file.save(plan, file)
+        with open_board(process.port) as board:
+            operate.configure(board, arm, replace=True)
+            begin_s = time.monotonic()
+            board.upload("first", pipeline.planned(plan).data)
+            upload_s = time.monotonic() - begin_s
+        begin_s = time.monotonic()
+        words = ["-c", "from armtempo.cli import main; main()", "upload", str(file), "--port", process.port]
+        subprocess.run([sys.executable, *words], check=True, capture_output=True)
+        return upload_s, time.monotonic() - begin_s
 
 
-def longest_pause_s() -> float:
-    """The longest time without a host that costs no sample, three joints."""
-    for pause_s in range(60, 0, -1):
+def runs(rate: float, kind: str) -> str:
+    """One line of the second table: samples that arrived, samples known to be lost, runs given up."""
+    arrived = lost = given_up = 0
+    for number in range(RUNS):
         with tempfile.TemporaryDirectory() as name:
             pipe = Pipe(Path(name) / "flash")
-            pipe.run_samples = 700
-            board = connect(pipe)
-            board.upload(wire.ARM_RECORD_NAME, ARM)
-            data = motion_record(random.Random(1))
-            board.upload("feed", data)
-            board.home([0, 0, 0])
-            run, _ = board.start("feed", wire.record_crc(data))
-            pipe.wait_away(pause_s)
+            board, crc = ready(pipe)
+            run, _ = board.start("feed", crc)
             follower = Follower(board, run)
-            if len(list(follower.samples())) == pipe.run_samples:
-                return pause_s
-    return 0.0
+            pipe.disturb(Noise(f"to {number}", rate, (kind,)), Noise(f"from {number}", rate, (kind,)))
+            try:
+                for _ in follower.samples():
+                    arrived += 1
+            except LinkError:
+                given_up += 1
+            lost += follower.end.samples_lost if follower.end else 0
+    return f"{arrived:8}{lost:8}{given_up:10}"
+
+
+def survives(pause_s: float, arm: bytes) -> bool:
+    """Whether a host that reads nothing for so long, from the start of a motion, gets every sample."""
+    with tempfile.TemporaryDirectory() as name:
+        pipe = Pipe(Path(name) / "flash")
+        pipe.run_samples = 700
+        board, crc = ready(pipe, arm)
+        run, _ = board.start("feed", crc)
+        pipe.wait_away(pause_s)
+        return len(list(Follower(board, run).samples())) == pipe.run_samples
+
+
+def longest_pause_s(arm: bytes) -> float:
+    """The longest time without a host that costs no sample, to 0.1 s."""
+    low, high = 0, 600  # tenths of a second: the first is survived, the last is not
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if survives(middle / 10, arm) else (low, middle)
+    return low / 10
+
+
+def power_cuts() -> tuple[int, int]:
+    """How often the power was cut, and how often the flash failed or was full, at every change of the store."""
+    lines = interpreters.run(interpreters.AVAILABLE[-1], test_store.SCRIPT).splitlines()
+    counts = {" cut ": 0, " error ": 0, " full ": 0}
+    for line in lines:
+        for word in counts:
+            counts[word] += len(line.rsplit(" ", 1)[1]) if word in line else 0
+    return counts.pop(" cut "), sum(counts.values())
 
 
 def main() -> None:
@@ -84,11 +139,23 @@ def main() -> None:
     for rate in (0.0, 0.001, 0.01, 0.02):
         with tempfile.TemporaryDirectory() as name:
             print(f"all faults, {100 * rate:4.1f} %    {uploads(Path(name) / 'flash', rate, FAULTS)}")
-    print("\nruns of 70 samples    samples    lost")
-    for kind in FAULTS:
-        with tempfile.TemporaryDirectory() as name:
-            print(f"{kind:<8} 1.0 %        {runs(Path(name) / 'flash', 0.01, (kind,))}")
-    print(f"\nlongest pause of the host without a lost sample: {longest_pause_s():.0f} s")
+    upload_s, command_s = upload_to_ready_s()
+    print(f"\nupload to ready on a virtual board: {upload_s:.2f} s; the whole command {command_s:.1f} s")
+    print(f"\n{RUNS} runs of 70 samples   arrived    lost  given up")
+    for rate in (0.01, 0.05):
+        for kind in FAULTS:
+            print(f"{kind:<8} {100 * rate:3.1f} %        {runs(rate, kind)}")
+    print("\nlongest pause of the host without a lost sample")
+    for joints in (1, 3, 6):
+        print(f"{joints} joints    {longest_pause_s(stand_in.arm(joints)):5.1f} s")
+    print("\nframes fuzzed      given     acted on")
+    for name in interpreters.AVAILABLE:
+        words = str(test_fuzz.FRAMES[name]), str(test_fuzz.SEED)
+        given, acted = interpreters.run(name, test_fuzz.SCRIPT, *words).split()[:2]
+        print(f"{name:<16}{given:>8}{acted:>13}")
+    cuts, failures = power_cuts()
+    print(f"\npower cuts, one at each change of each operation of the store: {cuts}")
+    print(f"failing or full flash, the same: {failures}")
 
 
 if __name__ == "__main__":

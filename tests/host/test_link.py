@@ -19,7 +19,7 @@ from armtempo.link.transport import SerialTransport
 from armtempo_shared import armrecord, motion, wire
 
 from tests.board.scripts import stand_in
-from tests.inprocess import Noise, Pipe, connect
+from tests.inprocess import FAULTS, Noise, Pipe, connect
 
 ARM = stand_in.arm(3)
 
@@ -248,6 +248,7 @@ class Silent:
         (b"raw REPL; CTRL-B to exit\r\n>", "armtempo deploy"),
         (b"$GPGGA,1234,N*5B\r\n", "something else"),
         (b"\xa5\x10", "check cable"),
+        (b"\x5d\x00\x01~\x01\x01\x003.4.0; MicroPython v1.29.0", "check cable"),
     ],
 )
 def test_what_else_sits_on_a_port(answer: bytes, words: str) -> None:
@@ -381,3 +382,28 @@ def test_what_is_no_serial_port_is_said_to_be_none(tmp_path: Path) -> None:
             SerialTransport(str(path))
     with pytest.raises(InputError, match="names no folder"):
         ports.sim_flash("sim:")
+
+
+@pytest.mark.parametrize("kind", FAULTS)
+def test_five_percent_is_survived_or_said(tmp_path: Path, kind: str) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, old = ready(pipe)
+    run, _ = board.start("feed", wire.record_crc(old))
+    pipe.disturb(Noise(f"to {kind}", 0.05, (kind,)), Noise(f"from {kind}", 0.05, (kind,)))
+    follower = Follower(board, run)
+    indices: list[int] = []
+    new = random_motion(random.Random(6))
+    said = ""
+    try:
+        for sample in follower.samples():
+            assert sample.stand.commanded_steps == (sample.index,) * 3
+            indices.append(sample.index)
+        assert follower.end is not None
+        missing = [index for first, count in follower.end.lost for index in range(first, first + count)]
+        assert sorted(indices + missing) == list(range(pipe.run_samples))
+        board.upload("feed", new)
+    except LinkError as error:
+        said = str(error)
+    assert not said or "damaged stretches received: check the cable" in said
+    assert indices == sorted(set(indices))
+    assert (tmp_path / "flash" / "feed.atm").read_bytes() in (old, new)

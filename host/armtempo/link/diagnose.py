@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from armtempo_shared import wire
 from armtempo_shared.messages import SYNC
 
 from armtempo.errors import LinkError
 from armtempo.link.transport import Transport
 
 LOOK_S = 0.4
-_REPL_SIGNS = (b">>>", b"raw REPL", b"MicroPython", b"Traceback (most recent call last)")
+_REPL_SIGNS = (b">>>", b"raw REPL")
+"""The firmware's name is none: the program's own answer to ``hello`` carries it."""
+_FRAME_SIGNS = (bytes((SYNC,)), bytes((wire.EVENT["ok"][1], wire.COMMAND["hello"][1])))
+"""A frame's first byte, or what an answer to ``hello`` begins with."""
 _NUDGE = b"\r\x02\r"
 """Ends a line, leaves a raw REPL, asks for a prompt; without meaning to the board program."""
 
@@ -30,7 +34,7 @@ def explain(transport: Transport, heard: bytes) -> LinkError:
         return Prompt(
             f"{where} runs MicroPython but not the armtempo program; install it with 'armtempo deploy'"
         )
-    if SYNC in heard:
+    if any(sign in heard for sign in _FRAME_SIGNS):
         return Garbled(
             f"{where} is hardly to be understood: pieces of armtempo's messages arrive, too few of them "
             "whole; check cable and plugs"
