@@ -6,15 +6,16 @@ import json
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from armtempo.boardfiles import own_crc
-from armtempo.deploy import changes, package, program
+from armtempo.deploy import changes, firmware, package, program
 from armtempo.deploy.remote import Survey
 from armtempo.errors import InputError, LinkError
 
 CORTEX_M4 = 6 | 3 << 8 | 7 << 10
-BOARD = Survey("STM32F4DISC with STM32F407", (1, 29, 0), CORTEX_M4, 95_000, 189, 512, False, {})
+BOARD = Survey("STM32F4DISC with STM32F407", (1, 29, 0), CORTEX_M4, 95_000, 189, 512, False, None, {})
 
 
 def quiet(text: str) -> None: ...
@@ -69,12 +70,22 @@ def test_completeness_needs_stamp_and_start_files() -> None:
         ({"version": (1, 12, 0)}, "MicroPython 1.12.0; install 1.20"),
         ({"sd_card": True}, "SD card"),
         ({"free_heap": 20_000}, "20000 bytes of free memory"),
+        ({"firmware_crc": own_crc() ^ 1}, "another version of the program built in"),
     ],
 )
 def test_unsuitable_boards_are_refused(change: dict[str, object], words: str) -> None:
     changes.check_suitable(BOARD)
     with pytest.raises(LinkError, match=words):
         changes.check_suitable(replace(BOARD, **change))  # type: ignore[arg-type]
+
+
+def test_program_in_the_firmware_leaves_no_library() -> None:
+    told: list[str] = []
+    frozen = replace(BOARD, firmware_crc=own_crc(), free_blocks=20)
+    changes.check_suitable(frozen)
+    assert changes.choose(frozen, False, told.append) == {}
+    assert "part of the board's firmware" in told[0]
+    assert list(changes.last_files(frozen)) == ["/flash/boot.py", "/flash/main.py"]
 
 
 def test_full_flash_is_refused() -> None:
@@ -97,6 +108,20 @@ def test_package_folder_lists_what_it_holds(tmp_path: Path) -> None:
     assert names[-1] == "main.py"
     with pytest.raises(InputError, match="not empty"):
         package.write(tmp_path / "new")
+
+
+def test_firmware_folder_holds_the_program_and_its_hash(tmp_path: Path) -> None:
+    folder = tmp_path / "new"
+    firmware.write(folder)
+    files = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+    assert files == {*program.modules(), "manifest.py"}
+    frozen: list[tuple[str, int]] = []
+    made = {"include": lambda path: None, "package": lambda name, opt: frozen.append((name, opt))}
+    exec((folder / "manifest.py").read_text(), made)
+    assert frozen == [("armtempo_board", 3), ("armtempo_shared", 3)]
+    told: dict[str, Any] = {}
+    exec((folder / "armtempo_shared" / "program.py").read_text(), told)
+    assert told["program_crc"]("", "") == told["FIRMWARE_CRC"] == own_crc()
 
 
 def test_missing_compiler_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from armtempo.deploy import deploy, package, remote
+from armtempo.deploy import deploy, firmware, package, remote
 from armtempo.errors import LinkError
 from armtempo.virtual import VirtualBoard, launch
 
@@ -79,3 +80,25 @@ def test_mip_installs_the_package(tmp_path: Path) -> None:
     for path in (tmp_path / "package").rglob("*.mpy"):
         assert (tmp_path / "flash" / path.relative_to(tmp_path / "package")).read_bytes() == path.read_bytes()
     assert (tmp_path / "flash" / "main.py").exists()
+
+
+def test_program_in_the_firmware_needs_only_start_files(tmp_path: Path) -> None:
+    """What is in the firmware is found before /flash/lib; here the root of the flash stands for it."""
+    flash = tmp_path / "flash"
+    firmware.write(tmp_path / "firmware")
+    shutil.copytree(tmp_path / "firmware", flash)
+    old = flash / "lib" / "armtempo_board" / "app.py"
+    old.parent.mkdir(parents=True)
+    old.write_text("an older one\n")
+    starter = interpreters.starter(INTERPRETERS[-1])
+    with launch(flash, interpreter=starter, deployed=True, flash_blocks=SOURCES_BLOCKS) as found:
+        port = found.port
+        assert "part of the board's firmware" in armtempo("deploy", "--port", port, cwd=tmp_path)
+        assert not old.exists()
+        assert "unconfigured" in armtempo("status", "--port", port, cwd=tmp_path)
+        assert "up to date" in armtempo("deploy", "--port", port, cwd=tmp_path)
+        assert "does not start" in armtempo("undeploy", "--port", port, cwd=tmp_path)
+        hash_module = flash / "armtempo_shared" / "program.py"
+        hash_module.write_text(hash_module.read_text().replace("FIRMWARE_CRC = 0x", "FIRMWARE_CRC = 1 ^ 0x"))
+        assert "deploy --firmware" in armtempo("deploy", "--port", port, cwd=tmp_path, code=1)
+        assert not (flash / "main.py").exists()

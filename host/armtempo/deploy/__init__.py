@@ -7,6 +7,7 @@
     changes.py    how the two differ, and whether the board is suitable
     install.py    the steps from one to the other
     package.py    the same files as a folder for ``mpremote mip install``
+    firmware.py   the library as a folder for MicroPython's build, to be a part of the firmware
 """
 
 from armtempo.deploy.install import deploy, undeploy

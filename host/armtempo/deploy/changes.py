@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from armtempo.deploy import program
+from armtempo.deploy import firmware, program
 from armtempo.deploy.remote import Survey
 from armtempo.errors import LinkError
 
@@ -30,6 +30,7 @@ class Change:
 
 def check_suitable(found: Survey) -> None:
     """LinkError, with the reason, where the program cannot run on this firmware."""
+    firmware.check_version(found.firmware_crc)
     if "STM32F4" not in found.machine:
         raise LinkError(
             f"the board is a {found.machine}; armtempo needs an STM32F405 or F407 with MicroPython"
@@ -46,10 +47,14 @@ def check_suitable(found: Survey) -> None:
 
 
 def choose(found: Survey, mpy: bool, tell: Tell) -> dict[str, bytes]:
-    """The library's files in the form that was asked for and fits: sources, or compiled.
+    """The library's files in the form that was asked for and fits: sources, or compiled; none for a firmware
+    that has the program.
 
     Raises LinkError where they do not fit, InputError where mpy-cross is needed and missing.
     """
+    if found.firmware_crc is not None:
+        tell("the program is a part of the board's firmware; only the start files are in the flash")
+        return {}
     library = program.library(found.mpy if mpy else None)
     if not mpy and not _fits(found, library):
         tell("the flash is too small for the sources; compiled files are used")
@@ -72,8 +77,13 @@ def difference(found: Survey, library: Mapping[str, bytes]) -> Change:
 
 def is_complete(found: Survey) -> bool:
     """Whether stamp and start files are the ones of this program."""
-    last = {program.STAMP_PATH: program.stamp(), **program.start_files()}
-    return not difference(found, last).write
+    return not difference(found, last_files(found)).write
+
+
+def last_files(found: Survey) -> dict[str, bytes]:
+    """What is written last, in this order; the stamp only where the library lies in files."""
+    stamp = {program.STAMP_PATH: program.stamp()} if found.firmware_crc is None else {}
+    return {**stamp, **program.start_files()}
 
 
 def ours(found: Survey) -> list[str]:

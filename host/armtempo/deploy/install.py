@@ -13,7 +13,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from armtempo.deploy import program
-from armtempo.deploy.changes import Tell, check_suitable, choose, difference, is_complete, ours
+from armtempo.deploy.changes import Tell, check_suitable, choose, difference, is_complete, last_files, ours
 from armtempo.deploy.remote import RECOVERY, Remote, Survey, each, rename
 from armtempo.errors import InputError, LinkError
 from armtempo.link import open_board
@@ -47,7 +47,7 @@ def deploy(port: str, mpy: bool, tell: Tell, progress: Progress) -> None:
         remote.run(each("os.remove", [f"{program.ROOT}/main.py", program.STAMP_PATH, *change.remove]))
         _write(remote, change.write, progress)
         _verify(remote, library)
-        _write(remote, {program.STAMP_PATH: program.stamp(), **program.start_files()}, progress)
+        _write(remote, last_files(found), progress)
         tell(f"{len(change.write)} files of the library written, {len(change.remove)} removed")
     else:
         tell("the program on the board is up to date")
@@ -71,6 +71,8 @@ def undeploy(port: str, tell: Tell) -> None:
         remote.run(["rmdir", f":{folder}"])
     remote.run(["reset"])
     tell(f"{len(files)} files of the library removed; stored motions are kept")
+    if found.firmware_crc is not None:
+        tell("the program stays a part of the board's firmware, but does not start")
 
 
 def end_program(port: str, tell: Tell) -> None:

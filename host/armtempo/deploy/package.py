@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
 from armtempo import __version__
 from armtempo.deploy import program
 from armtempo.errors import InputError
-from armtempo.files import replace_text
 
 PACKAGE = "package.json"
 STM32F4 = 6 | 3 << 8 | 7 << 10
@@ -22,14 +22,18 @@ def write(folder: Path) -> None:
     """
     files = {**program.library(STM32F4), program.STAMP_PATH: program.stamp(), **program.start_files()}
     names = {path.removeprefix(f"{program.ROOT}/"): data for path, data in files.items()}
+    content = {"version": __version__, "urls": [[name, name] for name in names]}
+    fill(folder, {**names, PACKAGE: f"{json.dumps(content, indent=1)}\n".encode()})
+
+
+def fill(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Write files by their path below a new or empty folder; raises as ``write``."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.iterdir()):
             raise InputError(f"{folder} is not empty; name a new folder")
-        for name, data in names.items():
+        for name, data in files.items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             (folder / name).write_bytes(data)
-        content = {"version": __version__, "urls": [[name, name] for name in names]}
-        replace_text(folder / PACKAGE, json.dumps(content, indent=1) + "\n")
     except OSError as error:
         raise InputError(f"{folder} cannot be written: {error.strerror}") from error

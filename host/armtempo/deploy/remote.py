@@ -36,6 +36,8 @@ class Survey:
     block_size: int
     sd_card: bool
     """The firmware has an SD card in, and would start from that."""
+    firmware_crc: int | None
+    """Hash of the program that is a part of the firmware; None where none is."""
     files: dict[str, tuple[int, str]]
     """Size and sha256, in hex, of each of our files, and of boot.py and main.py whoever they belong to."""
 
