@@ -227,6 +227,7 @@ def case_a_run_by_button_needs_no_host(world):
 def case_level_present_at_power_up(world):
     yield from ready(world)
     yield from unmoved(world)
+    assert notices(world) == []  # it is not even taken for a press
     world.press(0)
     yield from unmoved(world)
     yield from tap(world)
