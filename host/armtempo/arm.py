@@ -11,6 +11,9 @@ from armtempo import tomlcheck
 from armtempo.errors import InputError
 from armtempo.tomlcheck import Table
 
+MAX_LENGTH_MM = 1e6
+"""Longest link that an arm file may describe."""
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -214,8 +217,8 @@ def _joint(table: Table, number: int) -> Joint:
         raise table.fail("motor", "given where there is an encoder")
     joint = Joint(
         name=table.text("name", f"joint {number}"),
-        d_mm=table.number("d_mm"),
-        a_mm=table.number("a_mm"),
+        d_mm=table.number("d_mm", least=-MAX_LENGTH_MM, most=MAX_LENGTH_MM),
+        a_mm=table.number("a_mm", least=-MAX_LENGTH_MM, most=MAX_LENGTH_MM),
         alpha_deg=table.number("alpha_deg", least=-180.0, most=180.0),
         theta_offset_deg=table.number("theta_offset_deg", 0.0, least=-360.0, most=360.0),
         range_deg=(low, high),

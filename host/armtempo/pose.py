@@ -12,6 +12,9 @@ from armtempo.errors import InputError
 
 Array = NDArray[np.float64]
 
+LARGEST = 1e9
+"""Lengths in mm and angles in degrees beyond this are slips of the pen; with them no digit of a result is right."""
+
 ROUNDED = 1e-3
 """How far a rotation or a unit quaternion may be off by rounding of the printed numbers."""
 
@@ -26,8 +29,8 @@ def checked(matrix: ArrayLike, what: str = "the pose") -> Array:
         pose = np.vstack((pose, (0.0, 0.0, 0.0, 1.0)))
     if pose.shape != (4, 4):
         raise InputError(f"{what}: a pose is a matrix of 4 rows of 4 numbers, or its first 3 rows")
-    if not np.isfinite(pose).all():
-        raise InputError(f"{what}: every number of a pose must be finite")
+    if not np.all(np.abs(pose) <= LARGEST):
+        raise InputError(f"{what}: every number of a pose must be finite, and at most {LARGEST:g}")
     if np.abs(pose[3] - (0.0, 0.0, 0.0, 1.0)).max() > 1e-9:
         raise InputError(
             f"{what}: the last row of a pose is 0 0 0 1, not {' '.join(f'{v:g}' for v in pose[3])}"
@@ -86,12 +89,12 @@ def _joined(rotation: ArrayLike, position: Sequence[float], what: str) -> Array:
 
 def _cos_deg(angle_deg: float) -> float:
     """Cosine, exact at multiples of a quarter turn."""
-    return _sin_deg(90.0 - angle_deg)
+    return _sin_deg(90.0 - angle_deg) if abs(angle_deg) <= LARGEST else math.nan
 
 
 def _sin_deg(angle_deg: float) -> float:
-    """Sine, exact at multiples of a quarter turn; NaN for an angle that is not finite."""
-    if not math.isfinite(angle_deg):
+    """Sine, exact at multiples of a quarter turn; NaN for an angle that is not finite or beyond LARGEST."""
+    if not abs(angle_deg) <= LARGEST:
         return math.nan
     quarter, rest = divmod(angle_deg + 45.0, 90.0)
     rest = math.radians(rest - 45.0)

@@ -64,7 +64,8 @@ def axis(
         path, polished = _refined(angle_points_deg, limits, job, y, stages)
         y, optimum = polished.y, polished.bound_s
     y = y * max(1.0, MIN_DURATION_S / path.duration_s(y))
-    return Timed(y @ path.axis, y, path.duration_s(y), searched, optimum, found)
+    bound = max(optimum, MIN_DURATION_S) if optimum else 0.0
+    return Timed(y @ path.axis, y, path.duration_s(y), searched, bound, found)
 
 
 def _search(fitness: Fitness, job: Job, rng: np.random.Generator, progress: Progress) -> optimise.Result:

@@ -50,6 +50,7 @@ def test_the_shipped_arm_is_the_papers() -> None:
         ),
         ("microsteps = 8", "microstep = 8", ["joint[2].motor.microsteps is missing"]),
         ("gear_ratio = 20.0", "gear_ratio = 20.0, wheels = 3", ["joint[2].motor.wheels: unknown key"]),
+        ("a_mm = ", "a_mm = 1e300 # ", ["joint[1].a_mm = 1e+300", "of at most 1e+06"]),
         ("home_deg = 40.0", "home_def = 40.0", ["joint[3].home_def: unknown key", "'home_deg'"]),
         ("home_deg = 40.0", "home_deg = 400.0", ["joint[3].home_deg = 400.0", "at most 100"]),
         ("range_deg = [-10.0, 190.0]", "range_deg = [190.0, -10.0]", ["joint[1].range_deg", "smaller first"]),

@@ -55,6 +55,14 @@ def test_the_same_seed_gives_the_same_answer() -> None:
     np.testing.assert_array_equal(first.angles_rad, second.angles_rad)
 
 
+def test_an_arm_without_any_length_only_turns() -> None:
+    point = Geometry((5.0,), (0.0,), (0.0,), (0.0,))
+    ranges = Ranges(np.full(1, -np.pi), np.full(1, np.pi))
+    assert solve(point, forward(point, [0.5]), ranges, np.zeros(1)).angles_rad == pytest.approx([0.5])
+    away = solve(point, np.eye(4), ranges, np.zeros(1))
+    assert (away.found, away.position_error) == (False, 5.0)
+
+
 def test_arms_with_fewer_joints_than_the_pose_needs() -> None:
     planar = Geometry((0.0, 0.0), (3.0, 4.0), (0.0, 0.0), (0.0, 0.0))
     ranges = Ranges(np.full(2, -np.pi), np.full(2, np.pi))

@@ -53,6 +53,7 @@ def spoilt(row: int, column: int, value: float) -> np.ndarray:
         (spoilt(0, 0, 2.0), "not a rotation"),
         (spoilt(0, 3, np.nan), "finite"),
         (spoilt(1, 1, np.inf), "finite"),
+        (spoilt(0, 3, 1e200), "at most 1e"),
         (spoilt(3, 3, 2.0), "last row of a pose is 0 0 0 1, not 0 0 0 2"),
         (MATRIX * [1, 1, -1, 1], "left-handed"),
         (np.eye(3), "4 rows of 4 numbers"),

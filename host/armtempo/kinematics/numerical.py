@@ -79,10 +79,15 @@ def solve(
     return NumericalSolution(best.angles_rad, False, best.position_error, best.rotation_error_rad, STARTS)
 
 
+def _unit(geometry: Geometry) -> float:
+    """Length that errors of position are measured by: the reach, or 1 for an arm that has none."""
+    return geometry.reach or 1.0
+
+
 def _miss(geometry: Geometry, target: Array, angles: Array) -> Array:
     """Differences of the axes n, o, a and of the position in units of the reach: (12,)."""
     *_, tool = frames(geometry, angles)
-    position = (tool.origin - target[:3, 3]) / geometry.reach
+    position = (tool.origin - target[:3, 3]) / _unit(geometry)
     return np.concatenate((tool.x - target[:3, 0], tool.y - target[:3, 1], tool.z - target[:3, 2], position))
 
 
@@ -95,7 +100,7 @@ def _jacobian(geometry: Geometry, angles: Array) -> Array:
                 np.cross(frame.z, tool.x),
                 np.cross(frame.z, tool.y),
                 np.cross(frame.z, tool.z),
-                np.cross(frame.z, tool.origin - frame.origin) / geometry.reach,
+                np.cross(frame.z, tool.origin - frame.origin) / _unit(geometry),
             )
         )
         for frame in before
@@ -105,13 +110,13 @@ def _jacobian(geometry: Geometry, angles: Array) -> Array:
 
 def _judged(geometry: Geometry, target: Array, angles: Array, starts: int) -> NumericalSolution:
     miss = _miss(geometry, target, angles)
-    position = float(np.linalg.norm(miss[9:])) * geometry.reach
+    position = float(np.linalg.norm(miss[9:])) * _unit(geometry)
     # The chord of all three axes: 2 sqrt(2) sin(angle / 2).
     chord = float(np.linalg.norm(miss[:9]))
     rotation = 2.0 * float(np.arcsin(min(chord / np.sqrt(8.0), 1.0)))
-    found = position <= ACCURACY * geometry.reach and rotation <= ACCURACY
+    found = position <= ACCURACY * _unit(geometry) and rotation <= ACCURACY
     return NumericalSolution(angles, found, position, rotation, starts)
 
 
 def _error(geometry: Geometry, solution: NumericalSolution) -> float:
-    return solution.position_error / geometry.reach + solution.rotation_error_rad
+    return solution.position_error / _unit(geometry) + solution.rotation_error_rad

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from armtempo.errors import InputError
 from armtempo.files import why
 from armtempo.kinematics.geometry import Array
-from armtempo.pose import checked, from_quaternion, from_rpy
+from armtempo.pose import LARGEST, checked, from_quaternion, from_rpy
 
 FORMS = {
     6: "x y z roll pitch yaw",
@@ -58,6 +57,6 @@ def numbers(text: str, what: str) -> list[float]:
             found.append(float(word))
         except ValueError:
             raise InputError(f"{what}: {word!r} is not a number") from None
-        if not math.isfinite(found[-1]):
-            raise InputError(f"{what}: {word!r} is not a finite number")
+        if not abs(found[-1]) <= LARGEST:
+            raise InputError(f"{what}: {word!r} is not a finite number of at most {LARGEST:g}")
     return found
