@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from armtempo_shared.limits import MAX_NAME
+from armtempo_shared.limits import MAX_NAME, TICK_HZ
 from armtempo_shared.wire import record_crc
 
 from armtempo import decode, encode, moves, operate, record, trajectory_file
@@ -25,11 +25,15 @@ from armtempo.arm import Arm
 from armtempo.errors import InputError, LinkError
 from armtempo.interrupt import StopRequest
 from armtempo.link import Board
+from armtempo.link.follow import Follower
 from armtempo.link.ports import is_sim
 from armtempo.plan import Plan
 from armtempo.record import Repetition, RunFolder
 from armtempo.spline import Array
 from armtempo.trajectory import Trajectory
+
+_END_S = 1e-3
+"""A run that ended by more before its motion's end was stopped."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +136,27 @@ def repeat(
         end = operate.replay_recorded(board, motion=motion.stored, folder=folder, stop=stop, watch=watch)
         yield folder.repetitions[-1]
         operate.raise_fault(end)
+
+
+def fetch(board: Board, port: str, motion: Motion, parent: Path) -> tuple[RunFolder, Repetition]:
+    """The samples that the board keeps of its last run, which was one of ``motion``, into a new run folder.
+
+    Raises LinkError where it keeps none.
+    """
+    status = board.status()
+    if not status.run or not (status.moving or status.samples_kept):
+        raise LinkError("the board keeps no samples: nothing was run since it started, or they were fetched")
+    follower = Follower(board, status.run)
+    folder = new_run(parent, motion, port, board)
+    with folder.begin_repetition() as file:
+        for sample in follower.samples():
+            file.append(sample)
+        end = follower.end
+        assert end is not None  # the samples have ended
+        cut = end.ticks < motion.trajectory.duration_s * TICK_HZ - TICK_HZ * _END_S
+        state = record.FAULT if end.fault else record.INTERRUPTED if cut else record.COMPLETE
+        file.repetition.end(state, operate.fault_name(end.fault), end.ticks, end.stand, end.lost)
+    return folder, folder.repetitions[-1]
 
 
 def results(motion: Motion, repetition: Repetition) -> list[str]:

@@ -10,7 +10,7 @@ from armtempo.cli import main
 
 PAGE = (Path(__file__).parents[2] / "host" / "docs" / "cli.md").read_text(encoding="utf-8")
 STORE = ("upload", "list", "show", "remove", "rename")
-MOTION = ("home", "goto", "run", "stop", "status", "clear")
+MOTION = ("home", "goto", "run", "fetch", "stop", "status", "clear")
 BOARD = ("monitor", "deploy", "undeploy", "ports", "virtual-board")
 
 

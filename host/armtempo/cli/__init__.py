@@ -24,6 +24,7 @@ COMMANDS = (
     "paper",
     "upload",
     "run",
+    "fetch",
     "report",
     "export",
     "import",

@@ -34,7 +34,7 @@ def command(
     """
     from armtempo import operate, pipeline
 
-    file = _file(what)
+    file = motion_file(what)
     motion = pipeline.from_file(file, options.load_arm(arm_path) if arm_path else None) if file else None
     arm = motion.arm if motion else options.load_arm(arm_path)
     with options.board(port, log_traffic, arm) as board:
@@ -42,12 +42,14 @@ def command(
         replay(board, port, motion or pipeline.from_board(board, what, arm), repeat, out, live)
 
 
-def _file(what: str) -> Path | None:
+def motion_file(what: str) -> Path | None:
+    """The trajectory file that is meant; None for a name on the board."""
     path = Path(what)
     return path if path.suffix == ".json" or path.is_file() else None
 
 
-def _told(done: Repetition) -> str:
+def told(done: Repetition) -> str:
+    """One line on a repetition."""
     lost = sum(count for _, count in done.lost)
     missing = f", {lost} lost" if lost else ""
     state = f"{done.state} ({done.fault})" if done.fault else done.state
@@ -66,7 +68,7 @@ def replay(board: Board, port: str, motion: Motion, repeat: int, out: Path, live
         click.echo(f"{motion.name}: {motion.trajectory.duration_s:.3f} s, into {folder.path}")
         with Live(motion, window=live) as watch:
             for done in pipeline.repeat(board, motion, folder, repeat, stop, watch):
-                click.echo(_told(done))
+                click.echo(told(done))
     if stop.wanted:
         raise KeyboardInterrupt
     for line in pipeline.results(motion, folder.repetitions[-1]):
