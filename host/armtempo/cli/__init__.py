@@ -53,7 +53,7 @@ class LazyGroup(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """All names, in the order of the table."""
-        return list(COMMANDS)
+        return [*COMMANDS]  # "list" may be the module of that command here
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
         """The command of that name."""
