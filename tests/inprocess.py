@@ -135,9 +135,9 @@ class Pipe:
         self._check()
         return self
 
-    def wait_away(self, seconds: float) -> None:
-        """Let time pass while the host reads nothing: the board's port takes no more than its buffer."""
-        self.port.room = _USB_BUFFER
+    def wait_away(self, seconds: float, buffer: int = _USB_BUFFER) -> None:
+        """Let time pass while the host reads nothing: the port takes no more than its buffer's bytes."""
+        self.port.room = buffer
         for _ in range(round(seconds / _SAMPLE_S)):
             self.wait(_SAMPLE_S)
         self.port.room = 1 << 30

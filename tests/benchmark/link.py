@@ -109,8 +109,9 @@ def survives(pause_s: float, arm: bytes) -> bool:
         pipe.run_samples = 700
         board, crc = ready(pipe, arm)
         run, _ = board.start("feed", crc)
+        follower = Follower(board, run)
         pipe.wait_away(pause_s)
-        return len(list(Follower(board, run).samples())) == pipe.run_samples
+        return len(list(follower.samples())) == pipe.run_samples
 
 
 def longest_pause_s(arm: bytes) -> float:

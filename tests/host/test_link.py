@@ -134,6 +134,17 @@ def test_gap_is_counted_where_the_board_ran_out_of_memory(tmp_path: Path) -> Non
     assert follower.end.samples_lost + follower.end.received == 500
 
 
+def test_what_arrived_is_not_lost_though_the_board_has_let_it_go(tmp_path: Path) -> None:
+    """The system of a host that is stopped goes on reading: then the board keeps only younger samples."""
+    pipe = Pipe(tmp_path / "flash")
+    pipe.run_samples = 250
+    board, data = ready(pipe)
+    run, _ = board.start("feed", wire.record_crc(data))
+    follower = Follower(board, run)
+    pipe.wait_away(18.0, buffer=4096)
+    assert [sample.index for sample in follower.samples()] == list(range(250))
+
+
 def test_fault_ends_the_run(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
     board, data = ready(pipe)

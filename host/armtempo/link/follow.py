@@ -111,6 +111,9 @@ class Follower:
     def _request(self, missing: int) -> None:
         first, count = self._board.samples(self._next, min(missing, RESEND))
         self._asked_s = self._board.session.clock()
+        events = self._board.session.events
+        while events:  # they came before the answer, and may be what the board has let go since
+            self._take(events.popleft())
         self._oldest = max(self._oldest, first)
         self._total = first + count
 

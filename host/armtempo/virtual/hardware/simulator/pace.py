@@ -1,8 +1,9 @@
 """How virtual time goes beside real time, and the calls that wait.
 
 While a timer has something to do soon, virtual time runs as fast as this process can, or, with ``speed``, at
-that multiple of real time. It keeps to real time while nothing moves (asleep until input comes), and where the
-arm is to stop when the host falls silent: the host's silence is real.
+that multiple of real time. It keeps to real time while nothing moves (asleep until input comes), where the
+arm is to stop when the host falls silent (the host's silence is real), and while the host does not read, so
+that a host which is busy for a moment loses no more than with a real board.
 """
 
 import time
@@ -29,6 +30,7 @@ class Pace:
         self._last_us = self._ticks_us()
         self._lead_us = 0
         self._last_tick = 0
+        self._free = False
         board.millisecond = self._first_millisecond
 
     def idle(self):
@@ -52,8 +54,10 @@ class Pace:
             raise KeyboardInterrupt
         if not self._board.moving(_HORIZON_TICKS):
             self._nap()
-        elif self._speed or (the.arm and the.arm.watches_host):
+        elif self._speed or (the.arm and the.arm.watches_host) or self._serial.stuck():
             self._keep_pace(self._speed or 1)
+        else:
+            self._free = True
 
     def _elapsed_us(self):
         now = self._ticks_us()
@@ -79,6 +83,11 @@ class Pace:
 
     def _keep_pace(self, speed):
         """Moving in real time: sleep while virtual time is ahead."""
+        if self._free:  # what passed as fast as it could is not to be waited for
+            self._free = False
+            self._elapsed_us()
+            self._last_tick = self._board.now
+            self._lead_us = 0
         passed_us = (self._board.now - self._last_tick) // TICKS_PER_US
         self._last_tick = self._board.now
         self._lead_us = max(self._lead_us + passed_us / speed - self._elapsed_us(), -_LAG_US)

@@ -43,6 +43,10 @@ class Line:
     def pump(self):
         """Move bytes between the buffers and the host."""
 
+    def stuck(self):
+        """Whether the host does not read what is there for it."""
+        return bool(self.sending) and not self.silent
+
     def put(self, data):
         """Queue bytes for the host; how many there was room for."""
         count = min(len(data), BUFFER - len(self.sending))
