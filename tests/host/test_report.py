@@ -133,8 +133,12 @@ def test_two_runs_are_compared_on_one_page(tmp_path: Path) -> None:
     page = (tmp_path / comparison.PAGE).read_text()
     assert "run-1" in page
     assert page.count("<svg") == 3
-    comparison.write([*map(Path, runs), broken], tmp_path / "three.html")
+    three = CliRunner().invoke(main, ["report", *runs, str(broken), "--out", str(tmp_path / "three.html")])
+    assert three.exit_code == 0, three.output
+    assert "broken is not a run folder" in three.stderr
     assert "broken is not a run folder" in (tmp_path / "three.html").read_text()
+    alone = CliRunner().invoke(main, ["report", runs[0], "--out", str(tmp_path / "none.html")])
+    assert (alone.exit_code, "two or more" in alone.output) == (2, True)
     with pytest.raises(RunFolderError, match="fewer than two"):
         comparison.write([Path(runs[0]), broken], tmp_path / "none.html")
     assert not (tmp_path / "none.html").exists()

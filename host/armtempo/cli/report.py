@@ -19,13 +19,20 @@ import click
 def command(runs: tuple[Path, ...], out: Path | None) -> None:
     """Write report.html and its figures into the run folder RUNS.
 
-    With two or more run folders, each gets its page, and one more page compares them.
+    With two or more run folders, each gets its page, and one more page compares them. One that cannot be read
+    is named there.
     """
     from armtempo import comparison, report
+    from armtempo.errors import RunFolderError
 
+    if len(runs) == 1:
+        if out is not None:
+            raise click.UsageError("--out goes with two or more runs")
+        click.echo(f"wrote {report.write(runs[0])}")
+        return
     for run in runs:
-        click.echo(f"wrote {report.write(run)}")
-    if len(runs) > 1:
-        click.echo(f"wrote {comparison.write(runs, out or runs[0].parent / comparison.PAGE)}")
-    elif out is not None:
-        raise click.UsageError("--out goes with two or more runs")
+        try:
+            click.echo(f"wrote {report.write(run)}")
+        except RunFolderError as error:
+            click.echo(f"armtempo: {error}", err=True)
+    click.echo(f"wrote {comparison.write(runs, out or runs[0].parent / comparison.PAGE)}")
