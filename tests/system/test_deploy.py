@@ -63,6 +63,7 @@ def test_cut_off_deployment_is_completed_by_the_next(
     tmp_path: Path, cut: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(remote, "SILENCE_S", 2.0)
+    monkeypatch.setattr(remote, "SLOWEST_BYTES_S", 1e6)
     with board(INTERPRETERS[-1], tmp_path / "flash", power_cut_at=cut) as found:
         with pytest.raises(LinkError, match="repaired by doing it again"):
             deploy(found.port, False, lambda text: None, lambda done, whole: None)

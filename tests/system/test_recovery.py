@@ -211,9 +211,7 @@ STATES: dict[str, dict[str, Callable[[Bench], None]]] = {
     },
     "boot.py does not end": {"boot.py": lambda bench: file(bench, "boot.py", HANG)},
     "Another file is in the way": {"module": lambda bench: file(bench, "armtempo_board.py", "")},
-    "The program is whole and does not start": {
-        "module": lambda bench: file(bench, "armtempo_board.py", "")
-    },
+    "The program is whole and does not start": {"module": lambda bench: file(bench, "armtempo_board.py", "")},
     "The flash is full": {"data": full_flash},
     "An upload finds no room": {"motion": full_of_motions},
     "The flash is empty": {"": damaged("no file system")},

@@ -16,7 +16,9 @@ from typing import Any
 from armtempo.errors import LinkError
 
 SILENCE_S = 30.0
-"""No step of ours takes longer without a word; mpremote itself would wait for ever."""
+"""No step of ours takes longer without a word, but a file that is copied; mpremote itself would wait for ever."""
+SLOWEST_BYTES_S = 2000.0
+"""A file is copied faster than this."""
 RECOVERY = "see host/docs/recovery.md"
 _SURVEY = Path(__file__).with_name("survey.txt")
 
@@ -65,7 +67,7 @@ class Remote:
         with _process(arguments) as process:
             assert process.stdout is not None
             said = []
-            watchdog = _Watchdog(process)
+            watchdog = _Watchdog(process, SILENCE_S + _largest_file(commands) / SLOWEST_BYTES_S)
             for line in process.stdout:
                 watchdog.feed()
                 said.append(line)
@@ -106,18 +108,24 @@ def rename(old: str, new: str) -> list[str]:
     return ["exec", f"import os\nos.rename({old!r}, {new!r})"]
 
 
-class _Watchdog:
-    """Ends a process that has said nothing for SILENCE_S."""
+def _largest_file(commands: Iterable[Sequence[str]]) -> int:
+    """Bytes of the largest file that is copied to the board."""
+    return max((Path(command[-2]).stat().st_size for command in commands if command[0] == "cp"), default=0)
 
-    def __init__(self, process: subprocess.Popen[str]) -> None:
+
+class _Watchdog:
+    """Ends a process that has said nothing for so long."""
+
+    def __init__(self, process: subprocess.Popen[str], silence_s: float) -> None:
         self._process = process
+        self._silence_s = silence_s
         self._timer: threading.Timer | None = None
         self.feed()
 
     def feed(self) -> None:
         """Begin to count anew."""
         self.stop()
-        self._timer = threading.Timer(SILENCE_S, self._process.kill)
+        self._timer = threading.Timer(self._silence_s, self._process.kill)
         self._timer.daemon = True
         self._timer.start()
 
