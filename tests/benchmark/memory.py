@@ -31,21 +31,20 @@ def measure() -> dict[str, int]:
         for path, data in library.items():
             (folder / path).parent.mkdir(parents=True, exist_ok=True)
             (folder / path).write_bytes(data)
-        lines = _run(folder, fill_store(folder, arm.load_arm(arm.default_path()))).splitlines()
+        lines = _run(folder, _fill_store(folder)).splitlines()
     found = {stage: int(value) for stage, value in (line.rsplit(maxsplit=1) for line in lines)}
     found["machine code"] = sum(map(machine_code_bytes, library.values()))
     return found
 
 
-def fill_store(folder: Path, of_arm: arm.Arm) -> list[str]:
+def _fill_store(folder: Path) -> list[str]:
     """Store an arm and a motion; where its joints begin, in steps."""
-    home_deg = operate.home_deg(of_arm)
-    trajectory = moves.straight(
-        "go", home_deg, home_deg + np.resize([2.0, 1.0, -2.0], home_deg.shape), of_arm
-    )
-    (folder / "arm.ata").write_bytes(encode.arm_record(of_arm))
-    (folder / "go.atm").write_bytes(encode.motion_record(trajectory, of_arm))
-    pairs = zip(home_deg, of_arm.driven, strict=True)
+    shipped = arm.load_arm(arm.default_path())
+    home_deg = operate.home_deg(shipped)
+    trajectory = moves.straight("go", home_deg, home_deg + np.array([2.0, 1.0, -2.0]), shipped)
+    (folder / "arm.ata").write_bytes(encode.arm_record(shipped))
+    (folder / "go.atm").write_bytes(encode.motion_record(trajectory, shipped))
+    pairs = zip(home_deg, shipped.driven, strict=True)
     return [str(round(float(angle) * encode.steps_per_deg(joint))) for angle, joint in pairs]
 
 

@@ -20,8 +20,9 @@ def write(folder: Path) -> None:
 
     Raises InputError where it holds something already or cannot be written.
     """
-    sources = {**program.slimmed(), _HASH_MODULE: _hash_module(), MANIFEST: _manifest()}
-    package.fill(folder, {name: text.encode() for name, text in sources.items()})
+    sources = {name: path.read_bytes() for name, path in program.modules().items()}
+    made = {_HASH_MODULE: _hash_module(), MANIFEST: _manifest()}
+    package.fill(folder, {**sources, **{name: text.encode() for name, text in made.items()}})
 
 
 def check_version(firmware_crc: int | None) -> None:

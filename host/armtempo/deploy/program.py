@@ -61,11 +61,6 @@ def start_files() -> dict[str, bytes]:
     return {f"{ROOT}/{name}": (folder / name).read_bytes() for name in START_FILES}
 
 
-def slimmed() -> dict[str, str]:
-    """Sources of the library's modules without what only type checkers read, by path below the library folder."""
-    return {name: _slim(path.read_text(encoding="utf-8")) for name, path in modules().items()}
-
-
 def stamp() -> bytes:
     """What tells the board which program it has."""
     return f"{own_crc():08x}\n".encode()
@@ -76,10 +71,9 @@ def _compiled(mpy: int) -> dict[str, bytes]:
     result = {}
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder) / "module.py", Path(folder) / "module.mpy"
-        for name, text in slimmed().items():
-            source.write_text(text, encoding="utf-8")
-            file_name = name.rsplit("/", 1)[1]
-            _run(compiler, f"-march={architecture}", "-O3", "-s", file_name, "-o", str(target), str(source))
+        for name, path in modules().items():
+            source.write_text(_slim(path.read_text(encoding="utf-8")), encoding="utf-8")
+            _run(compiler, f"-march={architecture}", "-O3", "-s", path.name, "-o", str(target), str(source))
             result[name] = target.read_bytes()
     return result
 
