@@ -133,9 +133,11 @@ def deployed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("deployed")
     bench = Bench(folder)
     bench.power()
-    assert bench.board
-    armtempo("deploy", "--port", bench.board.port, cwd=folder)
-    bench.off()
+    try:
+        code, output = bench.run("armtempo deploy --port PORT")
+    finally:
+        bench.off()
+    assert code == 0, output
     small_plan(folder / "feed.json")
     return folder
 
