@@ -17,11 +17,8 @@ from armtempo.spline import Array
 SAMPLES = 16
 """Parts of a path segment between the grid points that the search looks at; the finished plan is checked
 without a grid."""
-
 _PENALTY = 30.0
 """Seconds that the penalty of Eq. (21) charges where a limit is exceeded by as much again."""
-
-
 _TINY = 1e-300
 """Keeps a flat stretch from dividing nothing by nothing."""
 
@@ -30,21 +27,14 @@ class Fitness:
     """Fitness of time intervals for one joint, or for several on one time axis.
 
     ``angle_points_deg``: (n + degree, J) control points; ``limits``: one for each joint. A point to
-    evaluate has n * refine intervals in seconds.
+    evaluate has n intervals in seconds (m = n below).
     """
 
-    def __init__(
-        self,
-        angle_points_deg: Array,
-        degree: int,
-        limits: Sequence[Limits],
-        refine: int = 1,
-        samples: int = SAMPLES,
-    ) -> None:
+    def __init__(self, angle_points_deg: Array, degree: int, limits: Sequence[Limits]) -> None:
         self.limits = np.array([limit.values for limit in limits])
-        pieces = spline.subdivide(spline.polynomials(angle_points_deg, degree), refine)
+        pieces = spline.polynomials(angle_points_deg, degree)
         self.intervals = len(pieces)
-        u = np.linspace(0.0, 1.0, max(5, -(-samples // refine) + 1))
+        u = np.linspace(0.0, 1.0, SAMPLES + 1)
         grid = (len(u), -1, self.intervals, 1)  # (G, J, m, N): a population fills the last axis, the fastest
         angles = [_on_grid(spline.derivative(pieces, order), u) for order in (1, 2, 3)]
         self._angles = [np.ascontiguousarray(angle).reshape(grid) for angle in angles]

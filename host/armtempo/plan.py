@@ -31,7 +31,7 @@ class Search:
     optimum_s: float
     """Where polished: bound from below on the local optimum with as many intervals; else 0."""
     floor_s: float
-    """No time law along this path keeps the limits in less."""
+    """No time law along this path keeps the limits in less (kind "path": to about 1 ms)."""
     floor_kind: str
     """How the floor was found, see ``floors.floor``."""
 

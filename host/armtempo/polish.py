@@ -127,7 +127,10 @@ def finish(path: Path, y: Array, rounds: int = _ROUNDS) -> Polished:
 
 
 def _solve(path: Path, rows: Rows, y: Array, box: float) -> tuple[Array, float, bool]:
-    """SLSQP on these rows within a box around ``y``: its point, motion time, and whether it is optimal."""
+    """SLSQP on these rows within a box around ``y``: its point, motion time, and whether it is optimal.
+
+    At a wall of the box it is not: beyond may be better, so it would be no bound from below.
+    """
     from scipy.optimize import minimize
 
     constraints = Constraints(path, rows, y)
@@ -144,7 +147,8 @@ def _solve(path: Path, rows: Rows, y: Array, box: float) -> tuple[Array, float, 
         )
     if not np.all(np.isfinite(found.x)) or np.any(found.x <= 0):
         return y, path.duration_s(y), False
-    return found.x, float(found.fun), found.status in (0, 8)
+    inside = bool(np.all(np.abs(found.x - y) < box * y * (1 - 1e-9)))
+    return found.x, float(found.fun), inside and found.status in (0, 8)
 
 
 def _parts(path: Path) -> int:

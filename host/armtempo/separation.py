@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from armtempo import spline
+from armtempo import reach, spline
 from armtempo.arm import Arm
 from armtempo.kinematics.forward import forward
 from armtempo.kinematics.geometry import Geometry
@@ -47,9 +47,7 @@ def _path_deg(trajectory: Trajectory) -> Array:
 
 def _tool(arm: Arm, driven_deg: Array) -> Array:
     """Tool positions in mm, (N, 3), for angles (N, J) of the driven joints."""
-    angles = np.tile([joint.home_deg for joint in arm.joints], (len(driven_deg), 1))
-    angles[:, [joint.motor is not None for joint in arm.joints]] = driven_deg
-    return forward(Geometry.of(arm), np.radians(angles))[:, :3, 3]
+    return forward(Geometry.of(arm), np.radians(reach.all_angles_deg(arm, driven_deg)))[:, :3, 3]
 
 
 def _distance(points: Array, starts: Array, ends: Array) -> Array:

@@ -89,3 +89,12 @@ def test_refined_shared_timing(refine: int, most_s: float) -> None:
 def test_shared_timing_without_refinement() -> None:
     total, _ = refined([0, 1, 2], "shared", 1)
     assert total <= 8.19
+
+
+def test_a_solution_at_the_wall_of_its_box_is_no_optimum() -> None:
+    path = Path(spline.fit(FEEDING, 5), 5, LIMITS, timeaxis.step_map(6, 5))
+    y = path.stretched(np.full(6, 1.2))
+    rows = near_rows(path, y, 8, 0.3)
+    assert not polish._solve(path, rows, y, 1e-3)[2]
+    best = polish.polish(path, y).y
+    assert polish._solve(path, near_rows(path, best, 8, 0.3), best, 0.3)[2]
