@@ -15,13 +15,12 @@ from simulator import the
 from simulator.board import TICKS_PER_MS
 from simulator.flash import real_open
 
-FLASHES, PROGRAM, HOME, CASES = whole_board.arguments()
+FLASHES, PROGRAM, HOME, DURATION, CASES = whole_board.arguments()
 FEWER = int(CASES.pop()) if CASES and CASES[-1].isdigit() else 1
 SEED = 20265
 KNOWN = 7
 LEAD_TICKS = 1_680_000
 GO = whole_board.read(FLASHES + "/finish/armtempo/go.atm")
-DURATION = 190_000_000  # about; the motion lasts a little longer
 
 
 class Trial:

@@ -7,11 +7,11 @@ import whole_board
 from armtempo_shared import wire
 from simulator import the
 
-FLASHES, PROGRAM, HOME, CASES = whole_board.arguments()
+FLASHES, PROGRAM, HOME, DURATION, CASES = whole_board.arguments()
 GO = whole_board.read(FLASHES + "/finish/armtempo/go.atm")
 CONNECT = b"\r\x03"  # what mpremote sends first
 BITE_MS = 8000
-MOVES_TICKS = 180_000_000  # the motion is a little longer
+MOVES_TICKS = DURATION - 20_000_000
 RUNNING = "from armtempo_board import watchdog; print(watchdog.running())"
 SEED = 20266
 

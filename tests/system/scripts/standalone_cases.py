@@ -9,7 +9,7 @@ import whole_board
 from armtempo_shared import armrecord, wire
 from simulator import the
 
-FLASHES, PROGRAM, HOME, CASES = whole_board.arguments()
+FLASHES, PROGRAM, HOME, _, CASES = whole_board.arguments()
 STEADY_MS = 30
 SEED = 20264
 
@@ -97,9 +97,11 @@ def case_a_level_that_stays_starts_it_once(world):
 def case_before_homing_nothing_moves(world):
     yield from world.hello()
     yield from world.ask("set_default", (), "go")
+    yield from world.wait(2 * STEADY_MS)
     world.press()
     yield from unmoved(world)
-    assert notices(world) == ["button: refused, error %d" % wire.ERROR_CODES["unhomed"]]
+    told = notices(world)
+    assert told == ["button: refused, error %d" % wire.ERROR_CODES["unhomed"]], told
     yield from world.home(HOME)
     yield from unmoved(world)
     world.press(0)

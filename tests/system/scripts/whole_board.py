@@ -1,7 +1,7 @@
 """A whole virtual board in this process: boot.py, main.py, the prompt, resets; a story plays host and world.
 
-A story is a generator that gets a ``World``. Each ``yield`` lets a millisecond of the board's time pass, which
-nothing but the board's own calls move on, so every run of it is the same.
+A story is a generator that gets a ``World``. Each ``yield`` lets up to a millisecond of the board's time pass,
+which nothing but the board's own calls move on, so every run of it is the same.
 """
 
 import builtins
@@ -10,7 +10,7 @@ import sys
 if sys.implementation.name != "micropython":
     import additions  # noqa: F401
 from armtempo_shared import armrecord, wire
-from simulator import modules, session, the
+from simulator import modules, pace, session, the
 from simulator.board import TICKS_PER_MS, print_exception
 from simulator.flash import real_open
 from simulator.inputs import set_level
@@ -18,6 +18,7 @@ from simulator.serial import Line, Serial
 from simulator.standalone import DEFAULTS
 
 modules.replace_sys()
+pace.Pace._elapsed_us = lambda self: 0  # no real time comes in
 
 TICK_HZ = 84_000_000
 BUTTON = "A0"
@@ -230,8 +231,13 @@ class Numbers:
 
 
 def arguments():
-    """FLASHES PROGRAM HOME [NAME …]: a folder of flashes, the packages' folders, steps at home; names of cases."""
-    return sys.argv[1], sys.argv[2].split(":"), [int(steps) for steps in sys.argv[3].split(",")], sys.argv[4:]
+    """FLASHES PROGRAM HOME [NAME …]: a folder of flashes, the packages' folders, steps at home; names of cases.
+
+    Gives them, and behind the steps how many ticks the motion ``go`` in the flashes lasts.
+    """
+    flashes, program, home = sys.argv[1:4]
+    ticks = int(read(flashes + "/ticks"))
+    return flashes, program.split(":"), [int(steps) for steps in home.split(",")], ticks, sys.argv[4:]
 
 
 def to_int(data):
