@@ -33,7 +33,11 @@ _ROWS = (
     ("limit_switch", "a limit switch tripped", "clear, then move away from it"),
     ("following", "the encoder is too far from the command (stall or slip)", "find the cause, then home"),
     ("underrun", "the step ring ran dry", "report it; the position is known"),
-    ("internal", "the board program failed", "report it with the log; home again where the position is unknown"),
+    (
+        "internal",
+        "the board program failed",
+        "report it with the log; home again where the position is unknown",
+    ),
     ("watchdog", "the watchdog restarted the board", "home again; report it"),
     ("link_lost", "the host disappeared during the motion", "reconnect"),
     ("start_failed", "the timers did not start as set up", "power-cycle the board"),
