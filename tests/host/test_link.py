@@ -7,7 +7,7 @@ import random
 from pathlib import Path
 
 import pytest
-from armtempo import operate
+from armtempo import deploy, operate
 from armtempo.errors import BoardError, InputError, LinkError
 from armtempo.interrupt import StopRequest
 from armtempo.link import Board, diagnose, ports, traffic
@@ -279,6 +279,8 @@ def test_port_in_use() -> None:
         first = SerialTransport(os.ttyname(slave))
         with pytest.raises(LinkError, match="in use by another program"):
             SerialTransport(os.ttyname(slave))
+        with pytest.raises(LinkError, match="in use by another program"):  # mpremote is not asked
+            deploy.deploy(os.ttyname(slave), False, print, lambda *_: None)
         first.close()
         SerialTransport(os.ttyname(slave)).close()
     finally:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from armtempo.arm import Arm
     from armtempo.link import Board
     from armtempo.link.traffic import Sink
+
+FC = TypeVar("FC", bound=Callable[..., Any] | click.Command)
 
 port = click.option(
     "--port",
@@ -30,24 +32,23 @@ log_traffic = click.option(
     metavar="FILE",
     help="Write every byte to and from the board to FILE ('armtempo monitor FILE' shows it).",
 )
-arm = click.option(
-    "--arm",
-    "arm_path",
-    envvar="ARMTEMPO_ARM",
-    show_envvar=True,
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="Arm file (TOML); without it the paper's 1:5 arm.",
-)
-arm_of_file = click.option(
-    "--arm",
-    "arm_path",
-    envvar="ARMTEMPO_ARM",
-    show_envvar=True,
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="Arm file (TOML), which a trajectory file must fit; without it the one in that file, else the paper's "
-    "1:5 arm.",
+
+
+def _arm_option(text: str) -> Callable[[FC], FC]:
+    return click.option(
+        "--arm",
+        "arm_path",
+        envvar="ARMTEMPO_ARM",
+        show_envvar=True,
+        type=click.Path(path_type=Path),
+        metavar="FILE",
+        help=text,
+    )
+
+
+arm = _arm_option("Arm file (TOML); without it the paper's 1:5 arm.")
+arm_of_file = _arm_option(
+    "Arm file (TOML), which a trajectory file must fit; without it the one in that file, else the paper's 1:5 arm."
 )
 job = click.option(
     "--job",

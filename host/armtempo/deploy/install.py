@@ -20,6 +20,7 @@ from armtempo.link import open_board
 from armtempo.link.board import Progress
 from armtempo.link.diagnose import Prompt
 from armtempo.link.ports import is_sim
+from armtempo.link.transport import NotOpened
 
 KEPT_ASIDE = ".before-armtempo"
 """Added to the name of a boot.py or main.py that was there before."""
@@ -76,7 +77,7 @@ def undeploy(port: str, tell: Tell) -> None:
 
 
 def end_program(port: str, tell: Tell) -> None:
-    """Ask a program that runs for the REPL; LinkError where it is moving."""
+    """Ask a program that runs for the REPL; LinkError where it is moving or the port is in use."""
     if is_sim(port):
         raise InputError(
             "a virtual board of --port sim needs no deployment; for one that does: "
@@ -85,6 +86,8 @@ def end_program(port: str, tell: Tell) -> None:
     with ExitStack() as stack:
         try:
             board = stack.enter_context(open_board(port, any_program=True))
+        except NotOpened:
+            raise
         except Prompt:
             return
         except LinkError:

@@ -15,6 +15,10 @@ BAUD_RATE = 115_200
 _ADVICE = "'armtempo ports' lists what is there"
 
 
+class NotOpened(LinkError):
+    """The port is there, but it cannot be opened."""
+
+
 class Transport(Protocol):
     """A pair of byte streams."""
 
@@ -33,7 +37,7 @@ class Transport(Protocol):
 class SerialTransport:
     """A transport over pyserial: a device name, or a URL such as ``socket://host:port``.
 
-    Raises InputError where there is no such port, LinkError where it is in use or breaks.
+    Raises InputError where there is no such port, NotOpened where it is in use, LinkError where it breaks.
     """
 
     def __init__(self, port: str) -> None:
@@ -83,10 +87,10 @@ def _open_error(port: str, error: Exception) -> LinkError | InputError:
     if number in (errno.EISDIR, errno.ENOTTY) or os.strerror(errno.ENOTTY) in text:
         return InputError(f"{port} is not a serial port; {_ADVICE}")
     if number in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in text:
-        return LinkError(f"port {port} is in use by another program; close it and try again")
+        return NotOpened(f"port {port} is in use by another program; close it and try again")
     if number == errno.EACCES or "PermissionError" in text:
-        return LinkError(
+        return NotOpened(
             f"no permission to open {port}: another program holds it, or your user may not use serial ports "
             "(on Debian: 'sudo adduser $USER dialout', then log in again)"
         )
-    return LinkError(f"port {port} cannot be opened: {text}; {_ADVICE}")
+    return NotOpened(f"port {port} cannot be opened: {text}; {_ADVICE}")
