@@ -62,7 +62,7 @@ def test_from_an_empty_board_and_back(tmp_path: Path, name: str) -> None:
 def test_cut_off_deployment_is_completed_by_the_next(
     tmp_path: Path, cut: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(remote, "SILENCE_S", 2.0)
+    monkeypatch.setattr(remote, "SILENCE_S", 6.0)  # a loaded machine must get as far as the cut
     monkeypatch.setattr(remote, "SLOWEST_BYTES_S", 1e6)
     with board(INTERPRETERS[-1], tmp_path / "flash", power_cut_at=cut) as found:
         with pytest.raises(LinkError, match="repaired by doing it again"):
