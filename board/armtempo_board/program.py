@@ -2,6 +2,7 @@
 
 import os
 
+import armtempo_shared
 import machine
 import micropython
 import pyb
@@ -104,4 +105,4 @@ def _attach(port: "Any") -> None:
 
 
 def _folders() -> "list[str]":
-    return [path.rsplit("/", 1)[0] for path in (__file__, codes.__file__)]
+    return [path.rsplit("/", 1)[0] for path in (__file__, armtempo_shared.__file__)]

@@ -10,8 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from armtempo_shared.program import STAMP
+from armtempo_shared.table import rows
 
+from armtempo import virtual
 from armtempo.boardfiles import PACKAGES, own_crc, package_folder
+from armtempo.deploy.compact import Compact, compact
 from armtempo.errors import InputError, LinkError
 
 ROOT = "/flash"
@@ -67,31 +70,63 @@ def stamp() -> bytes:
 
 
 def _compiled(mpy: int) -> dict[str, bytes]:
+    """The compact program, compiled."""
     compiler, architecture = _compiler(mpy)
+    packages = {path.split("/")[0] for path in modules()}
     result = {}
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder) / "module.py", Path(folder) / "module.mpy"
-        for name, path in modules().items():
-            source.write_text(_slim(path.read_text(encoding="utf-8")), encoding="utf-8")
-            _run(compiler, f"-march={architecture}", "-O3", "-s", path.name, "-o", str(target), str(source))
-            result[name] = target.read_bytes()
+        for module, text in compact_program().sources.items():
+            path = f"{module.replace('.', '/')}{'/__init__' if module in packages else ''}.py"
+            source.write_text(text, encoding="utf-8")
+            _run(
+                compiler,
+                f"-march={architecture}",
+                "-O3",
+                "-s",
+                Path(path).name,
+                "-o",
+                str(target),
+                str(source),
+            )
+            result[path] = target.read_bytes()
     return result
 
 
-def _slim(source: str) -> str:
-    """The source without what only type checkers read; every line keeps its number."""
-    lines = source.split("\n")
-    for node in ast.parse(source).body:
-        head = (
-            node.test
-            if isinstance(node, ast.If)
-            else node.targets[0]
-            if isinstance(node, ast.Assign)
-            else None
-        )
-        if isinstance(head, ast.Name) and head.id == "TYPE_CHECKING":
-            lines[node.lineno - 1 : node.end_lineno] = [""] * len(lines[node.lineno - 1 : node.end_lineno])
-    return "\n".join(lines)
+def compact_program() -> Compact:
+    """What is compiled: the program with fewer modules and shorter names."""
+    files = {path[:-3].removesuffix("/__init__").replace("/", "."): file for path, file in modules().items()}
+    sources = {module: file.read_text(encoding="utf-8") for module, file in files.items()}
+    board = package_folder(PACKAGES[0])
+    outside = [ast.parse((board / name).read_text(encoding="utf-8")) for name in START_FILES]
+    outside += [ast.parse(sources[package]) for package in PACKAGES]
+    nodes = [node for tree in outside for node in ast.walk(tree)]
+    entries = {alias.name for node in nodes if isinstance(node, ast.ImportFrom) for alias in node.names}
+    return compact(
+        sources,
+        f"{PACKAGES[0]}.program",
+        {f"{PACKAGES[0]}.{name}" for name in entries} & set(sources),
+        {*_handlers(), *_hardware_names(), *(name for node in nodes for name in _named(node))},
+    )
+
+
+def _handlers() -> set[str]:
+    """Methods that the board finds by the names of the commands."""
+    return {f"_{row[0]}" for row in rows("C")}
+
+
+def _hardware_names() -> set[str]:
+    """What methods of the hardware are called; the simulated hardware has them all."""
+    files = (Path(virtual.__file__).parent / "hardware").rglob("*.py")
+    nodes = [node for file in files for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))]
+    return {node.name for node in nodes if isinstance(node, ast.FunctionDef)}
+
+
+def _named(node: ast.AST) -> list[str]:
+    """What a node of a file from outside asks of the program, or defines for its users."""
+    if isinstance(node, ast.Attribute):
+        return [node.attr]
+    return [node.name] if isinstance(node, ast.FunctionDef) else []
 
 
 def _compiler(mpy: int) -> tuple[str, str]:

@@ -1,0 +1,53 @@
+"""Make the board program small before it is compiled: what a module costs in a board's memory is largely names.
+
+MicroPython keeps every name that a file mentions, and 10 to 20 bytes for each place where a module holds one. So
+constants are put in where they are used (``constants``), the modules that are always needed become one
+(``merge``), and the program's own names become short (``shorten``). What the program does stays the same.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+from armtempo.deploy.compact.constants import fold
+from armtempo.deploy.compact.merge import merge, used_whole
+from armtempo.deploy.compact.shorten import short_names, shorten
+
+
+@dataclass(frozen=True)
+class Compact:
+    """``sources``: text by dotted module name. ``names``: what each short name stands for."""
+
+    sources: dict[str, str]
+    names: dict[str, str]
+
+
+def compact(
+    sources: Mapping[str, str], main: str, entries: Collection[str], keep: Collection[str]
+) -> Compact:
+    """A program of fewer modules and shorter names that does the same.
+
+    ``sources``: text by dotted module name, packages by their own. ``main``: what it needs at once becomes the
+    module ``core`` of its package. ``entries``: modules that are imported from outside, ``main`` among them.
+    ``keep``: names that must stay, as they are used from outside or made at run time. Raises ValueError where
+    a module asks another for a name that is not there.
+    """
+    trees = {module: _at_run_time(ast.parse(text)) for module, text in sources.items()}
+    fold(trees, used_whole(trees))
+    merged = merge(trees, main, entries)
+    names = short_names(merged, keep)
+    shorten(merged, names)
+    texts = {module: ast.unparse(ast.fix_missing_locations(tree)) for module, tree in merged.items()}
+    return Compact(texts, {short: name for name, short in names.items()})
+
+
+def _at_run_time(tree: ast.Module) -> ast.Module:
+    """Without what only type checkers read."""
+    tree.body = [node for node in tree.body if not _is_for_checkers(node)]
+    return tree
+
+
+def _is_for_checkers(node: ast.stmt) -> bool:
+    return isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"

@@ -1,0 +1,110 @@
+"""Which names mean what in a module: its own, those it imports from the program, those of a function."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+
+Function = ast.FunctionDef | ast.Lambda
+
+
+@dataclass(frozen=True)
+class Target:
+    """What an imported name stands for: a module of the program, or a name in one."""
+
+    module: str
+    name: str | None = None
+
+
+def imported(nodes: Collection[ast.AST], program: Collection[str]) -> dict[str, Target]:
+    """Names that ``from ... import`` statements among the nodes bring in from modules of ``program``."""
+    found = {}
+    for node in nodes:
+        if isinstance(node, ast.ImportFrom):
+            for alias in node.names:
+                whole = f"{node.module}.{alias.name}"
+                if whole in program:
+                    found[alias.asname or alias.name] = Target(whole)
+                elif node.module in program:
+                    found[alias.asname or alias.name] = Target(str(node.module), alias.name)
+    return found
+
+
+def top_names(tree: ast.Module) -> set[str]:
+    """Names that a module itself defines."""
+    found: set[str] = set()
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            found.add(node.name)
+        elif not isinstance(node, ast.Import | ast.ImportFrom):
+            found |= _stored(node)
+    return found
+
+
+def local_names(function: Function) -> set[str]:
+    """Names that belong to a function: parameters and all that it binds and does not declare global."""
+    arguments = function.args
+    every = [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs]
+    found = {argument.arg for argument in (*every, arguments.vararg, arguments.kwarg) if argument}
+    if isinstance(function, ast.FunctionDef):
+        for node in function.body:
+            found |= _stored(node)
+        found -= {name for node in ast.walk(function) if isinstance(node, ast.Global) for name in node.names}
+    return found
+
+
+def _stored(node: ast.AST) -> set[str]:
+    found: set[str] = set()
+    for inner in _own(node):
+        if isinstance(inner, ast.Name) and isinstance(inner.ctx, ast.Store):
+            found.add(inner.id)
+        elif isinstance(inner, ast.FunctionDef | ast.ExceptHandler) and inner.name:
+            found.add(inner.name)
+        elif isinstance(inner, ast.Import | ast.ImportFrom):
+            found |= {alias.asname or alias.name.split(".")[0] for alias in inner.names}
+    return found
+
+
+def _own(node: ast.AST) -> Iterator[ast.AST]:
+    """The node and what is in it, but not inside of functions in it."""
+    yield node
+    if not isinstance(node, Function):
+        for child in ast.iter_child_nodes(node):
+            yield from _own(child)
+
+
+class Scoped(ast.NodeTransformer):
+    """Visits a module and knows at each name whether a function around it hides what the module means by it."""
+
+    def __init__(self) -> None:
+        self._hidden: list[set[str]] = []
+
+    def hides(self, name: str) -> bool:
+        """Whether a name is one of the functions around."""
+        return any(name in names for names in self._hidden)
+
+    def at_top(self) -> bool:
+        """Whether no function is around."""
+        return not self._hidden
+
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
+        """Decorators and defaults belong to what is around the function."""
+        node.decorator_list = [self.visit(decorator) for decorator in node.decorator_list]
+        node.args.defaults = [self.visit(default) for default in node.args.defaults]
+        self._hidden.append(local_names(node))
+        node.body = visit_all(self, node.body) or [ast.Pass()]
+        self._hidden.pop()
+        return node
+
+    def visit_Lambda(self, node: ast.Lambda) -> ast.AST:
+        """As a function."""
+        self._hidden.append(local_names(node))
+        node.body = self.visit(node.body)
+        self._hidden.pop()
+        return node
+
+
+def visit_all(visitor: ast.NodeTransformer, nodes: list[ast.stmt]) -> list[ast.stmt]:
+    """The statements as the visitor leaves them, without those that it takes out."""
+    return [node for node in map(visitor.visit, nodes) if node is not None]
