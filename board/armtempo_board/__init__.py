@@ -20,7 +20,7 @@ def forget() -> None:
 
     import armtempo_shared
 
-    for name in ("registers", "check", "rates"):
+    for name in ("registers", "check", "rates", "store", "storing"):
         sys.modules.pop("armtempo_board." + name, None)
         globals().pop(name, None)
     for name in ("armrecord", "table", "program"):

@@ -19,11 +19,11 @@ from array import array
 import machine
 from armtempo_shared import codes
 from armtempo_shared.limits import MAX_JOINTS
-from armtempo_shared.messages import SAMPLE_BRAKING, START_HOMING, STATES
+from armtempo_shared.messages import ARM_RECORD_NAME, SAMPLE_BRAKING, START_HOMING, STATES
 from armtempo_shared.motion import Motion, MotionError
 from micropython import const
 
-from armtempo_board import ends, forget, store
+from armtempo_board import ends, forget
 from armtempo_board.commands import Commands
 from armtempo_board.engine import Engine
 from armtempo_board.events import Events
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any
 
-SAMPLE_MEMORY = const(4096)
+SAMPLE_MEMORY = const(2048)
 _UNCONFIGURED, _UNHOMED, _IDLE, _MOVING, _BRAKING, _FAULT = range(len(STATES))
 _MOST_FAILURES = const(10)  # failing turns of the loop one after the other, then the program gives up
 
@@ -51,7 +51,8 @@ class App:
     def __init__(self, stream: object, root: str, program_crc: int = 0, fault: int = 0) -> None:
         from armtempo_shared.table import rows  # here, so that it can be forgotten
 
-        self.store = store.Store(root)
+        self._root = root
+        self._store: "Any" = None
         self.link = Link(stream)
         self.engine: "Any" = None
         self.samples = Samples(MAX_JOINTS, 0)
@@ -165,6 +166,22 @@ class App:
         if self.engine and self.engine.moving:
             self.engine.freeze()
 
+    # the store, which is there only while it is needed: its code takes memory that a motion needs
+
+    def store(self) -> "Any":
+        """The store; an upload that is under way keeps it."""
+        if self._store is None:
+            from armtempo_board import store
+
+            self._store = store.Store(self._root)
+        return self._store
+
+    def forget_store(self) -> None:
+        """Give up an upload that is under way."""
+        if self._store is not None:
+            self._store.abandon()
+            self._store = None
+
     # what commands and the button ask for
 
     def configure(self) -> None:
@@ -172,7 +189,7 @@ class App:
         from armtempo_shared import armrecord  # here, so that it can be forgotten
 
         try:
-            head, joints, crc = armrecord.unpack(self.store.read(store.ARM))
+            head, joints, crc = armrecord.unpack(self.store().read(ARM_RECORD_NAME))
         except (Refused, armrecord.ArmRecordError):
             return
         if crc == self.arm_crc:
@@ -211,6 +228,9 @@ class App:
         if missing and not homing:
             raise Refused(codes.UNHOMED, _lowest(missing))
         motion = self.load(name, crc)
+        self.forget_store()
+        forget()
+        gc.collect()
         if homing:
             self._assume(motion, missing)
         refused = self.engine.load(motion)
@@ -245,7 +265,7 @@ class App:
 
     def load(self, name: str, crc: "int | None" = None) -> "Motion":
         """The stored motion, checked as far as that needs no evaluator, or refused."""
-        data = self.store.read(name + store.MOTION)
+        data = self.store().read(name)
         try:
             motion = Motion(data)
         except MotionError:
@@ -307,7 +327,7 @@ class App:
     def look_around(self) -> None:
         """Bring ``free_flash`` and ``free_heap`` up to date; costs milliseconds, so not while moving."""
         if not self.moving():
-            self.free_flash = self.store.free()
+            self.free_flash = self.store().free()
             self.free_heap = _free_heap()
 
     def stand(self, target: bytearray, ticks_at: int, joints_at: int) -> int:

@@ -52,6 +52,7 @@ def _build(port: "pyb.USB_VCP", root: str) -> App:
     from armtempo_shared.program import program_crc
 
     built = App(port, root, program_crc(*_folders()), _fault_at_start())
+    built.forget_store()
     forget()
     return built
 
@@ -88,7 +89,7 @@ def _fault_at_start() -> int:
 
 def _replay_default() -> None:
     try:
-        app.begin(app.store.default(), 0)
+        app.begin(app.store().default(), 0)
     except Refused as refused:
         app.events.note("button: refused, error %d" % refused.code)
 

@@ -36,7 +36,7 @@ def replay(name: str = "", root: str = program.ROOT) -> None:
     watchdog = Watchdog()
     micropython.kbd_intr(-1)  # KeyboardInterrupt could come in the midst of anything
     try:
-        _begin(app, name or app.store.default())
+        _begin(app, name or app.store().default())
         _follow(app, watchdog)
         steps = [app.engine.commanded(joint) for joint in range(app.joints)]
         print("fault: " + _name(app.fault()) if app.fault() else "done", "at steps", steps)

@@ -2,6 +2,9 @@
 
 A record is written to ``NAME.new``, read back, synced and renamed. Where a power cut leaves a ``.new``
 behind, ``recover`` takes it if the old one is gone and the new one is whole, and removes it otherwise.
+
+A record's name is that of its trajectory, or ``ARM_RECORD_NAME``. The module is imported when it is needed
+and forgotten before a motion (see ``App.store``): no file is touched while one runs.
 """
 
 import os
@@ -9,6 +12,7 @@ from binascii import crc32
 
 from armtempo_shared import codes
 from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_NAME
+from armtempo_shared.messages import ARM_RECORD_NAME
 from armtempo_shared.motion import Motion, MotionError
 from micropython import const
 
@@ -19,8 +23,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-MOTION = ".atm"
-ARM = "arm.ata"
+_MOTION = ".atm"
+_ARM = "arm.ata"
 _DEFAULT = "default.txt"
 _NEW = ".new"
 _ENOSPC = const(28)
@@ -28,13 +32,19 @@ _PIECE = const(512)
 _MOST_FREE = const(0x3FFFFFFF)
 
 
-def check_name(name: str) -> None:
-    """Refuses a name that is no name for a trajectory."""
+def _file_name(name: str) -> str:
+    """The file of a record."""
+    return _ARM if name == ARM_RECORD_NAME else _motion_file(name)
+
+
+def _motion_file(name: str) -> str:
+    """The file of a trajectory; refuses what is no name for one."""
     if not 0 < len(name) <= MAX_NAME:
         raise Refused(codes.BAD_NAME)
     for letter in name:
         if not ("a" <= letter <= "z" or "A" <= letter <= "Z" or "0" <= letter <= "9" or letter in "-_"):
             raise Refused(codes.BAD_NAME)
+    return name + _MOTION
 
 
 def _sync() -> None:
@@ -45,13 +55,13 @@ def _sync() -> None:
 
 def _whole(file_name: str, data: bytes) -> bool:
     """Whether the bytes are a whole record of the kind that the name tells."""
-    if file_name.endswith(MOTION):
+    if file_name.endswith(_MOTION):
         try:
             Motion(data)
         except MotionError:
             return False
         return True
-    if file_name == ARM:
+    if file_name == _ARM:
         from armtempo_shared import armrecord  # here, so that it can be forgotten
 
         try:
@@ -95,10 +105,11 @@ class Store:
 
     def names(self) -> "list[str]":
         """Names of the stored trajectories, sorted."""
-        return sorted([name[: -len(MOTION)] for name in self._files() if name.endswith(MOTION)])
+        return sorted([name[: -len(_MOTION)] for name in self._files() if name.endswith(_MOTION)])
 
-    def begin(self, file_name: str, size: int) -> None:
+    def begin(self, name: str, size: int) -> None:
         """Begin an upload; gives up one that was under way."""
+        file_name = _file_name(name)
         self.abandon()
         if size > MAX_MOTION_BYTES:
             raise Refused(codes.TOO_LONG, value=MAX_MOTION_BYTES)
@@ -125,7 +136,7 @@ class Store:
         return self._received
 
     def commit(self, crc: int) -> str:
-        """Check the upload as it stands in the flash and put it in place; returns its file name."""
+        """Check the upload as it stands in the flash and put it in place; returns the record's name."""
         if not self._file or self._received != self._size:
             raise Refused(codes.BAD_OFFSET, value=self._received)
         name = self._target
@@ -136,7 +147,7 @@ class Store:
             self._discard(name + _NEW)
             raise
         self._replace(name)
-        return name
+        return ARM_RECORD_NAME if name == _ARM else name[: -len(_MOTION)]
 
     def abandon(self) -> None:
         """Give up the upload under way, if any."""
@@ -148,13 +159,14 @@ class Store:
             self._file = None
             self._discard(self._target + _NEW)
 
-    def read(self, file_name: str) -> bytes:
-        """All bytes of a file; NOT_FOUND, or TOO_LONG where they do not fit into memory."""
-        return self._read(file_name)
+    def read(self, name: str) -> bytes:
+        """All bytes of a record; NOT_FOUND, or TOO_LONG where they do not fit into memory."""
+        return self._read(_file_name(name))
 
-    def part(self, file_name: str, offset: int, length: int) -> "tuple[int, bytes]":
-        """(size of the file, bytes from offset on)."""
-        size = self.size(file_name)
+    def part(self, name: str, offset: int, length: int) -> "tuple[int, bytes]":
+        """(size of the record, bytes from offset on)."""
+        file_name = _file_name(name)
+        size = self._size_of(file_name)
         file = self._guard(open, self._path(file_name), "rb")
         try:
             self._guard(file.seek, min(offset, size))
@@ -162,28 +174,23 @@ class Store:
         finally:
             file.close()
 
-    def size(self, file_name: str) -> int:
-        """Bytes of a file; NOT_FOUND."""
-        try:
-            return os.stat(self._path(file_name))[6]
-        except OSError:
-            raise Refused(codes.NOT_FOUND)
-
     def remove(self, name: str) -> None:
         """Remove a trajectory."""
-        self.size(name + MOTION)
-        self._guard(os.remove, self._path(name + MOTION))
+        file_name = _motion_file(name)
+        self._size_of(file_name)
+        self._guard(os.remove, self._path(file_name))
         self._guard(_sync)
 
     def rename(self, old: str, new: str) -> None:
         """Give a trajectory another name; the default goes with it."""
-        self.size(old + MOTION)
+        old_file, new_file = _motion_file(old), _motion_file(new)
+        self._size_of(old_file)
         if new.lower() in [name.lower() for name in self.names() if name != old] or new == old:
             raise Refused(codes.EXISTS)
         was_default = self.default() == old
         if was_default:
             self._write_default(new + "\n" + old)
-        self._guard(os.rename, self._path(old + MOTION), self._path(new + MOTION))
+        self._guard(os.rename, self._path(old_file), self._path(new_file))
         self._guard(_sync)
         if was_default:
             self._write_default(new)
@@ -203,7 +210,7 @@ class Store:
     def set_default(self, name: str) -> None:
         """Make a stored trajectory the default; "" for none."""
         if name:
-            self.size(name + MOTION)
+            self._size_of(_motion_file(name))
         self._write_default(name)
 
     def _write_default(self, text: str) -> None:
@@ -229,11 +236,18 @@ class Store:
         except OSError:
             return []
 
+    def _size_of(self, file_name: str) -> int:
+        """Bytes of a file; NOT_FOUND."""
+        try:
+            return os.stat(self._path(file_name))[6]
+        except OSError:
+            raise Refused(codes.NOT_FOUND)
+
     def _path(self, file_name: str) -> str:
         return self._root + "/" + file_name
 
     def _read(self, file_name: str) -> bytes:
-        size = self.size(file_name)
+        size = self._size_of(file_name)
         if size > MAX_MOTION_BYTES:
             raise Refused(codes.TOO_LONG, value=size)
         file = self._guard(open, self._path(file_name), "rb")

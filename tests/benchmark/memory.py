@@ -7,6 +7,7 @@ interpreter keeps machine code outside of its heap, the chip within: its size is
 from __future__ import annotations
 
 import os
+import struct
 import subprocess
 import tempfile
 from pathlib import Path
@@ -15,44 +16,68 @@ import numpy as np
 from armtempo import arm, encode, moves, operate
 from armtempo.deploy import program
 from armtempo.deploy.package import STM32F4
+from armtempo_shared import wire
 
 from tests import interpreters
 from tests.benchmark.emulated import machine_code_bytes
 
 SCRIPT = interpreters.ROOT / "tests" / "board" / "scripts" / "memory_use.py"
 INTERPRETER = "micropython-arm"
+_SESSION = ("hello", "home", "start")
 
 
 def measure() -> dict[str, int]:
-    """Bytes in use after each stage, and ``machine code``."""
+    """Bytes in use at each stage, and ``machine code``."""
     library = {path.removeprefix(f"{program.ROOT}/"): data for path, data in program.library(STM32F4).items()}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for path, data in library.items():
             (folder / path).parent.mkdir(parents=True, exist_ok=True)
             (folder / path).write_bytes(data)
-        lines = _run(folder, _fill_store(folder)).splitlines()
+        _write_session(folder)
+        lines = _run(folder).splitlines()
+        assert _accepted((folder / "answers").read_bytes()) == len(_SESSION)
     found = {stage: int(value) for stage, value in (line.rsplit(maxsplit=1) for line in lines)}
     found["machine code"] = sum(map(machine_code_bytes, library.values()))
     return found
 
 
-def _fill_store(folder: Path) -> list[str]:
-    """Store an arm and a motion; where its joints begin, in steps."""
+def _write_session(folder: Path) -> None:
+    """Store an arm and a motion, and write the frames of a host that starts it."""
     shipped = arm.load_arm(arm.default_path())
     home_deg = operate.home_deg(shipped)
     trajectory = moves.straight("go", home_deg, home_deg + np.array([2.0, 1.0, -2.0]), shipped)
+    motion = encode.motion_record(trajectory, shipped)
     (folder / "arm.ata").write_bytes(encode.arm_record(shipped))
-    (folder / "go.atm").write_bytes(encode.motion_record(trajectory, shipped))
+    (folder / "go.atm").write_bytes(motion)
     pairs = zip(home_deg, shipped.driven, strict=True)
-    return [str(round(float(angle) * encode.steps_per_deg(joint))) for angle, joint in pairs]
+    steps = [round(float(angle) * encode.steps_per_deg(joint)) for angle, joint in pairs]
+    values = {
+        "hello": ((wire.PROTOCOL_VERSION, 1), b""),
+        "home": (((1 << len(steps)) - 1,), struct.pack(f"<{len(steps)}i", *steps)),
+        "start": ((0, wire.record_crc(motion)), b"go"),
+    }
+    with (folder / "frames").open("wb") as file:
+        for sequence, name in enumerate(_SESSION):
+            entry = wire.COMMAND[name]
+            frame = wire.frame(sequence, entry[1], wire.encode(entry, *values[name]))
+            file.write(struct.pack("<H", len(frame)) + frame)
 
 
-def _run(folder: Path, starts: list[str]) -> str:
-    command = [interpreters.starter(INTERPRETER), "-X", "heapsize=2M", str(SCRIPT), str(folder), *starts]
+def _accepted(answers: bytes) -> int:
+    """Commands that were carried out."""
+    parser = wire.Parser()
+    parser.feed(answers)
+    frames = iter(parser.next, None)
+    return sum(number == wire.EVENT["ok"][1] for _, number, _ in frames)
+
+
+def _run(folder: Path) -> str:
+    files = [str(folder), str(folder / "frames"), str(folder / "answers")]
+    command = [interpreters.starter(INTERPRETER), "-X", "heapsize=2M", str(SCRIPT), *files]
     environment = {**os.environ, "MICROPYPATH": f"{folder / 'lib'}{os.pathsep}.frozen"}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=100, check=False)
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
 
@@ -60,4 +85,3 @@ if __name__ == "__main__":
     stages = measure()
     for stage, size in stages.items():
         print(f"{stage:<14}{size:>8}")
-    print(f"{'on the chip':<14}{stages['motion'] + stages['machine code']:>8}  (estimate)")

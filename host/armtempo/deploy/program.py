@@ -111,8 +111,9 @@ def compact_program() -> Compact:
 
 
 def _handlers() -> set[str]:
-    """Methods that the board finds by the names of the commands."""
-    return {f"_{row[0]}" for row in rows("C")}
+    """Methods and functions that the board finds by the names of the commands."""
+    names = {row[0] for row in rows("C")}
+    return names | {f"_{name}" for name in names}
 
 
 def _hardware_names() -> set[str]:

@@ -319,7 +319,7 @@ def case_exception_becomes_a_fault():
 
 def case_exception_in_a_command_becomes_a_fault():
     app, host = connected()
-    app.store.names = None
+    app.store().names = None
     assert host.ask("list", (0,)) is None
     assert state(host) == "fault"
 
@@ -397,7 +397,7 @@ def case_samples_of_a_run_without_host_are_kept():
     host.ask("set_default", (), "feed")
     again = App(host.port, ROOT + str(COUNT[0]))
     again.engine.home(3, [0, 0])
-    again.begin(again.store.default(), 0)
+    again.begin(again.store().default(), 0)
     host = stand_in.Host(again, host.port)
     host.turn()
     again.engine.advance(4)

@@ -26,9 +26,9 @@ def put(place, file_name, data):
 
 
 OPERATIONS = (
-    ("put a new one", lambda place: put(place, "other.atm", NEW)),
-    ("put over an old one", lambda place: put(place, "feed.atm", NEW)),
-    ("put the arm record", lambda place: put(place, "arm.ata", NEW_ARM)),
+    ("put a new one", lambda place: put(place, "other", NEW)),
+    ("put over an old one", lambda place: put(place, "feed", NEW)),
+    ("put the arm record", lambda place: put(place, wire.ARM_RECORD_NAME, NEW_ARM)),
     ("remove", lambda place: place.remove("feed")),
     ("rename the default", lambda place: place.rename("feed", "food")),
     ("rename another", lambda place: place.rename("spare", "food")),
@@ -42,9 +42,9 @@ def fresh():
     store.os = chip
     store.open = chip.open
     place = store.Store("/flash/armtempo")
-    put(place, "feed.atm", OLD)
-    put(place, "spare.atm", OLD)
-    put(place, "arm.ata", ARM)
+    put(place, "feed", OLD)
+    put(place, "spare", OLD)
+    put(place, wire.ARM_RECORD_NAME, ARM)
     place.set_default("feed")
     chip.changes = 0
     return chip, place
@@ -52,9 +52,9 @@ def fresh():
 
 def content(place):
     """All that the store holds; every record must be whole."""
-    found = [place.default(), wire.record_crc(place.read(store.ARM))]
+    found = [place.default(), wire.record_crc(place.read(wire.ARM_RECORD_NAME))]
     for name in place.names():
-        data = place.read(name + store.MOTION)
+        data = place.read(name)
         assert data in (OLD, NEW), name
         found.append((name, data == NEW))
     return found

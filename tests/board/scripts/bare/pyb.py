@@ -32,7 +32,7 @@ class Timer:
     OC_TIMING = 1
     callbacks = {}
 
-    def __init__(self, number, prescaler=0, period=0):
+    def __init__(self, number, prescaler=0, period=0, freq=0, callback=None):
         self._number = number
 
     def channel(self, number, mode, callback=None):
