@@ -49,8 +49,6 @@ class App:
     """
 
     def __init__(self, stream: object, root: str, program_crc: int = 0, fault: int = 0) -> None:
-        from armtempo_shared.table import rows  # here, so that it can be forgotten
-
         self._root = root
         self._store: "Any" = None
         self.link = Link(stream)
@@ -78,9 +76,15 @@ class App:
         self._assumed = 0  # joints whose position a homing motion took for granted
         self._turns = self._failed = 0  # turns of the loop, and the last of them that failed
         self._failures = 0
+        self._make_parts()
+        forget()
+        self.configure()
+
+    def _make_parts(self) -> None:
+        from armtempo_shared.table import rows  # here, so that it can be forgotten
+
         self.commands = Commands(self, rows)
         self.events = Events(self, rows)
-        self.configure()
 
     # the loop
 
@@ -186,24 +190,35 @@ class App:
 
     def configure(self) -> None:
         """Take the stored arm record; without one the board stays unconfigured."""
-        from armtempo_shared import armrecord  # here, so that it can be forgotten
+        from armtempo_shared.armrecord import FLAG_STOP_ON_LINK_LOSS  # here, so that it can be forgotten
 
-        try:
-            head, joints, crc = armrecord.unpack(self.store().read(ARM_RECORD_NAME))
-        except (Refused, armrecord.ArmRecordError):
+        record = self._arm_record()
+        if record is None or record[2] == self.arm_crc:
             return
-        if crc == self.arm_crc:
-            return
+        head, joints, crc = record
+        self.forget_store()
+        forget()
         if self.engine:
             self.engine.close()
+            self.engine = None
+            self.arm_crc = 0
         self.engine = Engine(head, joints)
         self._head = head
-        self._needs_link = bool(head["flags"] & armrecord.FLAG_STOP_ON_LINK_LOSS)
+        self._needs_link = bool(head["flags"] & FLAG_STOP_ON_LINK_LOSS)
         self._arm_joints = joints
         self.joints = len(joints)
         self.arm_crc = crc
         self._raw = array("i", [0] * (2 + 2 * self.joints))
         self.samples = Samples(self.joints, SAMPLE_MEMORY)
+
+    def _arm_record(self) -> "tuple[dict[str, int], list[dict[str, int]], int] | None":
+        """The stored one: head, joints, crc32; None where there is none."""
+        from armtempo_shared import armrecord  # here, so that it can be forgotten
+
+        try:
+            return armrecord.unpack(self.store().read(ARM_RECORD_NAME))
+        except (Refused, armrecord.ArmRecordError):
+            return None
 
     def check_ready(self) -> None:
         """Refuses while a fault is pending or no arm is configured."""

@@ -49,12 +49,16 @@ def main(root: str = ROOT) -> None:
 
 def _build(port: "pyb.USB_VCP", root: str) -> App:
     """The App; what only its making needs is forgotten again, for the sake of the heap."""
-    from armtempo_shared.program import program_crc
-
-    built = App(port, root, program_crc(*_folders()), _fault_at_start())
+    built = App(port, root, _crc(), _fault_at_start())
     built.forget_store()
     forget()
     return built
+
+
+def _crc() -> int:
+    from armtempo_shared.program import program_crc  # here, so that it can be forgotten
+
+    return int(program_crc(*_folders()))
 
 
 def run(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:

@@ -40,7 +40,7 @@ def compact(
     names = short_names(merged, keep)
     shorten(merged, names)
     texts = {module: ast.unparse(ast.fix_missing_locations(tree)) for module, tree in merged.items()}
-    return Compact(texts, {short: name for name, short in names.items()})
+    return Compact(texts, names.readable())
 
 
 def _at_run_time(tree: ast.Module) -> ast.Module:

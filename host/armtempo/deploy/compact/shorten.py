@@ -7,13 +7,12 @@ import ast
 import builtins
 import io
 import keyword
-from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
 from itertools import product
 from string import ascii_lowercase
 
-from armtempo.deploy.compact.merge import CORE
-from armtempo.deploy.compact.scopes import top_names
+from armtempo.deploy.compact.scopes import Scoped, imported, top_names
 
 _TYPES = (
     object,
@@ -36,34 +35,107 @@ _SHORTEST = 3
 """Names of fewer letters stay."""
 
 
-def short_names(trees: Mapping[str, ast.Module], keep: Collection[str]) -> dict[str, str]:
-    """A short name for each name that is the program's own; the most frequent come first.
+@dataclass(frozen=True)
+class Names:
+    """Short names: of what each module defines, and of attributes. The same may stand for one of each."""
 
-    Not shortened: what built-in types or imported modules may mean by it, what stands in a string or is a
-    keyword in a call, names of modules, and ``keep``. A name is the same everywhere, whatever it names.
+    own: dict[str, dict[str, str]]
+    attributes: dict[str, str]
+
+    def readable(self) -> dict[str, str]:
+        """What each short name may stand for."""
+        found: dict[str, list[str]] = {}
+        for names in (*self.own.values(), self.attributes):
+            for name, short in names.items():
+                found.setdefault(short, []).append(name)
+        return {short: " or ".join(names) for short, names in found.items()}
+
+
+def short_names(trees: Mapping[str, ast.Module], keep: Collection[str]) -> Names:
+    """Short names for all that is the program's own.
+
+    Not shortened: what built-in types or imported modules may mean by a name, what stands in a string or is a
+    keyword in a call, names of modules, and ``keep``.
     """
     nodes = [node for tree in trees.values() for node in ast.walk(tree)]
     modules = {part for module in trees for part in module.split(".")}
-    fixed = {*keep, *modules, *_built_in(), *_imported(nodes), *_keywords(nodes), *_strings(nodes)}
-    used = Counter(name for node in nodes for name in _mentioned(node))
-    defined = {name for tree in trees.values() for name in _defined(tree)}
-    free = (name for name in _short() if name not in fixed and name not in used)
-    return {
-        name: next(free)
-        for name, _ in used.most_common()
-        if name in defined and name not in fixed and len(name) >= _SHORTEST and not name.startswith("__")
-    }
+    fixed = {*keep, *modules, *_built_in(), *_imported(nodes, trees), *_keywords(nodes), *_strings(nodes)}
+    taken = fixed | {name for node in nodes for name in _mentioned(node)}
+
+    def shorts(names: Collection[str]) -> dict[str, str]:
+        free = (short for short in _short() if short not in taken)
+        return {name: next(free) for name in sorted(names) if _is_long(name) and name not in fixed}
+
+    own = {module: shorts(top_names(tree)) for module, tree in trees.items()}
+    return Names(own, shorts({name for tree in trees.values() for name in _attributes(tree)}))
 
 
-def shorten(trees: Mapping[str, ast.Module], names: Mapping[str, str]) -> None:
+def shorten(trees: Mapping[str, ast.Module], names: Names) -> None:
     """Rename what stands in ``names``, and the parameters of functions to single letters."""
-    nodes = [node for tree in trees.values() for node in ast.walk(tree)]
-    keywords = set(_keywords(nodes))
-    for node in nodes:
-        if isinstance(node, ast.FunctionDef):
-            _shorten_parameters(node, keywords)
-    for node in nodes:
-        _rename(node, names)
+    keywords = {name for tree in trees.values() for name in _keywords(list(ast.walk(tree)))}
+    for module, tree in trees.items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.FunctionDef):
+                _shorten_parameters(node, keywords)
+        _Renamer(module, tree, names).visit(tree)
+
+
+class _Renamer(Scoped):
+    def __init__(self, module: str, tree: ast.Module, names: Names) -> None:
+        super().__init__()
+        self._names = names
+        self._own = names.own[module]
+        self._body = tree.body
+        self._top = imported(tree.body, names.own)
+        self._inside = imported([node for node in ast.walk(tree) if node not in tree.body], names.own)
+        self._of_class: set[str] = set()
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        """Names of functions' own cost nothing."""
+        if not self.hides(node.id):
+            names = self._names.attributes if self.at_top() and node.id in self._of_class else self._own
+            node.id = names.get(node.id, node.id)
+        return node
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
+        """Of an object, or a name in a module."""
+        names = self._names.attributes
+        if isinstance(node.value, ast.Name):
+            base = node.value.id
+            target = self._inside.get(base) if self.hides(base) else self._top.get(base)
+            if target and target.name is None:
+                names = self._names.own[target.module]
+        node.attr = names.get(node.attr, node.attr)
+        return self.generic_visit(node)
+
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
+        """Of the module, or a method."""
+        if self.at_top():
+            names = self._own if node in self._body else self._names.attributes
+            node.name = names.get(node.name, node.name)
+        return super().visit_FunctionDef(node)
+
+    def visit_ClassDef(self, node: ast.ClassDef) -> ast.AST:
+        """Its variables are attributes."""
+        node.name = self._own.get(node.name, node.name)
+        self._of_class = _class_variables(node)
+        self.generic_visit(node)
+        self._of_class = set()
+        return node
+
+    def visit_Global(self, node: ast.Global) -> ast.AST:
+        """Names of the module."""
+        node.names = [self._own.get(name, name) for name in node.names]
+        return node
+
+    def visit_ImportFrom(self, node: ast.ImportFrom) -> ast.AST:
+        """Where it is used it keeps its name."""
+        names = self._names.own.get(str(node.module), {})
+        for alias in node.names:
+            if alias.name in names:
+                alias.asname = alias.asname or alias.name
+                alias.name = names[alias.name]
+        return node
 
 
 def _short() -> Iterator[str]:
@@ -75,14 +147,23 @@ def _short() -> Iterator[str]:
                 yield name
 
 
-def _defined(tree: ast.Module) -> Iterator[str]:
-    """Functions, classes, attributes that are set, and what the module assigns."""
+def _is_long(name: str) -> bool:
+    return len(name) >= _SHORTEST and not name.startswith("__")
+
+
+def _attributes(tree: ast.Module) -> Iterator[str]:
+    """Methods, what classes assign, and attributes that are set."""
     for node in ast.walk(tree):
-        if isinstance(node, ast.FunctionDef | ast.ClassDef):
-            yield node.name
+        if isinstance(node, ast.ClassDef):
+            yield from (each.name for each in node.body if isinstance(each, ast.FunctionDef))
+            yield from _class_variables(node)
         elif isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
             yield node.attr
-    yield from top_names(tree)
+
+
+def _class_variables(node: ast.ClassDef) -> set[str]:
+    targets = [target for each in node.body if isinstance(each, ast.Assign) for target in each.targets]
+    return {target.id for target in targets if isinstance(target, ast.Name)}
 
 
 def _mentioned(node: ast.AST) -> Iterator[str]:
@@ -102,15 +183,18 @@ def _built_in() -> Iterator[str]:
         yield from dir(each)
 
 
-def _imported(nodes: Collection[ast.AST]) -> Iterator[str]:
-    """Imported names, and what is asked of them: ``sys.implementation._mpy``."""
+def _imported(nodes: Collection[ast.AST], program: Collection[str]) -> Iterator[str]:
+    """Names imported from outside of the program, and what is asked of them: ``sys.implementation._mpy``."""
+    packages = {module.split(".")[0] for module in program}
     roots = set()
     for node in nodes:
+        if isinstance(node, ast.ImportFrom) and str(node.module).split(".")[0] in packages:
+            continue
         if isinstance(node, ast.Import | ast.ImportFrom):
             roots |= {alias.asname or alias.name.split(".")[0] for alias in node.names}
-    yield from roots - {CORE}
+    yield from roots
     for node in nodes:
-        if isinstance(node, ast.Attribute) and _root(node) in roots - {CORE}:
+        if isinstance(node, ast.Attribute) and _root(node) in roots:
             yield node.attr
 
 
@@ -140,21 +224,7 @@ def _shorten_parameters(function: ast.FunctionDef, keywords: Collection[str]) ->
     arguments = [*function.args.args, *([function.args.vararg] if function.args.vararg else [])]
     names = {each.arg: next(letters) for each in arguments if each.arg not in keywords and len(each.arg) > 1}
     for node in inner:
-        if isinstance(node, ast.Name | ast.arg):
-            _rename(node, names)
-
-
-def _rename(node: ast.AST, names: Mapping[str, str]) -> None:
-    if isinstance(node, ast.FunctionDef | ast.ClassDef):
-        node.name = names.get(node.name, node.name)
-    elif isinstance(node, ast.Attribute):
-        node.attr = names.get(node.attr, node.attr)
-    elif isinstance(node, ast.Name):
-        node.id = names.get(node.id, node.id)
-    elif isinstance(node, ast.arg):
-        node.arg = names.get(node.arg, node.arg)
-    elif isinstance(node, ast.Global | ast.Nonlocal):
-        node.names = [names.get(name, name) for name in node.names]
-    elif isinstance(node, ast.ImportFrom):
-        for alias in node.names:
-            alias.name = names.get(alias.name, alias.name)
+        if isinstance(node, ast.Name):
+            node.id = names.get(node.id, node.id)
+        elif isinstance(node, ast.arg):
+            node.arg = names.get(node.arg, node.arg)
