@@ -37,8 +37,12 @@ def test_compiled_files_fit_the_smallest_board() -> None:
 
 
 def test_sources_go_where_there_is_room() -> None:
-    library = changes.choose(replace(BOARD, free_blocks=2000), False, quiet)
+    library = changes.choose(replace(BOARD, free_blocks=2000, free_heap=200_000), False, quiet)
     assert "/flash/lib/armtempo_board/app.py" in library
+    told: list[str] = []
+    library = changes.choose(replace(BOARD, free_blocks=2000), False, told.append)
+    assert "/flash/lib/armtempo_board/core.mpy" in library
+    assert "memory is too small for the sources" in told[0]
 
 
 def test_only_what_differs_is_written() -> None:

@@ -11,8 +11,10 @@ from armtempo.deploy.remote import Survey
 from armtempo.errors import LinkError
 
 LEAST_RELEASE = (1, 20)
-LEAST_HEAP = 60_000
-"""Bytes that must be free before anything of the program is loaded."""
+LEAST_HEAP = 92_000
+"""Bytes that must be free before anything of the program is loaded: see board/docs/memory.md."""
+_SOURCES_HEAP = 160_000
+"""The same for sources, which the board compiles."""
 _RESERVE_BLOCKS = 8
 """For folders, the arm's record and a motion."""
 
@@ -43,7 +45,10 @@ def check_suitable(found: Survey) -> None:
             "an SD card is in the board, and the board starts from it; take it out, press reset, deploy again"
         )
     if found.free_heap < LEAST_HEAP:
-        raise LinkError(f"the board has {found.free_heap} bytes of free memory; {LEAST_HEAP} are needed")
+        raise LinkError(
+            f"the board has {found.free_heap} bytes of free memory; {LEAST_HEAP} are needed: "
+            "is there a boot.py that loads something?"
+        )
 
 
 def choose(found: Survey, mpy: bool, tell: Tell) -> dict[str, bytes]:
@@ -56,8 +61,8 @@ def choose(found: Survey, mpy: bool, tell: Tell) -> dict[str, bytes]:
         tell("the program is a part of the board's firmware; only the start files are in the flash")
         return {}
     library = program.library(found.mpy if mpy else None)
-    if not mpy and not _fits(found, library):
-        tell("the flash is too small for the sources; compiled files are used")
+    if not mpy and (small := _too_small_for_sources(found, library)):
+        tell(f"the board's {small} is too small for the sources; compiled files are used")
         library = program.library(found.mpy)
     if not _fits(found, library):
         raise LinkError(
@@ -94,6 +99,13 @@ def ours(found: Survey) -> list[str]:
 def digest(data: bytes) -> str:
     """sha256 in hex."""
     return hashlib.sha256(data).hexdigest()
+
+
+def _too_small_for_sources(found: Survey, sources: Mapping[str, bytes]) -> str:
+    """What is too small, or nothing."""
+    if not _fits(found, sources):
+        return "flash"
+    return "memory" if found.free_heap < _SOURCES_HEAP else ""
 
 
 def _fits(found: Survey, library: Mapping[str, bytes]) -> bool:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import ast
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from types import SimpleNamespace
 
-from armtempo.deploy.compact.scopes import Scoped, Target, imported, visit_all
+from armtempo.deploy.compact.scopes import Scoped, Target, imported, stored, visit_all
 
 Value = int | str | bytes
 _DEPTH = 8
@@ -52,13 +53,12 @@ def _known(
 
 
 def _assigned(tree: ast.Module) -> Iterator[tuple[str, ast.expr]]:
-    """Names that are assigned once in the module's top, with what they are assigned."""
-    stored = [
-        node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
-    ]
+    """Names that are assigned once, at the module's top, with what they are assigned."""
+    times = Counter(name for node in tree.body for name in stored(node))
+    times.update(name for node in ast.walk(tree) if isinstance(node, ast.Global) for name in node.names)
     for node in tree.body:
         for name, value in _pairs(node):
-            if stored.count(name) == 1:
+            if times[name] == 1:
                 yield name, value
 
 

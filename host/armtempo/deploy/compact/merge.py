@@ -35,18 +35,28 @@ def packages(trees: Collection[str]) -> set[str]:
 
 def used_whole(trees: Mapping[str, ast.Module]) -> set[str]:
     """Modules that are used as an object, not only for a name in them."""
-    found = set()
+    found: set[str] = set()
     for tree in trees.values():
-        modules = {
-            name: target.module for name, target in imported(tree.body, trees).items() if target.name is None
-        }
-        bases = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
-        found |= {
-            modules[node.id]
-            for node in ast.walk(tree)
-            if isinstance(node, ast.Name) and node.id in modules and id(node) not in bases
-        }
+        _Users(imported(tree.body, trees), found).visit(tree)
     return found
+
+
+class _Users(Scoped):
+    def __init__(self, targets: Mapping[str, Target], found: set[str]) -> None:
+        super().__init__()
+        self._targets = targets
+        self._found = found
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
+        """A name in a module is no use of the module."""
+        return node if isinstance(node.value, ast.Name) else self.generic_visit(node)
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        """A use."""
+        target = self._targets.get(node.id)
+        if target and target.name is None and not self.hides(node.id):
+            self._found.add(target.module)
+        return node
 
 
 def _imported_later(trees: Mapping[str, ast.Module]) -> set[str]:

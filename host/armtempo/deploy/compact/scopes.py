@@ -38,7 +38,7 @@ def top_names(tree: ast.Module) -> set[str]:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             found.add(node.name)
         elif not isinstance(node, ast.Import | ast.ImportFrom):
-            found |= _stored(node)
+            found |= stored(node)
     return found
 
 
@@ -49,12 +49,13 @@ def local_names(function: Function) -> set[str]:
     found = {argument.arg for argument in (*every, arguments.vararg, arguments.kwarg) if argument}
     if isinstance(function, ast.FunctionDef):
         for node in function.body:
-            found |= _stored(node)
+            found |= stored(node)
         found -= {name for node in ast.walk(function) if isinstance(node, ast.Global) for name in node.names}
     return found
 
 
-def _stored(node: ast.AST) -> set[str]:
+def stored(node: ast.AST) -> set[str]:
+    """Names that a statement binds, but not what functions in it bind."""
     found: set[str] = set()
     for inner in _own(node):
         if isinstance(inner, ast.Name) and isinstance(inner.ctx, ast.Store):

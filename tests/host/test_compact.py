@@ -1,0 +1,160 @@
+"""The program that is compiled has fewer modules and shorter names, and does the same."""
+
+from __future__ import annotations
+
+import ast
+import sys
+import textwrap
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from armtempo.deploy import program
+from armtempo.deploy.compact import Compact, compact
+
+SOURCES = {
+    "made": "",
+    "made.main": """
+        from micropython import const
+        from made import shapes, tools
+        from made.shapes import SIDES, Square
+        from made.tools import area as measure
+
+        _OFFSET = const(SIDES + 1)
+        TYPE_CHECKING = False
+        if TYPE_CHECKING:
+            from somewhere import Nothing
+        state = None
+
+        def total(count: int = SIDES) -> "Nothing":
+            global state
+            area = measure(Square(count)) + tools.area(Square(2))
+            state = shapes.Square
+            from made import later
+            return area + _OFFSET + later.extra(area, more=shapes.SIDES)
+
+        def hidden(SIDES, tools):
+            return SIDES + tools
+
+        def table():
+            return [getattr(shapes.Square(1), "_" + name)() for name in ("first", "second")]
+    """,
+    "made.shapes": """
+        SIDES = 4
+        _LEAST, _MOST = 2, 9
+
+        class Square:
+            corners = SIDES
+            names = {"length": 1}
+
+            def __init__(self, length):
+                self.length = max(_LEAST, min(length, _MOST))
+                self.text = ", ".join([str(SIDES) for SIDES in range(2)])
+
+            def area(self):
+                return self.length * self.length + self.corners
+
+            def _first(self):
+                return 1
+
+            def _second(self):
+                return self.names["length"]
+    """,
+    "made.tools": """
+        import math
+
+        def area(square):
+            def root(value):
+                return math.sqrt(value)
+            return int(root(square.area() ** 2))
+    """,
+    "made.later": """
+        from made import shapes
+        from made.tools import area
+
+        _MORE = 100
+
+        def extra(base, more):
+            return base + _MORE + more + area(shapes.Square(3)) + shapes.SIDES
+    """,
+}
+
+
+@pytest.fixture
+def made() -> Compact:
+    sources = {module: textwrap.dedent(text) for module, text in SOURCES.items()}
+    return compact(
+        sources, "made.main", {"made.main"}, {"total", "hidden", "table", "state", "_first", "_second"}
+    )
+
+
+@pytest.fixture
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[object]:
+    """Gives what runs a call in ``made.main``; whatever it imported is forgotten again."""
+
+    def forget() -> None:
+        for name in [name for name in sys.modules if name.split(".")[0] == "made"]:
+            del sys.modules[name]
+
+    def call(sources: dict[str, str], words: str) -> object:
+        forget()
+        folder = tmp_path / str(len(list(tmp_path.iterdir())))
+        for module, text in sources.items():
+            path = folder / f"{module.replace('.', '/')}.py"
+            path = folder / "made" / "__init__.py" if module == "made" else path
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(textwrap.dedent(text))
+        (folder / "micropython.py").write_text("def const(value):\n    return value\n")
+        with monkeypatch.context() as patch:
+            patch.syspath_prepend(str(folder))
+            patch.delitem(sys.modules, "micropython", raising=False)
+            space: dict[str, object] = {}
+            exec(f"from made import main\nresult = main.{words}", space)
+            patch.delitem(sys.modules, "micropython", raising=False)
+        return space["result"]
+
+    yield call
+    forget()
+
+
+@pytest.mark.parametrize("words", ["total()", "total(7)", "hidden(1, 2)", "table()"])
+def test_it_does_the_same(made: Compact, run, words: str) -> None:  # type: ignore[no-untyped-def]
+    assert run(made.sources, words) == run(SOURCES, words)
+
+
+def test_modules_become_one_but_those_that_come_later(made: Compact) -> None:
+    assert set(made.sources) == {"made", "made.main", "made.later", "made.core"}
+
+
+def test_constants_and_long_names_are_gone(made: Compact) -> None:
+    text = "\n".join(made.sources.values())
+    for gone in ("SIDES =", "_LEAST", "_OFFSET", "const(", "_MORE", "corners", "Square", "somewhere"):
+        assert gone not in text, gone
+    for kept in ("def total", "_first", '"length"'.replace('"', "'"), "join", "sqrt", "more="):
+        assert kept in text, kept
+
+
+def test_short_names_can_be_read_again(made: Compact) -> None:
+    assert {"corners", "area", "shapes__Square", "extra"} <= {
+        name for names in made.names.values() for name in names.split(" or ")
+    }
+
+
+def test_a_name_that_is_not_there_is_told() -> None:
+    sources = {
+        "made": "",
+        "made.main": "from made import other\nprint(other.gone)\n",
+        "made.other": "here = [1]\n",
+    }
+    with pytest.raises(ValueError, match=r"made\.other defines no gone"):
+        compact(sources, "made.main", {"made.main"}, ())
+
+
+def test_the_board_program_is_mostly_one_module() -> None:
+    made = program.compact_program()
+    for text in made.sources.values():
+        ast.parse(text)
+    core = made.sources["armtempo_board.core"]
+    assert "armtempo_board.program" in made.sources
+    assert "armtempo_board.store" in made.sources
+    assert len(core) > sum(len(text) for text in made.sources.values()) / 2
