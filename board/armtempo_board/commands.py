@@ -72,7 +72,8 @@ class Commands:
     def _store(self, row: tuple, length: int) -> "int | None":
         from armtempo_board import storing  # here, so that it can be forgotten
 
-        return getattr(storing, row[0])(self, row, length)
+        handler: "Callable[[Commands, Any, int], int | None]" = getattr(storing, row[0])
+        return handler(self, row, length)
 
     def _refuse(self, number: int, code: int, joint: int = 255, value: int = 0) -> None:
         pack_into(self._error_form, self._link.reply, PAYLOAD, number, code, joint, value)

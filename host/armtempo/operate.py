@@ -188,6 +188,7 @@ def replay_recorded(
         end = replay(board, motion, stop, take)
         state = FAULT if end.fault else INTERRUPTED if stop.wanted else COMPLETE
         file.repetition.end(state, fault_name(end.fault), end.ticks, end.stand, end.lost)
+        file.repetition.notices = _readable(end.notices)
     return end
 
 
@@ -199,7 +200,17 @@ def fault_name(code: int) -> str:
 def raise_fault(end: RunEnd) -> None:
     """Raise BoardError, with the sentence for the fault, where a run ended by one."""
     if end.fault:
-        raise refusal("the motion ended by a fault", end.fault, end.fault_joint)
+        said = "".join(f"; the board says: {text.strip()}" for text in _readable(end.notices))
+        raise refusal(f"the motion ended by a fault{said}", end.fault, end.fault_joint)
+
+
+def _readable(notices: tuple[str, ...]) -> tuple[str, ...]:
+    """Notices with the names of the source, where the board has the compiled program."""
+    if not notices:
+        return ()
+    from armtempo.deploy.program import in_full  # reads the whole program: only where it is needed
+
+    return tuple(map(in_full, notices))
 
 
 def posture_deg(board: Board, arm: Arm) -> Array:

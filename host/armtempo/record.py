@@ -89,7 +89,7 @@ def row(sample: Sample, joints: Sequence[JointScale]) -> list[str]:
 
 @dataclass
 class Repetition:
-    """How one repetition went; ``lost``: (first index, number) of each gap."""
+    """How one repetition went; ``lost``: (first index, number) of each gap; ``notices``: words of the board."""
 
     file: str
     state: str = RUNNING
@@ -99,6 +99,7 @@ class Repetition:
     fault: str = ""
     commanded_steps: tuple[int, ...] = ()
     counts: tuple[int, ...] = ()
+    notices: tuple[str, ...] = ()
 
     def end(
         self, state: str, fault: str, ticks: int, stand: Stand, lost: tuple[tuple[int, int], ...]

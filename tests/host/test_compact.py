@@ -158,3 +158,13 @@ def test_the_board_program_is_mostly_one_module() -> None:
     assert "armtempo_board.program" in made.sources
     assert "armtempo_board.store" in made.sources
     assert len(core) > sum(len(text) for text in made.sources.values()) / 2
+
+
+def test_traceback_of_the_compiled_program_is_readable() -> None:
+    short = next(
+        short for short, names in program.compact_program().names.items() if "engine__Engine" in names
+    )
+    line = f'  File "core.py", line 1, in {short}\nValueError: deliberate\n'
+    assert f"in {short} (" in program.in_full(line)
+    assert "engine__Engine" in program.in_full(line)
+    assert program.in_full(line.replace("core.py", "engine.py")) == line.replace("core.py", "engine.py")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import tempfile
 from importlib import import_module
@@ -15,6 +16,7 @@ from armtempo_shared.table import rows
 from armtempo import virtual
 from armtempo.boardfiles import PACKAGES, own_crc, package_folder
 from armtempo.deploy.compact import Compact, compact
+from armtempo.deploy.compact.merge import CORE
 from armtempo.errors import InputError, LinkError
 
 ROOT = "/flash"
@@ -107,6 +109,18 @@ def compact_program() -> Compact:
         f"{PACKAGES[0]}.program",
         {f"{PACKAGES[0]}.{name}" for name in entries} & set(sources),
         {*_handlers(), *_hardware_names(), *(name for node in nodes for name in _named(node))},
+    )
+
+
+def in_full(traceback: str) -> str:
+    """A traceback from the board, with the source's names behind the short ones of the compiled program."""
+    if f"{CORE}.py" not in traceback:
+        return traceback
+    names = compact_program().names
+    return re.sub(
+        r"(?<=, in )\w+",
+        lambda found: found[0] + (f" ({names[found[0]]})" if found[0] in names else ""),
+        traceback,
     )
 
 

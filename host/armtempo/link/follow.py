@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from armtempo.errors import LinkError
 from armtempo.link.board import Board
-from armtempo.link.messages import Done, Event, Fault, Sample, Stand
+from armtempo.link.messages import Done, Event, Fault, Notice, Sample, Stand
 
 ACKNOWLEDGE_S = 0.25
 """Acknowledging this often also tells the board that the host is still there."""
@@ -35,6 +35,8 @@ class RunEnd:
     """Samples that arrived."""
     lost: tuple[tuple[int, int], ...]
     """Samples that never will: (first index, number) of each gap."""
+    notices: tuple[str, ...] = ()
+    """What the board had to say: the traceback of a failure in its program, for one."""
 
     @property
     def samples_lost(self) -> int:
@@ -56,6 +58,7 @@ class Follower:
         self._received = 0
         self._lost: list[tuple[int, int]] = []
         self._last: Done | Fault | None = None
+        self._notices: list[str] = []
         self._asked_s = board.session.clock()
         self._progress = (-1, 0)  # what should move on (motion clock, sample number); how often it did not
 
@@ -83,6 +86,8 @@ class Follower:
                 self._held[event.index] = event
         elif isinstance(event, Done | Fault) and event.run == self._run:
             self._last = event
+        elif isinstance(event, Notice):
+            self._notices.append(event.text)
 
     def _ready(self) -> Iterator[Sample]:
         while True:
@@ -151,4 +156,5 @@ class Follower:
 
     def _run_end(self, last: Done | Fault) -> RunEnd:
         fault, joint = (last.code, last.joint) if isinstance(last, Fault) else (0, 255)
-        return RunEnd(fault, joint, last.ticks, last.stand, self._received, tuple(self._lost))
+        lost, notices = tuple(self._lost), tuple(self._notices)
+        return RunEnd(fault, joint, last.ticks, last.stand, self._received, lost, notices)
