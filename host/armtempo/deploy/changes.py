@@ -105,7 +105,7 @@ def _too_small_for_sources(found: Survey, sources: Mapping[str, bytes]) -> str:
     """What is too small, or nothing."""
     if not _fits(found, sources):
         return "flash"
-    return "memory" if found.free_heap < _SOURCES_HEAP else ""
+    return "memory" if found.mpy and found.free_heap < _SOURCES_HEAP else ""
 
 
 def _fits(found: Survey, library: Mapping[str, bytes]) -> bool:
