@@ -93,7 +93,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[object]:
     """Gives what runs a call in ``made.main``; whatever it imported is forgotten again."""
 
     def forget() -> None:
-        for name in [name for name in sys.modules if name.split(".")[0] == "made"]:
+        for name in [name for name in sys.modules if name.split(".")[0] in ("made", "micropython")]:
             del sys.modules[name]
 
     def call(sources: dict[str, str], words: str) -> object:
@@ -107,10 +107,8 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[object]:
         (folder / "micropython.py").write_text("def const(value):\n    return value\n")
         with monkeypatch.context() as patch:
             patch.syspath_prepend(str(folder))
-            patch.delitem(sys.modules, "micropython", raising=False)
             space: dict[str, object] = {}
             exec(f"from made import main\nresult = main.{words}", space)
-            patch.delitem(sys.modules, "micropython", raising=False)
         return space["result"]
 
     yield call

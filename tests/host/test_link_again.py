@@ -79,7 +79,6 @@ def test_another_board_at_the_same_port_gets_no_command(tmp_path: Path) -> None:
     def swap() -> None:
         pipe.unplug_for(1.0)
         pipe.swap_board(b"another")
-        pipe.app.configure()
         pipe.app.engine.moving = True
 
     with pytest.raises(LinkError, match=r"another board is on pipe now \(another, before") as caught:

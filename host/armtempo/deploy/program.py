@@ -6,6 +6,7 @@ import ast
 import re
 import subprocess
 import tempfile
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -95,6 +96,7 @@ def _compiled(mpy: int) -> dict[str, bytes]:
     return result
 
 
+@cache
 def compact_program() -> Compact:
     """What is compiled: the program with fewer modules and shorter names."""
     files = {path[:-3].removesuffix("/__init__").replace("/", "."): file for path, file in modules().items()}

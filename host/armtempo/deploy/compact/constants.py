@@ -7,11 +7,9 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from types import SimpleNamespace
 
-from armtempo.deploy.compact.scopes import Scoped, Target, imported, stored, visit_all
+from armtempo.deploy.compact.scopes import Scoped, Target, imported, imported_inside, stored, visit_all
 
 Value = int | str | bytes
-_DEPTH = 8
-"""Constants may be made of others, through so many modules."""
 
 
 def fold(trees: Mapping[str, ast.Module], whole: Collection[str]) -> None:
@@ -30,10 +28,12 @@ def fold(trees: Mapping[str, ast.Module], whole: Collection[str]) -> None:
 def constants(trees: Mapping[str, ast.Module]) -> dict[str, dict[str, Value]]:
     """Value by name, by module."""
     values: dict[str, dict[str, Value]] = {module: {} for module in trees}
-    for _ in range(_DEPTH):
+    assigned = {module: list(_assigned(tree)) for module, tree in trees.items()}
+    found = -1
+    while found < (found := sum(map(len, values.values()))):  # constants may be made of others
         for module, tree in trees.items():
             known = _known(tree, trees, values) | values[module]
-            for name, expression in _assigned(tree):
+            for name, expression in assigned[module]:
                 if (value := _evaluate(expression, known)) is not None:
                     values[module][name] = known[name] = value
     return values
@@ -108,7 +108,7 @@ class _Folder(Scoped):
         self._own = own
         self._taken_out = taken_out
         self._imported = imported(tree.body, program)
-        self._inside = imported([node for node in ast.walk(tree) if node not in tree.body], program)
+        self._inside = imported_inside(tree, program)
 
     def _target(self, name: str) -> Target | None:
         """What a name was imported as: a function's own import counts, its other names hide the module's."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Collection, Mapping
 
-from armtempo.deploy.compact.scopes import Scoped, Target, imported, top_names, visit_all
+from armtempo.deploy.compact.scopes import Scoped, Target, imported, imported_inside, top_names, visit_all
 
 CORE = "core"
 
@@ -61,11 +61,7 @@ class _Users(Scoped):
 
 def _imported_later(trees: Mapping[str, ast.Module]) -> set[str]:
     """Modules that are imported inside of functions."""
-    found = set()
-    for tree in trees.values():
-        inner = [node for node in ast.walk(tree) if node not in tree.body]
-        found |= {target.module for target in imported(inner, trees).values()}
-    return found
+    return {target.module for tree in trees.values() for target in imported_inside(tree, trees).values()}
 
 
 def _in_order(trees: Mapping[str, ast.Module], main: str) -> list[str]:
@@ -120,6 +116,7 @@ class _Merger(Scoped):
         self._inside = inside
         self._core = core
         self._body = tree.body
+        self._top_nodes = set(tree.body)
         self._imported = imported(tree.body, inside)
         self._own = inside.get(module, set())
         self._needs_core = False
@@ -174,7 +171,7 @@ class _Merger(Scoped):
         return self.generic_visit(node)
 
     def _is_own(self, node: ast.FunctionDef | ast.ClassDef) -> bool:
-        return node in self._body and node.name in self._own
+        return node in self._top_nodes and node.name in self._own
 
     def visit_Global(self, node: ast.Global) -> ast.AST:
         """Names of the module again."""

@@ -31,6 +31,12 @@ def imported(nodes: Collection[ast.AST], program: Collection[str]) -> dict[str, 
     return found
 
 
+def imported_inside(tree: ast.Module, program: Collection[str]) -> dict[str, Target]:
+    """The same for imports inside of functions."""
+    top = set(tree.body)
+    return imported([node for node in ast.walk(tree) if node not in top], program)
+
+
 def top_names(tree: ast.Module) -> set[str]:
     """Names that a module itself defines."""
     found: set[str] = set()

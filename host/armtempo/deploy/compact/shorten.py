@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import product
 from string import ascii_lowercase
 
-from armtempo.deploy.compact.scopes import Scoped, imported, top_names
+from armtempo.deploy.compact.scopes import Scoped, imported, imported_inside, top_names
 
 _TYPES = (
     object,
@@ -85,9 +85,9 @@ class _Renamer(Scoped):
         super().__init__()
         self._names = names
         self._own = names.own[module]
-        self._body = tree.body
+        self._top_nodes = set(tree.body)
         self._top = imported(tree.body, names.own)
-        self._inside = imported([node for node in ast.walk(tree) if node not in tree.body], names.own)
+        self._inside = imported_inside(tree, names.own)
         self._of_class: set[str] = set()
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
@@ -111,7 +111,7 @@ class _Renamer(Scoped):
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
         """Of the module, or a method."""
         if self.at_top():
-            names = self._own if node in self._body else self._names.attributes
+            names = self._own if node in self._top_nodes else self._names.attributes
             node.name = names.get(node.name, node.name)
         return super().visit_FunctionDef(node)
 
