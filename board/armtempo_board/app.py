@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any
 
-SAMPLE_MEMORY = const(2048)
+SAMPLE_MEMORY = const(4096)
 _UNCONFIGURED, _UNHOMED, _IDLE, _MOVING, _BRAKING, _FAULT = range(len(STATES))
 _MOST_FAILURES = const(10)  # failing turns of the loop one after the other, then the program gives up
 

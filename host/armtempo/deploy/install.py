@@ -27,8 +27,8 @@ KEPT_ASIDE = ".before-armtempo"
 _START_S = 20.0
 """A board starts the program within this time after a reset."""
 _LOOK_S = 0.5
-_PROMPTS = 2
-"""Once the prompt may be the one from before the reset."""
+_SETTLE_S = 6.0
+"""A prompt that comes so soon after a reset may be the one from before it."""
 
 
 def deploy(port: str, mpy: bool, tell: Tell, progress: Progress) -> None:
@@ -145,15 +145,13 @@ def _verify(remote: Remote, library: Mapping[str, bytes]) -> None:
 
 def _confirm(port: str) -> None:
     """Wait until the board has started the program; LinkError where it does not."""
-    limit = time.monotonic() + _START_S
-    prompts = 0
+    begin = time.monotonic()
     while True:
         try:
             with open_board(port):
                 return
         except (LinkError, InputError) as error:
-            prompts += isinstance(error, Prompt)
-            if prompts >= _PROMPTS or time.monotonic() > limit:
+            if time.monotonic() - begin > (_SETTLE_S if isinstance(error, Prompt) else _START_S):
                 raise LinkError(
                     f"the files are on the board, but the program does not start: {error}; {RECOVERY}"
                 ) from None
