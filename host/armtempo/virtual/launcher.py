@@ -149,6 +149,7 @@ def launch(
         _make(flash)
         options = Options(
             flash=str(flash),
+            sources=program_folders(),
             program=[] if deployed else program_folders(),
             flash_blocks=flash_blocks or (_DEPLOYED_BLOCKS if deployed else Options.flash_blocks),
             speed=0.0 if virtual_time else 1.0,

@@ -35,6 +35,8 @@ class Options:
 
     flash: str
     """Folder that is the board's ``/flash``."""
+    sources: list[str]
+    """Folders with the packages of the board program: how its pins are wired, what an arm record says."""
     program: list[str]
     """Folders with the board's packages, as if they were deployed; empty: only what the flash has."""
     flash_blocks: int = 190

@@ -254,7 +254,7 @@ def run(story, flash, program, boot=None):
     the.board = the.arm = the.flash = the.edges = None
     the.serial = world = World(story, boot, flash)
     try:
-        session.run(dict(DEFAULTS, flash=flash, program=program), [])
+        session.run(dict(DEFAULTS, flash=flash, sources=program, program=program), [])
     finally:
         sys.path[:] = _path
         builtins.print, builtins.open = _stock

@@ -12,6 +12,7 @@ _POWER_ON, _SOFT = 1, 0
 
 def run(options, hardware):
     """Run the board until the launcher goes; ``hardware``: the folders of its built-in modules."""
+    setup.learn(options["sources"])
     path = hardware, options["program"] + sys.path
     before = list(sys.modules)
     builtins.print = board_print
@@ -36,7 +37,7 @@ def _live(options, before, mode, path):
     while True:
         firmware.mount(mode, path)
         if the.arm is None or the.arm.board is not the.board:
-            _connect()
+            setup.connect(the.pins)
         repl = Repl(raw)
         try:
             if mode != firmware.SAFE:
@@ -48,18 +49,6 @@ def _live(options, before, mode, path):
         mode = firmware.NORMAL
         _soft_reset()
         _forget(before)
-
-
-def _connect():
-    """Put the arm on the pins, by the pin table of the program that is there."""
-    try:
-        from armtempo_board import pins
-
-        setup.connect(pins)
-    except ImportError:  # nothing, or not all, is deployed
-        pass
-    except Exception as error:
-        sys.stderr.write("no arm on the pins: %r\n" % error)
 
 
 def _start(options, repl):

@@ -1,5 +1,6 @@
 """Builds the virtual board as its options say."""
 
+import sys
 from binascii import unhexlify
 
 from simulator import edgelog, faults, firmware, flash, pace, serial, the
@@ -36,6 +37,20 @@ def power_up(options, cause):
     return mode
 
 
+def learn(folders):
+    """What the world around the board has to know, from the sources in ``folders``, whatever the board has."""
+    path = list(sys.path)
+    sys.path[0:0] = folders
+    from armtempo_board import pins
+    from simulator import motors  # noqa: F401  with its armrecord
+
+    sys.path[:] = path
+    the.pins = pins
+    for name in list(sys.modules):
+        if name.split(".")[0] in ("armtempo_board", "armtempo_shared"):
+            del sys.modules[name]
+
+
 def connect(pins):
     """Put motors and encoders on the pins; ``pins`` is the board program's own table."""
     from simulator import motors
@@ -47,13 +62,11 @@ def connect(pins):
 
 def _arm_record():
     """(head, joints) of the arm that the options or the record in the flash describe, or None."""
+    from simulator.motors import armrecord
+
     arm = the.options["arm"]
     if arm:
         return arm["head"], arm["joints"]
-    try:
-        from armtempo_shared import armrecord
-    except ImportError:  # the program was taken off the board
-        return None
     try:
         with flash.real_open(the.options["flash"] + _ARM_RECORD, "rb") as file:
             head, joints, _ = armrecord.unpack(file.read())

@@ -7,5 +7,6 @@ port = None
 flash = None
 edges = None
 arm = None
+pins = None
 options = {}
 settings = {}
