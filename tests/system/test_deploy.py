@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from armtempo.deploy import deploy, firmware, package, remote
 from armtempo.errors import LinkError
-from armtempo.virtual import VirtualBoard, launch
+from armtempo.virtual import VirtualBoard, edgelog, launch
 
 from tests import interpreters
 from tests.system.boards import armtempo, small_plan
@@ -24,6 +24,26 @@ def board(name: str, flash: Path, power_cut_at: int = 0) -> VirtualBoard:
     blocks = SOURCES_BLOCKS if name == "cpython" else None
     starter = interpreters.starter(name)
     return launch(flash, interpreter=starter, deployed=True, flash_blocks=blocks, power_cut_at=power_cut_at)
+
+
+def steps_of_a_run(folder: Path, deployed: bool) -> dict[str, list[int]]:
+    """Times of all STEP edges of a motion, by pin, with the program of the sources or the one that is deployed."""
+    folder.mkdir()
+    log = folder / "edges"
+    starter = interpreters.starter(INTERPRETERS[-1])
+    with launch(folder / "flash", interpreter=starter, deployed=deployed, edge_log=log) as found:
+        if deployed:
+            armtempo("deploy", "--port", found.port, cwd=folder)
+        armtempo("home", "--port", found.port, cwd=folder)
+        armtempo("run", small_plan(folder / "small.json"), "--port", found.port, cwd=folder)
+    edges = edgelog.read(log)[-1].motion()
+    return {pin: edges[pin][0].tolist() for pin in ("A15", "A1", "B10")}
+
+
+def test_the_compiled_program_makes_the_same_pulses(tmp_path: Path) -> None:
+    steps = [steps_of_a_run(tmp_path / str(deployed), deployed) for deployed in (False, True)]
+    assert all(len(times) > 100 for times in steps[0].values())
+    assert steps[0] == steps[1]
 
 
 def mpremote(port: str, *arguments: str) -> str:

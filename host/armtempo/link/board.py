@@ -20,8 +20,26 @@ SMALLEST_PIECE = 16
 LARGEST_PIECE = MAX_PAYLOAD - 4
 PIECE_PATIENCE_S = 0.5
 
+_CTRL_C = 3
+_GREETINGS = 8
+"""So many of a session's first frames may be ``hello``."""
+
 Progress = Callable[[float, float], None]
 """Called with what is done and the whole."""
+
+
+def harmless_number() -> int:
+    """A random session number (32 bits) without a Ctrl-C in its ``hello``.
+
+    A board that is just starting would take it for a wish to interrupt boot.py.
+    """
+    entry = wire.COMMAND["hello"]
+    while True:
+        number = secrets.randbits(32)
+        payload = wire.encode(entry, (wire.PROTOCOL_VERSION, number))
+        frames = [wire.frame(sequence, entry[1], payload) for sequence in range(1, _GREETINGS)]
+        if not any(_CTRL_C in frame for frame in frames if frame[3] != _CTRL_C):
+            return number
 
 
 class Board:
@@ -30,7 +48,7 @@ class Board:
 
     def __init__(self, session: Session, session_number: int | None = None) -> None:
         self.session = session
-        self._number = secrets.randbits(32) if session_number is None else session_number
+        self._number = harmless_number() if session_number is None else session_number
         self._piece = LARGEST_PIECE
         self.info: messages.Hello | None = None
         session.greet = self._greet_again

@@ -18,6 +18,7 @@ from armtempo.errors import ArmtempoError, BoardError, LinkError
 from armtempo.link import messages
 from armtempo.link.transport import Transport
 
+_CTRL_C = 3
 REPEAT_S = 0.2
 """A command without an answer is sent again after this time."""
 SILENCE_S = 3.0
@@ -95,7 +96,7 @@ class Session:
         ``patience_s`` without an answer, LinkError where the port breaks.
         """
         number = wire.COMMAND[name][1]
-        self._sequence = sequence = (self._sequence + 1) % 256
+        sequence = self._next_sequence()
         data = wire.frame(sequence, number, wire.encode(wire.COMMAND[name], values, tail))
         begin_s = self._heard_s = self.clock()
         while True:
@@ -128,6 +129,11 @@ class Session:
         if self.frames_bad:
             return f"{what}; {self.frames_bad} damaged stretches received: check the cable"
         return f"{what}; check the cable and that the board is powered"
+
+    def _next_sequence(self) -> int:
+        """The next of 255: a board that is just starting would take a 3 for Ctrl-C."""
+        self._sequence = (self._sequence + (2 if self._sequence == _CTRL_C - 1 else 1)) % 256
+        return self._sequence
 
     def _reply(self, deadline_s: float, sequence: int, number: int) -> messages.Frame | None:
         while (left_s := deadline_s - self.clock()) > 0:

@@ -42,6 +42,7 @@ def learn(folders):
     path = list(sys.path)
     sys.path[0:0] = folders
     from armtempo_board import pins
+
     from simulator import motors  # noqa: F401  with its armrecord
 
     sys.path[:] = path
