@@ -37,7 +37,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any
 
-SAMPLE_MEMORY = const(4096)
+_MOST_SAMPLES = const(4096)  # bytes to keep samples in,
+_LEAST_SAMPLES = const(1024)
+_SHARE = const(8)  # in between this part of what is free
 _UNCONFIGURED, _UNHOMED, _IDLE, _MOVING, _BRAKING, _FAULT = range(len(STATES))
 _MOST_FAILURES = const(10)  # failing turns of the loop one after the other, then the program gives up
 
@@ -209,7 +211,7 @@ class App:
         self.joints = len(joints)
         self.arm_crc = crc
         self._raw = array("i", [0] * (2 + 2 * self.joints))
-        self.samples = Samples(self.joints, SAMPLE_MEMORY)
+        self.samples = Samples(self.joints, _sample_memory())
 
     def _arm_record(self) -> "tuple[dict[str, int], list[dict[str, int]], int] | None":
         """The stored one: head, joints, crc32; None where there is none."""
@@ -372,6 +374,11 @@ def _board_id() -> bytes:
 def _free_heap() -> int:
     free = getattr(gc, "mem_free", None)
     return free() if free else 0
+
+
+def _sample_memory() -> int:
+    gc.collect()
+    return min(max(_free_heap() // _SHARE, _LEAST_SAMPLES), _MOST_SAMPLES)
 
 
 def _traceback(error: "BaseException") -> str:
