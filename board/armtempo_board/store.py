@@ -160,7 +160,9 @@ class Store:
             self._discard(self._target + _NEW)
 
     def read(self, name: str) -> bytes:
-        """All bytes of a record; NOT_FOUND, or TOO_LONG where they do not fit into memory."""
+        """All bytes of a record; NOT_FOUND, or TOO_LONG where they do not fit into memory; "" is none."""
+        if not name:
+            raise Refused(codes.NOT_FOUND)
         return self._read(_file_name(name))
 
     def part(self, name: str, offset: int, length: int) -> "tuple[int, bytes]":
