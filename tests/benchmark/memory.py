@@ -23,7 +23,7 @@ from tests.benchmark.emulated import machine_code_bytes
 
 SCRIPT = interpreters.ROOT / "tests" / "board" / "scripts" / "memory_use.py"
 INTERPRETER = "micropython-arm"
-_SESSION = ("hello", "home", "start")
+SESSION = ("hello", "home", "start")
 
 
 def measure() -> dict[str, int]:
@@ -34,23 +34,24 @@ def measure() -> dict[str, int]:
         for path, data in library.items():
             (folder / path).parent.mkdir(parents=True, exist_ok=True)
             (folder / path).write_bytes(data)
-        _write_session(folder)
+        write_session(folder, arm.load_arm(arm.default_path()))
         lines = _run(folder).splitlines()
-        assert _accepted((folder / "answers").read_bytes()) == len(_SESSION)
+        assert accepted((folder / "answers").read_bytes()) == len(SESSION)
     found = {stage: int(value) for stage, value in (line.rsplit(maxsplit=1) for line in lines)}
     found["machine code"] = sum(map(machine_code_bytes, library.values()))
     return found
 
 
-def _write_session(folder: Path) -> None:
+def write_session(folder: Path, of_arm: arm.Arm) -> None:
     """Store an arm and a motion, and write the frames of a host that starts it."""
-    shipped = arm.load_arm(arm.default_path())
-    home_deg = operate.home_deg(shipped)
-    trajectory = moves.straight("go", home_deg, home_deg + np.array([2.0, 1.0, -2.0]), shipped)
-    motion = encode.motion_record(trajectory, shipped)
-    (folder / "arm.ata").write_bytes(encode.arm_record(shipped))
+    home_deg = operate.home_deg(of_arm)
+    trajectory = moves.straight(
+        "go", home_deg, home_deg + np.resize([2.0, 1.0, -2.0], home_deg.shape), of_arm
+    )
+    motion = encode.motion_record(trajectory, of_arm)
+    (folder / "arm.ata").write_bytes(encode.arm_record(of_arm))
     (folder / "go.atm").write_bytes(motion)
-    pairs = zip(home_deg, shipped.driven, strict=True)
+    pairs = zip(home_deg, of_arm.driven, strict=True)
     steps = [round(float(angle) * encode.steps_per_deg(joint)) for angle, joint in pairs]
     values = {
         "hello": ((wire.PROTOCOL_VERSION, 1), b""),
@@ -58,13 +59,13 @@ def _write_session(folder: Path) -> None:
         "start": ((0, wire.record_crc(motion)), b"go"),
     }
     with (folder / "frames").open("wb") as file:
-        for sequence, name in enumerate(_SESSION):
+        for sequence, name in enumerate(SESSION):
             entry = wire.COMMAND[name]
             frame = wire.frame(sequence, entry[1], wire.encode(entry, *values[name]))
             file.write(struct.pack("<H", len(frame)) + frame)
 
 
-def _accepted(answers: bytes) -> int:
+def accepted(answers: bytes) -> int:
     """Commands that were carried out."""
     parser = wire.Parser()
     parser.feed(answers)

@@ -6,7 +6,6 @@ import json
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 from armtempo.boardfiles import own_crc
@@ -118,14 +117,15 @@ def test_firmware_folder_holds_the_program_and_its_hash(tmp_path: Path) -> None:
     folder = tmp_path / "new"
     firmware.write(folder)
     files = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
-    assert files == {*program.modules(), "manifest.py"}
+    assert files == {*program.compact_files(), "armtempo_shared/firmware.py", "manifest.py"}
     frozen: list[tuple[str, int]] = []
     made = {"include": lambda path: None, "package": lambda name, opt: frozen.append((name, opt))}
     exec((folder / "manifest.py").read_text(), made)
     assert frozen == [("armtempo_board", 3), ("armtempo_shared", 3)]
-    told: dict[str, Any] = {}
-    exec((folder / "armtempo_shared" / "program.py").read_text(), told)
-    assert told["program_crc"]("", "") == told["FIRMWARE_CRC"] == own_crc()
+    told: dict[str, int] = {}
+    exec((folder / "armtempo_shared" / "firmware.py").read_text(), told)
+    assert told["CRC"] == own_crc()
+    assert "import CRC" in (folder / "armtempo_shared" / "program.py").read_text()
 
 
 def test_missing_compiler_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,18 +11,25 @@ from armtempo.errors import LinkError
 MANIFEST = "manifest.py"
 _OPTIMISED = 3
 """As in compiled files: no assertions, no line numbers."""
-_HASH_MODULE = f"{PACKAGES[1]}/program.py"
-"""On a board with files it takes the hash from them; in the firmware there are none."""
+_HASH = "firmware"
+"""Module of the shared package that only a firmware has."""
+_HASH_MODULE = f"""
+def program_crc(board, shared):
+    from {PACKAGES[1]}.{_HASH} import CRC
+
+    return CRC
+"""
+"""In the place of ``program`` of the shared package, which takes the hash from files."""
 
 
 def write(folder: Path) -> None:
-    """Write the library's sources and a manifest for MicroPython's FROZEN_MANIFEST into a new or empty folder.
+    """Write the program's sources and a manifest for MicroPython's FROZEN_MANIFEST into a new or empty folder.
 
     Raises InputError where it holds something already or cannot be written.
     """
-    sources = {name: path.read_bytes() for name, path in program.modules().items()}
-    made = {_HASH_MODULE: _hash_module(), MANIFEST: _manifest()}
-    package.fill(folder, {**sources, **{name: text.encode() for name, text in made.items()}})
+    sources = program.compact_files(_HASH_MODULE)
+    sources |= {f"{PACKAGES[1]}/{_HASH}.py": f"CRC = 0x{own_crc():08X}\n", MANIFEST: _manifest()}
+    package.fill(folder, {name: text.encode() for name, text in sources.items()})
 
 
 def check_version(firmware_crc: int | None) -> None:
@@ -40,16 +47,3 @@ def _manifest() -> str:
     """The packages beside it, and what the board's own manifest has."""
     lines = [f'package("{name}", opt={_OPTIMISED})' for name in PACKAGES]
     return "\n".join(['include("$(PORT_DIR)/boards/manifest.py")', *lines, ""])
-
-
-def _hash_module() -> str:
-    """Stands in the firmware for the module that makes the hash of a program that lies in files."""
-    return f'''"""The hash of the program in this firmware, by which host and board compare what each has."""
-
-FIRMWARE_CRC = 0x{own_crc():08X}
-
-
-def program_crc(board, shared):
-    """The hash; there are no files."""
-    return FIRMWARE_CRC
-'''

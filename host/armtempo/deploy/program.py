@@ -75,32 +75,35 @@ def stamp() -> bytes:
 def _compiled(mpy: int) -> dict[str, bytes]:
     """The compact program, compiled."""
     compiler, architecture = _compiler(mpy)
-    packages = {path.split("/")[0] for path in modules()}
     result = {}
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder) / "module.py", Path(folder) / "module.mpy"
-        for module, text in compact_program().sources.items():
-            path = f"{module.replace('.', '/')}{'/__init__' if module in packages else ''}.py"
+        for path, text in compact_files().items():
+            name = Path(path).name
             source.write_text(text, encoding="utf-8")
-            _run(
-                compiler,
-                f"-march={architecture}",
-                "-O3",
-                "-s",
-                Path(path).name,
-                "-o",
-                str(target),
-                str(source),
-            )
+            _run(compiler, f"-march={architecture}", "-O3", "-s", name, "-o", str(target), str(source))
             result[path] = target.read_bytes()
     return result
 
 
+def compact_files(hash_module: str = "") -> dict[str, str]:
+    """The compact program's sources by their path below the library folder; ``hash_module`` as below."""
+    return {
+        f"{module.replace('.', '/')}{'/__init__' if module in PACKAGES else ''}.py": text
+        for module, text in compact_program(hash_module).sources.items()
+    }
+
+
 @cache
-def compact_program() -> Compact:
-    """What is compiled: the program with fewer modules and shorter names."""
+def compact_program(hash_module: str = "") -> Compact:
+    """What is compiled: the program with fewer modules and shorter names.
+
+    ``hash_module``: source in the place of the module that takes the program's hash from its files.
+    """
     files = {path[:-3].removesuffix("/__init__").replace("/", "."): file for path, file in modules().items()}
     sources = {module: file.read_text(encoding="utf-8") for module, file in files.items()}
+    if hash_module:
+        sources[f"{PACKAGES[1]}.program"] = hash_module
     board = package_folder(PACKAGES[0])
     outside = [ast.parse((board / name).read_text(encoding="utf-8")) for name in START_FILES]
     outside += [ast.parse(sources[package]) for package in PACKAGES]
