@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 _MOST_SAMPLES = const(4096)  # bytes to keep samples in,
 _LEAST_SAMPLES = const(1024)
-_SHARE = const(8)  # in between this part of what is free
+_SHARE = const(16)  # in between this part of what is free
 _UNCONFIGURED, _UNHOMED, _IDLE, _MOVING, _BRAKING, _FAULT = range(len(STATES))
 _MOST_FAILURES = const(10)  # failing turns of the loop one after the other, then the program gives up
 
