@@ -378,7 +378,8 @@ def _free_heap() -> int:
 
 def _sample_memory() -> int:
     gc.collect()
-    return min(max(_free_heap() // _SHARE, _LEAST_SAMPLES), _MOST_SAMPLES)
+    free = _free_heap()
+    return min(max(free // _SHARE, _LEAST_SAMPLES), _MOST_SAMPLES) if free else _MOST_SAMPLES
 
 
 def _traceback(error: "BaseException") -> str:
