@@ -11,7 +11,6 @@ from armtempo import deploy, operate
 from armtempo.errors import BoardError, InputError, LinkError
 from armtempo.interrupt import StopRequest
 from armtempo.link import Board, diagnose, ports, traffic
-from armtempo.link.board import harmless_number
 from armtempo.link.follow import Follower, RunEnd
 from armtempo.link.messages import Sample
 from armtempo.link.replay import ReplayTransport
@@ -421,17 +420,3 @@ def test_five_percent_is_survived_or_said(tmp_path: Path, kind: str) -> None:
     assert not said or "damaged stretches received: check the cable" in said
     assert indices == sorted(set(indices))
     assert (tmp_path / "flash" / "feed.atm").read_bytes() in (old, new)
-
-
-def test_a_greeting_holds_no_ctrl_c() -> None:
-    entry = wire.COMMAND["hello"]
-    numbers = {harmless_number() for _ in range(300)}
-    assert len(numbers) > 250
-    for number in numbers:
-        payload = wire.encode(entry, (wire.PROTOCOL_VERSION, number))
-        assert all(3 not in wire.frame(sequence, entry[1], payload) for sequence in (1, 2, 4, 5, 6, 7))
-
-
-def test_no_command_has_ctrl_c_for_its_number(tmp_path: Path) -> None:
-    board = Board(Session(Pipe(tmp_path / "flash"), lambda: 0.0))
-    assert 3 not in {board.session._next_sequence() for _ in range(600)}
