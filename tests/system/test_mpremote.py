@@ -121,6 +121,7 @@ def test_while_it_moves_nobody_gets_in(flash: Path) -> None:
             run,
             steps(AWAY_DEG),
         )
+        time.sleep(_QUIET_S)
         assert mpremote(process.port, "resume", "exec", "print('in')") == "in\n"
 
 
