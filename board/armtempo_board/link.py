@@ -22,7 +22,6 @@ _OUT_SIZE = const(700)
 _ESCAPE_QUIET_MS = const(50)
 _CTRL_C = const(3)
 _CONTROLS = b"\r\x03"
-_ESCAPE_SESSION_MS = const(100)
 
 
 class Link:
@@ -34,7 +33,6 @@ class Link:
         self.reply = bytearray(MAX_PAYLOAD + OVERHEAD)
         self.out = bytearray(_OUT_SIZE)
         self.heard_ms: "Any" = 0  # when the last good frame came
-        self.fresh = False  # whether that was a moment ago
         self.escape = False  # somebody outside of any frame asks for the REPL
         self._begin = 0
         self._end = 0
@@ -55,7 +53,6 @@ class Link:
             return False
         self._controls = 0
         self._interrupt = False
-        self.fresh = True
         self.heard_ms = now_ms
         if self._repeated():
             self._reply_waits = True
@@ -137,9 +134,11 @@ class Link:
         )
 
     def _watch_escape(self, byte: int, now_ms: "Any") -> None:
-        """Tell a Ctrl-C (of mpremote, or typed twice) from noise: nothing but CR and Ctrl-C, after quiet."""
-        if self.fresh and time.ticks_diff(now_ms, self.heard_ms) >= _ESCAPE_SESSION_MS:
-            self.fresh = False
+        """Tell a Ctrl-C (of mpremote, or typed twice) from noise: nothing but CR and Ctrl-C, after quiet.
+
+        Three in a row are enough at once, also right behind a frame: mpremote's Ctrl-A follows, is sent once,
+        and is the prompt's.
+        """
         quiet = time.ticks_diff(now_ms, self._control_ms) >= _ESCAPE_QUIET_MS
         if byte < 0:
             needed = 2 if quiet else 3
@@ -147,7 +146,7 @@ class Link:
             needed = 3
             self._control_ms = now_ms
             self._count_control(byte, quiet)
-        if self._controls >= needed and self._interrupt and not self.fresh:
+        if self._controls >= needed and self._interrupt:
             self.escape = True
             self._controls = -1  # said once: asking while it moves is not kept for later
 

@@ -37,10 +37,6 @@ def flash(tmp_path: Path) -> Path:
     return tmp_path / "flash"
 
 
-_QUIET_S = 1.0
-"""Right behind a frame the program takes Ctrl-C for noise, also where it reads both late."""
-
-
 def mpremote(port: str, *arguments: str) -> str:
     """What mpremote prints."""
     command = [sys.executable, "-m", "mpremote", "connect", port, *arguments]
@@ -72,7 +68,6 @@ def test_replay_from_the_prompt(flash: Path, tmp_path: Path) -> None:
     with launch(flash, interpreter=INTERPRETER, edge_log=log) as process:
         with open_board(process.port) as board:
             operate.home(board, boards.ARM)
-        time.sleep(_QUIET_S)
         said = mpremote(process.port, "resume", "exec", REPLAY)
         assert said.splitlines() == [f"done at steps {steps(AWAY_DEG)}"]
         assert mpremote(process.port, "resume", "exec", REPLAY).startswith("refused: wrong_start joint 1")
@@ -121,7 +116,6 @@ def test_while_it_moves_nobody_gets_in(flash: Path) -> None:
             run,
             steps(AWAY_DEG),
         )
-        time.sleep(_QUIET_S)
         assert mpremote(process.port, "resume", "exec", "print('in')") == "in\n"
 
 

@@ -448,11 +448,19 @@ def case_noise_does_not_open_the_repl():
         host.port.inbox.extend(wire.frame(1, 2, b""))
         host.turn(1000)
         assert not app.left(), noise
+
+
+def case_repl_is_reached_right_behind_a_frame():
+    """A host program that starts mpremote; the port's buffer may hold both."""
+    app, host = connected()
+    host.turn(1000)
     host.send("status")
-    host.turn(10)
-    host.port.inbox.extend(b"\r\x03\r")
-    host.turn(40)
-    assert not app.left()
+    host.port.inbox.extend(b"\r\x03\r\x01")
+    for _ in range(10):
+        if not app.left():
+            host.turn(1)
+    assert app.left()
+    assert bytes(host.port.inbox) == b"\x01"
 
 
 def case_leave_answers_first():
