@@ -19,10 +19,11 @@ def test_first_words_to_last_sample(name: str, tmp_path: Path) -> None:
     assert lines == expected
 
 
+@pytest.mark.parametrize("subject", ["commands", "storing", "runs", "faults", "prompt"])
 @pytest.mark.parametrize("name", interpreters.AVAILABLE)
-def test_cases(name: str, tmp_path: Path) -> None:
+def test_cases(name: str, subject: str, tmp_path: Path) -> None:
     """Each case asserts by itself and prints its name when it holds."""
-    script = SCRIPTS / "app_cases.py"
+    script = SCRIPTS / f"app_{subject}.py"
     lines = interpreters.run(name, script, f"{tmp_path}/flash").splitlines()
     wanted = sorted(re.findall(r"def (case_\w+)", script.read_text()))
     assert lines == wanted
