@@ -11,26 +11,18 @@ from armtempo import operate
 from armtempo.errors import LinkError
 from armtempo.interrupt import StopRequest
 from armtempo.link import Board
-from armtempo.link.follow import RunEnd
+from armtempo.link.follow import Follower, RunEnd
 from armtempo.link.messages import Sample
-from armtempo.link.session import OtherBoard
-from armtempo_shared import armrecord, motion, wire
+from armtempo.link.session import NoAnswer, OtherBoard
+from armtempo_shared import wire
 
-from tests.board.scripts import stand_in
+from tests.host.linked import random_motion, ready
 from tests.inprocess import Pipe, connect
 
-ARM = stand_in.arm(3)
 
-
-def ready(pipe: Pipe) -> tuple[Board, operate.Stored]:
+def prepared(pipe: Pipe) -> tuple[Board, operate.Stored]:
     """A board with known positions and a motion."""
-    board = connect(pipe)
-    board.upload(wire.ARM_RECORD_NAME, ARM)
-    numbers = random.Random(5)
-    points = [[numbers.randrange(2**40) for _ in range(11)] for _ in range(3)]
-    data = motion.pack(5, points, points, 6, 1, 0, armrecord.unpack(ARM)[2])
-    board.upload("feed", data)
-    board.home([0, 0, 0])
+    board, data = ready(pipe)
     return board, operate.Stored("feed", wire.record_crc(data))
 
 
@@ -51,7 +43,7 @@ def replay(
 @pytest.mark.parametrize("trouble", ["unplug_for", "silence_for"])
 def test_trouble_is_told_once_and_its_end_once(tmp_path: Path, trouble: str) -> None:
     pipe = Pipe(tmp_path / "flash")
-    board, stored = ready(pipe)
+    board, stored = prepared(pipe)
     told: list[str] = []
     board.session.tell = told.append
     end, indices = replay(board, stored, lambda: getattr(pipe, trouble)(9.0))
@@ -62,7 +54,7 @@ def test_trouble_is_told_once_and_its_end_once(tmp_path: Path, trouble: str) -> 
 
 def test_a_board_that_stays_silent_is_given_up_after_a_minute(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
-    board, stored = ready(pipe)
+    board, stored = prepared(pipe)
     told: list[str] = []
     board.session.tell = told.append
     begin_s = pipe.clock()
@@ -74,7 +66,7 @@ def test_a_board_that_stays_silent_is_given_up_after_a_minute(tmp_path: Path) ->
 
 def test_another_board_at_the_same_port_gets_no_command(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
-    board, stored = ready(pipe)
+    board, stored = prepared(pipe)
 
     def swap() -> None:
         pipe.unplug_for(1.0)
@@ -89,7 +81,7 @@ def test_another_board_at_the_same_port_gets_no_command(tmp_path: Path) -> None:
 
 def test_the_same_board_started_anew_is_found_out_before_any_command(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
-    board, _ = ready(pipe)
+    board, _ = prepared(pipe)
     pipe.unplug_for(1.0)
     pipe.swap_board(pipe.app.board_id)
     with pytest.raises(OtherBoard, match="started anew"):
@@ -100,7 +92,7 @@ def test_the_same_board_started_anew_is_found_out_before_any_command(tmp_path: P
 
 def test_a_command_under_way_is_answered_after_the_greeting(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
-    board, _ = ready(pipe)
+    board, _ = prepared(pipe)
     pipe.unplug_for(1.0)
     assert board.find("feed") is not None
 
@@ -108,7 +100,7 @@ def test_a_command_under_way_is_answered_after_the_greeting(tmp_path: Path) -> N
 @pytest.mark.parametrize("trouble", ["unplug_for", "silence_for"])
 def test_a_wanted_stop_shortens_the_waiting(tmp_path: Path, trouble: str) -> None:
     pipe = Pipe(tmp_path / "flash")
-    board, stored = ready(pipe)
+    board, stored = prepared(pipe)
     stop = StopRequest()
 
     def interrupt() -> None:
@@ -120,3 +112,68 @@ def test_a_wanted_stop_shortens_the_waiting(tmp_path: Path, trouble: str) -> Non
     with pytest.raises(LinkError, match=words[trouble]):
         replay(board, stored, interrupt, stop)
     assert pipe.clock() - begin_s < 20.0
+
+
+def test_cable_out_during_a_run_costs_no_sample(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, data = ready(pipe)
+    told: list[str] = []
+    board.session.tell = told.append
+    run, _ = board.start("feed", wire.record_crc(data))
+    indices = []
+    follower = Follower(board, run)
+    for sample in follower.samples():
+        indices.append(sample.index)
+        if sample.index in (20, 40):
+            pipe.unplug_for(1.5)
+    assert indices == list(range(pipe.run_samples))
+    assert [text.split()[0] for text in told] == ["the", "connected"] * 2
+
+
+def test_cable_out_during_an_upload(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, _ = ready(pipe)
+    data = random_motion(random.Random(7), segments=60)
+    board.upload("feed", data, lambda done, whole: pipe.unplug_for(0.7))
+    assert board.fetch("feed") == data
+
+
+def test_cable_that_stays_out(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, _ = ready(pipe)
+    pipe.unplug_for(1000.0)
+    begin_s = pipe.clock()
+    with pytest.raises(LinkError, match="unplugged"):
+        board.status()
+    assert 50 < pipe.clock() - begin_s < 70
+
+
+def test_board_that_started_anew_is_found_out(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    with pytest.raises(LinkError, match="started anew during the motion"):
+        replay(*prepared(pipe), pipe.start_board)
+
+
+def test_silent_board_is_reported_in_time(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board = connect(pipe)
+    pipe._send = lambda way, frame: None  # type: ignore[method-assign]
+    begin_s = pipe.clock()
+    with pytest.raises(NoAnswer, match="did not answer 'status'"):
+        board.status()
+    assert pipe.clock() - begin_s < 4.0
+
+
+def test_a_cable_that_is_out_does_not_keep_who_wants_an_end(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    stop = StopRequest()
+    ended_s = [0.0]
+
+    def unplug() -> None:
+        pipe.unplug_for(1000.0)
+        stop.wanted = True
+        ended_s[0] = pipe.clock()
+
+    with pytest.raises(LinkError, match="could not be told to stop"):
+        replay(*prepared(pipe), unplug, stop)
+    assert pipe.clock() - ended_s[0] < 10.0

@@ -1,0 +1,45 @@
+"""A board in the same process that is ready to move, and a run of it."""
+
+from __future__ import annotations
+
+import random
+
+from armtempo.link import Board
+from armtempo.link.follow import Follower, RunEnd
+from armtempo.link.messages import Sample
+from armtempo_shared import armrecord, motion, wire
+
+from tests.board.scripts import stand_in
+from tests.inprocess import Pipe, connect
+
+ARM = stand_in.arm(3)
+
+
+def random_motion(numbers: random.Random, segments: int = 6, joints: int = 3) -> bytes:
+    """A motion record for ``ARM``; its numbers mean nothing."""
+    points = [[numbers.randrange(2**40) for _ in range(segments + 5)] for _ in range(joints)]
+    return motion.pack(5, points, points, segments, 1, 0, armrecord.unpack(ARM)[2])
+
+
+def ready(pipe: Pipe) -> tuple[Board, bytes]:
+    """A board with arm, motion ``feed`` and known positions."""
+    board = connect(pipe)
+    board.upload(wire.ARM_RECORD_NAME, ARM)
+    data = random_motion(random.Random(5))
+    board.upload("feed", data)
+    board.home([0, 0, 0])
+    return board, data
+
+
+def started(pipe: Pipe) -> Follower:
+    """A run of ``feed`` that has just begun on a board made ready for it."""
+    board, data = ready(pipe)
+    run, _ = board.start("feed", wire.record_crc(data))
+    return Follower(board, run)
+
+
+def follow(follower: Follower) -> tuple[list[Sample], RunEnd]:
+    """All samples of the run, and how it ended."""
+    samples = list(follower.samples())
+    assert follower.end is not None
+    return samples, follower.end

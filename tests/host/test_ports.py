@@ -1,0 +1,84 @@
+"""Serial ports: which there are, what cannot be opened, what else may answer on one."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from armtempo import deploy
+from armtempo.errors import InputError, LinkError
+from armtempo.link import diagnose, ports
+from armtempo.link.transport import SerialTransport
+
+
+class Silent:
+    """A port on which ``answer`` comes after the first byte is sent."""
+
+    name = "there"
+
+    def __init__(self, answer: bytes = b"") -> None:
+        self.answer = answer
+
+    def read(self, timeout_s: float) -> bytes:
+        data, self.answer = self.answer, b""
+        return data
+
+    def write(self, data: bytes) -> None: ...
+
+    def close(self) -> None: ...
+
+
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [
+        (b"", "does not answer within 2 s"),
+        (
+            b'\r\n>>> \r\nMicroPython v1.29.0 on 2026-01-01; STM32F4DISC\r\nType "help()"\r\n>>> ',
+            "armtempo deploy",
+        ),
+        (b"raw REPL; CTRL-B to exit\r\n>", "armtempo deploy"),
+        (b"$GPGGA,1234,N*5B\r\n", "something else"),
+        (b"\xa5\x10", "check cable"),
+        (b"\x5d\x00\x01~\x01\x01\x003.4.0; MicroPython v1.29.0", "check cable"),
+    ],
+)
+def test_what_else_sits_on_a_port(answer: bytes, words: str) -> None:
+    assert words in str(diagnose.explain(Silent(answer), b""))
+
+
+def test_port_that_does_not_exist() -> None:
+    with pytest.raises(InputError, match="there is no port /dev/nowhere"):
+        SerialTransport("/dev/nowhere")
+    with pytest.raises(InputError, match="not a port or URL"):
+        SerialTransport("nonsense://x")
+
+
+def test_port_in_use() -> None:
+    master, slave = os.openpty()
+    try:
+        first = SerialTransport(os.ttyname(slave))
+        with pytest.raises(LinkError, match="in use by another program"):
+            SerialTransport(os.ttyname(slave))
+        with pytest.raises(LinkError, match="in use by another program"):  # mpremote is not asked
+            deploy.deploy(os.ttyname(slave), False, print, lambda *_: None)
+        first.close()
+        SerialTransport(os.ttyname(slave)).close()
+    finally:
+        os.close(master)
+        os.close(slave)
+
+
+def test_found_ports_put_boards_first() -> None:
+    found = ports.find_ports()
+    assert [port.board for port in found] == sorted([port.board for port in found], reverse=True)
+
+
+def test_what_is_no_serial_port_is_said_to_be_none(tmp_path: Path) -> None:
+    for path in (tmp_path, Path("/dev/null"), tmp_path / "file"):
+        if path.name == "file":
+            path.write_text("")
+        with pytest.raises(InputError, match=f"{path} is not a serial port"):
+            SerialTransport(str(path))
+    with pytest.raises(InputError, match="names no folder"):
+        ports.sim_flash("sim:")
