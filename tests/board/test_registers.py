@@ -94,6 +94,6 @@ def test_table_in_the_documentation(document: str) -> None:
     """The documented register table has the rows that the board applies."""
     text = (interpreters.ROOT / "board" / "docs" / document).read_text()
     source = (interpreters.ROOT / "board" / "armtempo_board" / "registers.py").read_text()
-    sections = set(re.findall(r'"(\d+\.\d+\.\d+)"', source))
+    sections = set(re.findall(r"\),  # (\d+\.\d+\.\d+)", source))
     assert sections
     assert not [section for section in sections if section not in text]
