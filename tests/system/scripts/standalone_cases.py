@@ -51,6 +51,14 @@ def unmoved(world, runs=0):
     assert world.steps() == before
 
 
+def moves_when_pressed_anew(world, runs=0):
+    """The button, held until now, does nothing when let go; the next press starts a run."""
+    world.press(0)
+    yield from unmoved(world, runs)
+    yield from tap(world)
+    yield from moved(world, runs + 1)
+
+
 def notices(world):
     """What the board has said in words since the last time."""
     words = [tail for kind, _, tail in world.events if kind == "notice"]
@@ -88,10 +96,7 @@ def case_a_level_that_stays_starts_it_once(world):
     assert world.led() == "moving"
     yield from moved(world, 1)
     yield from unmoved(world, 1)
-    world.press(0)
-    yield from unmoved(world, 1)
-    yield from tap(world)
-    yield from moved(world, 2)
+    yield from moves_when_pressed_anew(world, 1)
 
 
 def case_before_homing_nothing_moves(world):
@@ -104,10 +109,7 @@ def case_before_homing_nothing_moves(world):
     assert told == ["button: refused, error %d" % wire.ERROR_CODES["unhomed"]], told
     yield from world.home(HOME)
     yield from unmoved(world)
-    world.press(0)
-    yield from unmoved(world)
-    yield from tap(world)
-    yield from moved(world, 1)
+    yield from moves_when_pressed_anew(world)
 
 
 def case_while_it_moves_the_button_does_nothing(world):
@@ -125,10 +127,7 @@ def case_while_it_moves_the_button_does_nothing(world):
         world.press()
         yield from moved(world, run)
         yield from unmoved(world, run)
-        world.press(0)
-        yield from unmoved(world, run)
-        yield from tap(world)
-        yield from moved(world, run + 1)
+        yield from moves_when_pressed_anew(world, run)
 
 
 def case_with_a_fault_pending_nothing_moves(world):
@@ -230,10 +229,7 @@ def case_level_present_at_power_up(world):
     yield from ready(world)
     yield from unmoved(world)
     assert notices(world) == []  # it is not even taken for a press
-    world.press(0)
-    yield from unmoved(world)
-    yield from tap(world)
-    yield from moved(world, 1)
+    yield from moves_when_pressed_anew(world)
 
 
 def case_a_failing_start_is_a_fault_not_the_end(world):
