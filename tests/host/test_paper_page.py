@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from armtempo.bench_table import Row, rows
 from armtempo.errors import LinkError
 from armtempo.interrupt import StopRequest
 from armtempo.paper import experiment, motions, sheet
-from armtempo.paper.claims import DIFFERS, SAME
+from armtempo.paper.claims import DIFFERS, SAME, Claim
 from armtempo.paper.experiment import CUBIC, QUINTIC, UNOPTIMISED, Series
 
 from tests import browser
@@ -61,20 +60,27 @@ def test_a_limit_that_is_exceeded_shows(tmp_path: Path) -> None:
     assert any(claim.verdict == DIFFERS and claim.because for claim in kept)
 
 
-def test_the_page_is_whole(made: motions.Plans, tmp_path: Path) -> None:
-    runs = series(tmp_path, {QUINTIC: 0.02, CUBIC: 0.2, UNOPTIMISED: 0.02})
+def the_page(made: motions.Plans, folder: Path) -> tuple[str, list[Claim]]:
+    """The page of one run of each motion, and the claims that it lists."""
+    runs = series(folder, {QUINTIC: 0.02, CUBIC: 0.2, UNOPTIMISED: 0.02})
     claims = experiment.claims(runs)
-    text = sheet.render(claims, made, searched(), runs)
+    return sheet.render(claims, made, searched(), runs), claims
+
+
+def test_the_page_is_whole(made: motions.Plans, tmp_path: Path) -> None:
+    text, claims = the_page(made, tmp_path)
     for claim in claims:
         assert claim.what in text
         assert claim.found in text
     assert text.count("<svg") == FIGURES
     assert all(f"Fig. {number}:" in text for number in (4, 5, 6, 7, 10, 11, 12))
     assert "replays of each motion</td><td>2<" in text
+
+
+def test_the_page_in_a_browser(made: motions.Plans, tmp_path: Path) -> None:
+    browser.needed()
     page = tmp_path / "paper.html"
-    page.write_text(text, encoding="utf-8")
-    if browser.BROWSER is None and not os.environ.get("CI"):
-        pytest.skip("left out: no Chromium on this machine (CI has one)")
+    page.write_text(the_page(made, tmp_path)[0], encoding="utf-8")
     for width, dark in ((1200, False), (500, True)):
         found = browser.probe(page, tmp_path, width, dark)
         assert found["fetched"] == []
