@@ -22,6 +22,7 @@ from armtempo_shared.wire import record_crc
 
 from armtempo import decode, encode, moves, operate, record, trajectory_file
 from armtempo.arm import Arm
+from armtempo.columns import aligned
 from armtempo.errors import InputError, LinkError
 from armtempo.interrupt import StopRequest
 from armtempo.link import Board
@@ -163,10 +164,7 @@ def results(motion: Motion, repetition: Repetition) -> list[str]:
     """What became of each joint, one line each: steps sent, and how far the arm ended from the plan."""
     end_deg = motion.trajectory(motion.trajectory.duration_s)
     scales = record.scales(motion.arm)
-    lines = [
-        f"{'joint':<12}{'steps sent':>10}{'angle':>12}{'error':>12}",
-        f"{'':<16}{'net':>6}{'deg':>12}{'deg':>12}",
-    ]
+    rows = [["joint", "steps sent", "angle", "error"], ["", "net", "deg", "deg"]]
     for joint, scale in enumerate(scales):
         steps = repetition.commanded_steps[joint]
         angle_deg = steps / scale.steps_per_deg
@@ -174,5 +172,5 @@ def results(motion: Motion, repetition: Repetition) -> list[str]:
             angle_deg = repetition.counts[joint] / scale.counts_per_deg
         error_deg = angle_deg - end_deg[joint]
         sent = steps - round(motion.start_deg[joint] * scale.steps_per_deg)
-        lines.append(f"{scale.name:<12}{sent:>10}{angle_deg:>12.3f}{error_deg:>+12.4f}")
-    return lines
+        rows.append([scale.name, str(sent), f"{angle_deg:.3f}", f"{error_deg:+.4f}"])
+    return aligned(rows, (11, 11, 12, 12))

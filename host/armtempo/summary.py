@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from armtempo import separation
+from armtempo.columns import aligned
 from armtempo.plan import Plan, Search
 
 _HEAD = (
-    f"{'joint':<12}{'time':>8}{'floor':>8}{'over':>7}{'speed':>16}{'acceleration':>16}{'jerk':>17}",
-    f"{'':<12}{'s':>8}{'s':>8}{'%':>7}{'deg/s':>16}{'deg/s²':>16}{'deg/s³':>17}",
+    ("joint", "time", "floor", "over", "speed", "acceleration", "jerk"),
+    ("", "s", "s", "%", "deg/s", "deg/s²", "deg/s³"),
 )
-_WIDTHS = (16, 16, 17)
+_WIDTHS = (12, 8, 8, 7, 16, 16, 17)
 _FLOORS = {
     "rests": "from turn to turn of a joint under its speed, acceleration and jerk limits",
     "path": "along the path under speed and acceleration limits alone",
@@ -23,8 +24,7 @@ def lines(plan: Plan) -> list[str]:
     made = f"{job.optimiser}, {job.population} x {job.iterations}, seed {job.seed}"
     shape = f"degree {job.degree}, refine {job.refine}"
     text = [f"{job.name}: {plan.trajectory.duration_s:.4f} s, {job.timing} timing, {shape}, {made}"]
-    text.extend(_HEAD)
-    text.extend(_row(plan, joint) for joint in range(len(plan.extremes)))
+    text.extend(aligned([*_HEAD, *(_row(plan, joint) for joint in range(len(plan.extremes)))], _WIDTHS))
     for kind in sorted({search.floor_kind for search in plan.searches}):
         text.append(f"floor: least time {_FLOORS[kind]}")
     text.extend(_polished(search) for search in plan.searches if search.optimum_s)
@@ -34,7 +34,7 @@ def lines(plan: Plan) -> list[str]:
     return text
 
 
-def _row(plan: Plan, joint: int) -> str:
+def _row(plan: Plan, joint: int) -> tuple[str, ...]:
     limits = plan.arm.driven[joint].limits
     assert limits is not None
     time = f"{plan.trajectory.joints[joint].duration_s:.4f}"
@@ -42,9 +42,9 @@ def _row(plan: Plan, joint: int) -> str:
     for search in plan.searches:
         if joint in search.joints:
             floor, over = f"{search.floor_s:.4f}", f"{100 * (search.total_s / search.floor_s - 1):.2f}"
-    pairs = zip(plan.extremes[joint].values, limits.values, _WIDTHS, strict=True)
-    cells = "".join(f"{f'{value:.2f} / {limit:g}':>{width}}" for value, limit, width in pairs)
-    return f"{plan.arm.driven[joint].name:<12}{time:>8}{floor:>8}{over:>7}{cells}"
+    pairs = zip(plan.extremes[joint].values, limits.values, strict=True)
+    reached = [f"{value:.2f} / {limit:g}" for value, limit in pairs]
+    return plan.arm.driven[joint].name, time, floor, over, *reached
 
 
 def _polished(search: Search) -> str:

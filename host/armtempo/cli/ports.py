@@ -11,9 +11,10 @@ def command() -> None:
     from armtempo.link.ports import SIM, find_ports
 
     found = find_ports()
+    width = max([24, *(1 + len(port.device) for port in found)])
     for port in found:
         mark = "a MicroPython board" if port.board else ""
-        click.echo(f"{port.device:<24}{port.description:<32}{mark}".rstrip())
+        click.echo(f"{port.device:<{width}}{port.description:<31} {mark}".rstrip())
     if not found:
         click.echo("no serial ports here; connect a board by its USB socket")
-    click.echo(f"{SIM:<24}a virtual board, started for one command")
+    click.echo(f"{SIM:<{width}}a virtual board, started for one command")

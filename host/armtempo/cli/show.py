@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from armtempo.cli import options, posture
+from armtempo.columns import aligned
 
 if TYPE_CHECKING:
     from armtempo.pipeline import Motion
@@ -41,6 +42,6 @@ def _lines(motion: Motion) -> list[str]:
         f"from {posture.words(motion.start_deg)}",
         f"to   {posture.words(trajectory(trajectory.duration_s))}",
     ]
-    for joint, spline, speed in zip(motion.arm.driven, trajectory.joints, speeds, strict=True):
-        found.append(f"{joint.name:<12}{spline.duration_s:>9.4f} s, up to {speed:.2f} deg/s")
-    return found
+    pairs = zip(motion.arm.driven, trajectory.joints, strict=True)
+    lasting = aligned([(joint.name, f"{spline.duration_s:.4f}") for joint, spline in pairs], (12, 9))
+    return found + [f"{row} s, up to {speed:.2f} deg/s" for row, speed in zip(lasting, speeds, strict=True)]

@@ -1,0 +1,65 @@
+"""Tables for the terminal: columns stand below their heads, however long the joints' names and numbers."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import pytest
+from armtempo import pipeline, record, summary
+from armtempo.cli import show
+from armtempo.columns import aligned
+from armtempo.plan import Plan
+from armtempo.record import Repetition
+
+from tests.host import made_runs
+
+NAMES = ("waist", "the shoulder of the arm", "elbow")
+
+
+@pytest.fixture(params=[NAMES, ("a", "b", "c")])
+def made(request: pytest.FixtureRequest) -> Plan:
+    """The shipped plan with other names of the joints."""
+    plan = made_runs.shipped_plan()
+    names = dict(zip((joint.name for joint in plan.arm.driven), request.param, strict=True))
+    joints = tuple(replace(joint, name=names.get(joint.name, joint.name)) for joint in plan.arm.joints)
+    return replace(plan, arm=replace(plan.arm, joints=joints))
+
+
+def ends(line: str) -> list[int]:
+    """Where the words of a line end that two or more spaces, or its end, follow."""
+    return [found.end() for found in re.finditer(r"\S(?=  |$)", line)]
+
+
+def test_rows_are_filled_up_to_the_widths() -> None:
+    assert aligned([("ab", "1"), ("", "23")], (4, 3)) == ["ab    1", "     23"]
+
+
+def test_what_is_longer_widens_its_column() -> None:
+    rows = [("joint", "s", "x"), ("a long name", "12345", "1"), ("b", "1", "1")]
+    assert aligned(rows, (6, 3, 3)) == [
+        "joint           s  x",
+        "a long name 12345  1",
+        "b               1  1",
+    ]
+
+
+def test_a_plan_of_joints_with_long_names(made: Plan) -> None:
+    table = summary.lines(made)[1:6]
+    assert len({len(line) for line in table}) == 1
+    heads, _, *rows = table
+    assert all(ends(row)[1:] == ends(heads)[1:] for row in rows)
+    assert [row[: len(joint.name) + 1] for row, joint in zip(rows, made.arm.driven, strict=True)] == [
+        f"{joint.name} " for joint in made.arm.driven
+    ]
+
+
+def test_results_and_times_of_joints_with_long_names(made: Plan) -> None:
+    motion = pipeline.planned(made)
+    scales = record.scales(made.arm)
+    steps = tuple(-1_234_567 for _ in scales)
+    lines = pipeline.results(motion, Repetition("", commanded_steps=steps, counts=steps))
+    assert len({len(line) for line in lines}) == 1
+    assert all(f"{joint.name} " in line for joint, line in zip(made.arm.driven, lines[2:], strict=True))
+    times = show._lines(motion)[3:]
+    assert len({line.index(" s, up to") for line in times}) == 1
