@@ -17,7 +17,8 @@ from armtempo.link import Board
 from armtempo.link.board import Progress
 from armtempo.link.follow import CHECK_S, Follower, RunEnd
 from armtempo.link.messages import Sample
-from armtempo.link.session import RECONNECT_S, NoAnswer, OtherBoard, refusal
+from armtempo.link.refusal import refusal
+from armtempo.link.session import RECONNECT_S, NoAnswer, OtherBoard
 from armtempo.record import COMPLETE, FAULT, INTERRUPTED, RunFolder
 from armtempo.spline import Array
 from armtempo.trajectory import Trajectory

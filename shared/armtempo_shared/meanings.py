@@ -26,7 +26,11 @@ _ROWS = (
     ("out_of_range", "the motion leaves the joint's range", "check the via points or the range"),
     ("too_fast", "the motion needs more steps per second than the board can make", "lower the limits"),
     ("wrong_start", "the arm does not stand where the motion begins", "'armtempo goto' its start"),
-    ("too_long", "the motion is longer or larger than the board can hold", "split it"),
+    (
+        "too_long",
+        "the motion is longer or larger than the board can hold",
+        "lower refine, use shared timing or fewer via points, or split it",
+    ),
     ("too_abrupt", "the motion reverses too fast for the step generator", "lower the limits"),
     ("no_session", "the board has started anew, or was never greeted in this session", "reconnect"),
     ("estop", "the E-stop input tripped", "release it, then 'armtempo clear' and home"),
@@ -49,6 +53,21 @@ ERROR_CODES: "dict[str, int]" = {}
 for _row in _ROWS:
     ERROR_CODES[_row[0]] = getattr(codes, _row[0].upper())
     ERRORS[ERROR_CODES[_row[0]]] = _row
+
+VALUES: "dict[str, str]" = {
+    "protocol": "version of the board",
+    "fault_pending": "code of the fault",
+    "flash_full": "bytes free",
+    "bad_offset": "bytes received so far",
+    "wrong_joints": "joints of the motion",
+    "time_order": "number of the control point",
+    "out_of_range": "position in steps",
+    "too_fast": "steps/s",
+    "wrong_start": "steps from there to the start",
+    "too_long": "bytes of the record (at `put_begin`: that it takes); of a joint: its largest number",
+    "too_abrupt": "steps/s²",
+}
+"""What ``value`` of a refusal is, by name; the others have none."""
 
 COMMANDS: "dict[str, str]" = {
     "hello": "Begins a session; `session` is a number that differs between hosts, so that the board knows a "

@@ -68,9 +68,10 @@ def _events() -> str:
 
 def _errors() -> str:
     lines = [
-        (str(code), f"`{name}`", what, cure) for code, (name, what, cure) in sorted(meanings.ERRORS.items())
+        (str(code), f"`{name}`", what, meanings.VALUES.get(name, "–"), cure)
+        for code, (name, what, cure) in sorted(meanings.ERRORS.items())
     ]
-    return _table(("code", "name", "meaning", "cure"), *lines)
+    return _table(("code", "name", "meaning", "`value`", "cure"), *lines)
 
 
 if __name__ == "__main__":

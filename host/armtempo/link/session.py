@@ -14,8 +14,9 @@ from typing import Any
 
 from armtempo_shared import wire
 
-from armtempo.errors import ArmtempoError, BoardError, LinkError
+from armtempo.errors import ArmtempoError, LinkError
 from armtempo.link import messages
+from armtempo.link.refusal import refusal
 from armtempo.link.transport import Transport
 
 _CTRL_C = 3
@@ -242,13 +243,3 @@ def _answer(name: str, sequence: int, number: int, payload: bytes) -> Answer:
             "run 'armtempo deploy'"
         ) from error
     return answer
-
-
-def refusal(what: str, code: int, joint: int = 255, value: int = 0) -> BoardError:
-    """A BoardError with the sentence for an error or fault code."""
-    _, meaning, cure = wire.ERRORS.get(
-        code, ("", f"error {code}, unknown to this version", "update armtempo")
-    )
-    where = f" (joint {joint + 1})" if joint < 6 else ""
-    detail = f" [{value}]" if value else ""
-    return BoardError(f"{what}: {meaning}{where}{detail}; {cure}", code)

@@ -1,0 +1,29 @@
+"""What the board means by a refusal or a fault, in a sentence."""
+
+from __future__ import annotations
+
+from armtempo_shared import wire
+from armtempo_shared.limits import MAX_JOINTS, MAX_MOTION_BYTES
+from armtempo_shared.meanings import VALUES
+
+from armtempo.errors import BoardError
+
+
+def refusal(what: str, code: int, joint: int = 255, value: int = 0) -> BoardError:
+    """A BoardError with the sentence for an error or fault code; ``joint`` from 0, 255 where it is about none."""
+    name, meaning, cure = wire.ERRORS.get(
+        code, ("", f"error {code}, unknown to this version", "update armtempo")
+    )
+    where = f" (joint {joint + 1})" if joint < MAX_JOINTS else ""
+    detail = f" [{_words(name, where, value)}]" if value else ""
+    return BoardError(f"{what}: {meaning}{where}{detail}; {cure}", code)
+
+
+def _words(name: str, where: str, value: int) -> str:
+    if name == "too_long" and where:
+        return f"its numbers reach {value}"
+    if name == "too_long" and value < MAX_MOTION_BYTES:
+        return f"{value} bytes, for which it has no memory free in one piece"
+    if name == "too_long":
+        return f"it takes {MAX_MOTION_BYTES} bytes at most"
+    return f"{VALUES[name]}: {value}" if name in VALUES else str(value)
