@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+import re
 import sys
 import textwrap
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -132,10 +134,61 @@ def test_constants_and_long_names_are_gone(made: Compact) -> None:
         assert kept in text, kept
 
 
-def test_short_names_can_be_read_again(made: Compact) -> None:
-    assert {"corners", "area", "shapes__Square", "extra"} <= {
-        name for names in made.names.values() for name in names.split(" or ")
+def test_attributes_that_no_object_has_together_share_a_name() -> None:
+    """A subclass's objects have those of both."""
+    sources = {
+        "made": "",
+        "made.main": """
+            class Square:
+                def __init__(self):
+                    self.length = 1
+                    self.corners = 4
+
+            class Named(Square):
+                def __init__(self):
+                    super().__init__()
+                    self.caption = "square"
+
+            class Circle:
+                def __init__(self):
+                    self.radius = 3
+                    self.colour = 5
+        """,
     }
+    made = compact(
+        {name: textwrap.dedent(text) for name, text in sources.items()}, "made.main", {"made.main"}, ()
+    )
+    text = made.sources["made.main"]
+    by_value = {value: name for name, value in re.findall(r"\.(\w+) = (\S+)", text)}
+    assert len({by_value[value] for value in ("1", "4", "'square'")}) == 3, text
+    assert {by_value["3"], by_value["5"]} < {by_value[value] for value in ("1", "4", "'square'")}, text
+    assert not {"length", "corners", "caption", "radius", "colour"} & set(by_value.values())
+
+
+def test_what_nothing_uses_is_left_out() -> None:
+    sources = {
+        "made": "",
+        "made.main": "from made import tools\n\ndef run():\n    return tools.used()\n",
+        "made.tools": "def used():\n    return 1\n\ndef helper():\n    return 77\n\n"
+        "def unused():\n    return helper()\n",
+    }
+    core = compact(sources, "made.main", {"made.main"}, ()).sources["made.core"]
+    assert "return 1" in core
+    assert "77" not in core
+    assert core.count("def ") == 1
+
+
+def test_the_most_used_names_come_first() -> None:
+    """What gives them their numbers is the first thing in the file, and goes again."""
+    body = ast.parse(program.compact_program().sources["armtempo_board.core"]).body
+    first, gone = body[:2]
+    assert isinstance(first, ast.Assign)
+    assert isinstance(first.value, ast.List)
+    assert isinstance(gone, ast.Delete)
+    names = [ast.literal_eval(each) for each in first.value.elts]
+    uses = Counter(node.attr for each in body for node in ast.walk(each) if isinstance(node, ast.Attribute))
+    assert {name for name, _ in uses.most_common(20)} - {"viper"} <= set(names)
+    assert names.index("_block") < 60 < len(names) <= 120
 
 
 def test_a_name_that_is_not_there_is_told() -> None:
@@ -158,11 +211,40 @@ def test_the_board_program_is_mostly_one_module() -> None:
     assert len(core) > sum(len(text) for text in made.sources.values()) / 2
 
 
-def test_traceback_of_the_compiled_program_is_readable() -> None:
-    short = next(
-        short for short, names in program.compact_program().names.items() if "engine__Engine" in names
+def _frame(label: str) -> str:
+    """A line of a traceback, as the compiled program gives it."""
+    known = program.compact_program().functions
+    module, short = next(
+        key for key, functions in known.items() if label in [function.label for function in functions]
     )
-    line = f'  File "core.py", line 1, in {short}\nValueError: deliberate\n'
-    assert f"in {short} (" in program.in_full(line)
-    assert "engine__Engine" in program.in_full(line)
-    assert program.in_full(line.replace("core.py", "engine.py")) == line.replace("core.py", "engine.py")
+    return f'  File "{module}", line 1, in {short}\n'
+
+
+def test_traceback_of_the_compiled_program_is_readable() -> None:
+    """A short name stands for several functions; who calls whom tells which it is."""
+    chain = (
+        "app.App.turn",
+        "app.App._turn",
+        "engine.Engine.service",
+        "engine.Engine._service",
+        "engine.Engine._stopped",
+    )
+    given = "".join(map(_frame, chain)) + "ValueError: deliberate\n"
+    lines = program.in_full(given).splitlines()
+    assert [line.rsplit("(")[-1].rstrip(")") for line in lines[:-1]] == list(chain)
+    assert lines[-1] == "ValueError: deliberate"
+    alone = program.in_full(_frame("engine.Engine._stopped"))
+    assert "engine.Engine._stopped" in alone
+    assert " or " in alone, "nothing tells which"
+
+
+def test_traceback_from_the_firmware_and_of_others() -> None:
+    line = _frame("app.App.turn")
+    frozen = line.replace('"core"', '"armtempo_board/core.py"')
+    assert "app.App.turn" in program.in_full(frozen)
+    for other in (
+        '  File "main.py", line 3, in turn\n',
+        '  File "core", line 1, in nothing\n',
+        "no traceback",
+    ):
+        assert program.in_full(other) == other

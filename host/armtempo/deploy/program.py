@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import re
 import subprocess
 import tempfile
 from functools import cache
@@ -16,8 +15,7 @@ from armtempo_shared.table import rows
 
 from armtempo import virtual
 from armtempo.boardfiles import PACKAGES, own_crc, package_folder
-from armtempo.deploy.compact import Compact, compact
-from armtempo.deploy.compact.merge import CORE
+from armtempo.deploy.compact import Compact, compact, frames
 from armtempo.errors import InputError, LinkError
 
 ROOT = "/flash"
@@ -79,7 +77,7 @@ def _compiled(mpy: int) -> dict[str, bytes]:
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder) / "module.py", Path(folder) / "module.mpy"
         for path, text in compact_files().items():
-            name = Path(path).name
+            name = Path(path).stem
             source.write_text(text, encoding="utf-8")
             _run(compiler, f"-march={architecture}", "-O3", "-s", name, "-o", str(target), str(source))
             result[path] = target.read_bytes()
@@ -118,15 +116,8 @@ def compact_program(hash_module: str = "") -> Compact:
 
 
 def in_full(traceback: str) -> str:
-    """A traceback from the board, with the source's names behind the short ones of the compiled program."""
-    if f"{CORE}.py" not in traceback:
-        return traceback
-    names = compact_program().names
-    return re.sub(
-        r"(?<=, in )\w+",
-        lambda found: found[0] + (f" ({names[found[0]]})" if found[0] in names else ""),
-        traceback,
-    )
+    """A traceback from the board, with the sources' names behind the short ones of the compiled program."""
+    return frames.in_full(traceback, compact_program().functions)
 
 
 def _handlers() -> set[str]:

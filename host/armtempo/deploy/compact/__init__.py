@@ -2,7 +2,8 @@
 
 MicroPython keeps every name that a file mentions, and 10 to 20 bytes for each place where a module holds one. So
 constants are put in where they are used (``constants``), the modules that are always needed become one
-(``merge``), and the program's own names become short (``shorten``). What the program does stays the same.
+(``merge``), the program's own names become short (``shorten``), and those that are used most come first
+(``order``). What the program does stays the same.
 """
 
 from __future__ import annotations
@@ -12,16 +13,18 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from armtempo.deploy.compact.constants import fold
+from armtempo.deploy.compact.frames import Functions, functions
 from armtempo.deploy.compact.merge import merge, used_whole
+from armtempo.deploy.compact.order import often_used_first
 from armtempo.deploy.compact.shorten import short_names, shorten
 
 
 @dataclass(frozen=True)
 class Compact:
-    """``sources``: text by dotted module name. ``names``: what each short name stands for."""
+    """``sources``: text by dotted module name. ``functions``: what the names of functions in them stand for."""
 
     sources: dict[str, str]
-    names: dict[str, str]
+    functions: Functions
 
 
 def compact(
@@ -38,9 +41,12 @@ def compact(
     fold(trees, used_whole(trees))
     merged = merge(trees, main, entries)
     names = short_names(merged, keep)
+    known = functions(merged, names)
     shorten(merged, names)
+    for tree in merged.values():
+        often_used_first(tree)
     texts = {module: ast.unparse(ast.fix_missing_locations(tree)) for module, tree in merged.items()}
-    return Compact(texts, names.readable())
+    return Compact(texts, known)
 
 
 def _at_run_time(tree: ast.Module) -> ast.Module:

@@ -5,7 +5,15 @@ from __future__ import annotations
 import ast
 from collections.abc import Collection, Mapping
 
-from armtempo.deploy.compact.scopes import Scoped, Target, imported, imported_inside, top_names, visit_all
+from armtempo.deploy.compact.scopes import (
+    Scoped,
+    Target,
+    imported,
+    imported_inside,
+    stored,
+    top_names,
+    visit_all,
+)
 
 CORE = "core"
 
@@ -23,9 +31,29 @@ def merge(trees: Mapping[str, ast.Module], main: str, entries: Collection[str]) 
     done = {module: _Merger(module, tree, inside, core).run() for module, tree in trees.items()}
     merged = {module: ast.Module(body, []) for module, body in done.items() if module not in inside}
     merged[core] = ast.Module(_once([node for module in inside for node in done[module]]), [])
+    while _drop_unused(merged, core):
+        pass
     for module in set(merged) - packages(trees):
         merged[module] = _without_unused(merged[module])
     return merged
+
+
+def _drop_unused(merged: Mapping[str, ast.Module], core: str) -> bool:
+    """Take out of ``core`` what nothing mentions; whether there was something."""
+    nodes = [node for tree in merged.values() for node in ast.walk(tree)]
+    used = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
+    used |= {node.attr for node in nodes if isinstance(node, ast.Attribute)}
+    body = merged[core].body
+    merged[core].body = [node for node in body if not _makes_only(node) or _makes_only(node) & used]
+    return len(merged[core].body) < len(body)
+
+
+def _makes_only(node: ast.stmt) -> set[str]:
+    """What a statement defines that does nothing else; none where it may do more."""
+    if isinstance(node, ast.FunctionDef | ast.ClassDef):
+        return {node.name}
+    calls = any(isinstance(inner, ast.Call) for inner in ast.walk(node))
+    return stored(node) if isinstance(node, ast.Assign) and not calls else set()
 
 
 def packages(trees: Collection[str]) -> set[str]:

@@ -9,9 +9,10 @@ import io
 import keyword
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from itertools import product
+from itertools import islice, product
 from string import ascii_lowercase
 
+from armtempo.deploy.compact.attributes import attributes, class_variables, share
 from armtempo.deploy.compact.scopes import Scoped, imported, imported_inside, top_names
 
 _TYPES = (
@@ -33,22 +34,29 @@ _TYPES = (
 )
 _SHORTEST = 3
 """Names of fewer letters stay."""
+_THERE = """
+    abs all any append bool builtins bytearray bytecode bytes callable chr classmethod clear const copy count dict dir
+    divmod end endswith eval exec extend find format from_bytes get getattr globals hasattr hash id index insert int
+    isalpha isdigit isinstance islower isspace issubclass isupper items iter join key len list little locals lower
+    lstrip main map max min next object open ord pop popitem pow print range readline remove replace repr reverse
+    rfind rindex round rsplit rstrip sep set setattr setdefault sort sorted split start startswith staticmethod step
+    stop str strip sum super to_bytes tuple type update upper zip
+"""
+"""Names that every MicroPython has built in, so that they cost nothing: the format of .mpy files counts on them.
+
+Without those that MicroPython itself looks for in objects.
+"""
 
 
 @dataclass(frozen=True)
 class Names:
-    """Short names: of what each module defines, and of attributes. The same may stand for one of each."""
+    """Short names: of what each module defines, and of attributes.
+
+    The same may stand for one of each, and for several attributes that no object has together.
+    """
 
     own: dict[str, dict[str, str]]
     attributes: dict[str, str]
-
-    def readable(self) -> dict[str, str]:
-        """What each short name may stand for."""
-        found: dict[str, list[str]] = {}
-        for names in (*self.own.values(), self.attributes):
-            for name, short in names.items():
-                found.setdefault(short, []).append(name)
-        return {short: " or ".join(names) for short, names in found.items()}
 
 
 def short_names(trees: Mapping[str, ast.Module], keep: Collection[str]) -> Names:
@@ -59,15 +67,22 @@ def short_names(trees: Mapping[str, ast.Module], keep: Collection[str]) -> Names
     """
     nodes = [node for tree in trees.values() for node in ast.walk(tree)]
     modules = {part for module in trees for part in module.split(".")}
-    fixed = {*keep, *modules, *_built_in(), *_imported(nodes, trees), *_keywords(nodes), *_strings(nodes)}
-    taken = fixed | {name for node in nodes for name in _mentioned(node)}
+    meant = {*keep, *modules, *_imported(nodes, trees), *_keywords(nodes), *_strings(nodes)}
+    fixed = meant | set(_built_in())
+    mentioned = {name for node in nodes for name in _mentioned(node)}
+    there = [name for name in _THERE.split() if name not in meant | mentioned]
 
-    def shorts(names: Collection[str]) -> dict[str, str]:
-        free = (short for short in _short() if short not in taken)
-        return {name: next(free) for name in sorted(names) if _is_long(name) and name not in fixed}
+    def ours(names: Collection[str]) -> list[str]:
+        return sorted(name for name in names if _is_long(name) and name not in fixed)
 
-    own = {module: shorts(top_names(tree)) for module, tree in trees.items()}
-    return Names(own, shorts({name for tree in trees.values() for name in _attributes(tree)}))
+    own = {module: ours(top_names(tree)) for module, tree in trees.items()}
+    of_objects = ours(attributes(trees))
+    most = max(map(len, (*own.values(), of_objects)))
+    shorts = [*there, *islice(_short(fixed | mentioned), most)]
+    return Names(
+        {module: dict(zip(names, shorts, strict=False)) for module, names in own.items()},
+        share(trees, of_objects, shorts),
+    )
 
 
 def shorten(trees: Mapping[str, ast.Module], names: Names) -> None:
@@ -118,7 +133,7 @@ class _Renamer(Scoped):
     def visit_ClassDef(self, node: ast.ClassDef) -> ast.AST:
         """Its variables are attributes."""
         node.name = self._own.get(node.name, node.name)
-        self._of_class = _class_variables(node)
+        self._of_class = class_variables(node)
         self.generic_visit(node)
         self._of_class = set()
         return node
@@ -138,32 +153,17 @@ class _Renamer(Scoped):
         return node
 
 
-def _short() -> Iterator[str]:
+def _short(taken: Collection[str]) -> Iterator[str]:
     """Two letters, then three."""
     for length in (2, 3):
         for letters in product(ascii_lowercase, repeat=length):
             name = "".join(letters)
-            if not keyword.iskeyword(name):
+            if not keyword.iskeyword(name) and name not in taken:
                 yield name
 
 
 def _is_long(name: str) -> bool:
     return len(name) >= _SHORTEST and not name.startswith("__")
-
-
-def _attributes(tree: ast.Module) -> Iterator[str]:
-    """Methods, what classes assign, and attributes that are set."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ClassDef):
-            yield from (each.name for each in node.body if isinstance(each, ast.FunctionDef))
-            yield from _class_variables(node)
-        elif isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
-            yield node.attr
-
-
-def _class_variables(node: ast.ClassDef) -> set[str]:
-    targets = [target for each in node.body if isinstance(each, ast.Assign) for target in each.targets]
-    return {target.id for target in targets if isinstance(target, ast.Name)}
 
 
 def _mentioned(node: ast.AST) -> Iterator[str]:

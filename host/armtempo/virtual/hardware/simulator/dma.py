@@ -2,7 +2,7 @@
 
 from simulator import memory
 
-# (stream, channel selection): timer and its compare channels that ask for a transfer (RM0090 table 42)
+# (stream, channel selection): timer and its compare channels that ask for a transfer (RM0090 10.3.3)
 REQUESTS = {
     (5, 3): ((2, 1),),
     (6, 3): ((2, 2), (2, 4)),
