@@ -20,10 +20,10 @@ def forget() -> None:
 
     import armtempo_shared
 
-    for name in ("registers", "check", "rates", "store", "storing"):
+    for name in ("pins", "registers", "check", "rates", "ends", "weights", "store", "storing"):
         sys.modules.pop("armtempo_board." + name, None)
         globals().pop(name, None)
-    for name in ("armrecord", "table", "program"):
+    for name in ("armrecord", "table", "program", "basis"):
         sys.modules.pop("armtempo_shared." + name, None)
         if hasattr(armtempo_shared, name):
             delattr(armtempo_shared, name)

@@ -84,7 +84,7 @@ JOINT_WORDS = const(18)
 PAIR_WORDS = const(5)
 # a raw sample: counter, NDTR a joint (6), encoder counter (4)
 RAW_WORDS = const(11)
-RAW_ROOM = const(16)
+RAW_ROOM = const(4)  # 0.4 s; the main loop comes every few milliseconds
 _SAMPLE_TICKS = const(8400000)
 _LATEST = const(84)  # 1 us: a compare value nearer than that may be missed
 _TOGGLE = const(3)

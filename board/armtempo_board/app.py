@@ -17,13 +17,13 @@ import time
 from array import array
 
 import machine
-from armtempo_shared import codes
+from armtempo_shared import codes, messages
 from armtempo_shared.limits import MAX_JOINTS
-from armtempo_shared.messages import ARM_RECORD_NAME, SAMPLE_BRAKING, START_HOMING, STATES
+from armtempo_shared.messages import ARM_RECORD_NAME, SAMPLE_BRAKING, START_HOMING
 from armtempo_shared.motion import Motion, MotionError
 from micropython import const
 
-from armtempo_board import ends, forget
+from armtempo_board import forget
 from armtempo_board.commands import Commands
 from armtempo_board.engine import Engine
 from armtempo_board.events import Events
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
 _MOST_SAMPLES = const(4096)  # bytes to keep samples in,
 _LEAST_SAMPLES = const(1024)
 _SHARE = const(16)  # in between this part of what is free
-_UNCONFIGURED, _UNHOMED, _IDLE, _MOVING, _BRAKING, _FAULT = range(len(STATES))
 _MOST_FAILURES = const(10)  # failing turns of the loop one after the other, then the program gives up
 
 
@@ -66,9 +65,8 @@ class App:
         self.run_number = 0
         self.duration = 0
         self._leaving = False
-        self._head: "dict[str, int]" = {}
+        self._link_timeout_ms = 0
         self._needs_link = False
-        self._arm_joints: "list[dict[str, int]]" = []
         self._raw = array("i", [0] * 2)
         self._fault = fault
         self._running = False  # a run has begun and its end has not been noted
@@ -134,7 +132,7 @@ class App:
 
     def _watch_link(self) -> None:
         silent_ms = time.ticks_diff(time.ticks_ms(), self.link.heard_ms)
-        if silent_ms > self._head["link_timeout_ms"] and self._needs_link:
+        if silent_ms > self._link_timeout_ms and self._needs_link:
             self._fault = codes.LINK_LOST
             self.stop(0)
 
@@ -205,9 +203,8 @@ class App:
             self.engine = None
             self.arm_crc = 0
         self.engine = Engine(head, joints)
-        self._head = head
+        self._link_timeout_ms = head["link_timeout_ms"]
         self._needs_link = bool(head["flags"] & FLAG_STOP_ON_LINK_LOSS)
-        self._arm_joints = joints
         self.joints = len(joints)
         self.arm_crc = crc
         self._raw = array("i", [0] * (2 + 2 * self.joints))
@@ -232,7 +229,7 @@ class App:
     def home(self, mask: int, steps: "Sequence[int]") -> None:
         """Declare where the joints of ``mask`` stand; ``steps`` has a number for every joint."""
         for joint in range(self.joints):
-            row = self._arm_joints[joint]
+            row = self.engine.limits[joint]
             if mask >> joint & 1 and not row["min_steps"] <= steps[joint] <= row["max_steps"]:
                 raise Refused(codes.OUT_OF_RANGE, joint, steps[joint])
         self.engine.home(mask, steps)
@@ -268,6 +265,8 @@ class App:
 
     def _assume(self, motion: "Motion", mask: int) -> None:
         """A homing motion may begin anywhere; joints that are not known to stand there are unknown after it."""
+        from armtempo_board import ends  # here, so that it can be forgotten
+
         self.engine.snapshot(self._raw)
         for joint in range(self.joints):
             if ends.start_offset(motion, joint, self._raw[2 + joint]):
@@ -332,14 +331,14 @@ class App:
         return self.engine.fault_joint if self.engine and self.engine.fault else 255
 
     def state(self) -> int:
-        """Index into STATES."""
+        """Number of the state (messages.STATES)."""
         if self.moving():
-            return _BRAKING if self._braking else _MOVING
+            return messages.BRAKING if self._braking else messages.MOVING
         if self.fault():
-            return _FAULT
+            return messages.FAULT
         if not self.engine:
-            return _UNCONFIGURED
-        return _IDLE if self.known() == self.everyone() else _UNHOMED
+            return messages.UNCONFIGURED
+        return messages.IDLE if self.known() == self.everyone() else messages.UNHOMED
 
     def look_around(self) -> None:
         """Bring ``free_flash`` and ``free_heap`` up to date; costs milliseconds, so not while moving."""

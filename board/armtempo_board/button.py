@@ -5,8 +5,6 @@ import time
 from micropython import const
 from pyb import Pin
 
-from armtempo_board import pins
-
 _STEADY_MS = const(30)
 
 
@@ -14,6 +12,8 @@ class Button:
     """``pressed`` says True once for each press that lasts long enough."""
 
     def __init__(self) -> None:
+        from armtempo_board import pins  # here, so that it can be forgotten
+
         self._pin = Pin(pins.BUTTON, Pin.IN, Pin.PULL_DOWN)
         self._high = True  # a level that is high from the start is no press
         self._changed_ms = time.ticks_ms()

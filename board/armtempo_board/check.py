@@ -31,16 +31,20 @@ _SPLIT = const(-1)
 
 
 def check(
-    motion: "Motion", joints: "list[dict[str, int]]", gap_ticks: int = GAP_TICKS
+    motion: "Motion",
+    joints: "list[dict[str, int]]",
+    gap_ticks: int = GAP_TICKS,
+    parts: "Parts | None" = None,
 ) -> "tuple[int, int, int] | None":
     """None, or (code, joint, value) of the first thing wrong.
 
-    ``joints``: the joints' rows of the arm record; ``gap_ticks``: see ``Walker.load``.
+    ``joints``: the joints' rows of the arm record; ``gap_ticks``: see ``Walker.load``. ``parts``: lent for
+    the walk through the motion, for the sake of the heap.
     ``value`` is, by code: time_order, the control point;
     too_long, ticks or steps of 2**28; out_of_range, the position in steps; too_fast, steps/s;
     too_abrupt, steps/s**2.
     """
-    parts = Parts()
+    parts = parts or Parts()
     for joint in range(motion.joints):
         wrong = _numbers(motion, joint)
         if wrong:

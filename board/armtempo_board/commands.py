@@ -38,8 +38,16 @@ class Commands:
         self._session = 0
         self._table: "dict[int, Any]" = {}
         answers = rows("A")
+        kept: "dict[str, str]" = {}  # one string for all that are equal, for the sake of the heap
         for place, (name, number, form, _, tail) in enumerate(rows("C")):
-            self._table[number] = (getattr(self, "_" + name, name), form, answers[place][2], tail)
+            answer = answers[place][2]
+            handler = getattr(self, "_" + name, name)
+            self._table[number] = (
+                handler,
+                kept.setdefault(form, form),
+                kept.setdefault(answer, answer),
+                tail,
+            )
         ok, error = rows("R")
         self._ok = ok[1]
         self._error = error[1]

@@ -3,7 +3,7 @@
 import stm
 from pyb import Pin
 
-from armtempo_board import access, pins
+from armtempo_board import access
 
 
 class Encoder:
@@ -14,7 +14,7 @@ class Encoder:
     """
 
     def __init__(self, channel: int, inverted: int) -> None:
-        from armtempo_board import registers  # here, so that it can be forgotten
+        from armtempo_board import pins, registers  # here, so that they can be forgotten
 
         timer, first, second, alternate = pins.ENCODER[channel]
         for name in (first, second):

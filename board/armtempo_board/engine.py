@@ -26,7 +26,7 @@ from armtempo_shared.motion import Motion
 from machine import mem32
 from micropython import const
 
-from armtempo_board import access, ends
+from armtempo_board import access, forget
 from armtempo_board.encoders import Encoder, NoEncoder
 from armtempo_board.following import Following
 from armtempo_board.inputs import Inputs
@@ -41,6 +41,7 @@ NO_JOINT = const(255)
 _PREFILLS = const(32)
 _BRAKE_MARGIN_K = const(2048)  # 25 ms, in which all joints are told
 _PULSE_SPARE_US = const(5)
+_LIMITS = ("min_steps", "max_steps", "max_rate")  # what of a joint's row in the arm record is needed later
 
 
 class Engine:
@@ -64,7 +65,7 @@ class Engine:
         self._readings = Readings(self._sampler, self._joints, self._encoders, slots)
         self._following = [Following(row) for row in joints]
         self._inputs = Inputs(head, joints, self._sampler)
-        self._arm = joints
+        self.limits = [{name: row[name] for name in _LIMITS} for row in joints]
         self._pulse_us = head["pulse_ticks"] // (TICK_HZ // 1000000) + _PULSE_SPARE_US
         self._epoch = 0
         self._low = 0
@@ -110,16 +111,17 @@ class Engine:
         return None
 
     def _refusal(self, motion: Motion) -> "tuple[int, int, int] | None":
-        from armtempo_board.check import check  # here, so that it can be forgotten
-
         if self.moving:
             return codes.BUSY, NO_JOINT, 0
         self._look()
         if self.fault:
             return codes.FAULT_PENDING, self.fault_joint, self.fault
-        refused = check(motion, self._arm, self._joints[0].gap_ticks)
+        refused = self._judge(motion)
         if refused:
             return refused
+        forget()
+        from armtempo_board import ends  # here, so that it can be forgotten
+
         self.duration_ticks = ends.duration_ticks(motion)
         for number, joint in enumerate(self._joints):
             if not self.known >> number & 1:
@@ -128,6 +130,12 @@ class Engine:
             if off:
                 return codes.WRONG_START, number, off
         return None
+
+    def _judge(self, motion: Motion) -> "tuple[int, int, int] | None":
+        from armtempo_board.check import check  # here, so that it can be forgotten
+
+        joint = self._joints[0]
+        return check(motion, self.limits, joint.gap_ticks, joint.walker.lend())
 
     def _prefill(self, joint: Joint) -> None:
         now_k = self._clock()

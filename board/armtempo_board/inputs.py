@@ -13,7 +13,7 @@ from machine import disable_irq, enable_irq
 from micropython import const
 from pyb import ExtInt, Pin
 
-from armtempo_board import access, pins
+from armtempo_board import access
 from armtempo_board.sampler import Sampler
 
 _NOBODY = const(255)
@@ -28,7 +28,7 @@ class Inputs:
     def __init__(self, head: "dict[str, int]", joints: "list[dict[str, int]]", sampler: Sampler) -> None:
         from armtempo_shared import armrecord  # here, so that they can be forgotten
 
-        from armtempo_board import registers
+        from armtempo_board import pins, registers
 
         flags = head["flags"]
         self._block = sampler.block
@@ -39,13 +39,12 @@ class Inputs:
         self.releases = bool(flags & armrecord.FLAG_ESTOP_RELEASES)
         self._estop = None
         self._limits: "list[tuple[Pin, int, int]]" = []  # pin, level when tripped, line
-        self._joints = joints
         self._pairs = array("I", bytearray(4 * access.PAIR_WORDS * 2 * len(joints)))
         self._count = 0
         if flags & armrecord.FLAG_ESTOP_FITTED:
             self._estop_level = 1 if flags & armrecord.FLAG_ESTOP_ACTIVE_HIGH else 0
             self._estop = self._hook(pins.ESTOP, self._estop_level, self._on_estop)  # type: ignore[arg-type]
-        self._add_limits(armrecord.NONE)
+        self._add_limits(joints, armrecord.NONE)
         registers.apply(registers.PRIORITIES)
 
     def _hook(self, name: str, level: int, callback: "Callable[[int], None]") -> Pin:
@@ -56,9 +55,11 @@ class Inputs:
         ExtInt(pin, mode, pull, callback)
         return pin
 
-    def _add_limits(self, none: int) -> None:
+    def _add_limits(self, joints: "list[dict[str, int]]", none: int) -> None:
+        from armtempo_board import pins  # here, so that it can be forgotten
+
         fitted = {}
-        for number, joint in enumerate(self._joints):
+        for number, joint in enumerate(joints):
             for side, positive in (("limit_low", 0), ("limit_high", 1)):
                 switch = joint[side]
                 if switch == none:
@@ -70,6 +71,8 @@ class Inputs:
             self._limits.append((pin, level, int(pins.LIMIT[switch][1:])))
 
     def _add_pair(self, number: int, joint: "dict[str, int]", line: int, positive: int) -> None:
+        from armtempo_board import pins  # here, so that it can be forgotten
+
         at = access.PAIR_WORDS * self._count
         direction = int(pins.STEP[joint["channel"]][6][1:])
         for word, value in enumerate((line, direction, positive ^ joint["dir_inverted"], number, 0)):

@@ -8,7 +8,7 @@ from armtempo_shared.motion import Motion
 from micropython import const
 from pyb import Pin
 
-from armtempo_board import access, pins
+from armtempo_board import access
 from armtempo_board.ring import Ring, size
 from armtempo_board.sampler import Sampler
 from armtempo_board.walker import Walker
@@ -25,6 +25,8 @@ class Joint:
     """``head`` and ``row``: the arm record; ``sampler`` lends the memory that the interrupt reads."""
 
     def __init__(self, number: int, head: "dict[str, int]", row: "dict[str, int]", sampler: Sampler) -> None:
+        from armtempo_board import pins  # here, so that it can be forgotten
+
         self._sampler = sampler
         self._block = sampler.block
         self._at = sampler.joint_at(number)

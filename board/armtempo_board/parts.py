@@ -36,7 +36,7 @@ class Parts:
     def load(self, motion: "Motion", joint: int) -> None:
         """Stand before the first part."""
         self._data = motion.data
-        self._weights = points.WEIGHTS[motion.degree]
+        self._weights = points.weights(motion.degree)
         self._angle_offset = motion.angle_offset(joint)
         self._time_offset = motion.time_offset(joint)
         self._refine = motion.refine

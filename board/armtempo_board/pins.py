@@ -1,6 +1,6 @@
 """Pins, timers and DMA streams of the board (STM32F4DISC): the only home of these facts.
 
-Free of USB, SWD, REPL and LEDs. Streams: RM0090 table 42; alternate functions: STM32F407
+Free of USB, SWD, REPL and LEDs. Streams: RM0090 10.3.3; alternate functions: STM32F407
 data sheet, table 9.
 """
 

@@ -10,7 +10,6 @@ they are loaded; all that follows knows quintics only.
 """
 
 import micropython
-from armtempo_shared.basis import BASIS, FACTORIAL
 from micropython import const
 
 TYPE_CHECKING = False
@@ -22,33 +21,16 @@ LOW_BITS = 28
 _BIAS = const(1 << 28)
 _LOW = const((1 << 28) - 1)
 _HALF_LOW = const((1 << 14) - 1)
-_BINOMIAL = (
-    (1, 0, 0, 0, 0, 0),
-    (1, 1, 0, 0, 0, 0),
-    (1, 2, 1, 0, 0, 0),
-    (1, 3, 3, 1, 0, 0),
-    (1, 4, 6, 4, 1, 0),
-    (1, 5, 10, 10, 5, 1),
-)
+_WEIGHTS: "dict[int, bytes]" = {}
 
 
-def _weights(degree: int) -> bytes:
-    """Eq. (15) turned into Bezier points of degree 5: weights of the control points, times 120.
+def weights(degree: int) -> bytes:
+    """What ``combine`` takes for control points of a spline of this degree; made once."""
+    if degree not in _WEIGHTS:
+        from armtempo_board.weights import table  # here, so that it can be forgotten
 
-    A power coefficient a_j adds C(i, j) / C(5, j) a_j to Bezier point i. First byte: number of control points.
-    """
-    table = bytearray([degree + 1])
-    for point in range(6):
-        for control in range(degree + 1):
-            total = 0
-            for power in range(degree + 1):
-                factor = 120 // FACTORIAL[degree] * BASIS[degree][power][control]
-                total += _BINOMIAL[point][power] * factor // _BINOMIAL[5][power]
-            table.append(total)
-    return bytes(table)
-
-
-WEIGHTS = {3: _weights(3), 5: _weights(5)}
+        _WEIGHTS[degree] = table(degree)
+    return _WEIGHTS[degree]
 
 
 @micropython.viper

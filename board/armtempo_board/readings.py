@@ -9,7 +9,7 @@ from armtempo_board.encoders import Encoder, NoEncoder
 from armtempo_board.joint import Joint
 from armtempo_board.sampler import Sampler
 
-_ROOM = const(16)
+_ROOM = const(4)
 _HALF_K = const(1 << 21)  # half a round of the counter in 1024 ticks
 
 

@@ -47,7 +47,7 @@ TIMERS = (
     ("TIM5", ARR, ALL, ALL),  # 18.4.12: all 32 bits
     ("TIM2", EGR, 0, 1),  # 18.4.6: UG: take prescaler and period over
     ("TIM5", EGR, 0, 1),  # 18.4.6: UG: take prescaler and period over
-    ("TIM5", SMCR, ALL, 6),  # 18.4.3: TS 000: ITR0 is TIM2 (table 98); SMS 110: trigger mode
+    ("TIM5", SMCR, ALL, 6),  # 18.4.3: TS 000: ITR0 is TIM2; SMS 110: trigger mode
     ("TIM2", CCMR1, ALL, 4 << 12 | 4 << 4),  # 18.4.7: channels 1, 2 forced low; no preload
     ("TIM2", CCMR1 + 1, ALL, 4 << 4),  # 18.4.8: channel 3 forced low; channel 4 timing only
     ("TIM5", CCMR1, ALL, 4 << 12 | 4 << 4),  # 18.4.7: channels 1, 2 forced low; no preload

@@ -14,7 +14,7 @@ from machine import disable_irq, enable_irq, mem32
 from micropython import const
 from pyb import Pin
 
-from armtempo_board import access, pins
+from armtempo_board import access
 
 _SPARE = const(8)  # entries behind the matched one that stay readable, and the far-away entry
 _LASTS_MS = const(15)
@@ -40,7 +40,7 @@ class Ring:
     """
 
     def __init__(self, channel: int, block: "array[int]", at: int, entries: int) -> None:
-        from armtempo_board import registers  # here, so that it can be forgotten
+        from armtempo_board import pins, registers  # here, so that they can be forgotten
 
         pin, timer, compare, alternate, stream, dma_channel, _ = pins.STEP[channel]
         self.entries = entries

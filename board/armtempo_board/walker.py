@@ -26,6 +26,8 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from armtempo_shared.motion import Motion
 
+    from armtempo_board.parts import Parts
+
 _BUDGET = const(4)  # parts looked at in one call: bounds its time
 _LARGEST = const(1024)  # steps of a stretch
 # where the prepared steps come from: see ``brake``
@@ -82,6 +84,10 @@ class Walker:
         while not self._state[STEPS] and not self.ended:
             if not self._prepare() and self.at_turn:
                 self.turn()
+
+    def lend(self) -> "Parts":
+        """The buffers of its parts, free until a motion is loaded."""
+        return self._cells
 
     def fill(self, ring: array, mask: int, head: int, room: int, until_1024: int = _NEVER) -> int:
         """Write up to ``room`` edge times (rise, fall, ...; ticks modulo 2**32) to ``ring`` from ``head`` on.

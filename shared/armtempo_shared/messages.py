@@ -11,4 +11,7 @@ ARM_RECORD_NAME = "/arm"
 
 SAMPLE_BRAKING = 1  # flag of a sample: taken while braking
 START_HOMING = 1  # a limit switch ends the motion without a fault
+
+UNCONFIGURED, UNHOMED, IDLE, MOVING, BRAKING, FAULT = 0, 1, 2, 3, 4, 5
 STATES = ("unconfigured", "unhomed", "idle", "moving", "braking", "fault")
+"""Names of the states by their number."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from tests.benchmark import memory
 
-PEAK = 74_500
-MOTION = 71_000
-MACHINE_CODE = 24_500
+PEAK = 60_000
+MOTION = 55_000
+MACHINE_CODE = 24_000
 
 
 def test_heap_of_the_compiled_program() -> None:

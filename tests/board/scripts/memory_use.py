@@ -2,7 +2,8 @@
 
 The program is driven through its serial port, so it may be the compact one. Hardware is the memory of ``bare``.
 Arguments: folder of the store, with an arm and a motion; a file with the frames that a host sends, each behind
-its length in two bytes, the last one starting the motion; a file for what the program answers.
+its length in two bytes, the last one starting the motion; a file for what the program answers; bytes of heap that
+the program finds.
 """
 
 import builtins
@@ -11,6 +12,8 @@ import os
 import sys
 
 sys.path.insert(0, __file__.rsplit("/", 1)[0] + "/bare")
+
+import struct
 
 import machine
 import micropython
@@ -21,6 +24,7 @@ import uctypes  # noqa: F401
 TURNS = 20
 """Turns of the program's loop between two frames, and at the end."""
 _START = 0
+_MOST = 0
 
 
 def tell(name):
@@ -59,6 +63,25 @@ class Beyond:
 
 def nothing(*arguments):
     """In the place of what does not matter here."""
+
+
+class Pins:
+    """In the place of the class: the pins of the firmware are constants and take no heap."""
+
+    IN, OUT_PP, AF_PP, PULL_NONE, PULL_UP, PULL_DOWN = range(6)
+
+    def __call__(self, *arguments, **how):
+        """Any pin."""
+        return self
+
+    def value(self, level=None):
+        """Low."""
+        return 0
+
+
+def free():
+    """What is left of the heap that the program finds."""
+    return int(sys.argv[4]) - (gc.mem_alloc() - _START)
 
 
 class Port:
@@ -104,23 +127,33 @@ class Port:
         return self._answers.write(memoryview(buffer)[start : start + count])
 
 
+def unpack_from(*arguments):
+    """As in ``struct``; the check of a motion calls it while it has all that it needs."""
+    global _MOST
+    gc.collect()
+    _MOST = max(_MOST, gc.mem_alloc() - _START)
+    return struct.unpack_from(*arguments)
+
+
 def watch(name, *arguments):
-    """As the built-in ``__import__``; what the check needs is counted while it is there."""
-    module = IMPORT(name, *arguments)
-    if name == "armtempo_board.check":
-        tell("check")
-    return module
+    """As the built-in ``__import__``; what comes behind the check tells of it."""
+    if name == "armtempo_board.ends":
+        print("check", _MOST)
+    return IMPORT(name, *arguments)
 
 
 machine.unique_id = lambda: b"123456789012"
 machine.idle = gc.collect
 machine.reset_cause = lambda: 0
 machine.WDT_RESET = 1
-machine.WDT = lambda timeout: pyb.Pin("watchdog")
+machine.WDT = lambda timeout: WATCHDOG
+WATCHDOG = pyb.Pin("watchdog")
 pyb.Pin.feed = nothing
-pyb.LED = pyb.Pin
+pyb.LED = pyb.Pin = Pins()
 pyb.USB_VCP = Port
 sys.modules["time"] = Time()
+sys.modules["struct"] = Beyond(struct, unpack_from=unpack_from)
+sys.modules["gc"] = Beyond(gc, mem_free=free)
 sys.modules["os"] = Beyond(os, dupterm=nothing)
 sys.modules["micropython"] = Beyond(micropython, alloc_emergency_exception_buf=nothing, kbd_intr=nothing)
 IMPORT = builtins.__import__

@@ -143,7 +143,7 @@ def sample_times():
     assert list(raw[11:13]) == [1001, 77] and raw[18] == 65535
     for _ in range(20):
         access.take(raw, block, dma, (uctypes.addressof(encoder),))
-    assert (block[access.TAKEN], block[access.LOST]) == (16, 8)
+    assert (block[access.TAKEN], block[access.LOST]) == (access.RAW_ROOM, 24 - access.RAW_ROOM)
     assert raw[0] == 1000
 
 
