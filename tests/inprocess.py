@@ -24,7 +24,7 @@ FAULTS = ("lose", "double", "flip", "delay", "cut")
 _DELAY_S = 0.03
 _SAMPLE_S = 0.1
 _TURNS = 3
-_IMPORTED_LATER = ("armtempo_board", "armtempo_board.store", "armtempo_board.storing")
+_IMPORTED_LATER = ("armtempo_board", "armtempo_board.ends", "armtempo_board.store", "armtempo_board.storing")
 _USB_BUFFER = 1024
 _STEP_S = 0.01
 
