@@ -14,7 +14,8 @@ import click
 
 from armtempo import __version__
 from armtempo.errors import ArmtempoError
-from armtempo.interrupt import terminate_as_interrupt
+from armtempo.interrupt import raised_by_signals
+from armtempo.start import INTERRUPTED
 
 COMMANDS = (
     "demo",
@@ -45,8 +46,6 @@ COMMANDS = (
 )
 """In the order of the help page. Each is ``command`` in its module: '-' as '_', a keyword with '_' behind."""
 
-INTERRUPTED = 130
-
 
 class LazyGroup(click.Group):
     """A group that imports a command's module when it is asked for it."""
@@ -70,7 +69,7 @@ class LazyGroup(click.Group):
                 stream.reconfigure(errors="replace")  # a ² in a code page that has none ends no command
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads only cost time on matrices this small
         try:
-            with terminate_as_interrupt():
+            with raised_by_signals():
                 return super().invoke(ctx)
         except ArmtempoError as error:
             click.echo(f"armtempo: {error}", err=True)

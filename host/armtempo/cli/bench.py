@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from armtempo.cli import INTERRUPTED, options
+from armtempo.cli import options
 from armtempo.cli.progress import Progress
 from armtempo.errors import MissingPackageError
+from armtempo.start import INTERRUPTED
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

@@ -1,0 +1,24 @@
+"""Where the ``armtempo`` command begins: Ctrl-C ends it quietly from here on, before much is imported."""
+
+from __future__ import annotations
+
+import os
+import signal
+
+INTERRUPTED = 130
+"""Exit code after Ctrl-C."""
+
+
+def _end(number: int, frame: object) -> None:
+    """At once: nothing is open yet, and what is being imported may swallow an exception."""
+    os.write(2, b"armtempo: interrupted\n")
+    os._exit(INTERRUPTED)
+
+
+def main() -> None:
+    """The command; ``armtempo.cli`` takes Ctrl-C over when a subcommand begins."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # it may be ignored, in the background
+        signal.signal(signal.SIGINT, _end)
+    from armtempo.cli import main as command
+
+    command(prog_name="armtempo")
