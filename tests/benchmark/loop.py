@@ -1,0 +1,308 @@
+"""What a turn of the program's loop costs on the chip, and up to which rates it keeps up: board/docs/evaluator.md.
+
+    python -m tests.benchmark.loop MICROPYTHON
+
+MICROPYTHON as for tests/benchmark/firmware.py. The program is built into MicroPython's own firmware for the chip, and
+that is run by QEMU, which counts instructions: so long lasts the motion's time meanwhile, so a ring that the loop comes
+back to too late runs dry as on the chip. What stands in for timers, DMA, USB and encoders: loop_board.c and
+tests/board/scripts/firmware_loop.py.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+import sys
+import tempfile
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from statistics import median
+from typing import Any
+from zlib import crc32
+
+from armtempo import arm as arms
+from armtempo import encode
+from armtempo.deploy import firmware as deployed
+from armtempo.deploy import program
+from armtempo_shared import armrecord, wire
+from armtempo_shared.limits import TICK_HZ
+
+from tests.benchmark import firmware
+from tests.board import motions
+from tests.board.scripts.arm_rows import HEAD, row
+
+CORE_HZ = 168_000_000
+CYCLES = (1.3, 2.0, 2.5)
+"""Cycles an instruction: see board/docs/evaluator.md."""
+RATES = (5_000, 10_000, 20_000, 33_000, 50_000, 70_000, 100_000, 130_000, 160_000, 200_000, 250_000, 333_000)
+JOINTS = (1, 3)
+RAMP_S, WHOLE_S = 0.5, 1.2
+BRAKE_TICKS = TICK_HZ // 2
+COMMANDS = 60  # status and samples in turn, one every 50 ms
+_SHIFT = 7
+_INSTRUCTION_NS = 1 << _SHIFT  # of QEMU's time, in which its TIM2 has a tick a nanosecond before it is scaled
+_WRITTEN, _CELL = 1, 2
+
+Row = dict[str, int]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A motion on an arm; ``start``: where its joints stand."""
+
+    name: str
+    head: Row
+    rows: list[Row]
+    motion: bytes
+    start: list[int]
+
+
+@dataclass(frozen=True)
+class Turn:
+    """Instructions of one turn of the loop, and what was done in it."""
+
+    cost: float
+    command: bool
+    answer: bool
+    joints: tuple[tuple[float, int, int], ...]
+    """Each joint that was looked at: instructions, entries written, cells taken up."""
+
+    @property
+    def cells(self) -> int:
+        """Joints that changed their cell."""
+        return sum(joint[2] > 0 for joint in self.joints)
+
+    @property
+    def busy(self) -> int:
+        """Joints for which something was written."""
+        return sum(joint[1] > 0 for joint in self.joints)
+
+
+@dataclass(frozen=True)
+class Run:
+    """One motion: its turns, and when which fault ended it."""
+
+    turns: list[Turn]
+    fault: int
+    seconds: float
+
+
+def cruise(rate: int, joints: int) -> Case:
+    """All joints alike: up to a rate, and down again. All limit switches and two encoders are fitted."""
+    flags = armrecord.FLAG_ESTOP_FITTED | armrecord.FLAG_ESTOP_ACTIVE_HIGH
+    rows = [
+        row(
+            channel=joint,
+            encoder=(0, 2, armrecord.NONE)[joint],
+            max_rate=rate * 101 // 100,
+            min_steps=-10_000_000,
+            max_steps=10_000_000,
+            limit_low=joint,
+        )
+        for joint in range(joints)
+    ]
+    motion = motions.cruise(rate, joints, RAMP_S, WHOLE_S)
+    return Case(
+        "cruise", {**HEAD, "flags": flags, "pulse_ticks": 100, "low_ticks": 100}, rows, motion, [0] * joints
+    )
+
+
+def paper() -> Case:
+    """The paper's motion on the shipped arm."""
+    head, rows, _ = armrecord.unpack(encode.arm_record(arms.load_arm(arms.default_path())))
+    flags = head["flags"] & ~armrecord.FLAG_STOP_ON_LINK_LOSS | armrecord.FLAG_ESTOP_ACTIVE_HIGH
+    start = [round(rate * via) for rate, via in zip(motions.STEPS_PER_DEG, motions.VIA_DEG[0], strict=True)]
+    return Case("paper", {**head, "flags": flags}, rows, motions.feeding(), start)
+
+
+class Board:
+    """The firmware with the program, built once."""
+
+    def __init__(self, micropython: Path, folder: Path) -> None:
+        self._folder = folder
+        deployed.write(folder / "program")
+        source = Path(__file__).with_name("loop_board.c").read_text()
+        self._elf = firmware.build(micropython, folder, folder / "program" / "manifest.py", source)
+        places = firmware.symbols(self._elf)
+        self._settings: dict[str, Any] = {
+            name: places[name] for name in ("allocated", "at_compare", "looks_per_ms")
+        }
+        self._settings |= {
+            name.split(".")[1]: _short(name) for name in ("access.read_ndtr", "access.seal", "crossing.enter")
+        }
+
+    def run(self, case: Case, cycles: float, collects: bool) -> Run:
+        """``collects``: the collector as main.py leaves it; otherwise only where memory runs out."""
+        scale = round(2 * _INSTRUCTION_NS / cycles)  # TIM2 counts half the core's cycles
+        settings: dict[str, Any] = {
+            **self._settings,
+            "prescaler": scale - 1,
+            "millisecond": round(
+                CORE_HZ / 1000 / cycles * _INSTRUCTION_NS * CORE_HZ / 1e9
+            ),  # SysTick's clock is 168 MHz
+            "collects": collects,
+            "session": 3,
+        }
+        with tempfile.TemporaryDirectory(dir=self._folder) as name:
+            tree = Path(name) / "files"
+            _write(tree, case, settings)
+            image = firmware.make_image(tree, "firmware_loop.py")
+            cut = Path(name) / "cut"
+            cut.write_bytes(bytes(4))
+            said = firmware.emulate(self._elf, image, cut, "-icount", f"shift={_SHIFT}")
+        return _read(said, scale / _INSTRUCTION_NS)
+
+    def highest(self, joints: int, cycles: float, collects: bool) -> tuple[int, Run | None]:
+        """The highest of RATES that ends without a fault, and that motion."""
+        low, high, found = -1, len(RATES), None
+        while high - low > 1:
+            middle = (low + high) // 2
+            run = self.run(cruise(RATES[middle], joints), cycles, collects)
+            if run.fault:
+                high = middle
+            else:
+                low, found = middle, run
+        return (RATES[low] if found else 0), found
+
+
+def _short(label: str) -> str:
+    """What the compact program calls a function of the sources."""
+    known = program.compact_program(deployed._HASH_MODULE).functions
+    (name,) = {
+        short
+        for (module, short), found in known.items()
+        for one in found
+        if (module, one.label) == ("core", label)
+    }
+    return name
+
+
+def _write(tree: Path, case: Case, settings: dict[str, Any]) -> None:
+    """The files of the flash. Encoders stand still here, so no counts belong to a step; switches are not tripped."""
+    (tree / "armtempo").mkdir(parents=True)
+    rows = [{**joint, "counts_num": 0, "counts_den": 1, "limit_active_high": 1} for joint in case.rows]
+    record = armrecord.pack(case.head, rows)
+    motion = bytearray(case.motion)
+    struct.pack_into("<II", motion, 12, BRAKE_TICKS, wire.record_crc(record))
+    struct.pack_into("<I", motion, len(motion) - 4, crc32(motion[:-4]))
+    (tree / "armtempo" / "arm.ata").write_bytes(record)
+    (tree / "armtempo" / "go.atm").write_bytes(motion)
+    joints = len(rows)
+    session: list[tuple[str, tuple[int, ...], bytes]] = [
+        ("hello", (wire.PROTOCOL_VERSION, 1), b""),
+        ("home", ((1 << joints) - 1,), struct.pack(f"<{joints}i", *case.start)),
+        ("start", (0, wire.record_crc(bytes(motion))), b"go"),
+    ]
+    for number in range(COMMANDS // 2):
+        session += [("status", (), b""), ("samples", (number, 0), b"")]
+    with (tree / "frames").open("wb") as file:
+        for sequence, (name, values, tail) in enumerate(session):
+            entry = wire.COMMAND[name]
+            frame = wire.frame(sequence, entry[1], wire.encode(entry, values, tail))
+            file.write(struct.pack("<H", len(frame)) + frame)
+    probe = f"import probe\n\nprobe.replace({settings!r})\n{firmware.START}, core\n\nprobe.hook(core)\n"
+    for path, data in program.start_files().items():
+        (tree / Path(path).name).write_text(data.decode().replace(firmware.START, probe))
+
+
+def _read(said: str, scale: float) -> Run:
+    """``scale``: instructions a tick."""
+    lines = re.findall(r"^@ turn (\d+) (\d) (\d)((?: \d+)*)$", said, re.MULTILINE)
+    turns = [
+        _turn(int(took), command == "1", answer == "1", log, scale) for took, command, answer, log in lines
+    ]
+    parser = wire.Parser()
+    parser.feed(bytes.fromhex("".join(re.findall(r"@ answer (\w+)", said))))
+    for _, number, payload in iter(parser.next, None):
+        name, *_ = entry = wire.EVENT_BY_ID[number]
+        values, _ = wire.decode(entry, payload)
+        if name == "done":
+            return Run(turns[1:], 0, values[1] / TICK_HZ)
+        if name == "fault":
+            return Run(turns[1:], values[1], values[3] / TICK_HZ)
+    raise AssertionError(said[-2000:])
+
+
+def _turn(took: int, command: bool, answer: bool, log: str, scale: float) -> Turn:
+    numbers = [int(word) for word in log.split()]
+    entries = list(zip(numbers[::2], numbers[1::2], strict=True))
+    looks = [at for at, (what, _) in enumerate(entries) if what >> 16 == 0]
+    joints = []
+    for at, until in pairwise(looks):
+        done = [what for what, _ in entries[at + 1 : until]]
+        written = sum(what & 0xFFFF for what in done if what >> 16 == _WRITTEN)
+        cells = sum(what >> 16 == _CELL for what in done)
+        joints.append(((entries[until][1] - entries[at][1]) * scale, written, cells))
+    return Turn(took * scale, command, answer, tuple(joints))
+
+
+def _line(name: str, costs: Iterable[float]) -> str:
+    found = sorted(costs)
+    if not found:
+        return f"    {name:<58} none"
+    return f"    {name:<58}{median(found) / 1e3:7.0f}{found[-1] / 1e3:7.0f}   {len(found):5d} times"
+
+
+def describe(run: Run) -> list[str]:
+    """What turns and joints cost."""
+    calm = [turn for turn in run.turns if not turn.command and not turn.answer]
+    joints = [joint for turn in calm for joint in turn.joints]
+    still = [turn for turn in calm if not turn.busy and not turn.cells]
+    return [
+        _line("turn, nothing written", (turn.cost for turn in still)),
+        _line(
+            "turn, rings filled, no cell changed",
+            (turn.cost for turn in calm if turn.busy and not turn.cells),
+        ),
+        _line("turn, one joint changes its cell", (turn.cost for turn in calm if turn.cells == 1)),
+        _line("turn, three joints change it", (turn.cost for turn in calm if turn.cells == 3)),
+        _line("turn with a command", (turn.cost for turn in run.turns if turn.command)),
+        _line(
+            "turn with a sample to send",
+            (turn.cost for turn in run.turns if turn.answer and not turn.command),
+        ),
+        _line("joint, ring full", (cost for cost, written, cells in joints if not written and not cells)),
+        _line("joint, ring filled", (cost for cost, written, cells in joints if written and not cells)),
+        _line("joint, changes its cell", (cost for cost, _, cells in joints if cells)),
+    ]
+
+
+def _end(run: Run) -> str:
+    return (
+        f"ends by fault {run.fault} after {run.seconds:.2f} s"
+        if run.fault
+        else f"ends well after {run.seconds:.2f} s"
+    )
+
+
+def main(micropython: Path) -> None:
+    """Print the figures."""
+    with tempfile.TemporaryDirectory() as name:
+        board = Board(micropython, Path(name))
+        for title, case in (("the paper's motion", paper()), ("3 joints, 50 000 steps/s", cruise(50_000, 3))):
+            print(f"{title}: thousands of instructions, median and most")
+            print("\n".join(describe(board.run(case, CYCLES[0], False))), flush=True)
+        for collects in (True, False):
+            print("the collector " + ("as main.py leaves it" if collects else "only where memory runs out"))
+            for cycles in CYCLES:
+                run = board.run(paper(), cycles, collects)
+                print(
+                    f"    {cycles} cycles: the paper's motion {_end(run)}; {_turns(run, cycles)}", flush=True
+                )
+                for joints in JOINTS:
+                    rate, best = board.highest(joints, cycles, collects)
+                    print(
+                        f"    {cycles} cycles, joints {joints}: {rate} steps/s; {_turns(best, cycles)}",
+                        flush=True,
+                    )
+
+
+def _turns(run: Run | None, cycles: float) -> str:
+    costs = sorted(turn.cost * cycles / CORE_HZ * 1e3 for turn in run.turns) if run else [0.0]
+    return f"a turn takes {median(costs):.1f} ms, at most {costs[-1]:.1f} ms"
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]).resolve())
