@@ -18,7 +18,7 @@ SOURCES = {
     "made": "",
     "made.main": """
         from micropython import const
-        from made import shapes, tools
+        from made import kinds, shapes, tools
         from made.shapes import SIDES, Square
         from made.tools import area as measure
 
@@ -38,8 +38,15 @@ SOURCES = {
         def hidden(SIDES, tools):
             return SIDES + tools
 
+        def listed():
+            return sorted(name for name in dir(kinds) if getattr(kinds, name) == 2)
+
         def table():
             return [getattr(shapes.Square(1), "_" + name)() for name in ("first", "second")]
+    """,
+    "made.kinds": """
+        FIRST_KIND = 1
+        SECOND_KIND = 2
     """,
     "made.shapes": """
         SIDES = 4
@@ -86,7 +93,10 @@ SOURCES = {
 def made() -> Compact:
     sources = {module: textwrap.dedent(text) for module, text in SOURCES.items()}
     return compact(
-        sources, "made.main", {"made.main"}, {"total", "hidden", "table", "state", "_first", "_second"}
+        sources,
+        "made.main",
+        {"made.main"},
+        {"total", "hidden", "listed", "table", "state", "_first", "_second"},
     )
 
 
@@ -117,13 +127,13 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[object]:
     forget()
 
 
-@pytest.mark.parametrize("words", ["total()", "total(7)", "hidden(1, 2)", "table()"])
+@pytest.mark.parametrize("words", ["total()", "total(7)", "hidden(1, 2)", "table()", "listed()"])
 def test_it_does_the_same(made: Compact, run, words: str) -> None:  # type: ignore[no-untyped-def]
     assert run(made.sources, words) == run(SOURCES, words)
 
 
 def test_modules_become_one_but_those_that_come_later(made: Compact) -> None:
-    assert set(made.sources) == {"made", "made.main", "made.later", "made.core"}
+    assert set(made.sources) == {"made", "made.main", "made.later", "made.kinds", "made.core"}
 
 
 def test_constants_and_long_names_are_gone(made: Compact) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from armtempo import arm as arms
 from armtempo import encode, operate, planner
+from armtempo.deploy import program
 from armtempo.job import Job
 from armtempo_shared.limits import TICK_HZ
 
@@ -37,6 +38,13 @@ CHOSEN = {
     ("cpython", "prompt_cases"): ["case_replay_typed_at_the_prompt"],
 }
 """The emulated interpreter is slow, and CPython has no prompt of its own on a board: what they are to run."""
+SCRIPTED = ("standalone_cases", "fault_cases", "prompt_cases")
+INSIDE = {
+    "case_a_failing_start_is_a_fault_not_the_end",
+    "case_ctrl_c_stops_a_replay_wherever_it_comes",
+    "case_exception_anywhere",
+}
+"""They reach into the program by the names in its sources."""
 
 
 @pytest.fixture(scope="session")
@@ -61,16 +69,44 @@ def flashes(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("script", ["standalone_cases", "fault_cases", "prompt_cases"])
-def test_cases(interpreter: str, script: str, flashes: Path, tmp_path: Path) -> None:
+@pytest.fixture(scope="session")
+def compact(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The folder of the program as ``armtempo deploy`` compiles it."""
+    folder = tmp_path_factory.mktemp("compact")
+    for name, text in program.compact_files().items():
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_text(text)
+    for path, data in program.start_files().items():
+        (folder / program.PACKAGES[0] / Path(path).name).write_bytes(data)
+    return str(folder)
+
+
+def play(
+    interpreter: str, script: str, cases: list[str], flashes: Path, tmp_path: Path, folders: str = PROGRAM
+) -> None:
     """Each case asserts by itself and prints its name when it holds."""
     copied = shutil.copytree(flashes, tmp_path / "flashes")
-    path = SCRIPTS / f"{script}.py"
-    cases = sorted(re.findall(r"def (case_\w+)", path.read_text()))
-    cases = CHOSEN.get((interpreter, script), cases)
     home = ",".join(map(str, HOME_STEPS))
     fewer = [str(FEWER[interpreter])] if script == "fault_cases" else []
+    path = SCRIPTS / f"{script}.py"
     output = interpreters.run(
-        interpreter, path, str(copied), PROGRAM, home, *cases, *fewer, heap=HEAP[interpreter]
+        interpreter, path, str(copied), folders, home, *cases, *fewer, heap=HEAP[interpreter]
     )
     assert [line.split()[0] for line in output.splitlines()] == cases
+
+
+def every_case(script: str) -> list[str]:
+    """The names of a script's cases."""
+    return sorted(re.findall(r"def (case_\w+)", (SCRIPTS / f"{script}.py").read_text()))
+
+
+@pytest.mark.parametrize("script", SCRIPTED)
+def test_cases(interpreter: str, script: str, flashes: Path, tmp_path: Path) -> None:
+    play(interpreter, script, CHOSEN.get((interpreter, script), every_case(script)), flashes, tmp_path)
+
+
+@pytest.mark.parametrize("script", SCRIPTED)
+def test_cases_with_the_compact_program(script: str, flashes: Path, compact: str, tmp_path: Path) -> None:
+    interpreter = "micropython" if "micropython" in interpreters.AVAILABLE else "cpython"
+    cases = CHOSEN.get((interpreter, script), every_case(script))
+    play(interpreter, script, [case for case in cases if case not in INSIDE], flashes, tmp_path, compact)

@@ -10,7 +10,7 @@ import sys
 if sys.implementation.name != "micropython":
     import additions  # noqa: F401
 from armtempo_shared import armrecord, wire
-from simulator import modules, pace, session, the
+from simulator import modules, motors, pace, session, the  # noqa: F401  motors: with the armrecord of the sources
 from simulator.board import TICKS_PER_MS, print_exception
 from simulator.flash import real_open
 from simulator.inputs import set_level
@@ -28,7 +28,12 @@ REPEAT_MS = 200  # as the host does it
 ANSWERS = 20
 say = print
 _stock = (builtins.print, builtins.open)
-_before = list(sys.modules)
+_ROOT = __file__.rsplit("/tests/", 1)[0]
+SOURCES = [
+    _ROOT + "/board",
+    _ROOT + "/shared",
+]  # from which the world knows the board, whatever program it has
+_before = [name for name in sys.modules if not name.startswith("armtempo_")]
 _path = list(sys.path)
 
 
@@ -254,7 +259,7 @@ def run(story, flash, program, boot=None):
     the.board = the.arm = the.flash = the.edges = None
     the.serial = world = World(story, boot, flash)
     try:
-        session.run(dict(DEFAULTS, flash=flash, sources=program, program=program), [])
+        session.run(dict(DEFAULTS, flash=flash, sources=SOURCES, program=program), [])
     finally:
         sys.path[:] = _path
         builtins.print, builtins.open = _stock

@@ -38,9 +38,10 @@ def compact(
     a module asks another for a name that is not there.
     """
     trees = {module: _at_run_time(ast.parse(text)) for module, text in sources.items()}
-    fold(trees, used_whole(trees))
+    whole = used_whole(trees)
+    fold(trees, whole)
     merged = merge(trees, main, entries)
-    names = short_names(merged, keep)
+    names = short_names(merged, keep, whole)
     known = functions(merged, names)
     shorten(merged, names)
     for tree in merged.values():

@@ -59,11 +59,11 @@ class Names:
     attributes: dict[str, str]
 
 
-def short_names(trees: Mapping[str, ast.Module], keep: Collection[str]) -> Names:
+def short_names(trees: Mapping[str, ast.Module], keep: Collection[str], whole: Collection[str] = ()) -> Names:
     """Short names for all that is the program's own.
 
     Not shortened: what built-in types or imported modules may mean by a name, what stands in a string or is a
-    keyword in a call, names of modules, and ``keep``.
+    keyword in a call, names of modules, what modules of ``whole`` define, and ``keep``.
     """
     nodes = [node for tree in trees.values() for node in ast.walk(tree)]
     modules = {part for module in trees for part in module.split(".")}
@@ -75,12 +75,12 @@ def short_names(trees: Mapping[str, ast.Module], keep: Collection[str]) -> Names
     def ours(names: Collection[str]) -> list[str]:
         return sorted(name for name in names if _is_long(name) and name not in fixed)
 
-    own = {module: ours(top_names(tree)) for module, tree in trees.items()}
+    own = {module: ours(top_names(tree)) for module, tree in trees.items() if module not in whole}
     of_objects = ours(attributes(trees))
     most = max(map(len, (*own.values(), of_objects)))
     shorts = [*there, *islice(_short(fixed | mentioned), most)]
     return Names(
-        {module: dict(zip(names, shorts, strict=False)) for module, names in own.items()},
+        {module: dict(zip(own.get(module, ()), shorts, strict=False)) for module in trees},
         share(trees, of_objects, shorts),
     )
 
