@@ -1,6 +1,7 @@
 """Stands in main.py of an emulated board for the start of the program: prints the heap after each stage.
 
-The program is driven through its serial port, so it may be the compact one.
+The program is driven through its serial port, so it may be the compact one. ``memory_use.py`` has that port too.
+All is in this one small file, because it shares the chip's heap with the program.
 """
 
 import gc
@@ -12,6 +13,7 @@ import machine
 import pyb
 from micropython import mem_info
 
+FRAMES = "/flash/frames"
 TURNS = 20
 """Turns of the program's loop between two frames, and at the end."""
 
@@ -33,7 +35,7 @@ class Port:
     RTS = CTS = 0
 
     def __init__(self):
-        self._frames = open("/flash/frames", "rb")  # noqa: SIM115  until the end
+        self._frames = open(FRAMES, "rb")  # noqa: SIM115  until the end
         self._left = 0
         self._turns = 0
         self._stages = ["program", "hello"]
@@ -59,7 +61,7 @@ class Port:
         head = self._frames.read(2)
         if not head:
             tell("motion")
-            print("@ end")
+            tell("end")
             sys.exit()
         self._left = head[0] + 256 * head[1]
 

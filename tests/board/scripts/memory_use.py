@@ -15,14 +15,14 @@ sys.path.insert(0, __file__.rsplit("/", 1)[0] + "/bare")
 
 import struct
 
+import firmware_heap
 import machine
 import micropython
 import pyb
 import stm
 import uctypes  # noqa: F401
+from firmware_heap import Beyond, nothing
 
-TURNS = 20
-"""Turns of the program's loop between two frames, and at the end."""
 _START = 0
 _MOST = 0
 
@@ -30,7 +30,10 @@ _MOST = 0
 def tell(name):
     """The bytes that are in use beyond what the stand-ins took."""
     gc.collect()
-    print(name, gc.mem_alloc() - _START)
+    if name == "end":
+        ANSWERS.close()
+    else:
+        print(name, gc.mem_alloc() - _START)
 
 
 class Time:
@@ -48,21 +51,6 @@ class Time:
         """Move the counters of both timers."""
         for name in ("TIM2", "TIM5"):
             stm.BLOCKS[name][9] = stm.BLOCKS[name][9] + 84 * wait_us & 0xFFFFFFFF
-
-
-class Beyond:
-    """A module, and what the chip's has besides."""
-
-    def __init__(self, module, **names):
-        self._module = module
-        self._names = names
-
-    def __getattr__(self, name):
-        return self._names[name] if name in self._names else getattr(self._module, name)
-
-
-def nothing(*arguments):
-    """In the place of what does not matter here."""
 
 
 class Pins:
@@ -84,47 +72,12 @@ def free():
     return int(sys.argv[4]) - (gc.mem_alloc() - _START)
 
 
-class Port:
-    """Hands the frames over one after the other, then ends the program."""
-
-    RTS = CTS = 0
-
-    def __init__(self):
-        self._frames = open(sys.argv[2], "rb")  # noqa: SIM115  until the end
-        self._answers = open(sys.argv[3], "wb")  # noqa: SIM115
-        self._left = 0
-        self._turns = 0
-        self._told = -1
-
-    def init(self, flow):
-        """Flow control does not matter here."""
-
-    def readinto(self, buffer, count):
-        """The rest of a frame, or nothing for some turns."""
-        if self._left == 0:
-            self._turns += 1
-            if self._turns < TURNS:
-                return 0
-            self._turns = 0
-            self._next()
-        got = self._frames.readinto(memoryview(buffer)[: min(count, self._left)])
-        self._left -= got
-        return got
-
-    def _next(self):
-        self._told += 1
-        if self._told < 2:
-            tell(("program", "hello")[self._told])
-        head = self._frames.read(2)
-        if not head:
-            tell("motion")
-            self._answers.close()
-            sys.exit()
-        self._left = head[0] + 256 * head[1]
+class Port(firmware_heap.Port):
+    """Writes what the program answers to a file."""
 
     def write(self, buffer, start, count):
         """All goes."""
-        return self._answers.write(memoryview(buffer)[start : start + count])
+        return ANSWERS.write(memoryview(buffer)[start : start + count])
 
 
 def unpack_from(*arguments):
@@ -156,6 +109,9 @@ sys.modules["struct"] = Beyond(struct, unpack_from=unpack_from)
 sys.modules["gc"] = Beyond(gc, mem_free=free)
 sys.modules["os"] = Beyond(os, dupterm=nothing)
 sys.modules["micropython"] = Beyond(micropython, alloc_emergency_exception_buf=nothing, kbd_intr=nothing)
+firmware_heap.FRAMES = sys.argv[2]
+firmware_heap.tell = tell
+ANSWERS = open(sys.argv[3], "wb")  # noqa: SIM115  until the end
 IMPORT = builtins.__import__
 gc.collect()
 _START = gc.mem_alloc()
