@@ -11,6 +11,18 @@ def replay(name: str = "") -> None:
     standalone.replay(name)
 
 
+def collect_often(often: bool = True) -> None:
+    """Whether the heap is collected long before it is full, so that it does not fall to pieces.
+
+    While a motion runs it is not: what MicroPython allocates for calls is given back at once, but it counts, and a
+    collection would come every few turns of the loop and take longer than the rings last.
+    """
+    import gc
+
+    if hasattr(gc, "threshold"):
+        gc.threshold((gc.mem_free() + gc.mem_alloc()) // 64 if often else -1)
+
+
 def forget() -> None:
     """Let the next collection have the modules that only set-up or the start of a motion needs.
 

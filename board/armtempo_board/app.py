@@ -23,7 +23,7 @@ from armtempo_shared.messages import ARM_RECORD_NAME, SAMPLE_BRAKING, START_HOMI
 from armtempo_shared.motion import Motion, MotionError
 from micropython import const
 
-from armtempo_board import forget
+from armtempo_board import collect_often, forget
 from armtempo_board.commands import Commands
 from armtempo_board.engine import Engine
 from armtempo_board.events import Events
@@ -74,7 +74,7 @@ class App:
         self._brakes = False  # the motion can come to rest along its path
         self._by_host = False  # the run was started by a command
         self._assumed = 0  # joints whose position a homing motion took for granted
-        self._turns = self._failed = 0  # turns of the loop, and the last of them that failed
+        self.turns = self._failed = 0  # turns of the loop, and the last of them that failed
         self._failures = 0
         self._make_parts()
         forget()
@@ -100,7 +100,7 @@ class App:
 
     def turn(self) -> None:
         """One turn of the loop; an exception in it becomes a fault."""
-        self._turns = (self._turns + 1) & 0xFFFF
+        self.turns = (self.turns + 1) & 0xFFFF
         try:
             self._turn()
         except Exception as error:
@@ -108,15 +108,21 @@ class App:
 
     def _turn(self) -> None:
         if self.link.poll():
+            self.refill()
             self.commands.act()
         if self.engine:
             self.engine.service()
             self._collect()
             self._watch()
-        if self.commands.greeted:
-            self.events.push()
+        if self.commands.greeted and self.events.push():
+            self.refill()
         self.link.flush()
         self._watch_escape()
+
+    def refill(self) -> None:
+        """What cannot wait for the end of longer work while something moves."""
+        if self.engine:
+            self.engine.refill()
 
     def _collect(self) -> None:
         while self.engine.next_sample(self._raw):
@@ -146,6 +152,7 @@ class App:
     def _end(self) -> None:
         self._collect()
         self._forget()
+        collect_often()
         self._running = False
         self._braking = False
         if not self.fault():
@@ -153,9 +160,9 @@ class App:
 
     def fail(self, error: "BaseException") -> None:
         """Freeze and keep the fault; raises where one turn after the other fails."""
-        again = (self._turns - self._failed) & 0xFFFF <= 1
+        again = (self.turns - self._failed) & 0xFFFF <= 1
         self._failures = self._failures + 1 if again else 1
-        self._failed = self._turns
+        self._failed = self.turns
         self._fault = codes.INTERNAL
         if self.engine:
             self.engine.freeze()
@@ -260,6 +267,7 @@ class App:
         self._brakes = motion.brake_ticks > 0
         forget()
         gc.collect()
+        collect_often(False)
         self._running = True
         self.engine.start(homing)
 

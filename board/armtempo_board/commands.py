@@ -74,7 +74,9 @@ class Commands:
         if self.app.moving() and number not in _WHILE_MOVING:
             return self._refuse(number, codes.BUSY)
         self._link.reply[PAYLOAD] = number
+        self.app.refill()
         size = self._store(row, length) if isinstance(row[0], str) else row[0](row, length)
+        self.app.refill()
         self._link.answer(self._ok, 1 + (size or 0))
 
     def _store(self, row: tuple, length: int) -> "int | None":

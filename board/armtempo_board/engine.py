@@ -163,6 +163,13 @@ class Engine:
         self._service()
         self._halfway = False
 
+    def refill(self) -> None:
+        """Refill the rings and nothing else: between other work, as full ones last a few milliseconds only."""
+        if self.moving and not self._block[access.FROZEN]:
+            self._halfway = True
+            self._serve()
+            self._halfway = False
+
     def _service(self) -> None:
         if not self.moving:
             self._look()

@@ -16,7 +16,6 @@ _SAMPLE_HEAD = "<II"  # run and index; the rest of the fields stands in the slot
 _SAMPLE_HEAD_SIZE = const(8)
 _DONE_TICKS = const(4)  # index of the ticks in done
 _FAULT_TICKS = const(6)  # and in fault
-_IN_ONE_TURN = const(4)  # so many samples at most, so that the loop stays short
 
 
 class Events:
@@ -52,14 +51,14 @@ class Events:
         if not self._notice:
             self._notice = text.encode()[-MAX_PAYLOAD:]
 
-    def push(self) -> None:
-        """Hand the link what is waiting and has room."""
-        for _ in range(_IN_ONE_TURN):
-            if not self._push_sample():
-                break
+    def push(self) -> bool:
+        """Hand the link what is waiting and has room, one sample at most; whether there was one."""
+        if self._push_sample():
+            return True
         if self._app.samples.waiting() < 0:
             self._push_end()
         self._push_notice()
+        return False
 
     def _push_sample(self) -> bool:
         samples = self._app.samples

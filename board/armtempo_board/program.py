@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 ROOT = "/flash/armtempo"
 _CTRL_C = const(3)
 _EXCEPTION_BUFFER = const(100)
+_SELDOM = const(7)  # while something moves, LEDs, watchdog and button in every eighth turn only
 
 app: "Any" = None
 """The program's App, kept when it is left for the REPL."""
@@ -77,6 +78,8 @@ def run(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
 
 
 def _look_around(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
+    if app.moving() and app.turns & _SELDOM:
+        return
     leds.show(app.state())
     watchdog.feed()
     pressed = button.pressed()  # a press while something moves is over and done with

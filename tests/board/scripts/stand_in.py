@@ -91,6 +91,9 @@ class Engine:
         self.ticks = 0
         self.sample()
 
+    def refill(self):
+        """Nothing to do."""
+
     def service(self):
         if self.explode:
             error, self.explode = self.explode, None

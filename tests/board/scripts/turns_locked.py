@@ -30,6 +30,9 @@ class Still:
         self.turns += 1
         self.due = self.turns % 10 == 0
 
+    def refill(self):
+        pass
+
     def next_sample(self, raw):
         due = self.due
         self.due = False
