@@ -133,8 +133,8 @@ class Board:
             name.split(".")[1]: _short(name) for name in ("access.read_ndtr", "access.seal", "crossing.enter")
         }
 
-    def run(self, case: Case, cycles: float, collects: bool) -> Run:
-        """``collects``: the collector as main.py leaves it; otherwise only where memory runs out."""
+    def run(self, case: Case, cycles: float) -> Run:
+        """Run a motion; a fault may end it."""
         scale = round(2 * _INSTRUCTION_NS / cycles)  # TIM2 counts half the core's cycles
         settings: dict[str, Any] = {
             **self._settings,
@@ -142,7 +142,6 @@ class Board:
             "millisecond": round(
                 CORE_HZ / 1000 / cycles * _INSTRUCTION_NS * CORE_HZ / 1e9
             ),  # SysTick's clock is 168 MHz
-            "collects": collects,
             "session": 3,
         }
         with tempfile.TemporaryDirectory(dir=self._folder) as name:
@@ -154,12 +153,12 @@ class Board:
             said = firmware.emulate(self._elf, image, cut, "-icount", f"shift={_SHIFT}")
         return _read(said, scale / _INSTRUCTION_NS)
 
-    def highest(self, joints: int, cycles: float, collects: bool) -> tuple[int, Run | None]:
+    def highest(self, joints: int, cycles: float) -> tuple[int, Run | None]:
         """The highest of RATES that ends without a fault, and that motion."""
         low, high, found = -1, len(RATES), None
         while high - low > 1:
             middle = (low + high) // 2
-            run = self.run(cruise(RATES[middle], joints), cycles, collects)
+            run = self.run(cruise(RATES[middle], joints), cycles)
             if run.fault:
                 high = middle
             else:
@@ -283,20 +282,13 @@ def main(micropython: Path) -> None:
         board = Board(micropython, Path(name))
         for title, case in (("the paper's motion", paper()), ("3 joints, 50 000 steps/s", cruise(50_000, 3))):
             print(f"{title}: thousands of instructions, median and most")
-            print("\n".join(describe(board.run(case, CYCLES[0], False))), flush=True)
-        for collects in (True, False):
-            print("the collector " + ("as main.py leaves it" if collects else "only where memory runs out"))
-            for cycles in CYCLES:
-                run = board.run(paper(), cycles, collects)
-                print(
-                    f"    {cycles} cycles: the paper's motion {_end(run)}; {_turns(run, cycles)}", flush=True
-                )
-                for joints in JOINTS:
-                    rate, best = board.highest(joints, cycles, collects)
-                    print(
-                        f"    {cycles} cycles, joints {joints}: {rate} steps/s; {_turns(best, cycles)}",
-                        flush=True,
-                    )
+            print("\n".join(describe(board.run(case, CYCLES[0]))), flush=True)
+        for cycles in CYCLES:
+            run = board.run(paper(), cycles)
+            print(f"{cycles} cycles: the paper's motion {_end(run)}; {_turns(run, cycles)}", flush=True)
+            for joints in JOINTS:
+                rate, best = board.highest(joints, cycles)
+                print(f"{cycles} cycles, joints {joints}: {rate} steps/s; {_turns(best, cycles)}", flush=True)
 
 
 def _turns(run: Run | None, cycles: float) -> str:

@@ -279,8 +279,6 @@ class Port:
 def start_clock(us):
     """In the place of the short wait behind the start of the counters: from here on they run."""
     mem32[stm.TIM2 + _PSC] = mem32[stm.TIM5 + _PSC] = here["prescaler"]
-    if not here["collects"]:
-        gc.threshold(-1)
     here["core"].time, here["core"].stm = time, stm
     mem32[here["at_compare"]] = id(interrupt)
     state[0] = -_LEAD & 0xFFFFFFFF
