@@ -16,7 +16,10 @@ from armtempo_board.walker import Walker
 LOOKAHEAD_K = const(4096)
 """How far ahead steps are computed, in 1024 ticks: 50 ms. Braking begins behind what is computed."""
 
+_PLENTY_K = const(3072)  # 37 ms: so far ahead nothing is added, as a few steps cost nearly what many do
 _GUARD_K = const(16)  # 195 us: entries are only added behind a rising edge that is further away
+_NEARLY_DRY_K = const(512)  # 6 ms: filling may take as long as what is left;
+_GAP_K = const(1024)  # 12 ms: where nothing comes for so long, the ring is better filled afresh
 _TURN_SLACK = const(8400)  # 100 us: how late the interrupt that turns DIR may come
 _TURNS = const(8)
 
@@ -32,6 +35,7 @@ class Joint:
         self._at = sampler.joint_at(number)
         self.ring = Ring(row["channel"], self._block, self._at, size(row["max_rate"]))
         self.walker = Walker()
+        self._plenty = self.ring.entries * 3 // 4
         self._inverted = row["dir_inverted"]
         self._pulse = head["pulse_ticks"]
         self._pulse_k = (self._pulse >> 10) + 1
@@ -90,6 +94,8 @@ class Joint:
         ring = self.ring
         left = ring.left()
         if left > 0:
+            if left > self._plenty or ring.last_k() > _PLENTY_K:
+                return 0
             if not self.walker.ended and ring.room(left) >= 2 and self._still_ahead():
                 return self._extend(now_k, left)
         elif left == 0:
@@ -107,6 +113,8 @@ class Joint:
         ring = self.ring
         room = ring.room(left)
         if self.walker.at_turn and not self._turn():
+            return 0
+        if ring.last_k() < _NEARLY_DRY_K and self.walker.next_1024() - now_k > _GAP_K:
             return 0
         made = ring.made()
         count = self.walker.fill(ring.words, ring.entries - 1, made, room, now_k + LOOKAHEAD_K)

@@ -26,7 +26,7 @@ from armtempo import arm as arms
 from armtempo import encode
 from armtempo.deploy import firmware as deployed
 from armtempo.deploy import program
-from armtempo_shared import armrecord, wire
+from armtempo_shared import armrecord, limits, wire
 from armtempo_shared.limits import TICK_HZ
 
 from tests.benchmark import firmware
@@ -123,6 +123,7 @@ class Board:
     def __init__(self, micropython: Path, folder: Path) -> None:
         self._folder = folder
         deployed.write(folder / "program")
+        _lift_limits(folder / "program")
         source = Path(__file__).with_name("loop_board.c").read_text()
         self._elf = firmware.build(micropython, folder, folder / "program" / "manifest.py", source)
         places = firmware.symbols(self._elf)
@@ -164,6 +165,18 @@ class Board:
             else:
                 low, found = middle, run
         return (RATES[low] if found else 0), found
+
+
+def _lift_limits(folder: Path) -> None:
+    """Let the board take rates beyond those that hello states, which this is to find."""
+    lifted = 0
+    for path in folder.rglob("*.py"):
+        text = path.read_text()
+        for limit in (limits.MAX_STEP_RATE, limits.MAX_STEP_RATE_SUM):
+            lifted += text.count(f"{limit} + {limit} // 100")
+            text = text.replace(f"{limit} + {limit} // 100", "10000000")
+        path.write_text(text)
+    assert lifted == 2, lifted
 
 
 def _short(label: str) -> str:

@@ -63,7 +63,8 @@ def test_rate(interpreter: str, name: str, tmp_path: Path) -> None:
 
 
 def test_the_boards_own_highest_rate(interpreter: str, tmp_path: Path) -> None:
-    fit, fast = motions.cruise(332_000), motions.cruise(340_000)
+    most = limits.MAX_STEP_RATE
+    fit, fast = motions.cruise(most * 997 // 1000), motions.cruise(most * 1021 // 1000)
     verdicts = judge(interpreter, tmp_path, fit, fast, rate=1_000_000)
     assert verdicts[0] is None
     assert verdicts[1] is not None
@@ -71,7 +72,8 @@ def test_the_boards_own_highest_rate(interpreter: str, tmp_path: Path) -> None:
 
 
 def test_sum_of_rates(interpreter: str, tmp_path: Path) -> None:
-    fit, fast = motions.cruise(165_000, joints=6), motions.cruise(175_000, joints=6)
+    each = limits.MAX_STEP_RATE_SUM // 6
+    fit, fast = motions.cruise(each * 99 // 100, joints=6), motions.cruise(each * 105 // 100, joints=6)
     verdicts = judge(interpreter, tmp_path, fit, fast)
     assert verdicts[0] is None
     assert verdicts[1] is not None
@@ -101,9 +103,9 @@ def test_longer_than_the_board_can_hold(interpreter: str, tmp_path: Path) -> Non
 
 def test_reversal_that_the_driver_cannot_follow(interpreter: str, tmp_path: Path) -> None:
     def there_and_back(seconds: float) -> bytes:
-        return motions.record([np.array([0.0, 1000.5, 0.0])], [np.full(2, seconds)], 5)
+        return motions.record([np.array([0.0, 200.5, 0.0])], [np.full(2, seconds)], 5)
 
-    fit, abrupt = there_and_back(0.1), there_and_back(0.02)
+    fit, abrupt = there_and_back(0.045), there_and_back(0.009)
     verdicts = judge(interpreter, tmp_path, fit, abrupt)
     assert verdicts[0] is None
     assert verdicts[1] is not None

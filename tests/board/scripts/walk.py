@@ -10,12 +10,15 @@ import sys
 from array import array
 
 import micropython
-from armtempo_board.check import check
+from armtempo_board import check as checking
+from armtempo_board import rates
 from armtempo_board.walker import Walker
 from armtempo_shared.motion import Motion
 
 MASK = 1023
 NEVER = 1 << 28
+checking.MAX_STEP_RATE = 333_000  # the evaluator is tried beyond what the program's loop keeps up with
+rates.MAX_STEP_RATE_SUM = 1_000_000
 FREE = {"min_steps": -50000000, "max_steps": 50000000, "max_rate": 336330}
 
 
@@ -59,7 +62,7 @@ def main(pulse, gap, room, start, length, *records):
     for record in records:
         with open(record, "rb") as file:
             motion = Motion(file.read())
-        wrong = check(motion, [FREE] * motion.joints, int(gap))
+        wrong = checking.check(motion, [FREE] * motion.joints, int(gap))
         print(wrong)
         with open(record + ".steps", "wb") as out:
             for joint in range(0 if wrong else motion.joints):
