@@ -36,7 +36,11 @@ _ROWS = (
     ("estop", "the E-stop input tripped", "release it, then 'armtempo clear' and home"),
     ("limit_switch", "a limit switch tripped", "clear, then move away from it"),
     ("following", "the encoder is too far from the command (stall or slip)", "find the cause, then home"),
-    ("underrun", "the step ring ran dry", "report it; the position is known"),
+    (
+        "underrun",
+        "the board fell behind with the steps",
+        "lower the limits and plan again; the position is known",
+    ),
     (
         "internal",
         "the board program failed",

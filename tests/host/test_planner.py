@@ -14,6 +14,7 @@ from armtempo.arm import Arm, Limits
 from armtempo.errors import InputError, PlanError
 from armtempo.job import Job
 from armtempo.plan import Plan
+from armtempo_shared.limits import MAX_STEP_RATE
 
 from tests.host import problems
 from tests.host.test_extremes import dense
@@ -189,7 +190,7 @@ def test_refuses_sizes_that_cannot_be_computed_with(
 
 
 def test_refuses_more_steps_than_the_board_makes_together() -> None:
-    fast = problems.make_arm([[300_000 / 200 * 360 / 8, 1e9, 1e12]] * 6, microsteps=8)
+    fast = problems.make_arm([[0.9 * MAX_STEP_RATE / 200 * 360 / 8, 1e9, 1e12]] * 6, microsteps=8)
     via = (tuple([0.0] * 6), tuple([1e6] * 6))
     with pytest.raises(PlanError, match="steps/s"):
         planner.plan(fast, Job("fast", via, iterations=5))
