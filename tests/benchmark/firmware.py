@@ -38,7 +38,9 @@ HEADER = f"""
 """
 BOARD_C = "void SystemClock_Config(void) {\n}\n"
 START = "from armtempo_board import program"
-PROBE = f"""gc.collect()
+PROBE = f"""import gc
+
+gc.collect()
 before = gc.mem_alloc()
 import probe
 
