@@ -1,5 +1,7 @@
 """A motion under way: stopping it, its samples, and hosts that stall, change or are gone."""
 
+import gc
+
 import stand_in
 from app_rig import App, connected, ends_of, flash, run, samples_of, start, state
 from armtempo_shared import armrecord, messages, motion, wire
@@ -135,6 +137,21 @@ def case_lost_host_leaves_the_motion_otherwise():
     start(host)
     host.turn(2000)
     assert app.engine.calls[-1] == "start"
+
+
+def case_the_heap_is_collected_often_but_while_something_moves():
+    """What calls allocate counts, so that a collection would come every few turns of a motion."""
+    if not hasattr(gc, "threshold"):
+        return
+    app, host = connected()
+    for _ in range(2):
+        start(host)
+        assert gc.threshold() == -1
+        host.turn(1000)
+        assert gc.threshold() == -1
+        app.engine.finish()
+        host.turn(10)
+        assert 0 < gc.threshold() < (gc.mem_alloc() + gc.mem_free()) // 60
 
 
 run(globals())
