@@ -38,6 +38,9 @@ CYCLES = (1.3, 2.0, 2.5)
 """Cycles an instruction: see board/docs/evaluator.md."""
 RATES = (5_000, 10_000, 20_000, 33_000, 50_000, 70_000, 100_000, 130_000, 160_000, 200_000, 250_000, 333_000)
 JOINTS = (1, 3)
+AT_LIMITS = ((80_000, 1), (60_000, 2), (40_000, 3), (25_000, 3), (2_000, 6), (8_000, 6))
+"""Rates of each joint, and joints: at the limits that hello states, and where many start together."""
+WORST_CYCLES = 3.0
 RAMP_S, WHOLE_S = 0.5, 1.2
 BRAKE_TICKS = TICK_HZ // 2
 COMMANDS = 60  # status and samples in turn, one every 50 ms
@@ -95,11 +98,11 @@ def cruise(rate: int, joints: int) -> Case:
     rows = [
         row(
             channel=joint,
-            encoder=(0, 2, armrecord.NONE)[joint],
+            encoder=(0, 2)[joint] if joint < 2 else armrecord.NONE,
             max_rate=rate * 101 // 100,
             min_steps=-10_000_000,
             max_steps=10_000_000,
-            limit_low=joint,
+            limit_low=joint if joint < 3 else armrecord.NONE,
         )
         for joint in range(joints)
     ]
@@ -302,6 +305,16 @@ def main(micropython: Path) -> None:
             for joints in JOINTS:
                 rate, best = board.highest(joints, cycles)
                 print(f"{cycles} cycles, joints {joints}: {rate} steps/s; {_turns(best, cycles)}", flush=True)
+        print("at single rates")
+        _at_limits(board)
+
+
+def _at_limits(board: Board) -> None:
+    for cycles in (*CYCLES, WORST_CYCLES):
+        print(f"    {cycles} cycles: the paper's motion {_end(board.run(paper(), cycles))}", flush=True)
+        for rate, joints in AT_LIMITS:
+            run = board.run(cruise(rate, joints), cycles)
+            print(f"    {cycles} cycles, joints {joints}, {rate} steps/s: {_end(run)}", flush=True)
 
 
 def _turns(run: Run | None, cycles: float) -> str:

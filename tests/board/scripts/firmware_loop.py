@@ -25,7 +25,6 @@ _PSC = const(0x28)
 _EVERY_MS = const(50)  # a command that often while something moves
 _BEFORE, _BEHIND = const(20), const(40)  # turns between two commands, and at the end
 _LOGGED = const(100)
-_LEAD = const(1680000)
 
 dma = array("I", bytes(4 * 64))
 unmoved = array("I", bytes(4 * 24))  # the encoders' timers
@@ -281,7 +280,7 @@ def start_clock(us):
     mem32[stm.TIM2 + _PSC] = mem32[stm.TIM5 + _PSC] = here["prescaler"]
     here["core"].time, here["core"].stm = time, stm
     mem32[here["at_compare"]] = id(interrupt)
-    state[0] = -_LEAD & 0xFFFFFFFF
+    pause()
     resume(0)
     wait(84 * us)
 
