@@ -51,8 +51,8 @@ def check(
             return wrong[0], joint, wrong[1]
         parts.load(motion, joint)
         judge = Judge(parts, joints[joint], gap_ticks)
-        while parts.bring():
-            code = judge.verdict()
+        while found := parts.bring():
+            code = judge.verdict(found)
             if code == _SPLIT:
                 parts.split()
             elif code:
@@ -94,21 +94,18 @@ class Judge:
         self._high = row["max_steps"] + points.BIAS
         self._limit = min(row["max_rate"], MAX_STEP_RATE + MAX_STEP_RATE // 100)
         self._mantissa, self._exponent = rates.scaled(self._limit)
-        self._heading = self._even = 0
         self.value = 0
 
-    def verdict(self) -> int:
-        """A code, _PASS, or _SPLIT where it takes a closer look."""
+    def verdict(self, found: int) -> int:
+        """A code, _PASS, or _SPLIT where it takes a closer look; ``found``: what ``bring`` gave."""
         parts = self._parts
-        self._heading = cell.localise(parts.angle, parts.angle_local)
-        self._even = cell.localise(parts.time, parts.time_local)
         for position in (parts.start(), parts.end()):
             if not self._low <= position <= self._high:
                 self.value = position - points.BIAS
                 return codes.OUT_OF_RANGE
         if not parts.angle_local[cell.SCALE] or not parts.time_local[cell.SCALE]:
             return _SPLIT
-        return self._range() or self._rate() or self._abrupt()
+        return self._range() or self._rate() or self._abrupt(found)
 
     def _short(self) -> bool:
         return self._parts.time[5] - self._parts.time[0] < 2 and self._parts.ticks() <= _SHORT_TICKS
@@ -130,16 +127,16 @@ class Judge:
         self.value = rates.at_ends(parts) if found == rates.FASTER else rates.highest(parts)
         return codes.TOO_FAST
 
-    def _abrupt(self) -> int:
+    def _abrupt(self, found: int) -> int:
         """Where the joint stands still or turns, acceleration may carry it 0.02 steps in half a gap.
 
         Two opposite steps closer than the gap are left out; acceleration a goes a gap**2 / 8 past a threshold.
         """
         parts = self._parts
         local = parts.angle_local
-        if self._heading:
+        if found & cell.STRAIGHT:
             return _PASS
-        if self._even <= 0:
+        if not found & cell.EVEN:
             return _SPLIT
         bend, per = _acceleration(local, parts.time_local)
         if bend * self._gap_ticks**2 * 100 <= per * 16:

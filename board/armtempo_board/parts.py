@@ -11,93 +11,64 @@ if TYPE_CHECKING:
     from armtempo_shared.motion import Motion
 
 _START_LEVEL = const(4)
-_KEPT = const(3)  # levels between the part and the piece it is halved from
 
 
 class Parts:
     """Walks through a joint's motion part by part; all buffers are made once.
 
-    ``angle`` and ``time`` are the part's pieces (points.py), ``angle_local`` and ``time_local`` their measures.
+    ``angle`` and ``time`` begin with the part's pieces (points.py); ``angle_local`` and ``time_local`` are their
+    measures (cell.py).
     """
 
     def __init__(self) -> None:
-        self._raw = array("i", bytes(48))
-        self._segment = array("i", bytes(48))
-        self._angle_root = array("i", bytes(48))
-        self._time_root = array("i", bytes(48))
-        self._angle_base = array("i", bytes(48))
-        self._time_base = array("i", bytes(48))
-        self.angle = array("i", bytes(48))
-        self.time = array("i", bytes(48))
+        self.angle = array("i", bytes(4 * cell.PIECES_SIZE))
+        self.time = array("i", bytes(4 * cell.PIECES_SIZE))
         self.angle_local = array("i", bytes(4 * cell.LOCAL_SIZE))
         self.time_local = array("i", bytes(4 * cell.LOCAL_SIZE))
-        self.level = 0
 
     def load(self, motion: "Motion", joint: int) -> None:
         """Stand before the first part."""
         self._data = motion.data
         self._weights = points.weights(motion.degree)
-        self._angle_offset = motion.angle_offset(joint)
-        self._time_offset = motion.time_offset(joint)
+        self._angle_offset = motion.angle_offset(joint) >> 2
+        self._time_offset = motion.time_offset(joint) >> 2
         self._refine = motion.refine
         self._segments = motion.segments * motion.refine
-        self._number = 0
-        self.level = _START_LEVEL
-        self._index = 0
-        self._enter()
-
-    def _enter(self) -> None:
-        """Load the time segment ``_number`` and the part of the angle segment that belongs to it."""
-        part = self._number % self._refine
-        count = self._weights[0]
-        if part == 0:
-            offset = self._angle_offset + 8 * (self._number // self._refine)
-            points.load(self._data, offset, count, self._raw)
-            points.combine(self._raw, self._weights, self._segment)
-        points.copy(self._segment, self._angle_root)
-        if self._refine > 1:
-            points.restrict(self._angle_root, part, self._refine)
-        points.load(self._data, self._time_offset + 8 * self._number, count, self._raw)
-        points.combine(self._raw, self._weights, self._time_root)
-        self._base_level = -1
-        self._base_index = 0
+        self._number = -1
+        self.angle_local[cell.LEVEL] = _START_LEVEL
+        self.time_local[cell.NODE] = 1 << _START_LEVEL
+        self.time_local[cell.MOVE] = cell.STAY
+        self.page()
 
     def page(self) -> bool:
-        """Go on to the next segment where the last part ended one; True where it did."""
-        if not self._index >> self.level or self._number + 1 >= self._segments:
+        """Load the next time segment and the part of the angle segment that belongs to it; False: there is none."""
+        number = self._number + 1
+        if number == self._segments:
             return False
-        self._number += 1
-        self._index = 0
-        self._enter()
+        self._number = number
+        offset = self._angle_offset + 2 * (number // self._refine)
+        points.load(self._data, offset, self._weights, self.angle)
+        points.restrict(self.angle, number % self._refine, self._refine)
+        points.load(self._data, self._time_offset + 2 * number, self._weights, self.time)
+        points.restrict(self.time, 0, 1)
         return True
 
-    def bring(self) -> bool:
-        """Compute the part; False: past the end."""
-        if self._index >> self.level and not self.page():
-            return False
-        below = self.level - self._base_level
-        if self._base_level < 0 or below < 0 or self._index >> below != self._base_index:
-            below = min(self.level, _KEPT)
-            self._base_level = self.level - below
-            self._base_index = self._index >> below
-            points.descend(self._angle_root, self._angle_base, self._base_level, self._base_index)
-            points.descend(self._time_root, self._time_base, self._base_level, self._base_index)
-        index = self._index & ((1 << below) - 1)
-        points.descend(self._angle_base, self.angle, below, index)
-        points.descend(self._time_base, self.time, below, index)
-        return True
+    def bring(self) -> int:
+        """Compute and measure the part; 0: past the end, otherwise 1 + what is known of it (cell.py)."""
+        found = 0
+        while not found:
+            found = cell.seek(self.time, self.angle, self.time_local, self.angle_local, 0, 0) >> 2
+            if not found and not self.page():
+                break
+        return found
 
     def split(self) -> None:
         """Go on with the first half of the part."""
-        self.level += 1
-        self._index <<= 1
+        self.time_local[cell.MOVE] = cell.SPLIT
 
     def skip(self) -> None:
         """Go on behind the part, with one twice as long where the grid allows it."""
-        self._index += 1
-        if self._index & 1 == 0 and self.level > 0 and not self._index >> self.level:
-            self._index >>= 1
-            self.level -= 1
+        self.time_local[cell.MOVE] = cell.SKIP
 
     def start(self) -> int:
         """Position (+ points.BIAS) at the start of the part."""

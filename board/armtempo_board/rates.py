@@ -113,8 +113,6 @@ def _add(parts: "Parts", motion: "Motion", joint: int, width: int, sums: "array[
     peaks = array("I", bytes(4 * (_BINS + 1)))
     parts.load(motion, joint)
     while parts.bring():
-        cell.localise(parts.angle, parts.angle_local)
-        cell.localise(parts.time, parts.time_local)
         whole = parts.angle_local[cell.SCALE] and parts.time_local[cell.SCALE]
         if not whole or parts.time[5] - parts.time[0] > width:
             parts.split()

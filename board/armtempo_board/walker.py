@@ -226,8 +226,6 @@ class Walker:
         block = self._block
         steps = walk.end() - self._position
         heading = 1 if steps > 0 else -1
-        if not steps or (heading != walk.heading and not at_once):
-            return
         scale = walk.time_local[cell.SCALE] - 12
         self._state[stretch.TIME_SCALE] = scale
         self._high = walk.time[0]
