@@ -4,6 +4,8 @@ in a block scale of their own, in single words, and judges whether the part can 
 An array of pieces holds six, 13 words each: the one that is looked at, four right halves by their level modulo
 4, and the root. A right half comes with the left one; it is kept, as it is the next to be looked at or halved.
 The last word of a kept one tells where it stands, as a node: 2**level + index among the 2**level parts.
+One of an earlier segment is never taken for one of this: before a right half is looked for, what both were
+halved from has been halved in this segment, which put it into its place.
 
 Signed values in arrays are stored with a bias, see points.py.
 """
@@ -106,7 +108,7 @@ def seek(piece: ptr32, here: ptr32, local: ptr32, other_local: ptr32, position: 
                     piece[11] = here[11]
                 if not todo:
                     break
-                # by de Casteljau: the left half stays in place, point by point of the right one is left at the end
+                # by de Casteljau: the left half stays in place, point by point of the right one comes out at its end
                 todo -= 1
                 work -= 1
                 kept = ptr32(int(piece) + (((level - todo) & 3) + 1) * 52)
@@ -115,8 +117,8 @@ def seek(piece: ptr32, here: ptr32, local: ptr32, other_local: ptr32, position: 
                 kept[12] = i | 1
                 i = 5
                 while True:
-                    kept[i] = piece[5]
-                    kept[i + 6] = piece[11]
+                    kept[5] = piece[5]
+                    kept[11] = piece[11]
                     if not i:
                         break
                     here = ptr32(int(piece) + 16)
@@ -129,8 +131,9 @@ def seek(piece: ptr32, here: ptr32, local: ptr32, other_local: ptr32, position: 
                         here[1] = ((low >> 28) + high) >> 1
                         here = ptr32(int(here) - 4)
                         k -= 1
+                    kept = ptr32(int(kept) - 4)
                     i -= 1
-                here = kept
+                here = ptr32(int(kept) + 20)
             # the hull: of the high words, then, where it matters, of the rounded positions
             bits = 28
             while True:

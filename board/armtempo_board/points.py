@@ -109,6 +109,3 @@ def restrict(piece: ptr32, part: int, parts: int) -> object:
     while i < 12:
         piece[i + 65] = piece[i]
         i += 1
-    while i < 65:
-        piece[i] = 0
-        i += 13
