@@ -55,6 +55,7 @@ class _Pointer32(_Pointer):
 def _caster(kind: type[_Pointer], cell: Literal["B", "H", "i"], width: int) -> Callable[[Any], _Pointer]:
     """A cast to a pointer. Pointers to addresses and arrays are kept: most calls come with the same ones."""
     kept: dict[int, _Pointer] = {}
+    alive: list[Any] = []  # what they point at: another object may take the number of one that is gone
 
     def cast(target: Any) -> _Pointer:
         key = ~target if target.__class__ is int else id(target)
@@ -67,7 +68,9 @@ def _caster(kind: type[_Pointer], cell: Literal["B", "H", "i"], width: int) -> C
         if key < 0 or isinstance(target, (array, memoryview)):  # a bytearray may want to grow
             if len(kept) >= _MOST_KEPT:
                 kept.clear()
+                alive.clear()
             kept[key] = pointer
+            alive.append(target)
         return pointer
 
     return cast
