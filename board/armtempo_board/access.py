@@ -35,15 +35,6 @@ IDR = const(4)
 ODR = const(5)
 BSRR = const(6)
 
-# words of a ring's state
-MADE = const(0)  # entries written since the stream was started
-LOADS = const(1)  # words that the stream has handed on since; as many matches have been
-FIRST = const(2)  # NDTR right after the start
-LAST = const(3)  # time of the last entry written
-FAR = const(4)  # the far-away entry behind it
-MASK = const(5)  # entries of the ring less 1; they are a power of two, so that an index is a mask away
-STATE_WORDS = const(6)
-
 # words of the block
 NEXT = const(0)  # time of the next sample
 LEFT = const(1)  # samples still to come before the last one
@@ -69,26 +60,42 @@ BLOCK_HEAD = const(19)
 DIR_BIT = const(0)
 TURNS_IN = const(1)
 TURNS_OUT = const(2)
-NDTR_AT = const(3)  # word offset of its stream's NDTR in DMA1
-ON_TIM5 = const(4)
-CCR_AT = const(5)
-CCMR_AT = const(6)
-MODE_SHIFT = const(7)
-ON_PORT_B = const(8)
-PIN_BIT = const(9)
-TURN_TIMES = const(10)
+ON_TIM5 = const(3)
+CCR_AT = const(4)
+CCMR_AT = const(5)
+MODE_SHIFT = const(6)
+ON_PORT_B = const(7)
+PIN_BIT = const(8)
+TURN_TIMES = const(9)
 TURN_ROOM = const(8)
-JOINT_WORDS = const(18)
+RING = const(17)  # the state of its ring:
+JOINT_WORDS = const(26)
+# words of a ring's state
+MADE = const(0)  # entries written since the stream was started
+LOADS = const(1)  # words that the stream has handed on since; as many matches have been
+FIRST = const(2)  # NDTR right after the start
+LAST = const(3)  # time of the last entry written
+FAR = const(4)  # the far-away entry behind it
+MASK = const(5)  # entries of the ring less 1; they are a power of two, so that an index is a mask away
+NDTR_AT = const(6)  # word offset of its stream's NDTR in DMA1
+FED = const(7)  # the interrupt writes to the ring; it ends that when the ring has run dry
+ROOM = const(8)  # entries that may be written now
+STATE_WORDS = const(9)
 
 # a limit switch and a joint: line, DIR bit, DIR level that moves towards it, joint, whether it moves
 PAIR_WORDS = const(5)
-# a raw sample: counter, NDTR a joint (6), encoder counter (4)
+# a raw sample: counter, matches a joint (6), encoder counter (4)
 RAW_WORDS = const(11)
 RAW_ROOM = const(4)  # 0.4 s; the main loop comes every few milliseconds
 _SAMPLE_TICKS = const(8400000)
 _LATEST = const(84)  # 1 us: a compare value nearer than that may be missed
-_TOGGLE = const(3)
-_FORCED_LOW = const(4)
+SPARE = const(8)  # entries of a ring behind the matched one that stay readable, and the far-away entry
+_GUARD = const(32768)  # 390 us: entries are only added behind a rising edge that is further away,
+_PLENTY = const(3145728)  # but not 37 ms away,
+_MOST = const(512)  # and so many at most, which takes less than the 390 us
+# from the mode 7 down
+_TO_TOGGLE = const(4)  # to 3
+_TO_FORCED_LOW = const(3)  # to 4
 
 
 @micropython.viper
@@ -138,81 +145,100 @@ def until_k(timer: ptr32, words: ptr32, at: int) -> int:
 
 
 @micropython.viper
-def advance(state: ptr32, ndtr: int) -> int:
-    """Count the stream's loads up to a reading of NDTR; entries that have not matched yet.
+def matches(state: ptr32, dma: ptr32) -> int:
+    """Matches of a ring since its stream was started.
 
-    Fewer loads than the ring has entries can have come since the last count, so the difference is unambiguous.
+    Fewer than the ring has entries can have come since LOADS was written, so the difference is unambiguous, also where
+    the interrupt writes LOADS meanwhile.
     """
     loads = state[LOADS]
-    loads += (state[FIRST] - ndtr - loads) & state[MASK]
-    state[LOADS] = loads
-    return state[MADE] - loads
+    return loads + ((state[FIRST] - dma[state[NDTR_AT]] - loads) & state[MASK])
 
 
 @micropython.viper
-def read_ndtr(stream: ptr32, block: ptr32) -> int:
-    """Words that the stream has still to hand on in this round; -1 while a raw sample waits to be converted.
+def hungry(block: ptr32, dma: ptr32, timer: ptr32) -> int:
+    """Look after all rings; a bit for each joint to whose ring entries are to be added now, ROOM at most.
 
-    Counts go forward only, and the raw sample may be older than this reading.
+    That is where a quarter is free. -1: there is nothing to look after. 130 instructions and 76 a joint, 123 where
+    entries are to be added.
     """
-    ndtr = stream[STREAM_NDTR] & 0xFFFF
-    if block[TAKEN] != block[READ]:
-        return -1
-    return ndtr
+    found = 0
+    fed = 0
+    now = timer[CNT] + block[PULSE] + _GUARD
+    joint = 0 if block[FROZEN] else block[JOINTS]
+    block = ptr32(int(block) + 4 * (BLOCK_HEAD + RING) + joint * (4 * JOINT_WORDS))
+    while joint:
+        joint -= 1
+        block = ptr32(int(block) - 4 * JOINT_WORDS)
+        if block[FED]:
+            fed = 1
+            block[LOADS] = ((block[FIRST] - dma[block[NDTR_AT]] - block[LOADS]) & block[MASK]) + block[LOADS]
+            room = block[LOADS] - block[MADE]
+            if room:
+                room += block[MASK] + 1
+                if room > block[MASK] >> 2 and ((block[LAST] - now) & 0x3FFFFFFF) < _PLENTY - _GUARD:
+                    found |= 1 << joint
+                    room -= SPARE
+                    block[ROOM] = room
+                    if room > _MOST:
+                        block[ROOM] = _MOST
+            else:
+                block[FED] = 0
+    return found if fed else -1
 
 
 @micropython.viper
-def seal(state: ptr32, ring: ptr32, count: int) -> object:
-    """Take ``count`` new entries in and write the far-away entry behind them.
+def written(state: ptr32, ring: ptr32, timer: ptr32, queue: ptr32) -> int:
+    """Take in what was written up to the queue's HEAD, and write the far-away entry behind it; 1: it came too late.
 
     Entry 0 goes into the compare register by hand, so the stream begins with entry 1 and runs over the
     words behind it: word 0 is repeated behind the end.
     """
-    mask = state[MASK]
-    made = state[MADE] + count
-    last = ring[(made - 1) & mask]
-    half = 1
-    far = last + (half << 31)
-    ring[made & mask] = far
-    ring[mask + 1] = ring[0]
-    state[MADE] = made
-    state[LAST] = last
-    state[FAR] = far
+    late = 0
+    made = queue[18]
+    if made != state[MADE]:
+        late = ((state[LAST] - queue[17] - timer[CNT]) >> 31) & 1
+        state[MADE] = made
+        state[LAST] = ring[(made - 1) & state[MASK]]
+        half = 1
+        state[FAR] = (half << 31) + state[LAST]
+        ring[made & state[MASK]] = state[FAR]
+        ring[state[MASK] + 1] = ring[0]
+    return late
 
 
 @micropython.viper
 def arm_channel(block: ptr32, timer: ptr32, ring: ptr32, at: int) -> int:
-    """Put the first entry into the compare register and let it toggle; 1 unless it is too late for that.
+    """Put the first entry into the compare register and let it toggle; 1 where it is too late for that.
 
     ``at``: the joint's words in the block. Call it with interrupts off.
     """
     if block[FROZEN]:
-        return 1
+        return 0
     first = ring[0]
-    given = block[at + TURNS_IN]
-    if given != block[at + TURNS_OUT]:
-        turn = block[at + TURN_TIMES + ((given - 1) & (TURN_ROOM - 1))]
-        if ((first - turn - block[SETUP]) >> 31) & 1:
-            return 0
-    shift = block[at + MODE_SHIFT]
-    compare = block[at + CCR_AT]
-    timer[compare] = first
-    channel = compare - CCR1 + 1
-    timer[SR] = (1 << 16) - 1 - (1 << channel)
-    mode = block[at + CCMR_AT]
-    timer[mode] = (timer[mode] & (0xFFFF - (7 << shift))) | (_TOGGLE << shift)
-    timer[DIER] = timer[DIER] | (1 << (8 + channel))
-    return 1 - (((first - timer[CNT] - _LATEST) >> 31) & 1)
+    due = first - block[SETUP]
+    block = ptr32(int(block) + 4 * at)
+    if (
+        block[TURNS_IN] != block[TURNS_OUT]
+        and ((due - block[TURN_TIMES + ((block[TURNS_IN] - 1) & (TURN_ROOM - 1))]) >> 31) & 1
+    ):
+        return 1
+    timer[block[CCR_AT]] = first
+    bit = 1 << (block[CCR_AT] - CCR1 + 1)
+    timer[SR] = (1 << 16) - 1 - bit
+    mode = block[CCMR_AT]
+    timer[mode] = (timer[mode] | (7 << block[MODE_SHIFT])) - (_TO_TOGGLE << block[MODE_SHIFT])
+    timer[DIER] = timer[DIER] | (bit << 8)
+    return ((first - timer[CNT] - _LATEST) >> 31) & 1
 
 
 @micropython.viper
 def release_channel(block: ptr32, timer: ptr32, at: int) -> object:
     """Hold the output low and take no more words from DMA. Call it with interrupts off."""
-    shift = block[at + MODE_SHIFT]
-    channel = block[at + CCR_AT] - CCR1 + 1
-    mode = block[at + CCMR_AT]
-    timer[mode] = (timer[mode] & (0xFFFF - (7 << shift))) | (_FORCED_LOW << shift)
-    timer[DIER] = timer[DIER] & (0xFFFF - (1 << (8 + channel)))
+    block = ptr32(int(block) + 4 * at)
+    mode = block[CCMR_AT]
+    timer[mode] = (timer[mode] | (7 << block[MODE_SHIFT])) - (_TO_FORCED_LOW << block[MODE_SHIFT])
+    timer[DIER] = timer[DIER] & (0xFFFF - (1 << (block[CCR_AT] - CCR1 + 9)))
 
 
 @micropython.viper
@@ -233,11 +259,12 @@ def mark(timer: ptr32, state: ptr32) -> object:
 @micropython.viper
 def add_turn(block: ptr32, state: ptr32, at: int, delay: int) -> int:
     """Queue a turn of DIR, ``delay`` ticks behind the last entry; 0 when the queue is full."""
-    given = block[at + TURNS_IN]
-    if ((given - block[at + TURNS_OUT]) & 0xFF) >= TURN_ROOM:
+    block = ptr32(int(block) + 4 * at)
+    given = block[TURNS_IN]
+    if ((given - block[TURNS_OUT]) & 0xFF) >= TURN_ROOM:
         return 0
-    block[at + TURN_TIMES + (given & (TURN_ROOM - 1))] = state[LAST] + delay
-    block[at + TURNS_IN] = (given + 1) & 0xFF
+    block[TURN_TIMES + (given & (TURN_ROOM - 1))] = state[LAST] + delay
+    block[TURNS_IN] = (given + 1) & 0xFF
     return 1
 
 
@@ -254,33 +281,37 @@ def call_soon(timer: ptr32) -> object:
 def serve(block: ptr32, timer: ptr32, port: ptr32) -> int:
     """The compare interrupt: turn the DIR pins that are due; 1 when a sample is due, else arm for the next.
 
-    200 instructions and 48 a joint; a turn of DIR takes as much again.
+    185 instructions and 24 a joint; a turn of DIR takes almost as much again.
     """
+    head = block
     while True:
         now = timer[CNT]
         soonest = 1 << 29
-        levels = port[ODR]
         turned = 0
-        at = BLOCK_HEAD
-        for _ in range(block[JOINTS]):
-            out = block[at + TURNS_OUT]
-            if out != block[at + TURNS_IN] and block[FROZEN] == 0:
-                gap = block[at + TURN_TIMES + (out & (TURN_ROOM - 1))] - now
+        joints = block[JOINTS]
+        block = ptr32(int(block) + 4 * BLOCK_HEAD)
+        while joints:
+            joints -= 1
+            if block[TURNS_OUT] != block[TURNS_IN] and not head[FROZEN]:
+                gap = block[TURN_TIMES + (block[TURNS_OUT] & (TURN_ROOM - 1))] - now
                 if ((gap - 1) >> 31) & 1:
-                    bit = block[at + DIR_BIT]
-                    turned |= bit << 16 if levels & bit else bit
-                    block[at + TURNS_OUT] = (out + 1) & 0xFF
-                    if ((gap + block[SLACK]) >> 31) & 1:
-                        block[LATE] = 1
+                    bit = block[DIR_BIT]
+                    if port[ODR] & bit:
+                        bit <<= 16
+                    turned |= bit
+                    block[TURNS_OUT] = (block[TURNS_OUT] + 1) & 0xFF
+                    if ((gap + head[SLACK]) >> 31) & 1:
+                        head[LATE] = 1
                     soonest = 0
                 else:
                     gap &= 0x3FFFFFFF
                     if gap < soonest:
                         soonest = gap
-            at += JOINT_WORDS
+            block = ptr32(int(block) + 4 * JOINT_WORDS)
+        block = head
         if turned:
             port[BSRR] = turned
-        if block[DONE] == 0:
+        if not block[DONE]:
             gap = block[NEXT] - now
             if ((gap - 1) >> 31) & 1:
                 block[NOW] = now
@@ -289,42 +320,51 @@ def serve(block: ptr32, timer: ptr32, port: ptr32) -> int:
             if gap < soonest:
                 soonest = gap
         if soonest:
-            timer[CCR4] = now + soonest
-            if ((now + soonest - timer[CNT] - 1) >> 31) & 1 == 0:
+            now += soonest
+            timer[CCR4] = now
+            if not ((now - timer[CNT] - 1) >> 31) & 1:
                 return 0
 
 
 @micropython.viper
 def take(raw: ptr32, block: ptr32, dma: ptr32, encoders: object) -> object:
-    """Store a raw sample and find the time of the next. 250 instructions, 30 a joint, 100 an encoder."""
-    taken = block[TAKEN]
-    if ((taken - block[READ]) & 0xFF) >= RAW_ROOM:
-        block[LOST] += 1
+    """Store a raw sample and find the time of the next. 160 instructions, 40 a joint, 100 an encoder."""
+    n = block[TAKEN]
+    if ((n - block[READ]) & 0xFF) >= RAW_ROOM:
+        block[LOST] = block[LOST] + 1
     else:
-        to = (taken & (RAW_ROOM - 1)) * RAW_WORDS
-        raw[to] = block[NOW]
-        at = BLOCK_HEAD + NDTR_AT
-        for joint in range(block[JOINTS]):
-            raw[to + 1 + joint] = dma[block[at]]
-            at += JOINT_WORDS
-        for index in range(block[ENCODERS]):
-            counter = ptr32(encoders[index])  # type: ignore[index]
-            raw[to + 7 + index] = counter[CNT]
-        block[TAKEN] = (taken + 1) & 0xFF
-    left = block[LEFT]
-    if left > 1:
-        block[LEFT] = left - 1
-        block[NEXT] = block[NEXT] + _SAMPLE_TICKS
-    elif left == 1:
-        block[LEFT] = 0
-        block[NEXT] = block[END]
+        block[TAKEN] = (n + 1) & 0xFF
+        raw = ptr32(int(raw) + (n & (RAW_ROOM - 1)) * (4 * RAW_WORDS))
+        raw[0] = block[NOW]
+        head = block
+        n = block[JOINTS]
+        raw = ptr32(int(raw) + 4 * n)
+        block = ptr32(int(block) + 4 * (BLOCK_HEAD + RING) + n * (4 * JOINT_WORDS))
+        while n:
+            n -= 1
+            block = ptr32(int(block) - 4 * JOINT_WORDS)
+            raw[0] = ((block[FIRST] - dma[block[NDTR_AT]] - block[LOADS]) & block[MASK]) + block[LOADS]
+            raw = ptr32(int(raw) - 4)
+        block = head
+        n = block[ENCODERS]
+        while n:
+            n -= 1
+            raw[7 + n] = ptr32(encoders[n])[CNT]  # type: ignore[index]
+    n = block[LEFT]
+    if n:
+        n -= 1
+        block[LEFT] = n
+        if n:
+            block[NEXT] = block[NEXT] + _SAMPLE_TICKS
+        else:
+            block[NEXT] = block[END]
     else:
         block[DONE] = 1
 
 
 @micropython.viper
 def freeze(block: ptr32, timer2: ptr32, timer5: ptr32) -> int:
-    """Stop all STEP outputs now; ``finish_pulses`` has to follow; 0 where that is done. 135 + 50 a joint.
+    """Stop all STEP outputs now; ``finish_pulses`` has to follow; 0 where that is done. 125 + 27 a joint.
 
     First no more words come from DMA, then every compare value goes far away: from there on the pins stand
     still. What DMA had been asked for before is served within a few bus cycles, long before its compare value
@@ -335,17 +375,18 @@ def freeze(block: ptr32, timer2: ptr32, timer5: ptr32) -> int:
     block[FROZEN] = 1
     timer2[DIER] = 0
     timer5[DIER] = 0
-    now = timer2[CNT]
-    half = 1
-    far = now + (half << 31)
-    at = BLOCK_HEAD
-    for _ in range(block[JOINTS]):
-        if block[at + ON_TIM5]:
-            timer5[block[at + CCR_AT]] = far
+    block[FROZEN_AT] = timer2[CNT]
+    far = 1
+    far = (far << 31) + block[FROZEN_AT]
+    joints = block[JOINTS]
+    block = ptr32(int(block) + 4 * BLOCK_HEAD)
+    while joints:
+        joints -= 1
+        if block[ON_TIM5]:
+            timer5[block[CCR_AT]] = far
         else:
-            timer2[block[at + CCR_AT]] = far
-        at += JOINT_WORDS
-    block[FROZEN_AT] = now
+            timer2[block[CCR_AT]] = far
+        block = ptr32(int(block) + 4 * JOINT_WORDS)
     return 1
 
 
@@ -354,30 +395,32 @@ def finish_pulses(block: ptr32, timer2: ptr32, timer5: ptr32, ports: object) -> 
     """After ``freeze``: a STEP pin that is high gets its falling edge, one that is low is held low."""
     port_a = ptr32(ports[0])  # type: ignore[index]
     port_b = ptr32(ports[1])  # type: ignore[index]
+    head = block
     high = 0
-    at = BLOCK_HEAD
-    for joint in range(block[JOINTS]):
+    joint = block[JOINTS]
+    block = ptr32(int(block) + 4 * BLOCK_HEAD + joint * (4 * JOINT_WORDS))
+    while joint:
+        joint -= 1
+        block = ptr32(int(block) - 4 * JOINT_WORDS)
         timer = timer2
-        if block[at + ON_TIM5]:
+        if block[ON_TIM5]:
             timer = timer5
         port = port_a
-        if block[at + ON_PORT_B]:
+        if block[ON_PORT_B]:
             port = port_b
-        if (port[IDR] >> block[at + PIN_BIT]) & 1:
+        if (port[IDR] >> block[PIN_BIT]) & 1:
             high |= 1 << joint
-            timer[block[at + CCR_AT]] = timer[CNT] + block[PULSE]
+            timer[block[CCR_AT]] = timer[CNT] + head[PULSE]
         else:
-            mode = block[at + CCMR_AT]
-            shift = block[at + MODE_SHIFT]
-            timer[mode] = (timer[mode] & (0xFFFF - (7 << shift))) | (_FORCED_LOW << shift)
-        at += JOINT_WORDS
-    block[HIGH] = high
+            mode = block[CCMR_AT]
+            timer[mode] = (timer[mode] | (7 << block[MODE_SHIFT])) - (_TO_FORCED_LOW << block[MODE_SHIFT])
+    head[HIGH] = high
 
 
 @micropython.viper
 def trip(block: ptr32, code: int, joint: int) -> object:
     """Note a fault; the first one stays."""
-    if block[FAULT] == 0:
+    if not block[FAULT]:
         block[FAULT] = code
         block[FAULT_JOINT] = joint
 
@@ -385,11 +428,11 @@ def trip(block: ptr32, code: int, joint: int) -> object:
 @micropython.viper
 def towards(pairs: ptr32, count: int, line: int, levels: int) -> int:
     """1 + the active joint that moves towards the switch on ``line``, or 0; ``levels`` of the DIR port."""
-    at = 0
-    for _ in range(count):
-        if pairs[at] == line and pairs[at + 4] and ((levels >> pairs[at + 1]) & 1) == pairs[at + 2]:
-            return pairs[at + 3] + 1
-        at += PAIR_WORDS
+    while count:
+        if pairs[0] == line and pairs[4] and ((levels >> pairs[1]) & 1) == pairs[2]:
+            return pairs[3] + 1
+        pairs = ptr32(int(pairs) + 4 * PAIR_WORDS)
+        count -= 1
     return 0
 
 

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 _MOST_SAMPLES = const(4096)  # bytes to keep samples in,
 _LEAST_SAMPLES = const(1024)
 _SHARE = const(16)  # in between this part of what is free
+_ALONE = const(3)  # while something moves, a turn looks after the engine so many times more
 _MOST_FAILURES = const(10)  # failing turns of the loop one after the other, then the program gives up
 
 
@@ -118,6 +119,9 @@ class App:
             self.refill()
         self.link.flush()
         self._watch_escape()
+        for _ in range(_ALONE):
+            if self.moving():
+                self.engine.service()
 
     def refill(self) -> None:
         """What cannot wait for the end of longer work while something moves."""

@@ -44,24 +44,25 @@ def passed(block: "array[int]", high: int) -> bool:
 
 
 @micropython.viper
-def slow(block: ptr32, where: int, high: int, scale: int) -> int:
-    """Move the time (2**-scale ticks from ``high`` on) of the node at ``where`` to real time; 0: it never comes.
+def slow(block: ptr32, h: int, high: int, scale: int) -> int:
+    """Move the time (2**-scale ticks from ``high`` on) of the node at ``h`` to real time; 0: it never comes.
 
     The whole ticks of delay go to the node's DELAY, the rest to its time; RATE becomes that of the motion's time.
+    The compiler keeps the first two arguments in registers: ``block`` becomes the node, ``h`` a high half.
     """
-    node = ptr32(int(block) + 4 * where)
     law = ptr32(int(block) + 240)
+    block = ptr32(int(block) + 4 * h)
     one = 1 << 29
     one += one
-    node[3] = 0
-    node[4] = one
+    block[3] = 0
+    block[4] = one
     unit = law[3]
     high -= law[1]
     if high < 0 - (1 << 17):
         return 1
     if high > (1 << 17):
         return 0
-    ticks = (high << 12) + (node[0] >> scale) - law[2]
+    ticks = (high << 12) + (block[0] >> scale) - law[2]
     if ticks <= 0:
         return 1
     length = law[0]
@@ -69,7 +70,7 @@ def slow(block: ptr32, where: int, high: int, scale: int) -> int:
         return 0
     # y: the way gone, ticks / length
     way = ticks >> unit
-    rest = ((ticks & ((1 << unit) - 1)) << scale) + (node[0] & ((1 << scale) - 1))
+    rest = ((ticks & ((1 << unit) - 1)) << scale) + (block[0] & ((1 << scale) - 1))
     up = 0
     while length < (1 << 29):
         length <<= 1
@@ -142,23 +143,23 @@ def slow(block: ptr32, where: int, high: int, scale: int) -> int:
     low = ((high & 1) << 14) + ((first * low) >> 1) + second * h + ((second * low) >> 15)
     high = ((high >> 1) + (low >> 15)) << unit
     low = (low & _LOW) << unit
-    node[3] = high + (low >> 15)
-    node[4] = rate
+    block[3] = high + (low >> 15)
+    block[4] = rate
     low &= _LOW
     if scale <= 15:
-        node[0] += low >> (15 - scale)
+        block[0] += low >> (15 - scale)
     else:
-        node[0] += low << (scale - 15)
+        block[0] += low << (scale - 15)
     return 1
 
 
 @micropython.viper
 def steepen(block: ptr32, where: int) -> object:
     """Divide the slope of the node at ``where`` by the rate there: ticks of real time per step."""
-    node = ptr32(int(block) + 4 * where)
-    rate = node[4]
-    time = node[1]
-    exponent = node[2]
+    block = ptr32(int(block) + 4 * where)
+    rate = block[4]
+    time = block[1]
+    exponent = block[2]
     while rate < (1 << 29):
         rate <<= 1
         exponent -= 1
@@ -169,5 +170,5 @@ def steepen(block: ptr32, where: int) -> object:
     first = time // digit
     rest = ((time - first * digit) << 15) - first * (rate & _LOW)
     rest = (first << 15) + rest // digit
-    node[1] = rest if rest >> 30 == 0 else _MOST
-    node[2] = exponent if exponent > 0 else 0
+    block[1] = rest if rest >> 30 == 0 else _MOST
+    block[2] = exponent if exponent > 0 else 0

@@ -74,7 +74,7 @@ def seek(piece: ptr32, here: ptr32, local: ptr32, other_local: ptr32, position: 
                     move = 0
                     found = 3
                     break
-                if node & 1 == 0:
+                if not node & 1:
                     node >>= 1
                     level -= 1
             while below < level:

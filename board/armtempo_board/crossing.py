@@ -51,8 +51,8 @@ def enter(cell: ptr32, angle: ptr32, angle_local: ptr32, time_local: ptr32) -> o
     cell[21] = scale
     cell[24] = time_local[0] - 12 - scale + 64
     local = angle_local
-    at = 0
-    while at < 20:
+    passes = 2
+    while passes:
         bias = 1 << 29
         a = (local[1] - bias) * sign
         b = (local[2] - bias) * sign
@@ -60,7 +60,7 @@ def enter(cell: ptr32, angle: ptr32, angle_local: ptr32, time_local: ptr32) -> o
         d = (local[4] - bias) * sign
         e = (local[5] - bias) * sign
         bias += bias
-        if at == 0:
+        if passes > 1:
             cell[22] = a + b + c + d + e
             cell[25] = 0
             cell[26] = a
@@ -69,38 +69,45 @@ def enter(cell: ptr32, angle: ptr32, angle_local: ptr32, time_local: ptr32) -> o
         d += 3 * b - 3 * c - a
         c += a - 2 * b
         b -= a
-        cell[at] = 5 * a + bias
-        cell[at + 1] = 10 * b + bias
-        cell[at + 2] = 10 * c + bias
-        cell[at + 3] = 5 * d + bias
-        cell[at + 4] = e + bias
-        cell[at + 5] = a + bias
-        cell[at + 6] = 4 * b + bias
-        cell[at + 7] = 6 * c + bias
-        cell[at + 8] = 4 * d + bias
-        cell[at + 9] = e + bias
-        at += 10
+        cell[0] = 5 * a + bias
+        cell[1] = 10 * b + bias
+        cell[2] = 10 * c + bias
+        cell[3] = 5 * d + bias
+        cell[4] = e + bias
+        cell[5] = a + bias
+        cell[6] = 4 * b + bias
+        cell[7] = 6 * c + bias
+        cell[8] = 4 * d + bias
+        cell[9] = e + bias
+        cell = ptr32(int(cell) + 40)
+        passes -= 1
         sign = 1
         local = time_local
 
 
 @micropython.viper
-def solve(cell: ptr32, index: int, length: int) -> object:
-    """Set node A to the cell's step ``index``, or MIDDLE and B to those ``length`` and twice ``length`` behind it.
+def solve(cell: ptr32, h: int, length: int) -> object:
+    """Set node A to the cell's step ``h``, or MIDDLE and B to those ``length`` and twice ``length`` behind it.
 
-    Each Newton step leaves at most the square of the relative error; the last one starts below 2**-14. Products
+    Each Newton step leaves at most the square of the relative error; the last one starts below 2**-14, from a
+    residual that was evaluated, so errors do not add up from one step to the next. Products
     are made of 15-bit halves: nothing exceeds 31 bits. The slope is a long division with 15-bit digits,
     its relative error below 2**-28.
+
+    The compiler keeps the first two arguments in registers: ``h`` becomes the high half of what is multiplied.
     """
-    where = 28
-    if length > 0:
-        where = 36
+    index = h
+    last = 1
+    node = ptr32(int(cell) + 112)
+    if length:
+        last = 0
+        node = ptr32(int(cell) + 144)
     while True:
         index += length
         bias = 1 << 29
         target = cell[20] - bias + (index << cell[21])
         bias += bias
-        if cell[22] == 0:
+        if not cell[22]:
             cell[28] = cell[23]
             return  # type: ignore[return-value]
         if target < 0:
@@ -119,7 +126,7 @@ def solve(cell: ptr32, index: int, length: int) -> object:
                 slope <<= 1
                 rest <<= 1
             h = slope >> 14
-            if rest < h and rest > 0 - h:
+            if rounds and rest < h and rest > 0 - h:
                 rounds = 13
                 w += ((rest << 12) // (slope >> 15)) << 3
             else:
@@ -133,31 +140,35 @@ def solve(cell: ptr32, index: int, length: int) -> object:
             rounds += 1
             if rounds > 12:
                 break
-            rest = cell[4] - bias
-            rate = cell[9] - bias
-            i = 3
-            while i >= 0:
-                h = rest >> 15
-                rest = h * wh + (((rest & _LOW) * wh + _HALF) >> 15) + ((h * wl) >> 15) + cell[i] - bias
-                h = rate >> 15
-                rate = h * wh + (((rate & _LOW) * wh) >> 15) + ((h * wl) >> 15) + cell[i + 5] - bias
+            here = ptr32(int(cell) + 16)
+            rest = here[0] - bias
+            rate = here[5] - bias
+            i = 4
+            while i:
                 i -= 1
+                here = ptr32(int(here) - 4)
+                h = rest >> 15
+                rest = h * wh + (((rest & _LOW) * wh + _HALF) >> 15) + ((h * wl) >> 15) + here[0] - bias
+                h = rate >> 15
+                rate = h * wh + (((rate & _LOW) * wh) >> 15) + ((h * wl) >> 15) + here[5] - bias
             h = rest >> 15
             rest = target - h * wh - (((rest & _LOW) * wh + _HALF) >> 15) - ((h * wl) >> 15)
-        rate = cell[9] - bias
-        time = cell[14] - bias
-        slope = cell[19] - bias
-        i = 3
-        while i >= 0:
-            h = rate >> 15
-            rate = h * wh + (((rate & _LOW) * wh) >> 15) + ((h * wl) >> 15) + cell[i + 5] - bias
-            h = time >> 15
-            time = h * wh + (((time & _LOW) * wh + _HALF) >> 15) + ((h * wl) >> 15) + cell[i + 10] - bias
-            h = slope >> 15
-            slope = h * wh + (((slope & _LOW) * wh) >> 15) + ((h * wl) >> 15) + cell[i + 15] - bias
+        here = ptr32(int(cell) + 16)
+        rate = here[5] - bias
+        time = here[10] - bias
+        slope = here[15] - bias
+        i = 4
+        while i:
             i -= 1
+            here = ptr32(int(here) - 4)
+            h = rate >> 15
+            rate = h * wh + (((rate & _LOW) * wh) >> 15) + ((h * wl) >> 15) + here[5] - bias
+            h = time >> 15
+            time = h * wh + (((time & _LOW) * wh + _HALF) >> 15) + ((h * wl) >> 15) + here[10] - bias
+            h = slope >> 15
+            slope = h * wh + (((slope & _LOW) * wh) >> 15) + ((h * wl) >> 15) + here[15] - bias
         h = time >> 15
-        cell[where] = h * wh + (((time & _LOW) * wh + _HALF) >> 15) + ((h * wl) >> 15) + cell[23]
+        node[0] = h * wh + (((time & _LOW) * wh + _HALF) >> 15) + ((h * wl) >> 15) + cell[23]
         cell[25] = w
         cell[26] = rate
         cell[27] = target
@@ -180,8 +191,9 @@ def solve(cell: ptr32, index: int, length: int) -> object:
         wh = slope // h
         rest = ((slope - wh * h) << 15) - wh * (rate & _LOW)
         rest = (wh << 15) + rest // h
-        cell[where + 1] = rest if rest < bias else bias - 1  # still a small integer
-        cell[where + 2] = i if i > 0 else 0  # slower than that no stretch is made
-        where += 8
-        if where != 44:
+        node[1] = rest if rest < bias else bias - 1  # still a small integer
+        node[2] = i if i > 0 else 0  # slower than that no stretch is made
+        if last:
             break
+        last = 1
+        node = ptr32(int(node) + 32)

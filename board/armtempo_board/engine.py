@@ -1,7 +1,8 @@
 """The hardware side of a motion: from its splines to the pins, and back to samples.
 
-``load`` checks a motion and fills the rings, ``start`` lets the counters run, ``service`` keeps the rings
-filled (call it every few hundred microseconds), until ``moving`` is False. Then ``fault`` says why it ended.
+``load`` checks a motion and fills the rings, ``start`` lets the counters run, ``service`` keeps steps ready for
+the interrupt that fills the rings (call it every few milliseconds), until ``moving`` is False. Then ``fault``
+says why it ended.
 After any stop ``commanded`` is exact for every joint whose bit in ``known`` is set:
 
 =====================  =============================================================
@@ -28,6 +29,7 @@ from micropython import const
 
 from armtempo_board import access, forget
 from armtempo_board.encoders import Encoder, NoEncoder
+from armtempo_board.feeder import Feeder
 from armtempo_board.following import Following
 from armtempo_board.inputs import Inputs
 from armtempo_board.joint import LOOKAHEAD_K, Joint
@@ -39,6 +41,7 @@ LEAD_TICKS = const(1680000)
 
 NO_JOINT = const(255)
 _PREFILLS = const(32)
+_ROUNDS = const(8)  # while queues have room, this work comes before all other, so often
 _BRAKE_MARGIN_K = const(2048)  # 25 ms, in which all joints are told
 _PULSE_SPARE_US = const(5)
 _LIMITS = ("min_steps", "max_steps", "max_rate")  # what of a joint's row in the arm record is needed later
@@ -65,11 +68,13 @@ class Engine:
         self._readings = Readings(self._sampler, self._joints, self._encoders, slots)
         self._following = [Following(row) for row in joints]
         self._inputs = Inputs(head, joints, self._sampler)
+        Feeder(self._inputs, self._joints)  # its timer keeps it
+        registers.apply(registers.PRIORITIES)
         self.limits = [{name: row[name] for name in _LIMITS} for row in joints]
         self._pulse_us = head["pulse_ticks"] // (TICK_HZ // 1000000) + _PULSE_SPARE_US
         self._epoch = 0
         self._low = 0
-        self._watched = 0
+        self._watched = self._chore = 0
         self._homing = False
         self._brake_ticks = 0
         self._braked = self._end_moves = False
@@ -126,7 +131,7 @@ class Engine:
         for number, joint in enumerate(self._joints):
             if not self.known >> number & 1:
                 return codes.UNHOMED, number, 0
-            off = ends.start_offset(motion, number, joint.position())
+            off = ends.start_offset(motion, number, joint.position(joint.ring.matches()))
             if off:
                 return codes.WRONG_START, number, off
         return None
@@ -179,9 +184,12 @@ class Engine:
             return
         if not self._serve():
             return
-        self._inputs.poll()
-        self._follow()
-        if self._sampler.overdue(self._watched):
+        self._chore = self._chore + 1 if self._chore < 2 else 0
+        if self._chore == 0:
+            self._inputs.poll()
+        elif self._chore == 1:
+            self._follow()
+        elif self._sampler.overdue(self._watched):
             self._block[access.LATE] = 1
         if self._block[access.LATE]:
             self._fail(codes.INTERNAL, NO_JOINT)
@@ -195,11 +203,18 @@ class Engine:
         if self._end_moves and self._sampler.quiet():
             self._sampler.end_at(self.duration_ticks)
             self._end_moves = False
-        for number in range(len(self._joints)):
-            fault = self._joints[number].serve(now_k)
-            if fault:
-                self._fail(fault, number)
-                return False
+        for _ in range(_ROUNDS):
+            hungry = False
+            for number in range(len(self._joints)):
+                joint = self._joints[number]
+                fault = joint.serve(now_k)
+                if fault:
+                    self._fail(fault, number)
+                    return False
+                hungry = hungry or joint.hungry
+            if not hungry:
+                break
+            now_k = self._clock()
         return True
 
     def _over(self) -> bool:
@@ -213,11 +228,14 @@ class Engine:
         number = self._watched
         self._watched = (number + 1) % len(self._joints)
         joint = self._joints[number]
-        if not self._following[number].limit or joint.ring.left() < 0:
+        if not self._following[number].limit:
+            return
+        matches = joint.ring.matches()
+        if self._sampler.waits():  # a sample may be older than these matches, and comes first
             return
         encoder = self._encoders[number]
         encoder.update()
-        if self._following[number].lost(joint.position(), encoder.counts):
+        if self._following[number].lost(joint.position(matches), encoder.counts):
             self.known &= ~(1 << number)
             self._fail(codes.FOLLOWING, number)
 
@@ -260,7 +278,7 @@ class Engine:
         self._braked = self._end_moves = True
         self.duration_ticks = self._end_ticks = start_ticks + self._brake_ticks
         for joint in self._joints:
-            joint.walker.brake(start_ticks, self._brake_ticks)
+            joint.brake(start_ticks, self._brake_ticks)
             if not self._serve():
                 break
 
@@ -280,7 +298,6 @@ class Engine:
         self._readings.convert(self._epoch, self._low)
         high = self._block[access.HIGH]
         for number, joint in enumerate(self._joints):
-            joint.ring.left()
             joint.settle(high >> number & 1)
         self._sampler.take_now()
         self._readings.convert(self._epoch, self._low)
@@ -307,6 +324,7 @@ class Engine:
         self.finished = True
 
     def _stop_counters(self) -> None:
+        mem32[stm.TIM6] = 0
         mem32[stm.TIM2 + 4 * access.DIER] = 0
         mem32[stm.TIM2 + 4 * access.CR1] = 0
         mem32[stm.TIM5 + 4 * access.CR1] = 0
@@ -329,9 +347,11 @@ class Engine:
 
     def commanded(self, joint: int) -> int:
         """Steps issued so far, as a position."""
-        while self._joints[joint].ring.left() < 0:
-            self._readings.convert(self._epoch, self._low)
-        return self._joints[joint].position()
+        while True:
+            matches = self._joints[joint].ring.matches()
+            if not self._sampler.waits():
+                return self._joints[joint].position(matches)
+            self._readings.convert(self._epoch, self._low)  # samples come first: they may be older
 
     def next_sample(self, buffer: "array[int]") -> bool:
         """Copy the oldest sample to ``buffer``: ticks (low, high), commanded[], counts[]; False: none."""

@@ -9,7 +9,7 @@ import time
 from armtempo_shared.messages import MAX_PAYLOAD, OVERHEAD, SYNC
 from micropython import const
 
-from armtempo_board.octets import TABLE, copy, places, sealed
+from armtempo_board.octets import CHECK, TABLE, copy, places, seal
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ class FrameReader:
 
     def _accept(self) -> bool:
         length = self.data[1] | self.data[2] << 8
-        if length <= MAX_PAYLOAD and sealed(TABLE, self.data, 1, length + _HEAD):
+        if length <= MAX_PAYLOAD and seal(TABLE, self.data, 1 | (length + _HEAD) << 15, CHECK):
             self._whole = length + OVERHEAD
             self._skipping = False
             return True

@@ -28,7 +28,7 @@ class Inputs:
     def __init__(self, head: "dict[str, int]", joints: "list[dict[str, int]]", sampler: Sampler) -> None:
         from armtempo_shared import armrecord  # here, so that they can be forgotten
 
-        from armtempo_board import pins, registers
+        from armtempo_board import pins
 
         flags = head["flags"]
         self._block = sampler.block
@@ -45,7 +45,6 @@ class Inputs:
             self._estop_level = 1 if flags & armrecord.FLAG_ESTOP_ACTIVE_HIGH else 0
             self._estop = self._hook(pins.ESTOP, self._estop_level, self._on_estop)  # type: ignore[arg-type]
         self._add_limits(joints, armrecord.NONE)
-        registers.apply(registers.PRIORITIES)
 
     def _hook(self, name: str, level: int, callback: "Callable[[int], None]") -> Pin:
         mode = ExtInt.IRQ_RISING if level else ExtInt.IRQ_FALLING
@@ -102,7 +101,8 @@ class Inputs:
         """As the E-stop's interrupt does."""
         self._on_estop(None)
 
-    def freeze(self) -> None:
+    @micropython.viper
+    def freeze(self) -> object:
         """Stop all outputs now."""
         before = disable_irq()
         self._freeze()

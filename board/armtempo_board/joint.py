@@ -1,4 +1,7 @@
-"""One joint of a motion: from its walker to its ring, its DIR pin, and the count of what has been stepped."""
+"""One joint of a motion: its walker and its ring, its DIR pin, and the count of what has been stepped.
+
+The walker puts steps into its queue, from where an interrupt (feeder.py) writes them to the ring.
+"""
 
 from array import array
 
@@ -16,10 +19,10 @@ from armtempo_board.walker import Walker
 LOOKAHEAD_K = const(4096)
 """How far ahead steps are computed, in 1024 ticks: 50 ms. Braking begins behind what is computed."""
 
-_PLENTY_K = const(3072)  # 37 ms: so far ahead nothing is added, as a few steps cost nearly what many do
-_GUARD_K = const(16)  # 195 us: entries are only added behind a rising edge that is further away
-_NEARLY_DRY_K = const(512)  # 6 ms: filling may take as long as what is left;
-_GAP_K = const(1024)  # 12 ms: where nothing comes for so long, the ring is better filled afresh
+_GUARD_K = const(16)  # 195 us: turns of DIR are only queued behind an edge that is further away
+_DEAD_K = const(-164)  # 2 ms ago
+_ENOUGH_K = const(256)  # 3 ms
+_NEVER_K = const(1 << 29)
 _TURN_SLACK = const(8400)  # 100 us: how late the interrupt that turns DIR may come
 _TURNS = const(8)
 
@@ -31,14 +34,12 @@ class Joint:
         from armtempo_board import pins  # here, so that it can be forgotten
 
         self._sampler = sampler
-        self._block = sampler.block
+        self.block = sampler.block
         self._at = sampler.joint_at(number)
-        self.ring = Ring(row["channel"], self._block, self._at, size(row["max_rate"]))
+        self.ring = Ring(row["channel"], self.block, self._at, size(row["max_rate"]))
         self.walker = Walker()
-        self._plenty = self.ring.entries * 3 // 4
         self._inverted = row["dir_inverted"]
         self._pulse = head["pulse_ticks"]
-        self._pulse_k = (self._pulse >> 10) + 1
         self._turn_delay = head["dir_hold_ticks"] + _TURN_SLACK
         self.gap_ticks = max(
             self._pulse + self._turn_delay + _TURN_SLACK + head["dir_setup_ticks"],
@@ -46,14 +47,16 @@ class Joint:
         )
         name = pins.STEP[row["channel"]][6]
         self._dir = Pin(name, Pin.OUT_PP, value=0)
-        self._block[self._at + access.DIR_BIT] = 1 << int(name[1:])
-        self._block[access.PULSE] = self._pulse
-        self._block[access.SLACK] = _TURN_SLACK
-        self._block[access.SETUP] = head["dir_setup_ticks"]
+        self.block[self._at + access.DIR_BIT] = 1 << int(name[1:])
+        self.block[access.PULSE] = self._pulse
+        self.block[access.SLACK] = _TURN_SLACK
+        self.block[access.SETUP] = head["dir_setup_ticks"]
         self._turn_steps = array("i", [0] * _TURNS)
         self._direction = 1
         self._reset(0)
         self.over = True
+        self.hungry = False  # more could be put into the queue at once
+        self._enough_k = 0
 
     def _reset(self, position: int) -> None:
         """Count from here: the ring begins anew."""
@@ -71,10 +74,11 @@ class Joint:
         self.ring.stop()
         self._reset(position)
         self.over = False
+        self._enough_k = -LOOKAHEAD_K  # nothing is to be done before
 
-    def position(self) -> int:
-        """Commanded steps as the ring's count has them."""
-        steps = self.ring.steps()
+    def position(self, matches: int) -> int:
+        """Commanded steps after so many matches of the ring; readings come in their order."""
+        steps = (matches + 1) >> 1
         while self._turns_out != self._turns_in:
             turned = self._turn_steps[self._turns_out & (_TURNS - 1)]
             if turned > steps:
@@ -87,49 +91,30 @@ class Joint:
 
     def written_k(self) -> int:
         """How far ahead steps are in the ring, in 1024 ticks, rounded up."""
-        return self.ring.last_k() + 1 if self.ring.left() > 0 else 0
+        return self.ring.last_k() + 1 if self.ring.fed() else 0
 
     def serve(self, now_k: int) -> int:
-        """Keep the ring filled; code of a fault, or 0."""
-        ring = self.ring
-        left = ring.left()
-        if left > 0:
-            if left > self._plenty or ring.last_k() > _PLENTY_K:
-                return 0
-            if not self.walker.ended and ring.room(left) >= 2 and self._still_ahead():
-                return self._extend(now_k, left)
-        elif left == 0:
-            if not self.walker.ended:
-                return self._restart(now_k) if self._sampler.quiet() else 0
-            if not self.over:
-                ring.release()
-                self.over = True
-        return 0
-
-    def _still_ahead(self) -> bool:
-        return self.ring.last_k() - self._pulse_k > _GUARD_K
-
-    def _extend(self, now_k: int, left: int) -> int:
-        ring = self.ring
-        room = ring.room(left)
-        if self.walker.at_turn and not self._turn():
+        """Keep the queue filled; code of a fault, or 0."""
+        self.hungry = False
+        if now_k < self._enough_k:
             return 0
-        if ring.last_k() < _NEARLY_DRY_K and self.walker.next_1024() - now_k > _GAP_K:
-            return 0
-        made = ring.made()
-        count = self.walker.fill(ring.words, ring.entries - 1, made, room, now_k + LOOKAHEAD_K)
-        if count:
-            late = ring.last_k() < self._pulse_k
-            ring.seal(count)
-            if late:
-                return codes.UNDERRUN
-        return 0
+        walker = self.walker
+        until_k = now_k + LOOKAHEAD_K
+        self.hungry = walker.prepare(until_k)
+        if not self.ring.fed():
+            return self._dry(now_k) if self._sampler.quiet() else 0
+        ahead_k = self.ring.last_k()
+        if walker.at_turn and not walker.waits() and ahead_k > _GUARD_K and self._turn():
+            self.hungry = True
+        elif walker.latest_k() > until_k:
+            self._enough_k = now_k + _ENOUGH_K
+        return codes.INTERNAL if ahead_k < _DEAD_K else 0
 
     def _turn(self) -> bool:
         """Queue the turn of DIR that the walker stands at; False while the queue is full."""
         if self._turns_in - self._turns_out >= _TURNS:
             return False
-        if not access.add_turn(self._block, self.ring.state, self._at, self._turn_delay):
+        if not access.add_turn(self.block, self.ring.state, self._at, self._turn_delay):
             return False
         self._turn_steps[self._turns_in & (_TURNS - 1)] = self.ring.made() >> 1
         self._turns_in += 1
@@ -137,27 +122,39 @@ class Joint:
         access.call_soon(stm.TIM2)
         return True
 
-    def _restart(self, now_k: int) -> int:
-        """Fill a ring that ran dry from its start, once steps come near."""
+    def _dry(self, now_k: int) -> int:
+        """Fill a ring that has run dry from its start, once steps come near."""
         ring = self.ring
-        if self.walker.at_turn:
-            ring.mark_now()
-            if not self._turn():
-                return 0
-        if self.walker.next_1024() - now_k > LOOKAHEAD_K:
+        walker = self.walker
+        if not walker.waits():
+            if walker.ended:
+                ring.release()
+                self.over = True
+                self._enough_k = _NEVER_K
+            elif walker.at_turn:
+                ring.mark_now()
+                self._turn()
+            return 0
+        if walker.next_1024() - now_k > LOOKAHEAD_K:
             ring.push_away()
+            self._enough_k = now_k + _ENOUGH_K
             return 0
         if ring.made():
             self._rewind()
-        count = self.walker.fill(ring.words, ring.entries - 1, 0, ring.room(0), now_k + LOOKAHEAD_K)
-        if not count:
+        if not walker.write(ring.words, ring.entries - 1, 0, ring.room()):
             return 0
-        ring.seal(count)
-        return 0 if ring.run() else codes.UNDERRUN
+        return codes.UNDERRUN if ring.run(walker.state) else 0
+
+    def brake(self, start_ticks: int, length_ticks: int) -> None:
+        """Come to rest along the path (see ``Walker.brake``)."""
+        fed = self.ring.feed(0)
+        self.walker.brake(start_ticks, length_ticks)
+        self._enough_k = -LOOKAHEAD_K
+        self.ring.feed(fed)
 
     def _rewind(self) -> None:
         """Empty the ring; the position stays."""
-        self._reset(self.position())
+        self._reset(self.position(self.ring.matches()))
         self.ring.stop()
 
     def settle(self, high: int) -> None:
@@ -165,8 +162,9 @@ class Joint:
 
         A rising edge that came after the last word from DMA is not in the ring's count, but the pin shows it.
         """
-        if high and self.ring.settled_low():
-            self.position()
+        matches = self.ring.matches()
+        if high and matches & 1 == 0:
+            self.position(matches)
             self._base += self._direction
         self.ring.release()
         self.over = True

@@ -102,7 +102,7 @@ class Link:
 
     def _finish(self, buffer: bytearray, start: int, sequence: int, number: int, size: int) -> int:
         pack_into("<BHBB", buffer, start, SYNC, size, sequence, number)
-        seal(TABLE, buffer, start + 1, start + PAYLOAD + size)
+        seal(TABLE, buffer, start + 1 | (start + PAYLOAD + size) << 15, 0)
         return size + OVERHEAD
 
     def _fits(self, size: int) -> bool:

@@ -3,63 +3,49 @@
 from array import array
 
 import micropython
+from micropython import const
 
 
 def _nibble_table() -> array:
-    """crc32 (IEEE, reflected) of the 16 nibbles, each as low and high half word."""
-    table = array("H", [0] * 32)
+    """crc32 (IEEE, reflected) of the 16 nibbles, and what a crc begins with."""
+    table = array("I", [0] * 16 + [0xFFFFFFFF])
     for nibble in range(16):
         crc = nibble
         for _ in range(4):
             crc = (crc >> 1) ^ (0xEDB88320 if crc & 1 else 0)
-        table[2 * nibble] = crc & 0xFFFF
-        table[2 * nibble + 1] = crc >> 16
+        table[nibble] = crc
     return table
 
 
 TABLE = _nibble_table()
-"""First argument of ``seal`` and ``sealed``."""
-
-
-# The crc is kept in two half words, so that no word needs more than 31 bits on any interpreter.
-@micropython.viper
-def seal(table: ptr16, data: ptr8, start: int, end: int) -> object:
-    """Write the crc32 of data[start:end] behind it, little endian."""
-    low = 0xFFFF
-    high = 0xFFFF
-    at = start
-    while at < end:
-        low ^= data[at]
-        for _ in range(2):
-            entry = (low & 15) << 1
-            low = ((low >> 4) | ((high & 15) << 12)) ^ table[entry]
-            high = (high >> 4) ^ table[entry + 1]
-        at += 1
-    low ^= 0xFFFF
-    high ^= 0xFFFF
-    data[end] = low & 0xFF
-    data[end + 1] = low >> 8
-    data[end + 2] = high & 0xFF
-    data[end + 3] = high >> 8
+"""First argument of ``seal``."""
+CHECK = const(4)
+"""Last argument of ``seal`` that has it look only."""
 
 
 @micropython.viper
-def sealed(table: ptr16, data: ptr8, start: int, end: int) -> int:
-    """1 where the four bytes behind data[start:end] are its crc32, else 0."""
-    low = 0xFFFF
-    high = 0xFFFF
-    at = start
+def seal(table: ptr32, data: ptr8, places: int, there: int) -> int:
+    """Write the crc32 of data[start:end] behind it, little endian; ``places`` = start | end << 15, ``there`` = 0.
+
+    CHECK: the four bytes behind data[start:end] stay; 1 where they are its crc32, else 0.
+    """
+    at = places & 0x7FFF
+    end = (places >> 15) + there
+    crc = uint(table[16])
     while at < end:
-        low ^= data[at]
-        for _ in range(2):
-            entry = (low & 15) << 1
-            low = ((low >> 4) | ((high & 15) << 12)) ^ table[entry]
-            high = (high >> 4) ^ table[entry + 1]
+        crc ^= data[at]
+        crc = uint((crc >> 4) ^ table[crc & 15])
+        crc = uint((crc >> 4) ^ table[crc & 15])
         at += 1
-    low ^= 0xFFFF
-    high ^= 0xFFFF
-    wrong = (low ^ (data[end] | (data[end + 1] << 8))) | (high ^ (data[end + 2] | (data[end + 3] << 8)))
-    return 1 if wrong == 0 else 0
+    crc ^= uint(table[16])
+    # the crc of anything with its crc behind it
+    good = 1 if int(crc) == 0x2144DF1C else 0
+    while there < CHECK:
+        data[at] = crc
+        crc >>= 8
+        at += 1
+        there += 1
+    return good
 
 
 @micropython.viper
@@ -97,15 +83,20 @@ def spread(target: ptr8, raw: ptr8, places: int, joints: int) -> object:
     ``places``: index of the ticks in target | index of the joints' pairs (commanded, count) << 15.
     """
     to = places & 0x7FFF
-    for i in range(8):
-        target[to + i] = raw[i]
+    at = 0
+    while at < 8:
+        target[to + at] = raw[at]
+        at += 1
     to = places >> 15
-    counts = 8 + 4 * joints
-    for at in range(8, counts, 4):
-        for i in range(4):
-            target[to + i] = raw[at + i]
-            target[to + 4 + i] = raw[at + 4 * joints + i]
-        to += 8
+    joints <<= 2
+    end = at + joints
+    while at < end:
+        target[to] = raw[at]
+        target[to + 4] = raw[at + joints]
+        to += 1
+        at += 1
+        if not at & 3:
+            to += 4
 
 
 def places(to: int, at: int) -> int:

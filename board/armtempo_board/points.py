@@ -37,37 +37,43 @@ def load(data: ptr32, offset: int, weights: ptr8, piece: ptr32) -> object:
     Rounded to the last bit. The control points may differ by 2**24 in their high words (16 million steps; 818 s).
     Twelve words behind the piece are overwritten.
     """
-    count = int(weights[0]) + 12
-    i = 12
-    while i < count:
+    points = ptr32(int(piece) + 48)
+    here = points
+    i = int(weights[0])
+    while i:
+        i -= 1
         low = data[offset]
-        piece[i] = (((data[offset + 1] & _QUARTER) << 4) | ((low >> 28) & 15)) ^ _BIAS
-        piece[i + 6] = low & _LOW
-        i += 1
+        here[0] = (((data[offset + 1] & _QUARTER) << 4) | ((low >> 28) & 15)) ^ _BIAS
+        here[6] = low & _LOW
+        here = ptr32(int(here) + 4)
         offset += 2
-    at = 1
-    i = 0
-    while i < 6:
+    first = piece[12]
+    offset = 1
+    i = 6
+    while i:
+        i -= 1
         high = 0
         middle = 0
         low = 60
-        j = 12
-        while j < count:
-            weight = int(weights[at])
-            high += (piece[j] - piece[12]) * weight
-            rest = piece[j + 6]
+        here = points
+        j = int(weights[0])
+        while j:
+            j -= 1
+            weight = int(weights[offset])
+            high += (here[0] - first) * weight
+            rest = here[6]
             middle += (rest >> 14) * weight
             low += (rest & _HALF_LOW) * weight
-            at += 1
-            j += 1
+            offset += 1
+            here = ptr32(int(here) + 4)
         middle += low >> 14
         high += middle >> 14
         rest = ((high % 120) << 14) + (middle & _HALF_LOW)
         low = ((rest % 120) << 14) + (low & _HALF_LOW)
         low = ((rest // 120) << 14) + low // 120
-        piece[i] = (low >> 28) + high // 120 + piece[12]
-        piece[i + 6] = low & _LOW
-        i += 1
+        piece[0] = (low >> 28) + high // 120 + first
+        piece[6] = low & _LOW
+        piece = ptr32(int(piece) + 4)
 
 
 @micropython.viper

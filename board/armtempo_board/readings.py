@@ -63,10 +63,9 @@ class Readings:
             access.copy_word(raw, at, words, to)
         for number in range(len(self._joints)):
             joint = self._joints[number]
-            joint.ring.left_at(raw[at + 1 + number])
             encoder = self._encoders[number]
             encoder.take(raw[at + self._slots[number]])
-            words[to + 2 + number] = joint.position()
+            words[to + 2 + number] = joint.position(raw[at + 1 + number])
             words[to + 2 + len(self._joints) + number] = encoder.counts
 
     def next(self, buffer: "array[int]") -> bool:

@@ -60,6 +60,7 @@ TIMERS = (
 PRIORITIES = (
     # with 4 bits of priority, 13 is TIM2's and 14 what MicroPython gives external interrupts
     ("NVIC_IPR", 5, 0xFF << 24, 12 << 28),  # PM0214 4.3.7: EXTI9_5 (limit switches) above TIM2
+    ("NVIC_IPR", 13, 0xFF << 16, 14 << 20),  # PM0214 4.3.7: TIM6 (rings are filled) below TIM2
     ("NVIC_IPR", 10, 0xFF, 12 << 4),  # PM0214 4.3.7: EXTI15_10 (E-stop, limit switch) above TIM2
 )
 _NVIC_IPR = 0xE000E400  # not in MicroPython's table of addresses

@@ -2,8 +2,8 @@
 
 The stream fetches one word ahead of the match that asks for it (RM0090 10.3.12), so what stands in the
 compare register and the word behind it are settled; only later words may still be written. Therefore new
-entries are added while the last rising edge is still well ahead, and an output that has run dry is started
-afresh.
+entries are added while the last rising edge is still well ahead (see feeder.py), and an output that has run dry is
+started afresh.
 """
 
 from array import array
@@ -16,17 +16,16 @@ from pyb import Pin
 
 from armtempo_board import access
 
-_SPARE = const(8)  # entries behind the matched one that stay readable, and the far-away entry
-_LASTS_MS = const(15)
+_LASTS_MS = const(4)
 _LEAST, _MOST = const(64), const(1024)
 
 
 def size(rate: int) -> int:
-    """Entries for a joint of at most ``rate`` steps/s: a power of two; full they last 15 ms, if 1024 can.
+    """Entries for a joint of at most ``rate`` steps/s: a power of two; full they last 4 ms, if 1024 can.
 
-    The main loop must come back to a ring before that, less the 195 us in which nothing is added.
+    The interrupt that fills it comes every 0.5 ms; nothing is added in the last 390 us.
     """
-    wanted = 2 * rate * _LASTS_MS // 1000 + _SPARE
+    wanted = 2 * rate * _LASTS_MS // 1000 + access.SPARE
     entries = _LEAST
     while entries < min(wanted, _MOST):
         entries *= 2
@@ -45,7 +44,7 @@ class Ring:
         pin, timer, compare, alternate, stream, dma_channel, _ = pins.STEP[channel]
         self.entries = entries
         self.words = array("I", bytearray(4 * entries + 4))
-        self.state = array("I", bytearray(4 * access.STATE_WORDS))
+        self.state = memoryview(block)[at + access.RING : at + access.RING + access.STATE_WORDS]
         self.state[access.MASK] = entries - 1
         self._fed = memoryview(self.words)[1:]  # what the stream runs over
         self._block = block
@@ -60,11 +59,12 @@ class Ring:
         address = registers.compare_address(timer, compare)
         registers.apply(registers.stream_rows(stream, dma_channel, address, uctypes.addressof(self._fed)))
         self._describe(pin, timer, compare)
+        self.stop()
         Pin(pin, Pin.AF_PP, alt=alternate)
 
     def _describe(self, pin: str, timer: int, compare: int) -> None:
         block, at = self._block, self._at
-        block[at + access.NDTR_AT] = (self._ndtr - stm.DMA1) // 4
+        self.state[access.NDTR_AT] = (self._ndtr - stm.DMA1) // 4
         block[at + access.ON_TIM5] = timer == 5
         block[at + access.CCR_AT] = self._compare
         block[at + access.CCMR_AT] = access.CCMR1 + (compare - 1) // 2
@@ -72,56 +72,57 @@ class Ring:
         block[at + access.ON_PORT_B] = pin[0] == "B"
         block[at + access.PIN_BIT] = int(pin[1:])
 
-    def left(self) -> int:
-        """Entries that have not matched yet; -1 while a raw sample waits to be converted."""
-        ndtr = access.read_ndtr(self._registers, self._block)
-        return ndtr if ndtr < 0 else access.advance(self.state, ndtr)
+    def matches(self) -> int:
+        """Entries that have matched since the stream was started."""
+        return access.matches(self.state, stm.DMA1)
 
-    def left_at(self, ndtr: int) -> int:
-        """Entries that had not matched yet when NDTR was read; readings come in their order."""
-        return access.advance(self.state, ndtr)
-
-    def room(self, left: int) -> int:
-        """Entries that may be added."""
-        return self.entries - _SPARE - left
+    def room(self) -> int:
+        """Entries of an empty ring."""
+        return self.entries - access.SPARE
 
     def made(self) -> int:
         """Entries written since the stream was started."""
         return self.state[access.MADE]
 
-    def steps(self) -> int:
-        """Rising edges that have matched since the stream was started."""
-        return (self.state[access.LOADS] + 1) >> 1
+    def fed(self) -> int:
+        """Whether the interrupt writes to the ring; it ends that where the ring has run dry."""
+        return self.state[access.FED]
 
-    def settled_low(self) -> bool:
-        """Whether STEP is low after the matches that were counted."""
-        return self.state[access.LOADS] & 1 == 0
+    def feed(self, on: int) -> int:
+        """Let the interrupt write to the ring, or not; returns what was."""
+        before = self.state[access.FED]
+        self.state[access.FED] = on
+        if on:
+            mem32[stm.TIM6] = 1  # CR1: it stops while no ring is fed
+        return before
 
     def last_k(self) -> int:
         """Units of 1024 ticks from now to the last entry."""
         return access.until_k(self.timer, self.state, access.LAST)
-
-    def seal(self, count: int) -> None:
-        """Take ``count`` entries in that were written behind the last."""
-        access.seal(self.state, self.words, count)
 
     def stop(self) -> None:
         """Switch the stream off, ready to be filled from entry 0."""
         mem32[self._registers] = self._mode
         mem32[self._flags] = self._all_flags
         mem32[self._ndtr] = self.entries
+        self.state[access.FED] = 0
         self.state[access.MADE] = 0
         self.state[access.LOADS] = 0
         self.state[access.FIRST] = self.entries
 
-    def run(self) -> int:
-        """Switch the stream on and let the output toggle; False where its first entry came too late."""
+    def run(self, queue: "array[int]") -> int:
+        """Take in what was written from entry 0 on, switch the stream on and let the output toggle.
+
+        1 where the first entry came too late. ``queue``: see stretch.py.
+        """
+        access.written(self.state, self.words, self.timer, queue)
         mem32[self._registers] = self._mode | access.STREAM_ON
         self.state[access.FIRST] = mem32[self._ndtr] & 0xFFFF
         before = disable_irq()
-        in_time = access.arm_channel(self._block, self.timer, self.words, self._at)
+        late = access.arm_channel(self._block, self.timer, self.words, self._at)
         enable_irq(before)
-        return in_time
+        self.feed(1)
+        return late
 
     def release(self) -> None:
         """Hold the output low."""

@@ -79,10 +79,14 @@ class Sampler:
         block[access.LEFT] = left
         access.call_soon(self._timer2)
 
+    def waits(self) -> bool:
+        """Whether raw samples are to be converted."""
+        return self.block[access.TAKEN] != self.block[access.READ]
+
     def quiet(self) -> bool:
         """Whether all raw samples are converted and the next is at least 1 ms away."""
         block = self.block
-        if block[access.TAKEN] != block[access.READ]:
+        if self.waits():
             return False
         return block[access.DONE] != 0 or access.until_k(self._timer2, block, access.NEXT) >= _QUIET_K
 
@@ -98,7 +102,7 @@ class Sampler:
 
     def done(self) -> bool:
         """Whether the last sample has been taken and converted."""
-        return self.block[access.DONE] != 0 and self.block[access.TAKEN] == self.block[access.READ]
+        return self.block[access.DONE] != 0 and not self.waits()
 
     def next_raw(self) -> int:
         """Place of the oldest raw sample in ``raw``, or -1; ``drop`` it when it has been converted."""

@@ -1,4 +1,8 @@
-"""A stretch: steps between two nodes, their times by the cubic Hermite polynomial in forward differences."""
+"""A stretch: steps between two nodes, their times by the cubic Hermite polynomial in forward differences.
+
+Stretches that are prepared wait in a queue, which ``emit`` empties into a ring. It may be called by an interrupt: only
+``emit`` changes OUT and what it runs on, only the others change IN, and a stretch is whole before IN counts it.
+"""
 
 import micropython
 from micropython import const
@@ -13,24 +17,35 @@ SHIFT = 5
 _BASE = const(6)  # ticks, modulo 2**32
 _REST = const(7)  # of the time of a group what its steps have left over
 _LEFT = const(8)  # steps left in the group
-GROUP = 9  # steps in a group
+GROUP = 9  # steps in a group; 0: the times themselves stand in words 0 to 7, LEFT is the place of the next
 CARRY = 10  # REST / 2**CARRY is in units of TIME
 STEPS = 11  # steps of the stretch not written yet
-BASE_1024 = 12  # base in 1024 ticks
+_BASE_1024 = const(12)  # base in 1024 ticks
 UNTIL_1024 = 13  # steps after it are not written
 # what the stretch is made from
 TIME_SCALE = 14  # fraction bits of the nodes' times
 BASE_HIGH = 15  # what the nodes' times count from: 4096 ticks, + 2**28
-# the stretch behind it: its words 0 to 12
-NEXT = 16
-NEXT_STEPS = 27
-PULSE = 29  # ticks
-_STEP = const(30)  # time of one step of the group, ticks * 2**SHIFT
-LAST_1024 = 31  # time of the step written last, 1024 ticks
-# what ``emit`` is told
-HEAD = 32  # entry to be written next; not masked
-ROOM = 33  # entries that may be written
-STATE_SIZE = 34
+_STEP = const(16)  # time of one step of the group, ticks * 2**SHIFT
+PULSE = 17  # ticks
+HEAD = 18  # entry to be written next; not masked
+_ROOM = const(19)  # entries that may be written
+# the queue: stretches that were put in and taken out, modulo 2**16
+IN = 20
+OUT = 21
+LATEST_1024 = 22  # time of the last step put in, 1024 ticks
+# the cell that is gone through (see traverse.py)
+AT = 23  # step reached in it
+LAST = 24  # its last one
+SIZE = 25  # steps of a stretch that were possible
+SLOW = 26  # ticks: a last step that takes longer is held back
+HIGH = 27  # what the cell's times count from: 4096 ticks, + 2**28
+MODE = 28
+SINGLY = 29  # steps to be solved one by one before a stretch is tried
+HELD = 30
+ENDED = 31
+_QUEUE = const(32)  # eight times words 0 to 12
+QUEUE_ROOM = 8
+STATE_SIZE = 32 + 13 * 8
 
 REJECTED = 0
 ACCEPTED = 1
@@ -43,69 +58,89 @@ _LONG = const(1 << 19)  # 1024 ticks: longer than any stretch
 
 
 @micropython.viper
-def emit(now: int, ring: ptr32, state: ptr32, mask: int) -> int:
-    """Write edges of the prepared stretches to the ring; 1 where it could go on if there were more of them.
+def emit(now: int, ring: ptr32, state: ptr32, mask: int) -> object:
+    """Write edges of the stretches in the queue to the ring, up to UNTIL_1024 and as many as ``now`` says.
 
     The compiler keeps the first two arguments in registers: ``now`` becomes the running time, and ``ring`` moves.
     """
     start = int(ring)
-    pulse = state[29]
+    pulse = state[17]
+    state[19] = now
     while True:
-        if state[33] < 2:
-            return 0
-        if state[11] == 0:
-            if state[27] == 0:
-                return 1
+        if state[19] < 2:
+            break
+        if not state[11]:
+            count = state[21]
+            if count == state[20]:
+                break
+            ring = ptr32(int(state) + 4 * (32 + 13 * (count & 7)))
             n = 0
             while n < 13:
-                state[n] = state[n + 16]
+                state[n] = ring[n]
                 n += 1
-            state[27] = 0
+            state[21] = (count + 1) & 0xFFFF
+        at = state[18] & mask
+        if not state[9]:
+            now = state[state[8]]
+            if state[12] + (((now - state[0]) >> 10) & 0x3FFFFF) > state[13]:
+                break
+            ring = ptr32(start + 4 * at)
+            ring[0] = now
+            ring[1] = now + pulse
+            state[8] = state[8] + 1
+            state[11] = state[11] - 1
+            state[18] = state[18] + 2
+            state[19] = state[19] - 2
+            continue
         now = state[0]
         shift = state[5]
-        at = state[32] & mask
         count = (mask + 1 - at) >> 1
-        n = state[33] >> 1
+        n = state[19] >> 1
         if count > n:
             count = n
         if count > state[11]:
             count = state[11]
         n = state[13] - state[12]
         if n < _LONG:
-            step = state[30]
-            if state[8] == 0:
+            step = state[16]
+            if not state[8]:
                 step = state[1] >> state[4]
             n = (n << 10) - ((now + step) >> shift)
             if n < 0:
-                return 0
+                break
             n = n // ((step >> shift) + 1) + 1
             if count > n:
                 count = n
-        if count == 0:
-            return 0
+        if not count:
+            break
         state[11] = state[11] - count
-        state[32] = state[32] + count + count
-        state[33] = state[33] - count - count
+        state[18] = state[18] + count + count
+        state[19] = state[19] - count - count
         ring = ptr32(start + 4 * at)
         base = state[6]
-        while count > 0:
-            left = state[8]
-            if left == 0:
+        # in locals, which are quicker to come by
+        first = state[1]
+        second = state[2] - _BIAS
+        third = state[3] - _BIAS
+        power = state[4]
+        rest = state[7]
+        left = state[8]
+        carry = state[10]
+        step = state[16]
+        while count:
+            if not left:
                 left = state[9]
-                first = state[1]
-                second = state[2]
-                step = first >> state[4]
-                state[30] = step
-                n = state[7] + first - (step << state[4])
-                now += n >> state[10]
-                state[7] = n & ((1 << state[10]) - 1)
-                state[1] = first + second - _BIAS
-                state[2] = second + state[3] - _BIAS
-            step = state[30]
+                step = first >> power
+                rest += first - (step << power)
+                n = rest >> carry
+                rest -= n << carry
+                now += n
+                first += second
+                second += third
             n = count
             if n > left:
                 n = left
-            state[8] = left - n
+            left -= n
             count -= n
             while n >= 4:
                 now = now + step
@@ -122,49 +157,98 @@ def emit(now: int, ring: ptr32, state: ptr32, mask: int) -> int:
                 ring[7] = ring[6] + pulse
                 ring = ptr32(int(ring) + 32)
                 n -= 4
-            while n > 0:
+            if n > 1:
+                now = now + step
+                ring[0] = (now >> shift) + base
+                ring[1] = ring[0] + pulse
+                now = now + step
+                ring[2] = (now >> shift) + base
+                ring[3] = ring[2] + pulse
+                ring = ptr32(int(ring) + 16)
+                n -= 2
+            if n:
                 now = now + step
                 ring[0] = (now >> shift) + base
                 ring[1] = ring[0] + pulse
                 ring = ptr32(int(ring) + 8)
-                n -= 1
         state[0] = now
-        state[31] = state[12] + (now >> (shift + 10))
+        state[1] = first
+        state[2] = second + _BIAS
+        state[7] = rest
+        state[8] = left
+        state[16] = step
 
 
 @micropython.viper
-def single(state: ptr32, to: int, high: int, ticks: int) -> object:
-    """Prepare one step at ``high`` (4096 ticks, + 2**28) and ``ticks``: as the stretch at ``state[to]``, 0 or NEXT."""
-    out = ptr32(int(state) + 4 * to)
-    out[0] = 0
-    out[1] = 0
-    out[2] = _BIAS
-    out[3] = _BIAS
-    out[4] = 0
-    out[5] = 0
+def single(state: ptr32, high: int, ticks: int) -> object:
+    """Put one step at ``high`` (4096 ticks, + 2**28) and ``ticks`` into the queue."""
+    given = state[20]
+    out = ptr32(int(state) + 4 * (32 + 13 * (given & 7)))
     high -= _HIGH_BIAS
-    out[6] = (high << 12) + ticks
-    out[7] = 0
+    out[0] = (high << 12) + ticks
     out[8] = 0
-    out[9] = 1
-    out[10] = 0
+    out[9] = 0
     out[11] = 1
-    out[12] = (high << 2) + (ticks >> 10)
+    high = (high << 2) + (ticks >> 10)
+    out[12] = high
+    state[22] = high
+    state[20] = (given + 1) & 0xFFFF
+
+
+@micropython.viper
+def wanted(state: ptr32) -> int:
+    """1 where the queue has room for two stretches and does not go on beyond UNTIL_1024."""
+    return 1 if ((state[20] - state[21]) & 0xFFFF) < 7 and state[22] <= state[13] else 0
+
+
+@micropython.viper
+def waiting(state: ptr32) -> int:
+    """1 while steps in the queue have not been written."""
+    return 1 if state[11] or state[20] != state[21] else 0
 
 
 @micropython.viper
 def upcoming(state: ptr32) -> int:
-    """Time of the next step of the stretch, in 1024 ticks."""
-    now = state[0]
-    if state[8]:
-        now += state[30]
-    else:
-        now += state[1] >> state[4]
-    return state[12] + (now >> (state[5] + 10))
+    """Time of the next step in the queue, or of the one before it; 1024 ticks. -1: there is none."""
+    if state[11]:
+        now = state[0]
+        if not state[9]:
+            return state[12] + (((state[state[8]] - now) >> 10) & 0x3FFFFF)
+        if state[8]:
+            now += state[16]
+        else:
+            now += state[1] >> state[4]
+        return state[12] + (now >> (state[5] + 10))
+    if state[20] == state[21]:
+        return -1
+    return state[32 + 13 * (state[21] & 7) + 12]
 
 
 @micropython.viper
-def accept(state: ptr32, block: ptr32, steps: int) -> int:
+def withdraw(state: ptr32, first: int, from_1024: int) -> int:
+    """Take out the last stretches down to one that begins before a time; ``emit`` must not run meanwhile.
+
+    None goes that was put in before the ``first``. Returns their steps that were not written.
+    """
+    steps = 0
+    given = state[20]
+    while given != first:
+        if given == state[21]:
+            steps += state[11]
+            state[11] = 0
+            break
+        given = (given - 1) & 0xFFFF
+        place = 32 + 13 * (given & 7)
+        steps += state[place + 11]
+        if state[place + 12] < from_1024:
+            break
+    state[20] = given
+    state[22] = 0
+    return steps
+
+
+@micropython.viper
+def accept(steps: int, block: ptr32, state: ptr32) -> int:
     """Whether two stretches of ``steps`` each, from node A over MIDDLE to B, keep the error bound.
 
     The Hermite cubic through A and B misses MIDDLE by D in time and by E / (4 steps) in slope. Its fourth derivative
@@ -227,8 +311,10 @@ def accept(state: ptr32, block: ptr32, steps: int) -> int:
 
 
 @micropython.viper
-def differences(state: ptr32, block: ptr32, steps: int) -> object:
-    """Prepare the ``steps`` from node A (itself already written) to MIDDLE, and those to B, which becomes A.
+def differences(steps: int, block: ptr32, state: ptr32, held: int) -> object:
+    """Queue the ``steps`` from node A (itself already there) to MIDDLE, and those to B, which becomes A.
+
+    ``held``: 1 where the last of them is left out.
 
     With K = T - N s_a and D = N (s_b - s_a), the cubic is s_a k + (3 K - D) k**2 / N**2 + (D - 2 K) k**3 / N**3.
     Its differences are taken over groups of steps; within a group time grows evenly: groups are as long as
@@ -237,22 +323,23 @@ def differences(state: ptr32, block: ptr32, steps: int) -> object:
     ends and in the middle, the square at both ends: at most 0.004 M**3 and 0.06 M**2 units, for M groups.
     """
     scale = state[14]
-    a = ptr32(int(block) + 112)
-    out = state
+    block = ptr32(int(block) + 112)  # node A, later MIDDLE and B
+    given = state[20]
     while True:
+        out = ptr32(int(state) + 4 * (32 + 13 * (given & 7)))
         power = 0
         while (1 << power) < steps:
             power += 1
-        exponent = a[2]
-        if a[10] < exponent:
-            exponent = a[10]
+        exponent = block[2]
+        if block[10] < exponent:
+            exponent = block[10]
         shift = exponent - power
-        start = a[1] >> (a[2] - exponent)
-        bend = (a[9] >> (a[10] - exponent)) - start
+        start = block[1] >> (block[2] - exponent)
+        bend = (block[9] >> (block[10] - exponent)) - start
         up = 15 - power
         bend = (((bend >> 15) * steps) << up) + (((bend & _LOW) * steps) >> power)
-        time = a[8] - a[0]
-        rest = a[0] & ((1 << scale) - 1)
+        time = block[8] - block[0]
+        rest = block[0] & ((1 << scale) - 1)
         high = shift - scale
         if high >= 0:
             time <<= high
@@ -276,39 +363,30 @@ def differences(state: ptr32, block: ptr32, steps: int) -> object:
         group = 4
         if group > power:
             group = power
-        while group > 0 and (time << (2 * group)) > (3 << shift) >> 2:
+        while group and (time << (2 * group)) > (3 << shift) >> 2:
             group -= 1
         # in units of the differences, with some fraction bits: cubic * 2**(2 group + power) / steps**3
         bits = power
         if bits > 8:
             bits = 8
         up = 2 * group + power + bits
-        time = 0
-        while time < 3:
-            more = 16
-            while more > 0:
-                high = 1 << (29 - more)
-                if up >= more and cubic < high and cubic > 0 - high:
-                    cubic <<= more
-                    up -= more
-                more >>= 1
+        time = 5
+        while time:
+            if time == 2:  # and square * 2**(group + power) / steps**2
+                third = cubic << up
+                cubic = square
+                up = group + power + bits
+            high = cubic
+            if high < 0:
+                high = 0 - high
+            while up and not high >> 28:
+                high += high
+                cubic += cubic
+                up -= 1
             cubic = cubic // steps
-            time += 1
-        cubic <<= up
-        # and square * 2**(group + power) / steps**2
-        up = group + power + bits
-        time = 0
-        while time < 2:
-            more = 16
-            while more > 0:
-                high = 1 << (29 - more)
-                if up >= more and square < high and square > 0 - high:
-                    square <<= more
-                    up -= more
-                more >>= 1
-            square = square // steps
-            time += 1
-        square <<= up
+            time -= 1
+        square = cubic << up
+        cubic = third
         half = (1 << bits) >> 1
         groups = steps >> group
         third = (cubic + half) >> bits
@@ -325,7 +403,7 @@ def differences(state: ptr32, block: ptr32, steps: int) -> object:
         out[4] = power
         out[5] = shift
         high = state[15] - _HIGH_BIAS
-        time = a[0] >> scale
+        time = block[0] >> scale
         out[6] = (high << 12) + time
         out[7] = 0
         out[8] = 0
@@ -333,11 +411,16 @@ def differences(state: ptr32, block: ptr32, steps: int) -> object:
         out[9] = 1 << group
         out[11] = steps
         out[12] = (high << 2) + (time >> 10)
-        a = ptr32(int(a) + 32)
-        if int(out) != int(state):
+        block = ptr32(int(block) + 32)
+        given = (given + 1) & 0xFFFF
+        if given != (state[20] + 1) & 0xFFFF:
             break
-        out = ptr32(int(state) + 64)
-    power = 0
-    while power < 5:
-        block[28 + power] = block[44 + power]
-        power += 1
+    out[11] = steps - held
+    state[22] = (high << 2) + (block[0] >> (scale + 10))
+    state[20] = given
+    out = ptr32(int(block) - 64)
+    out[0] = block[0]
+    out[1] = block[1]
+    out[2] = block[2]
+    out[3] = block[3]
+    out[4] = block[4]

@@ -20,13 +20,13 @@ MAX_SEGMENTS = 512
 MAX_NAME = 24
 """Longest name of a stored trajectory, in bytes; letters, digits, '-', '_'."""
 
-MAX_STEP_RATE = 80_000
+MAX_STEP_RATE = 240_000
 """Highest step rate of one joint, steps/s: what the program's loop keeps up with, not its evaluator alone.
 
-Less than was seen to run on the emulated chip at 2.5 cycles an instruction: board/docs/evaluator.md.
+Seen to run on the emulated chip at 3 cycles an instruction, with one, two and three joints: board/docs/evaluator.md.
 """
 
-MAX_STEP_RATE_SUM = 120_000
+MAX_STEP_RATE_SUM = 240_000
 """Highest sum of the step rates of all joints, steps/s. The same."""
 
 MAX_MOTION_BYTES = 16384

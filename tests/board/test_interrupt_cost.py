@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from array import array
 
 import pytest
@@ -9,35 +10,57 @@ import pytest
 from tests import interpreters
 from tests.benchmark.emulated import Machine
 
-ACCESS = interpreters.ROOT / "board" / "armtempo_board" / "access.py"
-# words of the block and of a joint in it, as access.py has them
-_NEXT, _JOINTS, _HEAD, _JOINT = 0, 14, 19, 18
-_TURNS_IN, _ON_TIM5, _CCR_AT, _CCMR_AT, _TURN_TIMES = 1, 4, 5, 6, 10
-_CNT = 9
+BOARD = interpreters.ROOT / "board" / "armtempo_board"
 
-LIMITS = {1: (254, 487, 187), 3: (354, 687, 287), 6: (504, 987, 446)}
-ARM_CHANNEL = 314
+SERVE = {1: (209, 382), 3: (257, 478), 6: (329, 622)}
+FREEZE = {1: 150, 3: 202, 6: 289}
+TAKE = {1: 198, 3: 278, 6: 398}
+HUNGRY = {1: (208, 255), 3: (360, 501), 6: (588, 870)}
+EMIT = {2: 483, 32: 885, 512: 9255}
+WRITTEN = 193
+ARM_CHANNEL = 228
+
+RING = 1024  # entries
+
+
+def _offsets(module: str) -> dict[str, int]:
+    """The numbers that a board module names."""
+    found = re.findall(
+        r"^([A-Z_]+[A-Z0-9]*) = (?:const\()?(\d+)\b", (BOARD / module).read_text(), re.MULTILINE
+    )
+    return {name: int(number) for name, number in found}
+
+
+AT = _offsets("access.py")
+QUEUE = _offsets("stretch.py")
 
 
 def _words(count: int) -> array[int]:
     return array("I", bytes(4 * count))
 
 
-def _block(joints: int) -> array[int]:
-    block = _words(_HEAD + 6 * _JOINT)
-    block[_JOINTS] = joints
-    block[_NEXT] = 5000
+def _block(joints: int, made: int = 20) -> array[int]:
+    """Joints whose rings are fed; ``made`` entries stand in each."""
+    block = _words(AT["BLOCK_HEAD"] + 6 * AT["JOINT_WORDS"])
+    block[AT["JOINTS"]] = joints
+    block[AT["NEXT"]] = 5000
     for joint in range(joints):
-        at = _HEAD + joint * _JOINT
-        block[at + _CCR_AT] = 13 + joint % 3
-        block[at + _CCMR_AT] = 6
-        block[at + _ON_TIM5] = joint // 3
+        at = AT["BLOCK_HEAD"] + joint * AT["JOINT_WORDS"]
+        block[at + AT["CCR_AT"]] = AT["CCR1"] + joint % 3
+        block[at + AT["CCMR_AT"]] = AT["CCMR1"]
+        block[at + AT["ON_TIM5"]] = joint // 3
+        ring = at + AT["RING"]
+        block[ring + AT["FED"]] = 1
+        block[ring + AT["MADE"]] = made
+        block[ring + AT["FIRST"]] = RING
+        block[ring + AT["MASK"]] = RING - 1
+        block[ring + AT["LAST"]] = 100_000
     return block
 
 
 @pytest.fixture(scope="module")
 def machine() -> Machine:
-    return Machine(ACCESS)
+    return Machine(BOARD / "access.py", BOARD / "stretch.py")
 
 
 def _cost(machine: Machine, name: str, *arguments: array[int] | int) -> int:
@@ -46,19 +69,56 @@ def _cost(machine: Machine, name: str, *arguments: array[int] | int) -> int:
     return machine.count - before
 
 
-@pytest.mark.parametrize("joints", sorted(LIMITS))
-def test_interrupts(machine: Machine, joints: int) -> None:
-    idle, turn, freeze = LIMITS[joints]
+@pytest.mark.parametrize("joints", sorted(SERVE))
+def test_turning_and_stopping(machine: Machine, joints: int) -> None:
+    idle, turn = SERVE[joints]
     block, timer2, timer5, port = _block(joints), _words(18), _words(18), _words(10)
-    timer2[_CNT] = 100
+    timer2[AT["CNT"]] = 100
     assert _cost(machine, "serve", block, timer2, port) <= idle
-    block[_HEAD + _TURN_TIMES] = 100
-    block[_HEAD + _TURNS_IN] = 1
+    block[AT["BLOCK_HEAD"] + AT["DIR_BIT"]] = 128
+    block[AT["BLOCK_HEAD"] + AT["TURN_TIMES"]] = 100
+    block[AT["BLOCK_HEAD"] + AT["TURNS_IN"]] = 1
     assert _cost(machine, "serve", block, timer2, port) <= turn
-    assert _cost(machine, "freeze", block, timer2, timer5) <= freeze
+    assert port[AT["BSRR"]] == 128
+    assert _cost(machine, "freeze", block, timer2, timer5) <= FREEZE[joints]
+
+
+@pytest.mark.parametrize("joints", sorted(TAKE))
+def test_a_sample(machine: Machine, joints: int) -> None:
+    """Without encoders: these come by way of objects."""
+    raw = _words(AT["RAW_ROOM"] * AT["RAW_WORDS"])
+    assert _cost(machine, "take", raw, _block(joints), _words(60), 0) <= TAKE[joints]
+
+
+@pytest.mark.parametrize("joints", sorted(HUNGRY))
+def test_looking_after_the_rings(machine: Machine, joints: int) -> None:
+    """All of them full, and all to be written to."""
+    full, hungry = HUNGRY[joints]
+    dma, timer = _words(60), _words(18)
+    dma[0] = RING
+    assert _cost(machine, "hungry", _block(joints, RING - 8), dma, timer) <= full
+    assert machine.run("hungry", _block(joints, RING - 8), dma, timer) == 0
+    assert _cost(machine, "hungry", _block(joints), dma, timer) <= hungry
+    assert machine.run("hungry", _block(joints), dma, timer) == (1 << joints) - 1
+
+
+@pytest.mark.parametrize("entries", sorted(EMIT))
+def test_writing_to_a_ring(machine: Machine, entries: int) -> None:
+    """Edges of a long stretch in groups of 16 steps."""
+    queue, ring, block = _words(136), _words(RING + 1), _block(1, 0)
+    values = {"FIRST": 252 << 22, "SECOND": 1 << 29, "THIRD": 1 << 29, "POWER": 9, "SHIFT": 13, "GROUP": 16}
+    values |= {"CARRY": 5, "STEPS": 512, "UNTIL_1024": 1 << 28, "PULSE": 168}
+    for name, value in values.items():
+        queue[QUEUE[name]] = value
+    assert _cost(machine, "emit", entries, ring, queue, RING - 1) <= EMIT[entries]
+    assert queue[QUEUE["HEAD"]] == entries
+    at = AT["BLOCK_HEAD"] + AT["RING"]
+    state = block[at : at + AT["STATE_WORDS"]]
+    assert _cost(machine, "written", state, ring, _words(18), queue) <= WRITTEN
+    assert state[AT["MADE"]] == entries
 
 
 def test_arming_a_channel(machine: Machine) -> None:
-    ring = _words(1025)
+    ring = _words(RING + 1)
     ring[0] = 5000
-    assert _cost(machine, "arm_channel", _block(1), _words(18), ring, _HEAD) <= ARM_CHANNEL
+    assert _cost(machine, "arm_channel", _block(1), _words(18), ring, AT["BLOCK_HEAD"]) <= ARM_CHANNEL

@@ -6,7 +6,7 @@ from tests.benchmark import memory
 
 PEAK = 60_000
 MOTION = 55_000
-MACHINE_CODE = 24_000
+MACHINE_CODE = 26_000
 
 
 def test_heap_of_the_compiled_program() -> None:

@@ -45,7 +45,7 @@ def steps_of(data: bytes, joint: int) -> Steps:
     near, rise, fall = rows[:, 2] << 10, rows[:, 3], rows[:, 4]
     assert np.all((fall - rise) & 0xFFFFFFFF == PULSE_TICKS)
     ticks = near + ((rise - near + (1 << 31)) & 0xFFFFFFFF) - (1 << 31)
-    assert np.all(np.abs(ticks - near) <= 2048)
+    assert np.all((ticks - near >= -2048) & (ticks - near < 1 << 24))
     return Steps(ticks, rows[:, 1])
 
 

@@ -14,6 +14,12 @@ MOTION = Motion(
     Steps((500, 900, 700, -1), (700_000, 1100, 1000, 1)),
     Steps((200, 500_000, 4, 1)),
 )
+LONG = Motion(
+    TICK_HZ // 5,
+    Steps((1000, 600, 25_000, 1)),
+    Steps((500, 900, 700, -1), (700_000, 1500, 9_000, 1)),
+    Steps((200, 500_000, 30, 1)),
+)
 
 
 def stopped(rig, code=0, joint=255):
@@ -110,9 +116,9 @@ def underrun_anywhere():
     dry = 0
     for _ in range(30 // FEWER):
         rig = Rig(arm(3))
-        rig.start(MOTION)
-        rig.run_to(random.randrange(-100_000, MOTION.duration))
-        rig.board.spend(random.randrange(84 * 12_000))
+        rig.start(LONG)
+        rig.run_to(random.randrange(-100_000, LONG.duration))
+        rig.board.spend(random.randrange(84 * 90_000))
         while rig.engine.moving:
             rig.turn()
         if rig.engine.fault:
@@ -120,18 +126,59 @@ def underrun_anywhere():
             stopped(rig, codes.UNDERRUN, rig.engine.fault_joint)
             assert rig.engine.known == 7
         else:
-            assert rig.commanded() == [steps.total() for steps in MOTION.joints]
+            assert rig.commanded() == [steps.total() for steps in LONG.joints]
     assert 0 < dry < 30 // FEWER, dry
 
 
+def written_too_late():
+    """The interrupt takes so long that the last edge has passed when new ones are written."""
+    motion = Motion(LONG.duration, LONG.joints[0], Steps(), Steps())
+    for moment in (-500_000, 300_000, 9_000_000):
+        rig = Rig([dict(joint, following_counts=0) for joint in arm(3)])
+        from armtempo_board import feeder
+
+        emit = feeder.emit
+
+        def slow_emit(*arguments):
+            emit(*arguments)
+            if arguments[1] is rig.engine._joints[0].ring.words:
+                rig.board.stand_still(84 * 30_000)
+
+        rig.start(motion)
+        rig.run_to(moment)
+        feeder.emit = slow_emit
+        while rig.engine.moving:
+            rig.turn()
+        feeder.emit = emit
+        stopped(rig, codes.UNDERRUN, 0)
+        assert rig.engine.known == 7
+
+
+def interrupt_gone():
+    """TIM6 asks no more: the rings run dry, nothing wrong is stepped, and the fault says so."""
+    for moment in (-500_000, 300_000, 9_000_000):
+        rig = Rig(arm(3))
+        import stm
+        from armtempo_board import access
+        from machine import mem32
+
+        rig.start(LONG)
+        rig.run_to(moment)
+        mem32[stm.TIM6 + 4 * access.DIER] = 0
+        while rig.engine.moving:
+            rig.turn()
+        stopped(rig, codes.INTERNAL, rig.engine.fault_joint)
+        assert rig.engine.known == 7
+
+
 def long_stall():
-    """The main loop is away for nearly half the counter's range: the outputs stay where they stalled."""
+    """The main loop is away for nearly half the counter's range: the outputs stay where they stalled, 50 ms on."""
     rig = Rig(arm(3))
-    rig.start(MOTION)
+    rig.start(LONG)
     rig.run_to(800_000)
-    rises = rig.pulses[0].rises
+    served = rig.board.now
     rig.board.spend(20 * TICK_HZ)
-    assert rig.pulses[0].rises <= rises + 512
+    assert rig.pulses[0].last_rise <= served + TICK_HZ // 20
     for _ in range(3):
         rig.turn()
     stopped(rig, codes.UNDERRUN, rig.engine.fault_joint)
@@ -258,6 +305,8 @@ cases(
         estop_anywhere,
         estop_at_rest,
         underrun_anywhere,
+        written_too_late,
+        interrupt_gone,
         long_stall,
         limit_switches,
         limit_tripped_before,

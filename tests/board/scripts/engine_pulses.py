@@ -95,14 +95,14 @@ def across_the_wrap():
 
 
 def many_turns():
-    """To and fro with the shortest gaps, more turns waiting than the queue holds."""
+    """To and fro, every other time with the shortest gap, more turns waiting than the queue holds."""
     gap = 2 * 8400 + 2 * 420 + 168
     blocks = []
     time = 1000
     for n in range(120):
         count = 1 + n % 3
         blocks.append((time, 400, count, 1 - 2 * (n & 1)))
-        time += 400 * (count - 1) + gap
+        time += 400 * (count - 1) + (200_000 if n & 1 else gap)
     motion = Motion(time + 1000, Steps(*blocks), Steps(*[(t + 77, g, c, -d) for t, g, c, d in blocks]))
     rig = Rig(arm(2))
     rig.run(motion)

@@ -1,13 +1,16 @@
 """The engine on simulated hardware: planned steps instead of a motion, every edge checked as it comes."""
 
 import sys
+from array import array
 
 from arm_rows import HEAD, arm, row  # noqa: F401
+from armtempo_board import points, stretch, walker
 from simulator import motors, standalone, the
 
 TICK_HZ = 84_000_000
 FEWER = 3 if "short" in sys.argv else 1
 """Repetitions are divided by it; the emulated interpreter is slow."""
+SLOTS = stretch.STATE_SIZE - 13 * stretch.QUEUE_ROOM
 
 
 class Steps:
@@ -23,9 +26,9 @@ class Steps:
         first, gap, _, direction = self.blocks[place[0]]
         return first + place[1] * gap, direction
 
-    def go_on(self, place):
-        """Move a place to the next step."""
-        place[1] += 1
+    def go_on(self, place, steps=1):
+        """Move a place on; not beyond the end of its block."""
+        place[1] += steps
         if place[1] == self.blocks[place[0]][2]:
             place[0] += 1
             place[1] = 0
@@ -48,10 +51,15 @@ class Motion:
 class Walker:
     """Takes the place of the evaluator's walker."""
 
+    waits = walker.Walker.waits
+    latest_k = walker.Walker.latest_k
+    write = walker.Walker.write
+
     def __init__(self):
         self.ended = True
         self.at_turn = False
         self.direction = 1
+        self.state = array("i", bytes(4 * stretch.STATE_SIZE))
 
     def lend(self):
         """Nothing to lend."""
@@ -60,7 +68,10 @@ class Walker:
         """Stand before the first step."""
         self._steps = motion.joints[joint]
         self._place = [0, 0]
-        self._pulse = pulse
+        state = self.state
+        state[stretch.PULSE] = pulse
+        state[stretch.STEPS] = state[stretch.LATEST_1024] = 0
+        state[stretch.OUT] = state[stretch.IN]
         self.at_turn = False
         first = self._steps.at(self._place)
         self.ended = first is None
@@ -68,29 +79,41 @@ class Walker:
 
     def next_1024(self):
         """Time of the next step, in 1024 ticks."""
-        return 1 << 28 if self.ended else self._steps.at(self._place)[0] >> 10
+        return stretch.upcoming(self.state)
 
     def turn(self):
         """Go on in the other direction."""
         self.direction = -self.direction
         self.at_turn = False
 
-    def fill(self, ring, mask, head, room, until=1 << 28):
-        """Write edges as the evaluator's walker does."""
-        written = 0
-        while written + 2 <= room and not self.ended:
+    def prepare(self, until):
+        """Queue steps as the evaluator's walker does: the first of a block by itself, the others in stretches."""
+        self.state[stretch.UNTIL_1024] = until
+        while not self.ended and not self.at_turn and stretch.wanted(self.state):
             time, direction = self._steps.at(self._place)
             if direction != self.direction:
                 self.at_turn = True
                 break
-            if time >> 10 > until:
-                break
-            ring[(head + written) & mask] = time & 0xFFFFFFFF
-            ring[(head + written + 1) & mask] = (time + self._pulse) & 0xFFFFFFFF
-            written += 2
-            self._steps.go_on(self._place)
+            _, gap, count, _ = self._steps.blocks[self._place[0]]
+            steps = 1
+            if self._place[1]:
+                steps = max(1, min(count - self._place[1], 1024, (1 << 27) // gap))
+            stretch.single(self.state, (time >> 12) + points.BIAS, time & 4095)
+            if steps > 1:
+                self._lengthen(time, gap, steps)
+            self._steps.go_on(self._place, steps)
             self.ended = self._steps.at(self._place) is None
-        return written
+
+    def _lengthen(self, time, gap, steps):
+        """The stretch queued last has so many steps, all as far apart."""
+        state = self.state
+        place = SLOTS + 13 * ((state[stretch.IN] - 1) % stretch.QUEUE_ROOM)
+        base = (time - gap) & 0xFFFFFFFF
+        base -= base >> 31 << 32
+        words = (0, gap, 1 << 29, 1 << 29, 0, 0, base, 0, 0, 16, 0, steps, (time - gap) >> 10)
+        for word, value in enumerate(words):
+            state[place + word] = value
+        state[stretch.LATEST_1024] = (time + (steps - 1) * gap) >> 10
 
 
 class Pulses:

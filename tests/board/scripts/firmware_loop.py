@@ -21,6 +21,7 @@ from micropython import const
 
 _SYSTICK_LOAD = const(0xE000E014)
 _LOOKS = const(25)  # of the emulated board at the clock, in a millisecond
+_FEED_TICKS = const(42000)
 _PSC = const(0x28)
 _EVERY_MS = const(50)  # a command that often while something moves
 _BEFORE, _BEHIND = const(20), const(40)  # turns between two commands, and at the end
@@ -32,6 +33,7 @@ unmoved = array("I", bytes(4 * 24))  # the encoders' timers
 # where the firmware keeps them; 5: whether the clock stands; from 8 on the log: what, and when
 state = array("I", bytes(4 * (8 + 2 * _LOGGED)))
 interrupts = []
+feeds = []
 programs = []  # functions of the program whose place is taken
 here = {}
 
@@ -47,13 +49,14 @@ class Beyond:
         return self._names[name] if name in self._names else getattr(self._module, name)
 
 
-class Timer2:
-    """Takes the hook of the compare interrupt."""
+class Timer:
+    """Takes the hooks of the compare interrupt, and of the one that fills the rings."""
 
     OC_TIMING = pyb.Timer.OC_TIMING
 
-    def __init__(self, number, **settings):
-        pass
+    def __init__(self, number, callback=None, **settings):
+        if callback:
+            feeds.append(callback)
 
     def channel(self, number, mode, callback):
         """Keep it."""
@@ -120,38 +123,49 @@ def catch_up(stream: ptr32) -> int:
 
 
 @micropython.viper
+def all_catch_up():
+    """Let all streams."""
+    at = 16
+    for _ in range(8):
+        catch_up(int(ptr32(dma)) + at)
+        at += 24
+
+
+@micropython.viper
 def interrupt():
     """The compare interrupt."""
     words = ptr32(state)
     if words[5] == 0:
         pause()
-        at = 16
-        for _ in range(8):
-            catch_up(int(ptr32(dma)) + at)
-            at += 24
+        all_catch_up()
         resume(0)
         interrupts[0](None)
 
 
 @micropython.viper
-def read_ndtr(stream: ptr32, block: ptr32) -> int:
-    """In the place of the program's, whose time it takes."""
+def feed() -> int:
+    """The interrupt that fills the rings; 0 where the clock stands."""
+    words = ptr32(state)
+    if words[5]:
+        return 0
     pause()
-    log(int(stream) & 0x3FF)
-    left = int(catch_up(int(stream)))
-    resume(6)
-    if block[4] != block[5]:
-        return -1
-    return left
+    all_catch_up()
+    log(1 << 16)
+    resume(0)
+    feeds[0](None)
+    pause()
+    log(3 << 16)
+    resume(0)
+    return 1
 
 
 @micropython.viper
-def seal(words: ptr32, ring: ptr32, count: int):
-    """Entries were written."""
+def matches(words: ptr32, streams: ptr32) -> int:
+    """In the place of the program's, whose streams stand behind the clock."""
     pause()
-    log(1 << 16 | count)
+    all_catch_up()
     resume(0)
-    programs[0](int(words), int(ring), count)
+    return int(programs[0](int(words), int(streams)))
 
 
 @micropython.viper
@@ -280,6 +294,7 @@ def start_clock(us):
     mem32[stm.TIM2 + _PSC] = mem32[stm.TIM5 + _PSC] = here["prescaler"]
     here["core"].time, here["core"].stm = time, stm
     mem32[here["at_compare"]] = id(interrupt)
+    mem32[here["at_feed"]] = id(feed)
     pause()
     resume(0)
     wait(84 * us)
@@ -295,8 +310,9 @@ def replace(settings):
     state[4] = mem32[here["allocated"]]
     mem32[_SYSTICK_LOAD] = here["millisecond"] // _LOOKS - 1
     mem32[here["looks_per_ms"]] = _LOOKS
+    mem32[here["feed_ticks"]] = _FEED_TICKS
     still = uctypes.addressof(unmoved)
-    sys.modules["pyb"] = Beyond(pyb, USB_VCP=Port, Timer=Timer2)
+    sys.modules["pyb"] = Beyond(pyb, USB_VCP=Port, Timer=Timer)
     sys.modules["os"] = Beyond(os, dupterm=nothing)
     sys.modules["machine"] = Beyond(machine, unique_id=lambda: b"123456789012")
     addresses = {"DMA1": uctypes.addressof(dma), "TIM1": still, "TIM3": still, "TIM4": still, "TIM8": still}
@@ -305,8 +321,8 @@ def replace(settings):
 
 
 def hook(core):
-    """Take the place of three of the program's functions; the settings say what it calls them."""
+    """Take the place of two of the program's functions; the settings say what it calls them."""
     here["core"] = core
-    for name, function in (("seal", seal), ("enter", enter), ("read_ndtr", read_ndtr)):
+    for name, function in (("matches", matches), ("enter", enter)):
         programs.append(getattr(core, here[name]))
         setattr(core, here[name], function)

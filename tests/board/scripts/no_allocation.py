@@ -55,6 +55,8 @@ def move_to(now, streams):
         show((timer[access.CCR4] + 200) & 0xFFFFFFFF, streams)
         locked(pyb.Timer.callbacks[2, 4], 4)
     show(now & 0xFFFFFFFF, streams)
+    if stm.BLOCKS["TIM6"][access.CR1] & 1:
+        locked(pyb.Timer.callbacks[6, 0], 6)
 
 
 def show(counter, streams):

@@ -5,7 +5,7 @@ from simulator import memory
 
 rig = Rig([dict(joint, limit_low=0, limit_high=2) for joint in arm(6)])
 rig.board.sync()
-BLOCKS = "RCC TIM1 TIM2 TIM3 TIM4 TIM5 TIM8 DMA1 GPIOA GPIOB GPIOC GPIOD GPIOE NVIC_IPR"
+BLOCKS = "RCC TIM1 TIM2 TIM3 TIM4 TIM5 TIM6 TIM8 DMA1 GPIOA GPIOB GPIOC GPIOD GPIOE NVIC_IPR"
 for block in BLOCKS.split():
     at = memory.index(block)
     for word in range(56):

@@ -17,7 +17,7 @@ TURNS = 2000
 
 
 class Still:
-    """An engine whose own work allocates nothing, and which has a sample every tenth turn."""
+    """An engine whose own work allocates nothing, and which has a sample every 40th time."""
 
     def __init__(self):
         self.moving = True
@@ -28,7 +28,7 @@ class Still:
 
     def service(self):
         self.turns += 1
-        self.due = self.turns % 10 == 0
+        self.due = self.due or self.turns % 40 == 0
 
     def refill(self):
         pass

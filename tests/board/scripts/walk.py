@@ -2,7 +2,7 @@
 
 Arguments: pulse ticks, gap ticks, room, start and length of braking in ticks (0 0: none), then records. Prints
 what the check says of each, and writes its steps beside it (.steps), little endian int32 each: joint,
-direction, time of the last step of its batch in 1024 ticks, rising edge, falling edge.
+direction, time of it or of the one before in 1024 ticks, rising edge, falling edge.
 """
 
 import struct
@@ -30,13 +30,14 @@ def walk(motion, joint, walker, out, pulse, gap, room, start, length):
     braked = not length
     start_k = start >> 10
     lock, unlock = heap_lock, heap_unlock
-    while not walker.ended:
+    while walker.waits() or not walker.ended:
         lock()
-        if walker.at_turn:
+        if walker.at_turn and not walker.waits():
             walker.turn()
-        brake_now = not braked and walker.next_1024() >= start_k
-        count = 0 if brake_now else walker.fill(ring, MASK, head, room, NEVER if braked else start_k)
-        last = walker.last_1024()
+        walker.prepare(NEVER if braked else start_k)
+        near = walker.next_1024()
+        brake_now = not braked and near >= start_k
+        count = 0 if brake_now else walker.write(ring, MASK, head, room)
         unlock()
         if brake_now:
             walker.brake(start, length)
@@ -44,7 +45,7 @@ def walk(motion, joint, walker, out, pulse, gap, room, start, length):
         for i in range(0, count, 2):
             rise = ring[(head + i) & MASK]
             fall = ring[(head + i + 1) & MASK]
-            out.write(struct.pack("<iiiII", joint, walker.direction, last, rise, fall))
+            out.write(struct.pack("<iiiII", joint, walker.direction, near, rise, fall))
         head = (head + count) & MASK
 
 

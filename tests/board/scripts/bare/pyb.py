@@ -34,6 +34,8 @@ class Timer:
 
     def __init__(self, number, prescaler=0, period=0, freq=0, callback=None):
         self._number = number
+        if callback:
+            Timer.callbacks[number, 0] = callback
 
     def channel(self, number, mode, callback=None):
         """Remember the callback."""
