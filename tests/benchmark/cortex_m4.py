@@ -25,7 +25,17 @@ sys.path[:0] = [str(ROOT)] + [
 ]
 
 import micropython  # noqa: E402, F401  (puts ptr32 and its like into place)
-from armtempo_board import cell, cells, crossing, parts, points, stretch, walker  # noqa: E402
+from armtempo_board import (  # noqa: E402
+    braking,
+    cell,
+    cells,
+    crossing,
+    parts,
+    points,
+    stretch,
+    traverse,
+    walker,
+)
 from armtempo_shared.motion import Motion  # noqa: E402
 
 from tests.benchmark.emulated import Machine  # noqa: E402
@@ -39,8 +49,15 @@ LINE = 800
 """Instructions of a line of bytecode. Counted on the 32-bit Arm interpreter under an emulator (all executed
 instructions of a run less those of the compiled functions, per line): 770 in the cruise, 770 in the shipped motion."""
 
-COMPILED = (points, cell, crossing, stretch)
-ALL = (*COMPILED, parts, cells, walker)
+NATIVE_LINE = 12
+"""Instructions of a line of ``traverse``, which is compiled, but calls other functions, so it runs on CPython here: its
+machine code over its lines. A call in it takes CALL more."""
+
+CALL = 250
+"""Instructions of calling one compiled function from another (see board/docs/hardware.md)."""
+
+COMPILED = (points, cell, crossing, stretch, braking)
+ALL = (*COMPILED, parts, cells, traverse, walker)
 
 
 class Count:
@@ -52,6 +69,7 @@ class Count:
         self.on = False
         self.verify = False
         self.lines: Counter[str] = Counter()
+        self.native = 0.0
         self.longest = 0.0
         for name in self.machine.functions:
             home = next(module for module in COMPILED if hasattr(module, name))
@@ -64,6 +82,8 @@ class Count:
         def call(*arguments: Any) -> Any:
             if not self.on:
                 return original(*arguments)
+            if sys._getframe(1).f_code.co_name == "traverse":
+                self.native += CALL
             if not self.verify:
                 return self.machine.run(name, *arguments)
             copies = [argument[:] if isinstance(argument, array) else argument for argument in arguments]
@@ -83,6 +103,7 @@ class Count:
         head = self._fill(subject, ring, 0, skip, batch)
         self.machine.clear()
         self.lines.clear()
+        self.native = 0.0
         self.on = True
         sys.settrace(self._trace)
         try:
@@ -91,7 +112,7 @@ class Count:
             sys.settrace(None)
             self.on = False
         done = (end - head) // 2
-        compiled = self.machine.count / done
+        compiled = (self.machine.count + self.native) / done
         lines = self.lines.total() / done
         return {
             "steps": done,
@@ -104,19 +125,27 @@ class Count:
     def _fill(self, subject: walker.Walker, ring: array[int], head: int, steps: int, batch: int) -> int:
         end = head + 2 * steps
         self.longest = 0.0
-        while head < end and not subject.ended:
-            if subject.at_turn:
+        while head < end and (subject.waits() or not subject.ended):
+            if subject.at_turn and not subject.waits():
                 subject.turn()
-            before = self.machine.count + LINE * self.lines.total()
-            head += subject.fill(ring, 1023, head, batch)
-            self.longest = max(self.longest, self.machine.count + LINE * self.lines.total() - before)
+            before = self._all()
+            subject.prepare(1 << 28)
+            self.longest = max(self.longest, self._all() - before)
+            head += subject.write(ring, 1023, head, batch)
         return head
 
+    def _all(self) -> float:
+        return self.machine.count + self.native + LINE * self.lines.total()
+
     def _trace(self, frame: FrameType, event: str, _: Any) -> Any:
-        if "armtempo_board" not in frame.f_code.co_filename:
+        code = frame.f_code
+        if "armtempo_board" not in code.co_filename or code.co_name in ("write", "waits"):
             return None
         if event == "line":
-            self.lines[frame.f_code.co_name] += 1
+            if code.co_name == "traverse":
+                self.native += NATIVE_LINE
+            else:
+                self.lines[code.co_name] += 1
         return self._trace
 
     def kernel(self) -> float:
@@ -127,12 +156,12 @@ class Count:
             settings = {
                 stretch.FIRST: 252 << 22, stretch.SECOND: 1 << 29, stretch.THIRD: 1 << 29, stretch.POWER: 9,
                 stretch.SHIFT: 13, stretch.GROUP: 16, stretch.CARRY: 5, stretch.STEPS: steps,
-                stretch.UNTIL_1024: 1 << 28, stretch.ROOM: 1022, stretch.PULSE: 168,
+                stretch.UNTIL_1024: 1 << 28, stretch.PULSE: 168,
             }  # fmt: skip
             for place, value in settings.items():
                 state[place] = value
             self.machine.clear()
-            self.machine.run("emit", 0, array("I", bytes(4096)), state, 1023)
+            self.machine.run("emit", 1022, array("I", bytes(4096)), state, 1023)
             counts.append(self.machine.count)
         return (counts[1] - counts[0]) / 256
 
@@ -172,7 +201,7 @@ def report(figures: dict[str, dict[str, float]]) -> str:
     spent = sum(row["steps"] * row["all"] for case, row in figures.items() if case.startswith("shipped"))
     longest = figures["cruise"]["longest"] * CYCLES / CORE_HZ
     lines.append(
-        f"the longest call of fill() in the cruise takes {1e6 * longest:.0f} us, 256 steps {256e6 / 333e3:.0f} us"
+        f"the longest call of prepare() in the cruise takes {1e6 * longest:.0f} us, 256 steps {256e6 / 333e3:.0f} us"
     )
     lines.append(f"the shipped motion takes {100 * spent * CYCLES / CORE_HZ / seconds:.1f} % on average")
     return "\n".join(lines)

@@ -38,7 +38,7 @@ CYCLES = (1.3, 2.0, 2.5)
 """Cycles an instruction: see board/docs/evaluator.md."""
 RATES = (5_000, 10_000, 20_000, 33_000, 50_000, 70_000, 100_000, 130_000, 160_000, 200_000, 250_000, 333_000)
 JOINTS = (1, 3)
-AT_LIMITS = ((80_000, 1), (60_000, 2), (40_000, 3), (25_000, 3), (2_000, 6), (8_000, 6))
+AT_LIMITS = ((240_000, 1), (120_000, 2), (80_000, 3), (25_000, 3), (2_000, 6), (8_000, 6), (20_000, 6))
 """Rates of each joint, and joints: at the limits that hello states, and where many start together."""
 WORST_CYCLES = 3.0
 RAMP_S, WHOLE_S = 0.5, 1.2
@@ -46,7 +46,7 @@ BRAKE_TICKS = TICK_HZ // 2
 COMMANDS = 60  # status and samples in turn, one every 50 ms
 _SHIFT = 7
 _INSTRUCTION_NS = 1 << _SHIFT  # of QEMU's time, in which its TIM2 has a tick a nanosecond before it is scaled
-_WRITTEN, _CELL = 1, 2
+_FEED, _CELL, _FED = 1, 2, 3
 
 Row = dict[str, int]
 
@@ -69,18 +69,10 @@ class Turn:
     cost: float
     command: bool
     answer: bool
-    joints: tuple[tuple[float, int, int], ...]
-    """Each joint that was looked at: instructions, entries written, cells taken up."""
-
-    @property
-    def cells(self) -> int:
-        """Joints that changed their cell."""
-        return sum(joint[2] > 0 for joint in self.joints)
-
-    @property
-    def busy(self) -> int:
-        """Joints for which something was written."""
-        return sum(joint[1] > 0 for joint in self.joints)
+    cells: int
+    """Cells taken up."""
+    feeds: tuple[float, ...]
+    """Instructions of each interrupt that came meanwhile and filled the rings; part of the cost."""
 
 
 @dataclass(frozen=True)
@@ -131,11 +123,10 @@ class Board:
         self._elf = firmware.build(micropython, folder, folder / "program" / "manifest.py", source)
         places = firmware.symbols(self._elf)
         self._settings: dict[str, Any] = {
-            name: places[name] for name in ("allocated", "at_compare", "looks_per_ms")
+            name: places[name]
+            for name in ("allocated", "at_compare", "at_feed", "feed_ticks", "looks_per_ms")
         }
-        self._settings |= {
-            name.split(".")[1]: _short(name) for name in ("access.read_ndtr", "access.seal", "crossing.enter")
-        }
+        self._settings |= {name.split(".")[1]: _short(name) for name in ("access.matches", "crossing.enter")}
 
     def run(self, case: Case, cycles: float) -> Run:
         """Run a motion; a fault may end it."""
@@ -242,15 +233,14 @@ def _read(said: str, scale: float) -> Run:
 
 def _turn(took: int, command: bool, answer: bool, log: str, scale: float) -> Turn:
     numbers = [int(word) for word in log.split()]
-    entries = list(zip(numbers[::2], numbers[1::2], strict=True))
-    looks = [at for at, (what, _) in enumerate(entries) if what >> 16 == 0]
-    joints = []
-    for at, until in pairwise(looks):
-        done = [what for what, _ in entries[at + 1 : until]]
-        written = sum(what & 0xFFFF for what in done if what >> 16 == _WRITTEN)
-        cells = sum(what >> 16 == _CELL for what in done)
-        joints.append(((entries[until][1] - entries[at][1]) * scale, written, cells))
-    return Turn(took * scale, command, answer, tuple(joints))
+    entries = [(what >> 16, time * scale) for what, time in zip(numbers[::2], numbers[1::2], strict=True)]
+    feeds = [
+        end - begin
+        for (what, begin), (after, end) in pairwise(entry for entry in entries if entry[0] != _CELL)
+        if (what, after) == (_FEED, _FED)
+    ]
+    cells = sum(what == _CELL for what, _ in entries)
+    return Turn(took * scale, command, answer, cells, tuple(feeds))
 
 
 def _line(name: str, costs: Iterable[float]) -> str:
@@ -261,26 +251,18 @@ def _line(name: str, costs: Iterable[float]) -> str:
 
 
 def describe(run: Run) -> list[str]:
-    """What turns and joints cost."""
+    """What turns and the interrupt cost."""
     calm = [turn for turn in run.turns if not turn.command and not turn.answer]
-    joints = [joint for turn in calm for joint in turn.joints]
-    still = [turn for turn in calm if not turn.busy and not turn.cells]
     return [
-        _line("turn, nothing written", (turn.cost for turn in still)),
-        _line(
-            "turn, rings filled, no cell changed",
-            (turn.cost for turn in calm if turn.busy and not turn.cells),
-        ),
-        _line("turn, one joint changes its cell", (turn.cost for turn in calm if turn.cells == 1)),
-        _line("turn, three joints change it", (turn.cost for turn in calm if turn.cells == 3)),
+        _line("turn, no cell taken up", (turn.cost for turn in calm if not turn.cells)),
+        _line("turn, one cell", (turn.cost for turn in calm if turn.cells == 1)),
+        _line("turn, more cells", (turn.cost for turn in calm if turn.cells > 1)),
         _line("turn with a command", (turn.cost for turn in run.turns if turn.command)),
         _line(
             "turn with a sample to send",
             (turn.cost for turn in run.turns if turn.answer and not turn.command),
         ),
-        _line("joint, ring full", (cost for cost, written, cells in joints if not written and not cells)),
-        _line("joint, ring filled", (cost for cost, written, cells in joints if written and not cells)),
-        _line("joint, changes its cell", (cost for cost, _, cells in joints if cells)),
+        _line("interrupt", (feed for turn in run.turns for feed in turn.feeds)),
     ]
 
 

@@ -1,5 +1,6 @@
 // In an emulated board: 25 times a millisecond SysTick looks whether TIM2 has passed its compare value 4, and calls
-// what stands in at_compare, as the compare interrupt would; every 25th time it is SysTick as well.
+// what stands in at_compare, as the compare interrupt would; every 25th time it is SysTick as well. While TIM2 runs, it
+// also lets TIM6's interrupt come every feed_ticks; the processor knows its priority, and what stands in at_feed is called.
 
 #include <string.h>
 
@@ -9,10 +10,32 @@
 
 size_t *allocated;
 mp_obj_t at_compare;
-unsigned looks_per_ms = 1;
-static uint32_t vectors[128] __attribute__((aligned(512)));
+mp_obj_t at_feed;
+unsigned looks_per_ms = 1, feed_ticks;
+static uint32_t fed, feeding, vectors[128] __attribute__((aligned(512)));
 
 void SysTick_Handler(void);
+
+static mp_obj_t call(mp_obj_t function) {
+    nlr_buf_t before;
+    mp_obj_t result = mp_const_none;
+    mp_sched_lock();
+    gc_lock();
+    if (nlr_push(&before) == 0) {
+        result = mp_call_function_0(function);
+        nlr_pop();
+    }
+    gc_unlock();
+    mp_sched_unlock();
+    return result;
+}
+
+static void feed(void) {
+    if (mp_obj_is_true(call(at_feed))) {  // else the clock stands: again with the next look
+        fed += feed_ticks;
+    }
+    feeding = 0;
+}
 
 static void look(void) {
     static unsigned looks;
@@ -21,21 +44,21 @@ static void look(void) {
         SysTick_Handler();
     }
     if (at_compare && TIM2->DIER & TIM_DIER_CC4IE && (int32_t)(TIM2->CNT - TIM2->CCR4) >= 0) {
-        nlr_buf_t before;
-        mp_sched_lock();
-        gc_lock();
-        if (nlr_push(&before) == 0) {
-            mp_call_function_0(at_compare);
-            nlr_pop();
-        }
-        gc_unlock();
-        mp_sched_unlock();
+        call(at_compare);
+    }
+    if (!(TIM2->CR1 & 1)) {
+        fed = TIM2->CNT;
+    } else if (at_feed && !feeding && TIM2->CNT - fed >= feed_ticks) {
+        feeding = 1;
+        NVIC_SetPendingIRQ(TIM6_DAC_IRQn);
     }
 }
 
 void SystemClock_Config(void) {
     allocated = &MP_STATE_MEM(gc_alloc_amount);
     memcpy(vectors, (void *)SCB->VTOR, sizeof(vectors));
+    vectors[16 + TIM6_DAC_IRQn] = (uint32_t)feed;
+    NVIC_EnableIRQ(TIM6_DAC_IRQn);
     vectors[15] = (uint32_t)look;
     SCB->VTOR = (uint32_t)vectors;
 }

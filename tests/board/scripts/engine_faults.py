@@ -135,23 +135,28 @@ def written_too_late():
     motion = Motion(LONG.duration, LONG.joints[0], Steps(), Steps())
     for moment in (-500_000, 300_000, 9_000_000):
         rig = Rig([dict(joint, following_counts=0) for joint in arm(3)])
-        from armtempo_board import feeder
-
-        emit = feeder.emit
-
-        def slow_emit(*arguments):
-            emit(*arguments)
-            if arguments[1] is rig.engine._joints[0].ring.words:
-                rig.board.stand_still(84 * 30_000)
-
         rig.start(motion)
         rig.run_to(moment)
-        feeder.emit = slow_emit
-        while rig.engine.moving:
-            rig.turn()
-        feeder.emit = emit
+        with_slow_emit(rig)
         stopped(rig, codes.UNDERRUN, 0)
         assert rig.engine.known == 7
+
+
+def with_slow_emit(rig):
+    """Run to the end; whatever is written to the first joint's ring takes 30 ms."""
+    from armtempo_board import feeder
+
+    emit = feeder.emit
+
+    def slow_emit(*arguments):
+        emit(*arguments)
+        if arguments[1] is rig.engine._joints[0].ring.words:
+            rig.board.stand_still(84 * 30_000)
+
+    feeder.emit = slow_emit
+    while rig.engine.moving:
+        rig.turn()
+    feeder.emit = emit
 
 
 def interrupt_gone():
