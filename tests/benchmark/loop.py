@@ -42,6 +42,7 @@ AT_LIMITS = ((240_000, 1), (120_000, 2), (80_000, 3), (25_000, 3), (2_000, 6), (
 """Rates of each joint, and joints: at the limits that hello states, and where many start together."""
 WORST_CYCLES = 3.0
 RAMP_S, WHOLE_S = 0.5, 1.2
+MILLION = (333_000, 3, 1.0, 2.4)  # steps/s in sum; as ``cruise`` takes them
 BRAKE_TICKS = TICK_HZ // 2
 COMMANDS = 60  # status and samples in turn, one every 50 ms
 _SHIFT = 7
@@ -84,7 +85,7 @@ class Run:
     seconds: float
 
 
-def cruise(rate: int, joints: int) -> Case:
+def cruise(rate: int, joints: int, ramp_s: float = RAMP_S, whole_s: float = WHOLE_S) -> Case:
     """All joints alike: up to a rate, and down again. All limit switches and two encoders are fitted."""
     flags = armrecord.FLAG_ESTOP_FITTED | armrecord.FLAG_ESTOP_ACTIVE_HIGH
     rows = [
@@ -98,7 +99,7 @@ def cruise(rate: int, joints: int) -> Case:
         )
         for joint in range(joints)
     ]
-    motion = motions.cruise(rate, joints, RAMP_S, WHOLE_S)
+    motion = motions.cruise(rate, joints, ramp_s, whole_s)
     return Case(
         "cruise", {**HEAD, "flags": flags, "pulse_ticks": 100, "low_ticks": 100}, rows, motion, [0] * joints
     )
@@ -288,6 +289,9 @@ def main(micropython: Path) -> None:
                 rate, best = board.highest(joints, cycles)
                 print(f"{cycles} cycles, joints {joints}: {rate} steps/s; {_turns(best, cycles)}", flush=True)
         print("at single rates")
+        for cycles in CYCLES:
+            run = board.run(cruise(*MILLION), cycles)
+            print(f"    {cycles} cycles, rate, joints, ramp {MILLION[:3]}: {_end(run)}", flush=True)
         _at_limits(board)
 
 
