@@ -102,10 +102,10 @@ class Ring:
 
     def stop(self) -> None:
         """Switch the stream off, ready to be filled from entry 0."""
+        self.state[access.FED] = 0
         mem32[self._registers] = self._mode
         mem32[self._flags] = self._all_flags
         mem32[self._ndtr] = self.entries
-        self.state[access.FED] = 0
         self.state[access.MADE] = 0
         self.state[access.LOADS] = 0
         self.state[access.FIRST] = self.entries
