@@ -114,7 +114,7 @@ def underrun_anywhere():
     """The main loop stalls at many moments, for long enough and for not quite long enough."""
     random.seed(SEED)
     dry = 0
-    for _ in range(30 // FEWER):
+    for _ in range(18 // FEWER):
         rig = Rig(arm(3))
         rig.start(LONG)
         rig.run_to(random.randrange(-100_000, LONG.duration))
@@ -127,13 +127,13 @@ def underrun_anywhere():
             assert rig.engine.known == 7
         else:
             assert rig.commanded() == [steps.total() for steps in LONG.joints]
-    assert 0 < dry < 30 // FEWER, dry
+    assert 0 < dry < 18 // FEWER, dry
 
 
 def written_too_late():
     """The interrupt takes so long that the last edge has passed when new ones are written."""
     motion = Motion(LONG.duration, LONG.joints[0], Steps(), Steps())
-    for moment in (-500_000, 300_000, 9_000_000):
+    for moment in (-500_000, 9_000_000):
         rig = Rig([dict(joint, following_counts=0) for joint in arm(3)])
         rig.start(motion)
         rig.run_to(moment)
