@@ -163,13 +163,13 @@ class Engine:
     # while it moves
 
     def service(self) -> None:
-        """Refill the rings, convert samples, look for faults. What it raises leaves the position unknown."""
+        """Keep the queues filled, convert samples, look for faults. What it raises leaves the position unknown."""
         self._halfway = True
         self._service()
         self._halfway = False
 
     def refill(self) -> None:
-        """Refill the rings and nothing else: between other work, as full ones last a few milliseconds only."""
+        """Keep the queues filled and nothing else: between other work, as full ones last some milliseconds only."""
         if self.moving and not self._block[access.FROZEN]:
             self._halfway = True
             self._serve()
@@ -197,7 +197,7 @@ class Engine:
             self._finish()
 
     def _serve(self) -> bool:
-        """Refill all rings; False where that ended the motion."""
+        """Keep all queues filled; False where that ended the motion."""
         now_k = self._clock()
         self._readings.convert(self._epoch, self._low)
         if self._end_moves and self._sampler.quiet():
