@@ -4,8 +4,6 @@ Free of USB, SWD, REPL and LEDs. Streams: RM0090 10.3.3; alternate functions: ST
 data sheet, table 9.
 """
 
-from micropython import const
-
 STEP = (
     # STEP pin, timer, its channel, alternate function, DMA1 stream, DMA channel, DIR pin
     ("A15", 2, 1, 1, 5, 3, "E7"),
@@ -25,8 +23,5 @@ ENCODER = (
 ENABLE = "E12"
 ESTOP = "E15"
 LIMIT = ("D8", "D9", "D10")
-BUTTON = "A0"
+BUTTON = "A0"  # not together with the STEP of channel 6
 LEDS = ("D12", "D13", "D14", "D15")  # green, orange, red, blue
-
-BUTTON_CHANNEL = const(5)
-"""The STEP channel that cannot be used together with the replay button."""

@@ -47,10 +47,6 @@ _QUEUE = const(32)  # eight times words 0 to 12
 QUEUE_ROOM = 8
 STATE_SIZE = 32 + 13 * 8
 
-REJECTED = 0
-ACCEPTED = 1
-EASY = 2  # twice as many steps would do
-
 _BIAS = const(1 << 29)
 _HIGH_BIAS = const(1 << 28)
 _LOW = const((1 << 15) - 1)
@@ -249,7 +245,9 @@ def withdraw(state: ptr32, first: int, from_1024: int) -> int:
 
 @micropython.viper
 def accept(steps: int, block: ptr32, state: ptr32) -> int:
-    """Whether two stretches of ``steps`` each, from node A over MIDDLE to B, keep the error bound.
+    """1 where two stretches of ``steps`` each, from node A over MIDDLE to B, keep the error bound; else 0.
+
+    2 where twice as many steps would do.
 
     The Hermite cubic through A and B misses MIDDLE by D in time and by E / (4 steps) in slope. Its fourth derivative
     alone makes each stretch D / 16 wrong at most, its fifth E / 26: D / 16 + E / 16 <= 1/8 tick is asked, which

@@ -18,7 +18,7 @@ def traverse(block: object, state: object, budget: int) -> object:
 
     ``budget``: nodes to be solved at most, or a few more; each takes about 2000 instructions. A last step that is
     slow is not put in, but HELD is set. In MODE, 1: braking, 2: all steps come at once; ENDED is set where braking
-    ends before.
+    ends before. The words of ``state`` are named in stretch.py, those of ``block`` in crossing.py.
     """
     words = ptr32(state)  # type: ignore[arg-type]
     nodes = ptr32(block)  # type: ignore[arg-type]
