@@ -19,7 +19,7 @@ from armtempo.link import Board, greet
 
 from tests.board.scripts import stand_in
 
-SHIMS = Path(__file__).parents[1] / "host" / "armtempo" / "virtual" / "cpython"
+SHIMS = Path(__file__).parents[1] / "host" / "armtempo" / "simulator" / "cpython"
 FAULTS = ("lose", "double", "flip", "delay", "cut")
 _DELAY_S = 0.03
 _SAMPLE_S = 0.1

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-VIRTUAL = ROOT / "host" / "armtempo" / "virtual"
+VIRTUAL = ROOT / "host" / "armtempo" / "simulator"
 _CACHE = ROOT / ".cache" / "micropython"
 _STARTERS = {
     "cpython": Path(sys.executable),

@@ -20,18 +20,22 @@ from pathlib import Path
 from armtempo_shared.limits import MAX_NAME, TICK_HZ
 from armtempo_shared.wire import record_crc
 
-from armtempo import decode, encode, moves, operate, record, trajectory_file
-from armtempo.arm import Arm
-from armtempo.columns import aligned
 from armtempo.errors import InputError, LinkError
-from armtempo.interrupt import StopRequest
+from armtempo.formats.text_table import aligned
 from armtempo.link import Board
 from armtempo.link.follow import Follower
 from armtempo.link.ports import is_sim
-from armtempo.plan import Plan
-from armtempo.record import Repetition, RunFolder
-from armtempo.spline import Array
-from armtempo.trajectory import Trajectory
+from armtempo.model import trajectory_file
+from armtempo.model.arm import Arm
+from armtempo.model.plan import Plan
+from armtempo.planning import point_to_point
+from armtempo.records import decode, encode
+from armtempo.robot import operate
+from armtempo.robot.stop_request import StopRequest
+from armtempo.runs import run_folder
+from armtempo.runs.run_folder import Repetition, RunFolder
+from armtempo.splines.bspline import Array
+from armtempo.splines.trajectory import Trajectory
 
 _END_S = 1e-3
 """A run that ended by more before its motion's end was stopped."""
@@ -107,10 +111,12 @@ def new_run(parent: Path, motion: Motion, port: str, board: Board) -> RunFolder:
         "board": vars(board.info),
         "motion_crc": motion.data[-4:][::-1].hex(),
     }
-    folder = RunFolder(record.new_folder(parent, motion.name), motion.name, record.scales(motion.arm), origin)
+    folder = RunFolder(
+        run_folder.new_folder(parent, motion.name), motion.name, run_folder.scales(motion.arm), origin
+    )
     folder.write_motion(motion.data)
     if motion.plan is not None:
-        trajectory_file.save(motion.plan, folder.path / record.TRAJECTORY)
+        trajectory_file.save(motion.plan, folder.path / run_folder.TRAJECTORY)
     folder.write()
     return folder
 
@@ -128,7 +134,7 @@ def repeat(
     ``watch`` sees each sample. Gives each repetition when it has ended; a fault or a stop request ends the
     series.
     """
-    back = moves.backwards(motion.trajectory, operate.TEMPORARY + "back")
+    back = point_to_point.backwards(motion.trajectory, operate.TEMPORARY + "back")
     for number in range(times):
         if number:
             operate.move_once(board, motion.arm, back, stop)
@@ -155,7 +161,7 @@ def fetch(board: Board, port: str, motion: Motion, parent: Path) -> tuple[RunFol
         end = follower.end
         assert end is not None  # the samples have ended
         cut = end.ticks < motion.trajectory.duration_s * TICK_HZ - TICK_HZ * _END_S
-        state = record.FAULT if end.fault else record.INTERRUPTED if cut else record.COMPLETE
+        state = run_folder.FAULT if end.fault else run_folder.INTERRUPTED if cut else run_folder.COMPLETE
         file.repetition.end(state, operate.fault_name(end.fault), end.ticks, end.stand, end.lost)
     return folder, folder.repetitions[-1]
 
@@ -163,7 +169,7 @@ def fetch(board: Board, port: str, motion: Motion, parent: Path) -> tuple[RunFol
 def results(motion: Motion, repetition: Repetition) -> list[str]:
     """What became of each joint, one line each: steps sent, and how far the arm ended from the plan."""
     end_deg = motion.trajectory(motion.trajectory.duration_s)
-    scales = record.scales(motion.arm)
+    scales = run_folder.scales(motion.arm)
     rows = [["joint", "steps sent", "angle", "error"], ["", "net", "deg", "deg"]]
     for joint, scale in enumerate(scales):
         steps = repetition.commanded_steps[joint]

@@ -13,11 +13,12 @@ import math
 import time
 
 import numpy as np
-from armtempo import optimise, spline, timeaxis
-from armtempo.constraints import Path
-from armtempo.fitness import Fitness
+from armtempo import optimise
 from armtempo.optimise import acs
 from armtempo.optimise.tracker import Array
+from armtempo.planning.constraints import Path
+from armtempo.planning.fitness import Fitness
+from armtempo.splines import bspline, time_axis
 
 from tests.host import problems
 
@@ -93,11 +94,11 @@ def totals(form: str, joint: int, seeds: int, population: int, iterations: int) 
     """Planned motion times over the seeds, in percent above the best known: (seeds,)."""
     kind, fitness, parameters = FORMS[form]
     acs.VARIANTS["differences"] = kind
-    points = spline.fit(np.array(FEEDING.job.via), 5)[:, [joint]]
+    points = bspline.fit(np.array(FEEDING.job.via), 5)[:, [joint]]
     limits = FEEDING.arm.driven[joint].limits
     assert limits is not None
     function = getattr(Fitness(points, 5, [limits]), fitness)
-    path = Path(points, 5, [limits], timeaxis.step_map(len(points) - 5, 5))
+    path = Path(points, 5, [limits], time_axis.step_map(len(points) - 5, 5))
     found = []
     for seed in range(seeds):
         best = optimise.minimise(

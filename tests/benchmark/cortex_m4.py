@@ -21,7 +21,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent.parent
 STORED = Path(__file__).with_suffix(".json")
 sys.path[:0] = [str(ROOT)] + [
-    str(ROOT / folder) for folder in ("board", "shared", "host/armtempo/virtual/cpython", "host")
+    str(ROOT / folder) for folder in ("board", "shared", "host/armtempo/simulator/cpython", "host")
 ]
 
 import micropython  # noqa: E402, F401  (puts ptr32 and its like into place)

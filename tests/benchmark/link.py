@@ -15,13 +15,16 @@ import tempfile
 import time
 from pathlib import Path
 
-from armtempo import arm as arms
-from armtempo import job as jobs
-from armtempo import operate, pipeline, planner, trajectory_file
+from armtempo import pipeline
 from armtempo.errors import LinkError
 from armtempo.link import Board, open_board
 from armtempo.link.follow import Follower
-from armtempo.virtual import launch
+from armtempo.model import arm as arms
+from armtempo.model import job as jobs
+from armtempo.model import trajectory_file
+from armtempo.planning import planner
+from armtempo.robot import operate
+from armtempo.simulator import launch
 from armtempo_shared import armrecord, motion, wire
 
 from tests import interpreters

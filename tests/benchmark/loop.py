@@ -22,10 +22,10 @@ from statistics import median
 from typing import Any
 from zlib import crc32
 
-from armtempo import arm as arms
-from armtempo import encode
 from armtempo.deploy import firmware as deployed
 from armtempo.deploy import program
+from armtempo.model import arm as arms
+from armtempo.records import encode
 from armtempo_shared import armrecord, limits, wire
 from armtempo_shared.limits import TICK_HZ
 

@@ -14,9 +14,12 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from armtempo import arm, encode, moves, operate
 from armtempo.deploy import program
 from armtempo.deploy.package import STM32F4
+from armtempo.model import arm
+from armtempo.planning import point_to_point
+from armtempo.records import encode
+from armtempo.robot import operate
 from armtempo_shared import wire
 
 from tests import interpreters
@@ -49,7 +52,7 @@ def measure() -> dict[str, int]:
 def write_session(folder: Path, of_arm: arm.Arm) -> None:
     """Store an arm and a motion, and write the frames of a host that starts it."""
     home_deg = operate.home_deg(of_arm)
-    trajectory = moves.straight(
+    trajectory = point_to_point.straight(
         "go", home_deg, home_deg + np.resize([2.0, 1.0, -2.0], home_deg.shape), of_arm
     )
     motion = encode.motion_record(trajectory, of_arm)

@@ -16,12 +16,14 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from armtempo import arm as arms
-from armtempo import operate, planner, trajectory_file
-from armtempo.job import Job
 from armtempo.link import open_board
-from armtempo.plan import Plan
-from armtempo.virtual import launch
+from armtempo.model import arm as arms
+from armtempo.model import trajectory_file
+from armtempo.model.job import Job
+from armtempo.model.plan import Plan
+from armtempo.planning import planner
+from armtempo.robot import operate
+from armtempo.simulator import launch
 
 SPEED_DEG_S = 0.3
 VIAS = ((0.0, -60.0, 40.0), (90.0, -100.0, 0.0), (180.0, -38.0, -52.0))

@@ -24,10 +24,11 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
 import numpy as np  # noqa: E402
-from armtempo import arm as arms  # noqa: E402
-from armtempo import bench, optimise  # noqa: E402
-from armtempo import job as jobs  # noqa: E402
+from armtempo import optimise  # noqa: E402
+from armtempo.model import arm as arms  # noqa: E402
+from armtempo.model import job as jobs  # noqa: E402
 from armtempo.optimise.tracker import Array  # noqa: E402
+from armtempo.research.bench import cases  # noqa: E402
 
 NESTS = 10
 PARTICLES = 20
@@ -40,7 +41,7 @@ class Enough(Exception):
 class Counted:
     """The fitness, counted and timed, which ends the search when its evaluations are used up."""
 
-    def __init__(self, problem: bench.Problem, most: int) -> None:
+    def __init__(self, problem: cases.Problem, most: int) -> None:
         self._function = problem.function()
         self._left = most
         self.evaluations = 0
@@ -93,7 +94,7 @@ def main() -> None:
     job = jobs.load_job(jobs.default_path(), arm)
     solvers = dict(own(options.evaluations)) | peers(options.evaluations)
     for joint in (int(number) for number in options.joints.split(",")):
-        problem = bench.problem_of(arm, job, joint, options.fitness, 500)
+        problem = cases.problem_of(arm, job, joint, options.fitness, 500)
         print(f"\njoint {joint}, {options.fitness}, {options.seeds} seeds")
         print(
             f"  {'solver':<34}{'best s':>9}{'median s':>10}{'worst s':>9}"
@@ -109,7 +110,7 @@ def main() -> None:
             )
 
 
-def measure(solver: str, search: Search, problem: bench.Problem, options: argparse.Namespace) -> Row:
+def measure(solver: str, search: Search, problem: cases.Problem, options: argparse.Namespace) -> Row:
     """Runs a solver with seeds 1, 2, ..."""
     row = Row(solver, [], [], [], [])
     for seed in range(1, options.seeds + 1):

@@ -11,14 +11,16 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from armtempo import encode, operate, planner
-from armtempo import job as jobs
-from armtempo.arm import Arm, Encoder, default_path, load_arm
-from armtempo.interrupt import StopRequest
 from armtempo.link import open_board
 from armtempo.link.messages import Sample
-from armtempo.trajectory import Trajectory
-from armtempo.virtual import edgelog, launch
+from armtempo.model import job as jobs
+from armtempo.model.arm import Arm, Encoder, default_path, load_arm
+from armtempo.planning import planner
+from armtempo.records import encode
+from armtempo.robot import operate
+from armtempo.robot.stop_request import StopRequest
+from armtempo.simulator import edgelog, launch
+from armtempo.splines.trajectory import Trajectory
 from armtempo_shared.limits import TICK_HZ
 
 from tests import interpreters

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from armtempo import spline, timeaxis
+from armtempo.splines import bspline, time_axis
 from armtempo_shared import limits, motion
 from numpy.typing import NDArray
 
@@ -32,9 +32,9 @@ STEPS_PER_DEG = np.array([6400.0, 16000.0 * 2, 6400.0]) * 2 / 360 / np.array([1,
 
 def record(via_steps: list[Array], intervals_s: list[Array], degree: int, refine: int = 1) -> bytes:
     """A motion record: via points of each joint, and intervals (n * refine) of each joint or one for all."""
-    angles = [_fixed(spline.fit(via, degree), limits.STEP_FRACTION_BITS) for via in via_steps]
+    angles = [_fixed(bspline.fit(via, degree), limits.STEP_FRACTION_BITS) for via in via_steps]
     times = [
-        _fixed(timeaxis.control_points(row, degree) * limits.TICK_HZ, limits.TICK_FRACTION_BITS)
+        _fixed(time_axis.control_points(row, degree) * limits.TICK_HZ, limits.TICK_FRACTION_BITS)
         for row in intervals_s
     ]
     return motion.pack(degree, angles, times, len(via_steps[0]) - 1, refine, 0, 0)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo import checks
+from armtempo.planning import checks
 from armtempo_shared import codes, limits, motion
 
 from tests import interpreters

@@ -5,12 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from armtempo import arm, encode, moves, operate
 from armtempo.errors import LinkError
 from armtempo.link.board import Board
 from armtempo.link.session import Session
 from armtempo.link.transport import SerialTransport
-from armtempo.virtual import launch
+from armtempo.model import arm
+from armtempo.planning import point_to_point
+from armtempo.records import encode
+from armtempo.robot import operate
+from armtempo.simulator import launch
 from armtempo_shared import wire
 
 from tests import interpreters
@@ -23,7 +26,9 @@ def test_upload_is_old_or_new(tmp_path: Path) -> None:
     paper_arm = arm.load_arm(arm.default_path())
     home_deg = operate.home_deg(paper_arm)
     old, new = (
-        encode.motion_record(moves.straight("go", home_deg, home_deg + np.array(move), paper_arm), paper_arm)
+        encode.motion_record(
+            point_to_point.straight("go", home_deg, home_deg + np.array(move), paper_arm), paper_arm
+        )
         for move in ([1.0, 1.0, 1.0], [2.0, 2.0, 2.0])
     )
     seen = []

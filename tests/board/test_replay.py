@@ -6,7 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo import arm, encode, moves, operate
+from armtempo.model import arm
+from armtempo.planning import point_to_point
+from armtempo.records import encode
+from armtempo.robot import operate
 
 from tests import interpreters
 
@@ -18,7 +21,7 @@ def test_replay_from_the_repl(name: str, tmp_path: Path) -> None:
     """The first call takes the posture for the start and moves; the second finds the arm elsewhere."""
     paper_arm = arm.load_arm(arm.default_path())
     home_deg = operate.home_deg(paper_arm)
-    trajectory = moves.straight("go", home_deg, home_deg + np.array([2.0, 1.0, -2.0]), paper_arm)
+    trajectory = point_to_point.straight("go", home_deg, home_deg + np.array([2.0, 1.0, -2.0]), paper_arm)
     (tmp_path / "armtempo").mkdir()
     (tmp_path / "armtempo" / "arm.ata").write_bytes(encode.arm_record(paper_arm))
     (tmp_path / "armtempo" / "go.atm").write_bytes(encode.motion_record(trajectory, paper_arm))

@@ -6,12 +6,13 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from armtempo import arm as arm_file
-from armtempo import job as job_file
-from armtempo import record, trajectory_file
 from armtempo.link.messages import Sample, Stand
-from armtempo.plan import Plan
-from armtempo.planner import plan
+from armtempo.model import arm as arm_file
+from armtempo.model import job as job_file
+from armtempo.model import trajectory_file
+from armtempo.model.plan import Plan
+from armtempo.planning.planner import plan
+from armtempo.runs import run_folder
 from armtempo_shared.limits import SAMPLE_TICKS, TICK_HZ
 
 
@@ -29,19 +30,19 @@ def make(
     made = shipped_plan()
     rng = np.random.default_rng(seed)
     path.mkdir(parents=True)
-    trajectory_file.save(made, path / record.TRAJECTORY)
-    folder = record.RunFolder(path, made.job.name, record.scales(made.arm), {"port": "sim"})
+    trajectory_file.save(made, path / run_folder.TRAJECTORY)
+    folder = run_folder.RunFolder(path, made.job.name, run_folder.scales(made.arm), {"port": "sim"})
     for number in range(repetitions):
         with folder.begin_repetition() as file:
             for sample in _samples(made, scatter_deg, rng):
                 if number or sample.index not in drop:
                     file.append(sample)
-            file.repetition.end(record.COMPLETE, "", sample.ticks, sample.stand, ())
+            file.repetition.end(run_folder.COMPLETE, "", sample.ticks, sample.stand, ())
     return path
 
 
 def _samples(made: Plan, scatter_deg: float, rng: np.random.Generator) -> list[Sample]:
-    scales = record.scales(made.arm)
+    scales = run_folder.scales(made.arm)
     end = round(made.trajectory.duration_s * TICK_HZ)
     ticks = [*range(0, end, SAMPLE_TICKS), end]
     found = []

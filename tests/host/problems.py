@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from armtempo.arm import Arm, Joint, Limits, Motor
-from armtempo.job import Job
+from armtempo.model.arm import Arm, Joint, Limits, Motor
+from armtempo.model.job import Job
 
 FILE = Path(__file__).parents[1] / "data" / "problems.toml"
 

@@ -6,8 +6,8 @@ import tomllib
 from pathlib import Path
 
 import numpy as np
-from armtempo.arm import default_path, load_arm
 from armtempo.kinematics import Geometry, Ranges
+from armtempo.model.arm import default_path, load_arm
 
 FOLDER = Path(__file__).parents[1] / "data" / "arms"
 FILES = sorted(FOLDER.glob("*.toml"))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from armtempo import optimise
 from armtempo.errors import InputError
-from armtempo.fitness import Fitness
+from armtempo.planning.fitness import Fitness
 
 from tests.host import problems
 
@@ -16,9 +16,9 @@ VARIANTS = ("differences", "paper")
 
 def fitness_of(joint: int) -> Fitness:
     """Fitness of one joint of the paper's motion."""
-    from armtempo import spline
+    from armtempo.splines import bspline
 
-    points = spline.fit(np.array(FEEDING.job.via), 5)
+    points = bspline.fit(np.array(FEEDING.job.via), 5)
     limits = FEEDING.arm.driven[joint].limits
     assert limits is not None
     return Fitness(points[:, [joint]], 5, [limits])

@@ -6,17 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from armtempo import analyse, spline
-from armtempo.arm import Limits
-from armtempo.runs import Samples
-from armtempo.trajectory import JointSpline, Trajectory
+from armtempo.model.arm import Limits
+from armtempo.runs import analysis
+from armtempo.runs.reader import Samples
+from armtempo.splines import bspline
+from armtempo.splines.trajectory import JointSpline, Trajectory
 
 VIA = ((0.0, 20, 40, 90, 130, 160, 180), (-60.0, -75, -110, -85, -60, -45, -38))
 
 
 def joint(via: tuple[float, ...], interval_s: float) -> JointSpline:
     """Equal intervals: the paper's motion before optimisation."""
-    return JointSpline(5, 1, spline.fit(np.array(via), 5), interval_s * np.arange(-2.0, len(via) + 2))
+    return JointSpline(5, 1, bspline.fit(np.array(via), 5), interval_s * np.arange(-2.0, len(via) + 2))
 
 
 PLAN = Trajectory("t", (joint(VIA[0], 2.0), joint(VIA[1], 2.2)), False)
@@ -37,22 +38,22 @@ def samples(delay_s: float = 0.0, seed: int | None = None, resolution: float = 0
 
 
 def test_exact_samples_show_the_theory() -> None:
-    found = analyse.curves([samples()], PLAN)
+    found = analysis.curves([samples()], PLAN)
     assert found.mean.shape == (3, 133, 2)
-    for rows, worst in zip(analyse.deviations(found), (1e-9, 0.05, 2.0), strict=True):
+    for rows, worst in zip(analysis.deviations(found), (1e-9, 0.05, 2.0), strict=True):
         for deviation in rows:
             assert deviation.rms <= deviation.largest <= worst
 
 
 def test_the_standard_error_is_that_of_the_scatter() -> None:
-    found = analyse.curves([samples(seed=seed) for seed in range(40)], PLAN)
+    found = analysis.curves([samples(seed=seed) for seed in range(40)], PLAN)
     assert np.nanmean(found.sem[0]) == pytest.approx(0.05 / np.sqrt(40), rel=0.1)
-    assert np.isnan(analyse.curves([samples()], PLAN).sem).all()
+    assert np.isnan(analysis.curves([samples()], PLAN).sem).all()
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.02, -0.02])
 def test_a_lag_is_found_at_both_ends(delay: float) -> None:
-    lags = analyse.lags_s(analyse.curves([samples(delay)], PLAN), PLAN)
+    lags = analysis.lags_s(analysis.curves([samples(delay)], PLAN), PLAN)
     np.testing.assert_allclose(lags, delay, atol=0.003)
 
 
@@ -66,16 +67,16 @@ def test_a_gap_leaves_a_hole_and_nothing_else() -> None:
         angle_deg=whole.angle_deg[keep],
         commanded_deg=whole.commanded_deg[keep],
     )
-    found = analyse.curves([cut], PLAN)
+    found = analysis.curves([cut], PLAN)
     assert np.isnan(found.mean[0, 20:25]).all()
     assert not np.isnan(np.delete(found.mean, np.s_[20:25], axis=1)).any()
-    both = analyse.curves([cut, whole], PLAN)
+    both = analysis.curves([cut, whole], PLAN)
     assert not np.isnan(both.mean).any()
 
 
 def test_limits_are_judged_with_the_encoders_rounding() -> None:
-    found = analyse.curves([samples(resolution=0.09)], PLAN)
-    checks = analyse.limit_checks(found, LIMITS, (0.09, 0.09))
+    found = analysis.curves([samples(resolution=0.09)], PLAN)
+    checks = analysis.limit_checks(found, LIMITS, (0.09, 0.09))
     assert checks[0][0].verdict == "kept"
     peak = checks[0][0].peak
     near = replace(checks[0][0], limit=peak - checks[0][0].sigma)
@@ -86,9 +87,9 @@ def test_limits_are_judged_with_the_encoders_rounding() -> None:
 def test_final_errors_are_taken_at_the_last_sample() -> None:
     late = samples()
     late.angle_deg[-1] += (0.25, -0.5)
-    np.testing.assert_allclose(analyse.final_errors(late, PLAN), (0.25, -0.5), atol=1e-9)
+    np.testing.assert_allclose(analysis.final_errors(late, PLAN), (0.25, -0.5), atol=1e-9)
 
 
 def test_no_samples_is_an_error() -> None:
     with pytest.raises(ValueError, match="no samples"):
-        analyse.curves([], PLAN)
+        analysis.curves([], PLAN)

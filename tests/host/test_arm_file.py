@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from armtempo.arm import default_path, load_arm
 from armtempo.errors import InputError
+from armtempo.model.arm import default_path, load_arm
 
 
 def changed(tmp_path: Path, old: str, new: str) -> Path:

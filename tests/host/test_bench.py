@@ -14,11 +14,11 @@ from pathlib import Path
 import distributed
 import numpy as np
 import pytest
-from armtempo import arm as arms
-from armtempo import bench, bench_plot, bench_store, bench_table, bench_workers
-from armtempo import job as jobs
 from armtempo.cli import main
 from armtempo.errors import ArmtempoError, InputError
+from armtempo.model import arm as arms
+from armtempo.model import job as jobs
+from armtempo.research.bench import cases, result_plot, result_store, result_table, worker_pool
 from click.testing import CliRunner
 
 ITERATIONS = 6
@@ -26,32 +26,32 @@ SMALL = ["--populations", "4,6", "--seeds", "2", "--iterations", str(ITERATIONS)
 
 
 @pytest.fixture(scope="module")
-def problem() -> bench.Problem:
+def problem() -> cases.Problem:
     arm = arms.load_arm(arms.default_path())
-    return bench.problem_of(arm, jobs.load_job(jobs.default_path(), arm), 1, "stretched", ITERATIONS)
+    return cases.problem_of(arm, jobs.load_job(jobs.default_path(), arm), 1, "stretched", ITERATIONS)
 
 
 @pytest.fixture(scope="module")
-def some() -> list[bench.Case]:
-    return bench.cases(["acs", "ga", "pso"], [4, 6], [1, 2])
+def some() -> list[cases.Case]:
+    return cases.cases(["acs", "ga", "pso"], [4, 6], [1, 2])
 
 
 @pytest.fixture(scope="module")
-def runs(problem: bench.Problem, some: list[bench.Case]) -> dict[bench.Case, bench.Run]:
-    return {case: bench.solve(problem, case) for case in some}
+def runs(problem: cases.Problem, some: list[cases.Case]) -> dict[cases.Case, cases.Run]:
+    return {case: cases.solve(problem, case) for case in some}
 
 
-def _numbers(run: bench.Run) -> tuple[object, ...]:
+def _numbers(run: cases.Run) -> tuple[object, ...]:
     """All of a run but the time it took."""
     return run.case, run.intervals_s, run.evaluations, run.improvements
 
 
-def test_cases_come_once_and_long_ones_first(some: list[bench.Case]) -> None:
+def test_cases_come_once_and_long_ones_first(some: list[cases.Case]) -> None:
     assert len(some) == len(set(some)) == 12
     assert [case.population for case in some] == [6] * 6 + [4] * 6
 
 
-def test_problem_is_the_planners_fitness(problem: bench.Problem) -> None:
+def test_problem_is_the_planners_fitness(problem: cases.Problem) -> None:
     table_6 = np.array([[1.514, 0.502, 1.628, 0.722, 0.253, 1.413]])
     assert problem.function()(table_6)[0] == pytest.approx(6.0319, rel=1e-3)
 
@@ -60,46 +60,46 @@ def test_problem_refuses_joints_that_cannot_be_timed() -> None:
     arm = arms.load_arm(arms.default_path())
     job = jobs.load_job(jobs.default_path(), arm)
     with pytest.raises(InputError, match="joints 1 to 3"):
-        bench.problem_of(arm, job, 4, "stretched", 1)
+        cases.problem_of(arm, job, 4, "stretched", 1)
 
 
 def test_history_is_rebuilt_from_improvements() -> None:
-    run = bench.Run(bench.Case("ga", 4, 1), (), 4, 0.0, ((0, 9.0), (2, 7.5), (5, 7.0)))
+    run = cases.Run(cases.Case("ga", 4, 1), (), 4, 0.0, ((0, 9.0), (2, 7.5), (5, 7.0)))
     assert run.history(6).tolist() == [9.0, 9.0, 7.5, 7.5, 7.5, 7.0, 7.0]
     assert run.best_s == 7.0
 
 
 def test_processes_give_the_same_numbers(
-    problem: bench.Problem, some: list[bench.Case], runs: dict[bench.Case, bench.Run]
+    problem: cases.Problem, some: list[cases.Case], runs: dict[cases.Case, cases.Run]
 ) -> None:
-    with bench_workers.local(2) as executor:
-        found = {run.case: run for run in bench.execute(problem, some, executor)}
+    with worker_pool.local(2) as executor:
+        found = {run.case: run for run in cases.execute(problem, some, executor)}
     assert {case: _numbers(run) for case, run in found.items()} == {c: _numbers(r) for c, r in runs.items()}
 
 
 def test_a_cluster_of_two_workers_gives_the_same_numbers(
-    tmp_path: Path, runs: dict[bench.Case, bench.Run], problem: bench.Problem
+    tmp_path: Path, runs: dict[cases.Case, cases.Run], problem: cases.Problem
 ) -> None:
     with distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None) as cluster:
         more = ["--algorithms", "acs,ga,pso", "--scheduler", cluster.scheduler_address, "--no-plot"]
         done = CliRunner().invoke(main, ["bench", *SMALL, *more, "--out", str(tmp_path)])
     assert done.exit_code == 0, done.output
-    found = bench_store.Store(tmp_path, problem).runs
+    found = result_store.Store(tmp_path, problem).runs
     assert {case: _numbers(run) for case, run in found.items()} == {c: _numbers(r) for c, r in runs.items()}
 
 
 def test_no_scheduler_and_no_workers_are_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bench_workers, "_CONNECT_S", 0.3)
-    with pytest.raises(InputError, match="no Dask scheduler"), bench_workers.cluster("tcp://127.0.0.1:9"):
+    monkeypatch.setattr(worker_pool, "_CONNECT_S", 0.3)
+    with pytest.raises(InputError, match="no Dask scheduler"), worker_pool.cluster("tcp://127.0.0.1:9"):
         pass
-    with pytest.raises(InputError, match="is no address"), bench_workers.cluster("nonsense"):
+    with pytest.raises(InputError, match="is no address"), worker_pool.cluster("nonsense"):
         pass
     with pytest.raises(InputError, match="no workers"):
-        bench_workers._check_workers("tcp://there", {})
+        worker_pool._check_workers("tcp://there", {})
     with pytest.raises(ArmtempoError, match="no armtempo"):
-        bench_workers._check_workers("tcp://there", {"w": ImportError()})
+        worker_pool._check_workers("tcp://there", {"w": ImportError()})
     with pytest.raises(ArmtempoError, match=r"armtempo 0\.0\.0"):
-        bench_workers._check_workers("tcp://there", {"w": "0.0.0"})
+        worker_pool._check_workers("tcp://there", {"w": "0.0.0"})
 
 
 def test_goes_on_where_it_was_interrupted(tmp_path: Path) -> None:
@@ -113,7 +113,7 @@ def test_goes_on_where_it_was_interrupted(tmp_path: Path) -> None:
         *arguments,
     ]
     command += ["--workers", "2", "--out", str(tmp_path)]
-    file = tmp_path / bench_store.FILE
+    file = tmp_path / result_store.FILE
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
         while process.poll() is None and not (file.exists() and file.read_bytes().count(b"\n") >= 3):
             time.sleep(0.01)
@@ -136,54 +136,54 @@ def test_goes_on_where_it_was_interrupted(tmp_path: Path) -> None:
 
 
 def test_a_line_cut_off_is_done_again(
-    tmp_path: Path, problem: bench.Problem, runs: dict[bench.Case, bench.Run]
+    tmp_path: Path, problem: cases.Problem, runs: dict[cases.Case, cases.Run]
 ) -> None:
-    store = bench_store.Store(tmp_path, problem)
+    store = result_store.Store(tmp_path, problem)
     for run in runs.values():
         store.add(run)
     content = store.path.read_bytes()
     store.path.write_bytes(content[:-7])
-    again = bench_store.Store(tmp_path, problem)
+    again = result_store.Store(tmp_path, problem)
     assert again.runs == dict(list(runs.items())[:-1])
     again.add(list(runs.values())[-1])
     assert store.path.read_bytes() == content
 
 
-def test_runs_of_another_problem_and_other_files_are_refused(tmp_path: Path, problem: bench.Problem) -> None:
-    bench_store.Store(tmp_path, problem)
-    other = bench.Problem(**{**vars(problem), "iterations": 7, "fitness": "penalised"})
+def test_runs_of_another_problem_and_other_files_are_refused(tmp_path: Path, problem: cases.Problem) -> None:
+    result_store.Store(tmp_path, problem)
+    other = cases.Problem(**{**vars(problem), "iterations": 7, "fitness": "penalised"})
     with pytest.raises(InputError, match="differs in fitness, iterations"):
-        bench_store.Store(tmp_path, other)
-    (tmp_path / bench_store.FILE).write_text("a shopping list\n")
+        result_store.Store(tmp_path, other)
+    (tmp_path / result_store.FILE).write_text("a shopping list\n")
     with pytest.raises(InputError, match="not a file of runs"):
-        bench_store.Store(tmp_path, problem)
-    (tmp_path / bench_store.FILE).unlink()
-    store = bench_store.Store(tmp_path, problem)
+        result_store.Store(tmp_path, problem)
+    (tmp_path / result_store.FILE).unlink()
+    store = result_store.Store(tmp_path, problem)
     head = store.path.read_text()
     for improvements in ([], [["a", "b"]], [[0]]):
         case = {"algorithm": "acs", "population": 4, "seed": 1}
         run = {"case": case, "intervals_s": [], "evaluations": 1, "seconds": 0, "improvements": improvements}
         store.path.write_text(f"{head}{json.dumps(run)}\n")
         with pytest.raises(InputError, match="not a file of runs"):
-            bench_store.Store(tmp_path, problem)
+            result_store.Store(tmp_path, problem)
     (tmp_path / "flat").write_text("")
     with pytest.raises(InputError, match="cannot be used"):
-        bench_store.Store(tmp_path / "flat", problem)
+        result_store.Store(tmp_path / "flat", problem)
 
 
-def test_tables_say_what_the_runs_are(runs: dict[bench.Case, bench.Run]) -> None:
-    found = bench_table.rows(runs.values(), ITERATIONS)
+def test_tables_say_what_the_runs_are(runs: dict[cases.Case, cases.Run]) -> None:
+    found = result_table.rows(runs.values(), ITERATIONS)
     assert [(row.algorithm, row.population) for row in found] == [
         ("ga", 4), ("ga", 6), ("pso", 4), ("pso", 6), ("acs", 4), ("acs", 6),
     ]  # fmt: skip
-    table = list(csv.DictReader(bench_table.table_csv(found, with_paper=True).splitlines()))
-    mine = [runs[bench.Case("pso", 6, seed)] for seed in (1, 2)]
+    table = list(csv.DictReader(result_table.table_csv(found, with_paper=True).splitlines()))
+    mine = [runs[cases.Case("pso", 6, seed)] for seed in (1, 2)]
     row = next(row for row in table if (row["algorithm"], row["population"]) == ("pso", "6"))
     assert float(row["best_s"]) == pytest.approx(min(run.best_s for run in mine), abs=1e-6)
     assert float(row["worst_s"]) == pytest.approx(max(run.best_s for run in mine), abs=1e-6)
     assert float(row["median_s"]) == pytest.approx(sum(run.best_s for run in mine) / 2, abs=1e-6)
     assert int(row["evaluations"]) == 6 * (1 + 2 * ITERATIONS)
-    curves = list(csv.DictReader(bench_table.curves_csv(found).splitlines()))
+    curves = list(csv.DictReader(result_table.curves_csv(found).splitlines()))
     assert len(curves) == 6 * (ITERATIONS + 1)
     last = next(c for c in curves if (c["algorithm"], c["population"], c["iteration"]) == ("pso", "6", "6"))
     assert [last[name] for name in ("best_s", "median_s", "worst_s")] == [
@@ -200,12 +200,12 @@ def test_the_paper_stands_beside_its_own_problem_only(tmp_path: Path) -> None:
         assert ("10.491" in done.output) is expected
 
 
-def test_draws_the_curves(runs: dict[bench.Case, bench.Run], tmp_path: Path) -> None:
-    figure = bench_plot.convergence(bench_table.rows(runs.values(), ITERATIONS))
+def test_draws_the_curves(runs: dict[cases.Case, cases.Run], tmp_path: Path) -> None:
+    figure = result_plot.convergence(result_table.rows(runs.values(), ITERATIONS))
     titles = [axis.get_title() for axis in figure.axes]
     assert titles == ["population 4", "population 6"]
     lines = {line.get_label(): line for line in figure.axes[1].lines}
-    both = [runs[bench.Case("acs", 6, seed)].history(ITERATIONS) for seed in (1, 2)]
+    both = [runs[cases.Case("acs", 6, seed)].history(ITERATIONS) for seed in (1, 2)]
     assert lines["ACS"].get_ydata() == pytest.approx(np.mean(both, axis=0))
 
 

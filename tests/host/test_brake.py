@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from armtempo import brake, planner
-from armtempo.plan import Plan
+from armtempo.model.plan import Plan
+from armtempo.planning import brake_time, planner
 
 from tests.host import problems
 
@@ -34,10 +34,10 @@ def braked_excess(plan: Plan, brake_s: float, starts: int = 60) -> tuple[float, 
 def test_braking_keeps_its_limits_and_no_shorter_time_does(name: str) -> None:
     plan = planner.plan(PROBLEMS[name].arm, replace(PROBLEMS[name].job, iterations=100))
     limits = [joint.limits for joint in plan.arm.driven if joint.limits]
-    found = brake.brake_time_s(plan.trajectory, limits)
+    found = brake_time.brake_time_s(plan.trajectory, limits)
     speed, other = braked_excess(plan, min(found, 1.9 * plan.trajectory.duration_s))
     assert speed <= 1 + 1e-6
-    assert other <= brake.EXCESS * 1.01
+    assert other <= brake_time.EXCESS * 1.01
     _, shorter = braked_excess(plan, 0.8 * found)
     assert shorter > 1.0
     assert 0.01 < found < 4 * plan.trajectory.duration_s

@@ -8,11 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from armtempo import arm, link, planner, runs, trajectory_file
+from armtempo import link
 from armtempo.cli import COMMANDS, main
-from armtempo.interrupt import StopRequest
-from armtempo.job import Job
 from armtempo.link import Board, greet
+from armtempo.model import arm, trajectory_file
+from armtempo.model.job import Job
+from armtempo.planning import planner
+from armtempo.robot.stop_request import StopRequest
+from armtempo.runs import reader
 from click.testing import CliRunner, Result
 
 from tests.inprocess import Pipe
@@ -84,7 +87,7 @@ def test_run_writes_a_folder(run: Run, file: str, pipe: Pipe) -> None:
     output = run("run", file).output
     assert "samples-01.csv: complete" in output
     assert "12 samples" in output
-    found = runs.load(Path("runs/small-001"))
+    found = reader.load(Path("runs/small-001"))
     assert len(found.repetitions[0].index) == 12
     assert found.trajectory_path is not None
     assert (Path("runs/small-001") / "motion.bin").read_bytes()[:4] == b"ATM1"
@@ -115,7 +118,7 @@ def test_fault_during_a_run(run: Run, file: str, pipe: Pipe, monkeypatch: pytest
     monkeypatch.setattr(engine, "advance", stall)
     output = run("run", file, code=1).output
     assert "stall or slip) (joint 2)" in output
-    assert runs.load(Path("runs/small-001")).repetitions[0].state == "fault"
+    assert reader.load(Path("runs/small-001")).repetitions[0].state == "fault"
     assert "fault     following" in run("status").output
     assert "a fault is pending" in run("run", file, code=1).output
     assert "cleared: following" in run("clear").output
@@ -142,7 +145,7 @@ def test_interrupt_brakes_then_freezes_and_keeps_the_samples(
     output = run("run", file, code=130).output
     assert "interrupted" in output
     assert engine.calls[-len(calls) :] == calls
-    found = runs.load(Path("runs/small-001")).repetitions[0]
+    found = reader.load(Path("runs/small-001")).repetitions[0]
     assert found.state == "interrupted"
     assert len(found.index)
 

@@ -6,11 +6,13 @@ import re
 from dataclasses import replace
 
 import pytest
-from armtempo import pipeline, record, summary
+from armtempo import pipeline
 from armtempo.cli import show
-from armtempo.columns import aligned
-from armtempo.plan import Plan
-from armtempo.record import Repetition
+from armtempo.formats.text_table import aligned
+from armtempo.model.plan import Plan
+from armtempo.report import text_summary
+from armtempo.runs import run_folder
+from armtempo.runs.run_folder import Repetition
 
 from tests.host import made_runs
 
@@ -45,7 +47,7 @@ def test_what_is_longer_widens_its_column() -> None:
 
 
 def test_a_plan_of_joints_with_long_names(made: Plan) -> None:
-    table = summary.lines(made)[1:6]
+    table = text_summary.lines(made)[1:6]
     assert len({len(line) for line in table}) == 1
     heads, _, *rows = table
     assert all(ends(row)[1:] == ends(heads)[1:] for row in rows)
@@ -56,7 +58,7 @@ def test_a_plan_of_joints_with_long_names(made: Plan) -> None:
 
 def test_results_and_times_of_joints_with_long_names(made: Plan) -> None:
     motion = pipeline.planned(made)
-    scales = record.scales(made.arm)
+    scales = run_folder.scales(made.arm)
     steps = tuple(-1_234_567 for _ in scales)
     lines = pipeline.results(motion, Repetition("", commanded_steps=steps, counts=steps))
     assert len({len(line) for line in lines}) == 1

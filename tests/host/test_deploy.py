@@ -8,10 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from armtempo.boardfiles import own_crc
 from armtempo.deploy import changes, firmware, package, program
 from armtempo.deploy.remote import Survey
 from armtempo.errors import InputError, LinkError
+from armtempo.link.program_version import own_crc
 
 CORTEX_M4 = 6 | 3 << 8 | 7 << 10
 BOARD = Survey("STM32F4DISC with STM32F407", (1, 29, 0), CORTEX_M4, 95_000, 189, 512, False, None, {})

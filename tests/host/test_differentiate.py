@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo import differentiate
+from armtempo.runs import differentiation
 
 STEP = 0.1
 
@@ -16,21 +16,21 @@ STEP = 0.1
 def test_cubics_come_out_exactly_to_the_very_ends(count: int, order: int) -> None:
     cubic = np.polynomial.Polynomial([3.0, -2.0, 5.0, 1.5])
     t = np.arange(count) * STEP
-    found = differentiate.derivative(cubic(t), STEP, order)
+    found = differentiation.derivative(cubic(t), STEP, order)
     np.testing.assert_allclose(found, cubic.deriv(order)(t), atol=1e-9)
 
 
 def test_several_joints_at_once_equal_one_by_one() -> None:
     values = np.random.default_rng(1).normal(size=(30, 3))
-    both = differentiate.derivative(values, STEP, 1)
+    both = differentiation.derivative(values, STEP, 1)
     for joint in range(3):
-        np.testing.assert_allclose(both[:, joint], differentiate.derivative(values[:, joint], STEP, 1))
+        np.testing.assert_allclose(both[:, joint], differentiation.derivative(values[:, joint], STEP, 1))
 
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_a_wave_is_not_delayed(order: int) -> None:
     t = np.arange(200) * STEP
-    found = differentiate.derivative(np.sin(t), STEP, order)[10:-10]
+    found = differentiation.derivative(np.sin(t), STEP, order)[10:-10]
     exact = np.cos(t)[10:-10] if order == 1 else -np.sin(t)[10:-10]
     gain = found @ exact / (exact @ exact)
     assert gain == pytest.approx(1.0, abs=0.01)
@@ -39,16 +39,16 @@ def test_a_wave_is_not_delayed(order: int) -> None:
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_the_stated_noise_is_what_comes_out(order: int) -> None:
-    sigma = differentiate.quantisation_sigma(0.09)
+    sigma = differentiation.quantisation_sigma(0.09)
     values = np.random.default_rng(2).normal(scale=sigma, size=100_000)
-    found = differentiate.derivative(values, STEP, order)[10:-10].std()
-    assert found == pytest.approx(differentiate.noise(order, STEP, sigma), rel=0.02)
+    found = differentiation.derivative(values, STEP, order)[10:-10].std()
+    assert found == pytest.approx(differentiation.noise(order, STEP, sigma), rel=0.02)
 
 
 def test_the_page_states_noise_and_gain_as_they_are() -> None:
     page = (Path(__file__).parents[2] / "host" / "docs" / "analysis.md").read_text(encoding="utf-8")
-    sigma = differentiate.quantisation_sigma(0.09)
-    speed, acceleration = (differentiate.noise(order, STEP, sigma) for order in (1, 2))
+    sigma = differentiation.quantisation_sigma(0.09)
+    speed, acceleration = (differentiation.noise(order, STEP, sigma) for order in (1, 2))
     assert f"{speed:.3f} °/s and {acceleration:.3f} °/s²" in page
     t = np.arange(400) * STEP
     for frequency in (0.5, 1.0, 2.0):
@@ -56,10 +56,10 @@ def test_the_page_states_noise_and_gain_as_they_are() -> None:
         exact = (rate * np.cos(rate * t), -(rate**2) * np.sin(rate * t))
         gains = []
         for order, wanted in enumerate(exact, 1):
-            found = differentiate.derivative(np.sin(rate * t), STEP, order)
+            found = differentiation.derivative(np.sin(rate * t), STEP, order)
             gains.append(found[10:-10] @ wanted[10:-10] / (wanted[10:-10] @ wanted[10:-10]))
         assert f"| {frequency} | {gains[0]:.3f} | {gains[1]:.3f} |" in page
 
 
 def test_too_few_samples_say_so_with_nan() -> None:
-    assert np.isnan(differentiate.derivative(np.arange(3.0), STEP, 1)).all()
+    assert np.isnan(differentiation.derivative(np.arange(3.0), STEP, 1)).all()

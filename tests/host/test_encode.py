@@ -7,10 +7,11 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from armtempo import checks, encode
-from armtempo.arm import Limits, default_path, load_arm
 from armtempo.errors import InputError, PlanError
-from armtempo.trajectory import JointSpline, Trajectory
+from armtempo.model.arm import Limits, default_path, load_arm
+from armtempo.planning import checks
+from armtempo.records import encode
+from armtempo.splines.trajectory import JointSpline, Trajectory
 from armtempo_shared import armrecord, limits, motion
 
 ARM = load_arm(default_path())

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo import exchange, trajectory_file
-from armtempo.arm import default_path, load_arm
 from armtempo.cli import main
 from armtempo.errors import InputError
-from armtempo.job import load_job
+from armtempo.model import exchange, trajectory_file
+from armtempo.model.arm import default_path, load_arm
+from armtempo.model.job import load_job
 from click.testing import CliRunner
 
 from tests.host.made_runs import shipped_plan

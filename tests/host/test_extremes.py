@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from armtempo import bernstein, extremes, spline, timeaxis
-from armtempo.trajectory import JointSpline
+from armtempo.splines import bernstein, bspline, extremes, time_axis
+from armtempo.splines.trajectory import JointSpline
 
 
 def random_joint(seed: int) -> JointSpline:
     """A joint with any path and a time axis that may change pace by a factor of 100."""
     rng = np.random.default_rng(seed)
     degree, refine, count = int(rng.choice([3, 5])), int(rng.choice([1, 2, 5])), int(rng.integers(1, 9))
-    points = spline.fit(rng.normal(0, 50, count + 1), degree)
-    axis = timeaxis.control_points(10.0 ** rng.uniform(-1.5, 0.5, count * refine), degree)
+    points = bspline.fit(rng.normal(0, 50, count + 1), degree)
+    axis = time_axis.control_points(10.0 ** rng.uniform(-1.5, 0.5, count * refine), degree)
     return JointSpline(degree, refine, points, axis)
 
 
@@ -23,7 +23,7 @@ def dense(joint: JointSpline, order: int, count: int = 400) -> float:
     segment = np.repeat(np.arange(len(joint.time_polynomials)), count)
 
     def at(pieces: np.ndarray, n: int) -> np.ndarray:
-        return spline.evaluate(spline.derivative(pieces, n), segment, u)
+        return bspline.evaluate(bspline.derivative(pieces, n), segment, u)
 
     q = [at(joint.angle_polynomials, n) for n in range(4)]
     t = [at(joint.time_polynomials, n) for n in range(4)]
@@ -56,8 +56,8 @@ def test_joints_together_are_the_joints_alone() -> None:
         JointSpline(
             5,
             1,
-            spline.fit(np.random.default_rng(n).normal(0, 9, 5), 5),
-            timeaxis.control_points([1, 2, 0.5, n + 1], 5),
+            bspline.fit(np.random.default_rng(n).normal(0, 9, 5), 5),
+            time_axis.control_points([1, 2, 0.5, n + 1], 5),
         )
         for n in range(3)
     ]
@@ -66,8 +66,8 @@ def test_joints_together_are_the_joints_alone() -> None:
 
 
 def test_range_of_a_path() -> None:
-    points = spline.fit(np.array([[0.0, 5.0], [10.0, 5.0], [10.0, 5.0], [0.0, 5.0]]), 5)
-    pieces = np.moveaxis(spline.polynomials(points, 5), 2, 0)
+    points = bspline.fit(np.array([[0.0, 5.0], [10.0, 5.0], [10.0, 5.0], [0.0, 5.0]]), 5)
+    pieces = np.moveaxis(bspline.polynomials(points, 5), 2, 0)
     low, high = extremes.range_of(pieces)
     seen = np.polynomial.polynomial.polyval(np.linspace(0, 1, 10_001), pieces[0].T)
     assert low == pytest.approx([seen.min(), 5.0], abs=1e-9)
@@ -82,7 +82,7 @@ def test_golden_section_finds_single_extremes() -> None:
 def test_golden_section_agrees_on_the_unoptimised_motion() -> None:
     """Section 3.1 of the paper, where each segment has one extreme of the speed."""
     via = np.array([0.0, 20, 40, 90, 130, 160, 180])
-    joint = JointSpline(5, 1, spline.fit(via, 5), timeaxis.control_points([2.0] * 6, 5))
+    joint = JointSpline(5, 1, bspline.fit(via, 5), time_axis.control_points([2.0] * 6, 5))
     times = joint.via_times_s
     found = extremes.golden_section(lambda t: joint(t, 1), times[:-1], times[1:])
     assert found.max() == pytest.approx(extremes.of_joint(joint).speed_deg_s, rel=1e-9)

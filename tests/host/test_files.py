@@ -6,10 +6,10 @@ import os
 from pathlib import Path
 
 import pytest
-from armtempo import planner
 from armtempo.cli import main
 from armtempo.errors import InputError
-from armtempo.files import replace_text
+from armtempo.formats.atomic_file import replace_text
+from armtempo.planning import planner
 from click.testing import CliRunner
 
 

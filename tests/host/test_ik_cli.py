@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from armtempo.arm import default_path
 from armtempo.cli import main
 from armtempo.kinematics import forward
+from armtempo.model.arm import default_path
 from click.testing import CliRunner, Result
 
 from tests.host.published_arms import PAPER

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.arm import default_path as arm_path
-from armtempo.arm import load_arm
 from armtempo.errors import InputError
-from armtempo.job import OPTIMISERS, Pose, default_path, load_job
+from armtempo.model.arm import default_path as arm_path
+from armtempo.model.arm import load_arm
+from armtempo.model.job import OPTIMISERS, Pose, default_path, load_job
 from armtempo.optimise import ALGORITHMS
 
 ARM = load_arm(arm_path())

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from armtempo.arm import default_path, load_arm
 from armtempo.kinematics import BRANCHES, Branch, Geometry, Ranges, branch_of, choose, forward
 from armtempo.kinematics.choice import Choice
+from armtempo.model.arm import default_path, load_arm
 
 from tests.host.published_arms import FILES, NAMED, PAPER, read
 from tests.host.test_kinematics_singular import SHAPE, with_wrist_at

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from armtempo.arm import default_path, load_arm
 from armtempo.kinematics import Geometry, Ranges, forward, inverse, refusals
 from armtempo.kinematics.numerical import solve
+from armtempo.model.arm import default_path, load_arm
 
 from tests.host.published_arms import PAPER
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo import pose
 from armtempo.errors import InputError
 from armtempo.kinematics import pose_file
+from armtempo.model import pose
 from scipy.spatial.transform import Rotation
 
 TURN = Rotation.from_euler("xyz", [10.0, -20.0, 130.0], degrees=True)

@@ -6,10 +6,10 @@ import random
 from pathlib import Path
 
 import pytest
-from armtempo import operate
 from armtempo.errors import BoardError, LinkError
-from armtempo.interrupt import StopRequest
 from armtempo.link.follow import Follower
+from armtempo.robot import operate
+from armtempo.robot.stop_request import StopRequest
 from armtempo_shared import wire
 
 from tests.host.linked import ARM, follow, random_motion, ready, started

@@ -7,13 +7,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from armtempo import operate
 from armtempo.errors import LinkError
-from armtempo.interrupt import StopRequest
 from armtempo.link import Board
 from armtempo.link.follow import Follower, RunEnd
 from armtempo.link.messages import Sample
 from armtempo.link.session import NoAnswer, OtherBoard
+from armtempo.robot import operate
+from armtempo.robot.stop_request import StopRequest
 from armtempo_shared import wire
 
 from tests.host.linked import random_motion, ready

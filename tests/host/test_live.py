@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from armtempo import record
 from armtempo.cli.live import Live
 from armtempo.cli.progress import Progress
 from armtempo.link.messages import Sample, Stand
-from armtempo.liveplot import LivePlot
 from armtempo.pipeline import planned
+from armtempo.report.live_plot import LivePlot
+from armtempo.runs import run_folder
 
 from tests.host.made_runs import shipped_plan
 
@@ -21,7 +21,7 @@ from tests.host.made_runs import shipped_plan
 def sample(time_s: float, off_deg: float) -> Sample:
     """All joints on the plan but for ``off_deg``."""
     plan = shipped_plan()
-    scales = record.scales(plan.arm)
+    scales = run_folder.scales(plan.arm)
     angles = plan.trajectory(time_s)
     steps = tuple(round(a * s.steps_per_deg) for a, s in zip(angles, scales, strict=True))
     counts = tuple(round((a + off_deg) * s.counts_per_deg) for a, s in zip(angles, scales, strict=True))

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from armtempo import arm, decode, encode, moves
 from armtempo.errors import InputError
+from armtempo.model import arm
+from armtempo.planning import point_to_point
+from armtempo.records import decode, encode
 
 ARM = arm.load_arm(arm.default_path())
 START, END = np.array([0.0, -60.0, 40.0]), np.array([180.0, -38.0, -52.0])
@@ -18,7 +20,7 @@ def test_straight_keeps_the_limits_and_uses_one_of_them(seed: int) -> None:
     start, end = numbers.uniform(low, high, (2, 3))
     if seed % 2:
         end = start + 0.01 * (end - start)
-    motion = moves.straight("x", start, end, ARM)
+    motion = point_to_point.straight("x", start, end, ARM)
     np.testing.assert_allclose([motion(0.0), motion(motion.duration_s)], [start, end], atol=1e-9)
     times = np.linspace(0.0, motion.duration_s, 4001)
     limits = np.array([joint.limits.values for joint in ARM.driven if joint.limits]).T
@@ -30,20 +32,20 @@ def test_straight_keeps_the_limits_and_uses_one_of_them(seed: int) -> None:
 
 def test_straight_refuses_what_is_out_of_range() -> None:
     with pytest.raises(InputError, match="joint 1: 200 degrees is outside"):
-        moves.straight("x", START, [200.0, -60.0, 0.0], ARM)
+        point_to_point.straight("x", START, [200.0, -60.0, 0.0], ARM)
     with pytest.raises(InputError, match="3 angles, not 2"):
-        moves.straight("x", START, [0.0, 0.0], ARM)
+        point_to_point.straight("x", START, [0.0, 0.0], ARM)
 
 
 def test_backwards_mirrors_time() -> None:
-    motion = moves.straight("x", START, END, ARM)
-    back = moves.backwards(motion, "y")
+    motion = point_to_point.straight("x", START, END, ARM)
+    back = point_to_point.backwards(motion, "y")
     times = np.linspace(0.0, motion.duration_s, 101)
     np.testing.assert_allclose(back(times), motion(motion.duration_s - times), atol=1e-9)
 
 
 def test_records_read_back() -> None:
-    motion = moves.straight("x", START, END, ARM)
+    motion = point_to_point.straight("x", START, END, ARM)
     data = encode.motion_record(motion, ARM)
     found = decode.trajectory(data, ARM, "x")
     times = np.linspace(0.0, motion.duration_s, 101)

@@ -6,16 +6,19 @@ import re
 
 import numpy as np
 import pytest
-from armtempo import analyse, bench_plot, page, plots, reach
-from armtempo.bench import Case, Run
-from armtempo.bench_table import rows
+from armtempo.kinematics import chain
+from armtempo.report import html_page, plots
+from armtempo.research.bench import result_plot
+from armtempo.research.bench.cases import Case, Run
+from armtempo.research.bench.result_table import rows
+from armtempo.runs import analysis
 
 from tests.host.made_runs import shipped_plan
 
 
 def test_a_column_is_aligned_as_a_whole() -> None:
-    sheet = page.Page("t")
-    sheet.table(("n", "what"), [("1.5", "5, per-joint"), ("–", ("word", page.BAD))])
+    sheet = html_page.Page("t")
+    sheet.table(("n", "what"), [("1.5", "5, per-joint"), ("–", ("word", html_page.BAD))])
     cells = re.findall(r"<t[dh](?: [^>]*)?>[^<]*", sheet.render())
     assert cells == [
         '<th class="number">n',
@@ -28,7 +31,7 @@ def test_a_column_is_aligned_as_a_whole() -> None:
 
 
 def test_text_is_escaped() -> None:
-    sheet = page.Page("a < b", "x & y")
+    sheet = html_page.Page("a < b", "x & y")
     sheet.note("<script>")
     sheet.table(("<i>",), [("<b>",)], "<c>")
     assert not re.search(r"<(script|i|b|c)>", sheet.render())
@@ -41,17 +44,17 @@ def figure(name: str) -> str:
     limits = [joint.limits for joint in plan.arm.driven if joint.limits]
     times = np.linspace(0.0, plan.trajectory.duration_s, 50)
     theory = np.stack([plan.trajectory(times, order) for order in range(3)])
-    seen = analyse.Curves(times, theory[None], theory, 0.1 * np.abs(theory), theory, theory)
+    seen = analysis.Curves(times, theory[None], theory, 0.1 * np.abs(theory), theory, theory)
     runs = [Run(Case("acs", 10, seed), (), 1, 1.0, ((0, 6.0 + seed),)) for seed in (1, 2)]
-    chains = reach.chains_mm(plan.arm, plan.via_deg)
+    chains = chain.chains_mm(plan.arm, plan.via_deg)
     drawn = {
         "motion": lambda: plots.motion(plan.trajectory, limits, names),
         "tracking": lambda: plots.tracking(seen, plan.trajectory, limits, names),
         "errors": lambda: plots.errors(seen, names),
         "overlay": lambda: plots.overlay({"one": (times, theory[:, :, 0], times)}),
         "convergence": lambda: plots.convergence({"one": np.arange(9.0)}),
-        "postures": lambda: plots.postures(chains, reach.tool_path_mm(plan.arm, plan.trajectory, times)),
-        "searches": lambda: bench_plot.convergence(rows(runs, 5)),
+        "postures": lambda: plots.postures(chains, chain.tool_path_mm(plan.arm, plan.trajectory, times)),
+        "searches": lambda: result_plot.convergence(rows(runs, 5)),
     }
     return plots.inline_svg(drawn[name](), name, "what it shows")
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from armtempo.bench import Case, Run
-from armtempo.bench_table import rows
-from armtempo.paper import motions, postures, printed, searches
-from armtempo.paper.claims import BETTER, DIFFERS, SAME, compared
+from armtempo.research.bench.cases import Case, Run
+from armtempo.research.bench.result_table import rows
+from armtempo.research.paper import motions, postures, printed, searches
+from armtempo.research.paper.claims import BETTER, DIFFERS, SAME, compared
 
 
 @pytest.fixture(scope="module")

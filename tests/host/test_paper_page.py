@@ -7,14 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from armtempo import report
-from armtempo.bench import Case, Run
-from armtempo.bench_table import Row, rows
 from armtempo.errors import LinkError
-from armtempo.interrupt import StopRequest
-from armtempo.paper import experiment, motions, sheet
-from armtempo.paper.claims import DIFFERS, SAME, Claim
-from armtempo.paper.experiment import CUBIC, QUINTIC, UNOPTIMISED, Series
+from armtempo.report import run_report
+from armtempo.research.bench.cases import Case, Run
+from armtempo.research.bench.result_table import Row, rows
+from armtempo.research.paper import experiment, motions, sheet
+from armtempo.research.paper.claims import DIFFERS, SAME, Claim
+from armtempo.research.paper.experiment import CUBIC, QUINTIC, UNOPTIMISED, Series
+from armtempo.robot.stop_request import StopRequest
 
 from tests import browser
 from tests.host import made_runs
@@ -33,7 +33,7 @@ def made() -> motions.Plans:
 def series(folder: Path, scatter_deg: dict[str, float]) -> list[Series]:
     """Three runs of the quintic motion with more or less noise."""
     return [
-        Series(name, report.evaluate(made_runs.make(folder / name, 2, scatter)))
+        Series(name, run_report.evaluate(made_runs.make(folder / name, 2, scatter)))
         for name, scatter in scatter_deg.items()
     ]
 

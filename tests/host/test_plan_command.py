@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from armtempo import planner, trajectory_file
 from armtempo.cli import main
+from armtempo.model import trajectory_file
+from armtempo.planning import planner
 from click.testing import CliRunner, Result
 
 POINT_TO_POINT = """

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from armtempo import planner, polish, spline, timeaxis
-from armtempo.constraints import Constraints, Path, near_rows, peak_rows
+from armtempo.planning import local_search, planner
+from armtempo.planning.constraints import Constraints, Path, near_rows, peak_rows
+from armtempo.splines import bspline, time_axis
 
 from tests.host import problems
 from tests.host.test_fitness import LIMITS
@@ -19,7 +20,7 @@ PROBLEMS = {problem.name: problem for problem in problems.load()}
 @pytest.mark.parametrize("degree", [3, 5])
 @pytest.mark.parametrize("parts", [1, 3])
 def test_gradients_are_those_of_the_values(degree: int, parts: int) -> None:
-    path = Path(spline.fit(FEEDING, degree), degree, LIMITS, timeaxis.free_map(6 * parts, degree))
+    path = Path(bspline.fit(FEEDING, degree), degree, LIMITS, time_axis.free_map(6 * parts, degree))
     rng = np.random.default_rng(7)
     y = rng.uniform(0.3, 1.0, len(path.weights))
     rows = near_rows(path, y, 4, 2.0) + peak_rows(path, y, 8, 2.0)
@@ -32,7 +33,7 @@ def test_gradients_are_those_of_the_values(degree: int, parts: int) -> None:
 
 
 def test_values_are_what_is_left_of_the_limits() -> None:
-    path = Path(spline.fit(FEEDING, 5), 5, LIMITS, timeaxis.step_map(6, 5))
+    path = Path(bspline.fit(FEEDING, 5), 5, LIMITS, time_axis.step_map(6, 5))
     y = np.full(6, 1.2)
     values = Constraints(path, near_rows(path, y, 8, 2.0), y).values(y)
     assert values.min() == pytest.approx(path.slack(8, y).min())
@@ -53,10 +54,10 @@ def test_polished_plan_is_the_best_known_to_1e_6(name: str) -> None:
 def test_polish_never_makes_it_worse() -> None:
     rng = np.random.default_rng(11)
     for _ in range(10):
-        points = spline.fit(rng.normal(0, 40, (int(rng.integers(2, 9)), 2)), 5)
-        path = Path(points, 5, LIMITS[:2], timeaxis.step_map(len(points) - 5, 5))
+        points = bspline.fit(rng.normal(0, 40, (int(rng.integers(2, 9)), 2)), 5)
+        path = Path(points, 5, LIMITS[:2], time_axis.step_map(len(points) - 5, 5))
         start = path.stretched(rng.uniform(0.3, 2, len(points) - 5))
-        found = polish.polish(path, start)
+        found = local_search.polish(path, start)
         assert found.total_s <= path.duration_s(start) * (1 + 1e-12)
         assert path.duration_s(path.stretched(found.y)) == pytest.approx(found.total_s, rel=1e-9)
 
@@ -92,9 +93,9 @@ def test_shared_timing_without_refinement() -> None:
 
 
 def test_a_solution_at_the_wall_of_its_box_is_no_optimum() -> None:
-    path = Path(spline.fit(FEEDING, 5), 5, LIMITS, timeaxis.step_map(6, 5))
+    path = Path(bspline.fit(FEEDING, 5), 5, LIMITS, time_axis.step_map(6, 5))
     y = path.stretched(np.full(6, 1.2))
     rows = near_rows(path, y, 8, 0.3)
-    assert not polish._solve(path, rows, y, 1e-3)[2]
-    best = polish.polish(path, y).y
-    assert polish._solve(path, near_rows(path, best, 8, 0.3), best, 0.3)[2]
+    assert not local_search._solve(path, rows, y, 1e-3)[2]
+    best = local_search.polish(path, y).y
+    assert local_search._solve(path, near_rows(path, best, 8, 0.3), best, 0.3)[2]

@@ -8,19 +8,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo import arm, record, runs
 from armtempo.errors import InputError, RunFolderError
 from armtempo.link.messages import Sample, Stand
+from armtempo.model import arm
+from armtempo.runs import reader, run_folder
 
-SCALES = record.scales(arm.load_arm(arm.default_path()))
+SCALES = run_folder.scales(arm.load_arm(arm.default_path()))
 
 
 def sample(index: int) -> Sample:
     return Sample(1, index, index * 8_400_000, 0, Stand((index, -index, 0), (3 * index, -3 * index, 7)))
 
 
-def folder(path: Path) -> record.RunFolder:
-    return record.RunFolder(record.new_folder(path, "feed"), "feed", SCALES, {"port": "sim"})
+def folder(path: Path) -> run_folder.RunFolder:
+    return run_folder.RunFolder(run_folder.new_folder(path, "feed"), "feed", SCALES, {"port": "sim"})
 
 
 def test_whole_run(tmp_path: Path) -> None:
@@ -29,8 +30,8 @@ def test_whole_run(tmp_path: Path) -> None:
         with run.begin_repetition() as file:
             for index in range(5):
                 file.append(sample(index))
-            file.repetition.end(record.COMPLETE, "", 33_600_000, sample(4).stand, ())
-    found = runs.load(run.path)
+            file.repetition.end(run_folder.COMPLETE, "", 33_600_000, sample(4).stand, ())
+    found = reader.load(run.path)
     assert [(part.file, part.state) for part in found.repetitions] == [
         ("samples-01.csv", "complete"),
         ("samples-02.csv", "complete"),
@@ -47,15 +48,15 @@ def test_whole_run(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("error", "state"), [(KeyboardInterrupt, record.INTERRUPTED), (OSError, record.BROKEN)]
+    ("error", "state"), [(KeyboardInterrupt, run_folder.INTERRUPTED), (OSError, run_folder.BROKEN)]
 )
 def test_interrupted_run_keeps_what_arrived(tmp_path: Path, error: type[BaseException], state: str) -> None:
     run = folder(tmp_path)
     with pytest.raises(error), run.begin_repetition() as file:  # noqa: PT012
         file.append(sample(0))
-        assert len(runs.load(run.path).repetitions[0].index) == 1  # readable in the middle
+        assert len(reader.load(run.path).repetitions[0].index) == 1  # readable in the middle
         raise error
-    found = runs.load(run.path).repetitions[0]
+    found = reader.load(run.path).repetitions[0]
     assert (found.state, found.index.tolist()) == (state, [0])
 
 
@@ -66,29 +67,29 @@ def test_half_a_line_is_dropped(tmp_path: Path) -> None:
         file.append(sample(1))
     path = run.path / "samples-01.csv"
     path.write_text(path.read_text()[:-9])
-    assert runs.load(run.path).repetitions[0].index.tolist() == [0]
+    assert reader.load(run.path).repetitions[0].index.tolist() == [0]
 
 
 def test_folders_never_collide(tmp_path: Path) -> None:
-    names = [record.new_folder(tmp_path, "feed").name for _ in range(3)]
+    names = [run_folder.new_folder(tmp_path, "feed").name for _ in range(3)]
     assert names == ["feed-001", "feed-002", "feed-003"]
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="cannot be made"):
-        record.new_folder(tmp_path / "file", "feed")
+        run_folder.new_folder(tmp_path / "file", "feed")
 
 
 def test_damaged_folders_are_named(tmp_path: Path) -> None:
     with pytest.raises(RunFolderError, match="not a run folder"):
-        runs.load(tmp_path)
+        reader.load(tmp_path)
     run = folder(tmp_path)
     with run.begin_repetition() as file:
         file.append(sample(0))
-    meta_path = run.path / record.META
+    meta_path = run.path / run_folder.META
     meta = json.loads(meta_path.read_text())
     (run.path / "samples-01.csv").write_text("index,time_s\nx,0\n")
-    assert "damaged" in runs.load(run.path).repetitions[0].problem
+    assert "damaged" in reader.load(run.path).repetitions[0].problem
     (run.path / "samples-01.csv").unlink()
-    assert "missing" in runs.load(run.path).repetitions[0].problem
+    assert "missing" in reader.load(run.path).repetitions[0].problem
     for change, words in (
         ({"version": 99}, "version 99"),
         ({"format": "other"}, "not the description"),
@@ -96,10 +97,10 @@ def test_damaged_folders_are_named(tmp_path: Path) -> None:
     ):
         meta_path.write_text(json.dumps(meta | change))
         with pytest.raises(RunFolderError, match=words):
-            runs.load(run.path)
+            reader.load(run.path)
     meta_path.write_text("{")
     with pytest.raises(RunFolderError, match="damaged"):
-        runs.load(run.path)
+        reader.load(run.path)
 
 
 def test_full_disk_is_said_and_what_came_before_is_kept(tmp_path: Path) -> None:
@@ -116,13 +117,13 @@ def test_full_disk_is_said_and_what_came_before_is_kept(tmp_path: Path) -> None:
         file._file = full.open("w", encoding="utf-8", newline="")
         file._csv = csv.writer(file._file)
         file.append(sample(1))
-    found = runs.load(run.path).repetitions[0]
-    assert (found.state, found.index.tolist()) == (record.BROKEN, [0])
+    found = reader.load(run.path).repetitions[0]
+    assert (found.state, found.index.tolist()) == (run_folder.BROKEN, [0])
 
 
 def test_two_runs_at_once_get_folders_of_their_own(tmp_path: Path) -> None:
     (tmp_path / "feed-001").symlink_to(tmp_path / "nowhere")  # as if it came into being after a look
-    assert record.new_folder(tmp_path, "feed").name == "feed-002"
+    assert run_folder.new_folder(tmp_path, "feed").name == "feed-002"
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="the run folder cannot be made"):
-        record.new_folder(tmp_path / "file", "feed")
+        run_folder.new_folder(tmp_path / "file", "feed")

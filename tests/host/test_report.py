@@ -10,11 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from armtempo import comparison, report, separation, trajectory_file
-from armtempo.arm import Driver
 from armtempo.cli import main
 from armtempo.errors import RunFolderError
-from armtempo.plan import Plan
+from armtempo.model import trajectory_file
+from armtempo.model.arm import Driver
+from armtempo.model.plan import Plan
+from armtempo.planning import path_deviation
+from armtempo.report import comparison, run_report
 from click.testing import CliRunner
 
 from tests import browser
@@ -27,12 +29,12 @@ FIGURES = ("tracking", "errors", "motion", "convergence", "postures")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of three repetitions with two samples lost, and its report."""
     path = made_runs.make(tmp_path_factory.mktemp("runs") / "feed-001", drop=(5, 6))
-    report.write(path)
+    run_report.write(path)
     return path
 
 
 def test_the_page_and_every_figure_are_written(folder: Path) -> None:
-    text = (folder / report.PAGE).read_text()
+    text = (folder / run_report.PAGE).read_text()
     assert text.count("<svg") == len(FIGURES)
     for name in FIGURES:
         assert (folder / f"{name}.png").read_bytes().startswith(b"\x89PNG")
@@ -40,7 +42,7 @@ def test_the_page_and_every_figure_are_written(folder: Path) -> None:
 
 
 def test_nothing_is_fetched_and_no_id_is_used_twice(folder: Path) -> None:
-    text = (folder / report.PAGE).read_text()
+    text = (folder / run_report.PAGE).read_text()
     assert not re.search(r'(src|href)="(?!#)', text.replace('xlink:href="#', ""))
     assert "@import" not in text
     ids = re.findall(r'\bid="([^"]+)"', text)
@@ -48,14 +50,14 @@ def test_nothing_is_fetched_and_no_id_is_used_twice(folder: Path) -> None:
 
 
 def test_what_is_missing_is_said(folder: Path) -> None:
-    assert "samples-01.csv: samples 5 to 6 are missing" in (folder / report.PAGE).read_text()
+    assert "samples-01.csv: samples 5 to 6 are missing" in (folder / run_report.PAGE).read_text()
 
 
 def test_a_repetition_that_is_missing_does_not_hide_the_others(tmp_path: Path) -> None:
     path = made_runs.make(tmp_path / "run")
     (path / "samples-02.csv").unlink()
     (path / "samples-03.csv").write_text((path / "samples-03.csv").read_text()[:900])
-    found = report.evaluate(path)
+    found = run_report.evaluate(path)
     assert any("samples-02.csv" in text and "missing" in text for text in found.complaints)
     assert len(found.curves.each) == 2
 
@@ -64,7 +66,7 @@ def test_a_reset_in_the_middle_is_said(tmp_path: Path) -> None:
     path = made_runs.make(tmp_path / "run")
     lines = (path / "samples-01.csv").read_text().splitlines()
     (path / "samples-01.csv").write_text("\n".join(lines[:20] + lines[1:5]) + "\n")
-    assert any("starts again" in text for text in report.evaluate(path).complaints)
+    assert any("starts again" in text for text in run_report.evaluate(path).complaints)
 
 
 def describe(path: Path, **changes: object) -> None:
@@ -83,7 +85,7 @@ def test_a_cell_beyond_reason_makes_the_file_damaged(tmp_path: Path, cell: int, 
     lines = [line.split(",") for line in path.read_text().splitlines()]
     lines[5][cell] = value
     path.write_text("\n".join(map(",".join, lines)) + "\n")
-    found = report.evaluate(path.parent)
+    found = run_report.evaluate(path.parent)
     assert found.complaints[0].startswith("samples-01.csv: damaged (")
     assert len(found.curves.each) == 1
 
@@ -94,7 +96,7 @@ def test_a_joint_without_an_encoder_is_not_judged(tmp_path: Path, monkeypatch: p
     joints[1] = replace(joints[1], encoder=None)
     blind = replace(whole, arm=replace(whole.arm, joints=tuple(joints)))
     monkeypatch.setattr(made_runs, "shipped_plan", lambda: blind)
-    page = report.write(made_runs.make(tmp_path / "run")).read_text()
+    page = run_report.write(made_runs.make(tmp_path / "run")).read_text()
     assert page.count("not measured") == 2
     assert "nan" not in re.sub("<svg.*?</svg>", "", page, flags=re.DOTALL)
 
@@ -116,7 +118,7 @@ def test_a_folder_that_is_no_run_is_refused(tmp_path: Path, spoil: object, said:
     path = made_runs.make(tmp_path / "run", repetitions=1)
     spoil(path)  # type: ignore[operator]
     with pytest.raises(RunFolderError, match=said):
-        report.evaluate(path)
+        run_report.evaluate(path)
     result = CliRunner().invoke(main, ["report", str(path)])
     assert result.exit_code == 1
     assert said in result.output
@@ -150,8 +152,8 @@ def test_a_run_cut_short_is_said_and_the_rest_reported(tmp_path: Path) -> None:
     (path / "run.json").write_text(json.dumps(meta))
     samples = path / "samples-02.csv"
     samples.write_text("".join(samples.read_text().splitlines(keepends=True)[:31]))
-    report.write(path)
-    text = (path / report.PAGE).read_text()
+    run_report.write(path)
+    text = (path / run_report.PAGE).read_text()
     assert "samples-02.csv: cut short, ended as fault (following) after 2.9 s" in text
     assert "1 of 2 repetitions complete" in text
     assert text.count("<svg") == len(FIGURES)
@@ -159,13 +161,13 @@ def test_a_run_cut_short_is_said_and_the_rest_reported(tmp_path: Path) -> None:
 
 def test_when_the_joints_pass_the_via_points_is_told(folder: Path) -> None:
     plan = made_runs.shipped_plan()
-    text = (folder / report.PAGE).read_text()
+    text = (folder / run_report.PAGE).read_text()
     times = [joint.via_times_s[2] for joint in plan.trajectory.joints]
     cells = ("P2", *(f"{time:.3f}" for time in times), f"{max(times) - min(times):.3f}")
     row = re.search(r"<tr><td>P2.*?</tr>", text)
     assert row
     assert tuple(re.findall(r">([^<]+)<", row.group())) == cells
-    assert f"strays up to {separation.tool_stray_mm(plan.arm, plan.trajectory):.1f} mm" in text
+    assert f"strays up to {path_deviation.tool_stray_mm(plan.arm, plan.trajectory):.1f} mm" in text
 
 
 def test_shared_timing_needs_no_such_section(tmp_path: Path) -> None:
@@ -173,8 +175,8 @@ def test_shared_timing_needs_no_such_section(tmp_path: Path) -> None:
     spoil_plan(
         path, lambda plan: replace(plan, job=replace(plan.job, timing="shared"), notes=("by way of X",))
     )
-    report.write(path)
-    text = (path / report.PAGE).read_text()
+    run_report.write(path)
+    text = (path / run_report.PAGE).read_text()
     assert "Per-joint timing" not in text
     assert "Note: by way of X" in text
 
@@ -200,7 +202,7 @@ def test_runs_of_different_arms_are_told_apart(tmp_path: Path, changes: dict[str
 def test_in_a_browser(folder: Path, tmp_path: Path) -> None:
     """Wide, on a phone, light and dark: nothing fetched, nothing cut off, all figures there."""
     browser.needed()
-    page = folder / report.PAGE
+    page = folder / run_report.PAGE
     light = browser.probe(page, tmp_path, 1200)
     dark = browser.probe(page, tmp_path, 1200, dark=True)
     phone = browser.probe(page, tmp_path, 500)

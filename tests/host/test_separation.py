@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from armtempo import arm as arms
-from armtempo import job as jobs
-from armtempo import planner, separation, summary
-from armtempo.plan import Plan
+from armtempo.model import arm as arms
+from armtempo.model import job as jobs
+from armtempo.model.plan import Plan
+from armtempo.planning import path_deviation, planner
+from armtempo.report import text_summary
 
 ARM = arms.load_arm(arms.default_path())
 JOB = replace(jobs.load_job(jobs.default_path(), ARM), iterations=120)
@@ -26,12 +27,12 @@ def together() -> Plan:
 
 
 def test_shared_timing_keeps_joints_and_tool_together(together: Plan) -> None:
-    assert separation.via_spread_s(together.trajectory) == pytest.approx(np.zeros(7), abs=1e-12)
-    assert separation.tool_stray_mm(ARM, together.trajectory) < 0.05
+    assert path_deviation.via_spread_s(together.trajectory) == pytest.approx(np.zeros(7), abs=1e-12)
+    assert path_deviation.tool_stray_mm(ARM, together.trajectory) < 0.05
 
 
 def test_per_joint_timing_separates_joints(apart: Plan) -> None:
-    spread = separation.via_spread_s(apart.trajectory)
+    spread = path_deviation.via_spread_s(apart.trajectory)
     durations = [joint.duration_s for joint in apart.trajectory.joints]
     assert spread[0] == 0
     assert spread[-1] == pytest.approx(max(durations) - min(durations))
@@ -42,7 +43,7 @@ def test_tool_strays_as_far_as_the_nearest_point_of_the_path_is(apart: Plan) -> 
     """Against a plain search over u for the worst of a few times."""
     from armtempo.kinematics.forward import forward
     from armtempo.kinematics.geometry import Geometry
-    from armtempo.trajectory import Trajectory
+    from armtempo.splines.trajectory import Trajectory
 
     first = apart.trajectory.joints[0]
     same = tuple(replace(joint, time_points_s=first.time_points_s) for joint in apart.trajectory.joints)
@@ -57,11 +58,11 @@ def test_tool_strays_as_far_as_the_nearest_point_of_the_path_is(apart: Plan) -> 
         np.sqrt(((tool(apart.trajectory(np.array([time]))) - on_path) ** 2).sum(axis=1)).min()
         for time in np.linspace(0, apart.trajectory.duration_s, 300)
     ]
-    assert separation.tool_stray_mm(ARM, apart.trajectory) == pytest.approx(max(strays), rel=2e-3)
+    assert path_deviation.tool_stray_mm(ARM, apart.trajectory) == pytest.approx(max(strays), rel=2e-3)
 
 
 def test_summary_says_times_floors_limits_and_strays(apart: Plan, together: Plan) -> None:
-    text = summary.lines(apart)
+    text = text_summary.lines(apart)
     assert f"{apart.trajectory.duration_s:.4f} s" in text[0]
     for joint, search, line in zip(ARM.driven, apart.searches, text[3:6], strict=True):
         assert line.startswith(joint.name)
@@ -70,5 +71,5 @@ def test_summary_says_times_floors_limits_and_strays(apart: Plan, together: Plan
         assert joint.limits is not None
         assert f"/ {joint.limits.speed_deg_s:g}" in line
     assert any("strays up to" in line for line in text)
-    assert not any("strays" in line for line in summary.lines(together))
+    assert not any("strays" in line for line in text_summary.lines(together))
     assert all(len(line) <= 110 for line in text)

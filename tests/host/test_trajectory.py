@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from armtempo import spline, timeaxis
-from armtempo.trajectory import JointSpline, Trajectory
+from armtempo.splines import bspline, time_axis
+from armtempo.splines.trajectory import JointSpline, Trajectory
 
 from tests.host.test_spline import FEEDING
 
@@ -14,8 +14,8 @@ TABLE_6 = (1.514, 0.498, 1.638, 0.713, 0.257, 1.413)
 
 def made(via: np.ndarray, intervals: object, degree: int = 5) -> JointSpline:
     """The spline of one joint."""
-    axis = timeaxis.control_points(np.asarray(intervals, dtype=float), degree)
-    return JointSpline(degree, 1, spline.fit(via, degree), axis)
+    axis = time_axis.control_points(np.asarray(intervals, dtype=float), degree)
+    return JointSpline(degree, 1, bspline.fit(via, degree), axis)
 
 
 @pytest.mark.parametrize("degree", [3, 5])

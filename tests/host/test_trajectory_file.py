@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from armtempo import arm as arms
-from armtempo import job as jobs
-from armtempo import planner, trajectory_file
 from armtempo.errors import InputError
-from armtempo.job import Pose
-from armtempo.plan import Plan
+from armtempo.model import arm as arms
+from armtempo.model import job as jobs
+from armtempo.model import trajectory_file
+from armtempo.model.job import Pose
+from armtempo.model.plan import Plan
+from armtempo.planning import planner
 
 ARM = arms.load_arm(arms.default_path())
 JOB = replace(

@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo import job as jobs
-from armtempo import planner, trajectory_file, vias
-from armtempo.arm import Arm, default_path, load_arm
 from armtempo.cli import main
 from armtempo.errors import InputError, PlanError
-from armtempo.job import Job, Pose
 from armtempo.kinematics import Geometry, forward
+from armtempo.model import job as jobs
+from armtempo.model import trajectory_file
+from armtempo.model.arm import Arm, default_path, load_arm
+from armtempo.model.job import Job, Pose
+from armtempo.planning import planner, via_points
 from click.testing import CliRunner
 
 ARM = load_arm(default_path())
@@ -40,7 +41,7 @@ def job(*via: tuple[float, ...] | Pose) -> Job:
 
 def test_the_paper_s_motion_given_as_poses_comes_out_as_its_angles() -> None:
     poses = job(*(pose(*angles) for angles in JOB.via))
-    resolved = vias.resolve(ARM, poses)
+    resolved = via_points.resolve(ARM, poses)
     np.testing.assert_allclose(resolved.via_deg, JOB.via, atol=1e-9)
     assert resolved.notes == ()
     angles, _ = planner.via_angles(ARM, poses)
@@ -49,18 +50,18 @@ def test_the_paper_s_motion_given_as_poses_comes_out_as_its_angles() -> None:
 
 def test_angles_and_poses_may_be_mixed() -> None:
     mixed = job(*(pose(*angles) if number % 2 else angles for number, angles in enumerate(JOB.via)))
-    resolved = vias.resolve(ARM, mixed)
+    resolved = via_points.resolve(ARM, mixed)
     np.testing.assert_allclose(resolved.via_deg, JOB.via, atol=1e-9)
     assert resolved.notes == ()
 
 
 def test_angles_alone_stay_to_the_last_bit() -> None:
-    np.testing.assert_allclose(vias.resolve(ARM, JOB).via_deg, JOB.via, rtol=1e-15)
+    np.testing.assert_allclose(via_points.resolve(ARM, JOB).via_deg, JOB.via, rtol=1e-15)
 
 
 def test_all_six_joints_driven() -> None:
     angles = ((10.0, -60.0, 40.0, 20.0, 30.0, 40.0), (60.0, -80.0, 50.0, 60.0, 20.0, 300.0))
-    resolved = vias.resolve(ALL_DRIVEN, job(angles[0], pose(*angles[1], arm=ALL_DRIVEN)))
+    resolved = via_points.resolve(ALL_DRIVEN, job(angles[0], pose(*angles[1], arm=ALL_DRIVEN)))
     # Joint 6 is at -60, the turn nearer to where it was.
     np.testing.assert_allclose(
         resolved.via_deg, [angles[0], (60.0, -80.0, 50.0, 60.0, 20.0, -60.0)], atol=1e-9
@@ -69,7 +70,7 @@ def test_all_six_joints_driven() -> None:
 
 
 def test_a_pose_that_needs_undriven_joints_is_reported_with_the_miss() -> None:
-    resolved = vias.resolve(ARM, job(JOB.via[0], pose(20.0, -75.0, 50.0, 0.0, 30.0, 0.0)))
+    resolved = via_points.resolve(ARM, job(JOB.via[0], pose(20.0, -75.0, 50.0, 0.0, 30.0, 0.0)))
     np.testing.assert_allclose(resolved.via_deg[1], [20.0, -75.0, 50.0], atol=1e-9)
     (note,) = resolved.notes
     assert (note.kind, note.via) == ("undriven", 2)
@@ -83,8 +84,8 @@ def test_a_pose_that_needs_undriven_joints_is_reported_with_the_miss() -> None:
 def test_a_solution_with_the_undriven_joints_at_home_comes_before_a_nearer_one() -> None:
     """Rear, elbow up reaches it with the wrist at home; front would be nearer to where the arm stands."""
     target = pose(0.0, -93.0, -140.0)
-    assert vias.resolve(ARM, job((5.0, -93.0, -140.0), target)).notes == ()
-    far = vias.resolve(ARM, job((180.0, -38.0, -52.0), target))
+    assert via_points.resolve(ARM, job((5.0, -93.0, -140.0), target)).notes == ()
+    far = via_points.resolve(ARM, job((180.0, -38.0, -52.0), target))
     np.testing.assert_allclose(far.via_deg[1], [0.0, -93.0, -140.0], atol=1e-9)
     assert "undriven" not in {note.kind for note in far.notes}
 
@@ -92,13 +93,15 @@ def test_a_solution_with_the_undriven_joints_at_home_comes_before_a_nearer_one()
 def test_posture_deg_decides() -> None:
     wished = (0.0, -93.0, -157.0, 0.0, -19.0, 180.0)  # row 5 of Table 2
     target = pose(180.0, -38.0, -52.0, posture_deg=wished)
-    resolved = vias.resolve(ARM, job(JOB.via[0], target))
+    resolved = via_points.resolve(ARM, job(JOB.via[0], target))
     np.testing.assert_allclose(resolved.via_deg[1], [0.0, -93.242, -157.541], atol=1e-3)
     assert {note.kind for note in resolved.notes} == {"undriven", "branch"}
 
 
 def test_a_branch_change_is_reported_with_the_reason() -> None:
-    resolved = vias.resolve(ARM, job((40.0, -110.0, 70.0), pose(150.0, -93.0, -140.0), (40.0, -110.0, 70.0)))
+    resolved = via_points.resolve(
+        ARM, job((40.0, -110.0, 70.0), pose(150.0, -93.0, -140.0), (40.0, -110.0, 70.0))
+    )
     first, second = resolved.notes
     assert (first.kind, first.via, second.kind, second.via) == ("branch", 2, "branch", 3)
     assert "between via 1 and via 2 the arm changes its branch (base): from front up to rear up" in first.text
@@ -111,7 +114,7 @@ def test_a_branch_change_by_way_of_a_straight_wrist_is_reported() -> None:
     poses = (pose(0.0, -60.0, 40.0, 10.0, bend, 30.0, arm=ALL_DRIVEN) for bend in bends)
     postures = ((0.0, -60.0, 40.0, 10.0, bend, 30.0) for bend in bends)
     vias_given = [replace(each, posture_deg=posture) for each, posture in zip(poses, postures, strict=True)]
-    resolved = vias.resolve(ALL_DRIVEN, job(*vias_given))
+    resolved = via_points.resolve(ALL_DRIVEN, job(*vias_given))
     np.testing.assert_allclose(resolved.via_deg[:, 4], bends, atol=1e-9)
     (note,) = resolved.notes
     assert (note.kind, note.via) == ("branch", 3)
@@ -119,7 +122,7 @@ def test_a_branch_change_by_way_of_a_straight_wrist_is_reported() -> None:
 
 
 def test_a_branch_change_between_angles_the_user_gave_is_his_own() -> None:
-    assert vias.resolve(ARM, job((40.0, -110.0, 70.0), (150.0, -93.0, -140.0))).notes == ()
+    assert via_points.resolve(ARM, job((40.0, -110.0, 70.0), (150.0, -93.0, -140.0))).notes == ()
 
 
 def test_a_pose_out_of_reach_is_refused_with_every_reason() -> None:
@@ -127,12 +130,12 @@ def test_a_pose_out_of_reach_is_refused_with_every_reason() -> None:
     with pytest.raises(
         PlanError, match=r"via 2: no posture reaches this pose: out of reach by .*; out of reach by"
     ):
-        vias.resolve(ARM, job(JOB.via[0], far))
+        via_points.resolve(ARM, job(JOB.via[0], far))
 
 
 def test_a_pose_out_of_the_driven_ranges_is_refused_with_the_joint() -> None:
     with pytest.raises(PlanError, match=r"joint 1 at -60 deg is 50 deg below its range -10 to 190"):
-        vias.resolve(ARM, job(JOB.via[0], pose(-60.0, 0.0, 0.0)))
+        via_points.resolve(ARM, job(JOB.via[0], pose(-60.0, 0.0, 0.0)))
 
 
 @pytest.mark.parametrize(
@@ -148,7 +151,7 @@ def test_a_pose_out_of_the_driven_ranges_is_refused_with_the_joint() -> None:
 )
 def test_wrong_via_points_are_named(via: tuple[float, ...] | Pose, words: str) -> None:
     with pytest.raises(InputError, match="via 2") as caught:
-        vias.resolve(ARM, job(pose(0.0, -60.0, 40.0), via))
+        via_points.resolve(ARM, job(pose(0.0, -60.0, 40.0), via))
     assert words in str(caught.value)
 
 
@@ -175,8 +178,8 @@ def test_an_arm_outside_the_class_is_served_numerically() -> None:
     arm = replace(ARM, joints=bent)
     angles = JOB.via[0]
     assert not isinstance(angles, Pose)
-    resolved = vias.resolve(arm, job(angles, pose(10.0, -70.0, 45.0, arm=arm)))
+    resolved = via_points.resolve(arm, job(angles, pose(10.0, -70.0, 45.0, arm=arm)))
     np.testing.assert_allclose(resolved.via_deg[1], [10.0, -70.0, 45.0], atol=1e-5)
     far = Pose(((1.0, 0.0, 0.0, 3000.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0)))
     with pytest.raises(PlanError, match="no posture found from 20 starts"):
-        vias.resolve(arm, job(angles, far))
+        via_points.resolve(arm, job(angles, far))

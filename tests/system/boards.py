@@ -5,8 +5,9 @@ from __future__ import annotations
 import subprocess
 from pathlib import Path
 
-from armtempo import arm, planner, trajectory_file
-from armtempo.job import Job
+from armtempo.model import arm, trajectory_file
+from armtempo.model.job import Job
+from armtempo.planning import planner
 
 from tests.system import commandline
 

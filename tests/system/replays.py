@@ -7,15 +7,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from armtempo import arm as arms
-from armtempo import job as jobs
-from armtempo import operate, pipeline, planner, runs, trajectory_file, virtual
-from armtempo.arm import Joint
-from armtempo.interrupt import StopRequest
+from armtempo import pipeline, simulator
 from armtempo.link import open_board
-from armtempo.plan import Plan
-from armtempo.trajectory import JointSpline
-from armtempo.virtual import edgelog
+from armtempo.model import arm as arms
+from armtempo.model import job as jobs
+from armtempo.model import trajectory_file
+from armtempo.model.arm import Joint
+from armtempo.model.plan import Plan
+from armtempo.planning import planner
+from armtempo.robot import operate
+from armtempo.robot.stop_request import StopRequest
+from armtempo.runs import reader
+from armtempo.simulator import edgelog
+from armtempo.splines.trajectory import JointSpline
 
 from tests import interpreters
 
@@ -36,7 +40,7 @@ class Replay:
     plan: Plan
     pins: dict[str, edgelog.Edges]
     """Per pin its edges since power-up, in ticks of the motion clock."""
-    samples: runs.Samples
+    samples: reader.Samples
     repetition: dict[str, Any]
     """What run.json says of it."""
 
@@ -82,7 +86,7 @@ def replay(trajectory: Path, interpreter: str, folder: Path) -> Replay:
     log = folder / "edges.bin"
     starter = interpreters.starter(interpreter)
     with (
-        virtual.launch(edge_log=log, interpreter=starter) as process,  # without an arm: ideal motors
+        simulator.launch(edge_log=log, interpreter=starter) as process,  # without an arm: ideal motors
         open_board(process.port) as board,
         StopRequest() as stop,
     ):
@@ -90,7 +94,7 @@ def replay(trajectory: Path, interpreter: str, folder: Path) -> Replay:
         pipeline.prepare(board, "sim", motion, stop)
         run = pipeline.new_run(folder, motion, "sim", board)
         assert len(list(pipeline.repeat(board, motion, run, 1, stop))) == 1
-    recorded = runs.load(run.path)
+    recorded = reader.load(run.path)
     assert recorded.trajectory_path is not None
     (session,) = edgelog.read(log)
     (zero,) = session.starts  # the arm stood at the start already

@@ -8,10 +8,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from armtempo import arm as arms
-from armtempo import job as jobs
-from armtempo import virtual
+from armtempo import simulator
 from armtempo.link import open_board
+from armtempo.model import arm as arms
+from armtempo.model import job as jobs
 
 from tests.system import commandline
 
@@ -61,7 +61,7 @@ def test_a_port_that_does_not_exist(tmp_path: Path) -> None:
 
 
 def test_a_port_in_use(tmp_path: Path) -> None:
-    with virtual.launch() as board, open_board(board.port):
+    with simulator.launch() as board, open_board(board.port):
         done = commandline.run("status", "--port", board.port, folder=tmp_path)
     done.said(f"port {board.port} is in use", "close it")
     assert done.exit_code == 1

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from armtempo.deploy import deploy, firmware, package, remote
 from armtempo.errors import LinkError
-from armtempo.virtual import VirtualBoard, edgelog, launch
+from armtempo.simulator import VirtualBoard, edgelog, launch
 
 from tests import interpreters
 from tests.system.boards import armtempo, small_plan

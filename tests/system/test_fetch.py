@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from armtempo import runs, trajectory_file
 from armtempo.link import open_board
-from armtempo.virtual import Fault, launch
+from armtempo.model import trajectory_file
+from armtempo.runs import reader
+from armtempo.simulator import Fault, launch
 
 from tests.system import boards, commandline
 from tests.system.boards import armtempo
@@ -31,7 +32,7 @@ def test_button_then_fetch(tmp_path: Path) -> None:
         output = on_board("fetch")
         assert "samples-01.csv: complete" in output
         assert "fetched" in on_board("fetch", code=1)
-    fetched = runs.load(tmp_path / "runs" / "small-001")
+    fetched = reader.load(tmp_path / "runs" / "small-001")
     (samples,) = fetched.repetitions
     assert samples.index.tolist() == list(range(len(samples.index)))
     plan = trajectory_file.load(file)

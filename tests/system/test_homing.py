@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo import arm, homing, operate
 from armtempo.errors import BoardError, InputError, LinkError
-from armtempo.interrupt import StopRequest
 from armtempo.link import Board, open_board
-from armtempo.virtual import launch
+from armtempo.model import arm
+from armtempo.robot import homing, operate
+from armtempo.robot.stop_request import StopRequest
+from armtempo.simulator import launch
 
 PAPER = arm.load_arm(arm.default_path())
 SWITCH = """

@@ -7,9 +7,10 @@ import time
 from pathlib import Path
 
 import pytest
-from armtempo import record, runs, trajectory_file
 from armtempo.link import open_board
-from armtempo.virtual import launch
+from armtempo.model import trajectory_file
+from armtempo.runs import reader, run_folder
+from armtempo.simulator import launch
 
 from tests.system.boards import TIMEOUT_S, armtempo, small_plan, start
 
@@ -30,9 +31,9 @@ def test_interrupted_run(tmp_path: Path, number: signal.Signals) -> None:
         with open_board(board.port) as found:
             status = found.status()
     assert not status.moving
-    run = runs.load(tmp_path / "runs" / "small-001")
+    run = reader.load(tmp_path / "runs" / "small-001")
     repetition = run.meta["repetitions"][0]
-    assert repetition["state"] == record.INTERRUPTED
+    assert repetition["state"] == run_folder.INTERRUPTED
     assert len(run.repetitions[0].index) == repetition["samples"] >= 3
     assert repetition["duration_s"] < trajectory_file.load(file).trajectory.duration_s - 0.1
     assert tuple(repetition["commanded_steps"]) == status.stand.commanded_steps
@@ -47,8 +48,8 @@ def test_killed_host_leaves_a_readable_folder_and_a_board_to_talk_to(tmp_path: P
         process.kill()
         process.communicate()
         assert "state" in armtempo("stop", "--port", board.port, cwd=tmp_path)
-    run = runs.load(tmp_path / "runs" / "small-001")
-    assert run.repetitions[0].state == record.RUNNING
+    run = reader.load(tmp_path / "runs" / "small-001")
+    assert run.repetitions[0].state == run_folder.RUNNING
     assert len(run.repetitions[0].index) >= 2
 
 

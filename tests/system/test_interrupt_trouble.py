@@ -7,10 +7,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from armtempo import arm as arms
-from armtempo import operate, runs, virtual
+from armtempo import simulator
 from armtempo.link import open_board
-from armtempo.virtual import Fault
+from armtempo.model import arm as arms
+from armtempo.robot import operate
+from armtempo.runs import reader
+from armtempo.simulator import Fault
 
 from tests.system import commandline
 
@@ -19,10 +21,10 @@ ENDS_WITHIN_S = 60.0
 
 
 @contextmanager
-def board_at_home(*faults: Fault) -> Iterator[virtual.VirtualBoard]:
+def board_at_home(*faults: Fault) -> Iterator[simulator.VirtualBoard]:
     """A virtual board in real time whose arm stands where the shipped motion begins."""
     arm = arms.load_arm(arms.default_path())
-    with virtual.launch(arm=arm, virtual_time=False, faults=faults) as process:
+    with simulator.launch(arm=arm, virtual_time=False, faults=faults) as process:
         with open_board(process.port) as board:
             operate.configure(board, arm, replace=True)
             operate.home(board, arm)
@@ -46,7 +48,7 @@ def test_sigterm_ends_a_run_whose_board_has_fallen_silent(
         done = commandline.ended(command, ENDS_WITHIN_S)
     done.said("armtempo: the board was told to stop and does not", "switch off")
     assert done.exit_code == 1
-    assert runs.load(tmp_path / "feed-001").meta["repetitions"][0]["state"] == "broken"
+    assert reader.load(tmp_path / "feed-001").meta["repetitions"][0]["state"] == "broken"
 
 
 def test_a_second_ctrl_c_ends_it_at_once(plan_file: Callable[[str], Path], tmp_path: Path) -> None:
@@ -63,4 +65,4 @@ def test_a_second_ctrl_c_ends_it_at_once(plan_file: Callable[[str], Path], tmp_p
             assert not board.status().moving
     done.said("interrupted")
     assert done.exit_code == 130
-    assert runs.load(tmp_path / "feed-001").meta["repetitions"][0]["state"] == "interrupted"
+    assert reader.load(tmp_path / "feed-001").meta["repetitions"][0]["state"] == "interrupted"

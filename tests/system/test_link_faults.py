@@ -6,8 +6,8 @@ import time
 from pathlib import Path
 
 import pytest
-from armtempo import record, runs
-from armtempo.virtual import launch
+from armtempo.runs import reader, run_folder
+from armtempo.simulator import launch
 
 from tests.inprocess import Noise, clean
 from tests.system.boards import TIMEOUT_S, armtempo, small_plan, start
@@ -24,9 +24,9 @@ def test_run_over_a_bad_cable_is_complete(tmp_path: Path, kind: str) -> None:
         output = armtempo("run", file, "--port", relay.port, cwd=tmp_path)
     assert "complete" in output
     assert to_board.hits + from_board.hits > 0
-    samples = runs.load(tmp_path / "runs" / "small-001").repetitions[0]
+    samples = reader.load(tmp_path / "runs" / "small-001").repetitions[0]
     assert samples.index.tolist() == list(range(len(samples.index)))
-    assert samples.state == record.COMPLETE
+    assert samples.state == run_folder.COMPLETE
 
 
 def test_cable_pulled_during_a_run_and_put_back(tmp_path: Path) -> None:
@@ -46,7 +46,7 @@ def test_cable_pulled_during_a_run_and_put_back(tmp_path: Path) -> None:
     assert process.returncode == 0, out + error
     assert "waiting for it to come back" in error
     assert "complete" in out
-    samples = runs.load(tmp_path / "runs" / "small-001").repetitions[0]
+    samples = reader.load(tmp_path / "runs" / "small-001").repetitions[0]
     assert samples.index.tolist() == list(range(len(samples.index)))
     assert samples.time_s[-1] > 3.0
 
@@ -83,4 +83,4 @@ def test_interrupt_while_the_cable_is_out(tmp_path: Path) -> None:
         process.terminate()
         out, error = process.communicate(timeout=TIMEOUT_S)
     assert process.returncode == 130, out + error
-    assert len(runs.load(tmp_path / "runs" / "small-001").repetitions[0].index) >= 4
+    assert len(reader.load(tmp_path / "runs" / "small-001").repetitions[0].index) >= 4

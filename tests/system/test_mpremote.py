@@ -9,10 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo import encode, moves, operate
 from armtempo.errors import LinkError
 from armtempo.link import Board, open_board
-from armtempo.virtual import edgelog, launch
+from armtempo.planning import point_to_point
+from armtempo.records import encode
+from armtempo.robot import operate
+from armtempo.simulator import edgelog, launch
 from mpremote.transport import TransportError
 from mpremote.transport_serial import SerialTransport
 
@@ -32,7 +34,7 @@ def flash(tmp_path: Path) -> Path:
     folder.mkdir(parents=True)
     (folder / "arm.ata").write_bytes(encode.arm_record(boards.ARM))
     (folder / "go.atm").write_bytes(
-        operate.motion_data(moves.straight("go", HOME_DEG, AWAY_DEG, boards.ARM), boards.ARM)
+        operate.motion_data(point_to_point.straight("go", HOME_DEG, AWAY_DEG, boards.ARM), boards.ARM)
     )
     return tmp_path / "flash"
 

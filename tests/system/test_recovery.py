@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from armtempo.virtual import VirtualBoard, launch
-from armtempo.virtual.launcher import _DEPLOYED_BLOCKS
+from armtempo.simulator import VirtualBoard, launch
+from armtempo.simulator.launcher import _DEPLOYED_BLOCKS
 
 from tests import interpreters
 from tests.system import commandline

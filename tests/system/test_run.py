@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo import arm, runs
-from armtempo.virtual import launch
+from armtempo.model import arm
+from armtempo.runs import reader
+from armtempo.simulator import launch
 
 from tests.system import commandline
 from tests.system.boards import armtempo, small_plan
@@ -30,7 +31,7 @@ def test_board_on_a_port(tmp_path: Path) -> None:
         assert "upload" not in on_board("list")
         assert "small " in on_board("list")
         assert "start run=" in armtempo("monitor", "traffic.log", cwd=tmp_path)
-    found = runs.load(tmp_path / "runs" / "small-001")
+    found = reader.load(tmp_path / "runs" / "small-001")
     first, second = found.repetitions
     np.testing.assert_array_equal(first.commanded_steps, second.commanded_steps)
     with launch(tmp_path / "flash") as board:
@@ -70,7 +71,7 @@ def test_fault_is_named_in_terminal_run_folder_and_report(tmp_path: Path) -> Non
     output = armtempo("run", "throw.json", cwd=tmp_path, code=1)
     assert "samples-01.csv: fault (following)" in output
     assert "joint 1" in output
-    assert runs.load(tmp_path / "runs" / "throw-001").repetitions[0].state == "fault"
+    assert reader.load(tmp_path / "runs" / "throw-001").repetitions[0].state == "fault"
     armtempo("report", "runs/throw-001", cwd=tmp_path)
     assert "cut short, ended as fault (following)" in (tmp_path / "runs/throw-001/report.html").read_text()
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
-from armtempo import arm as arms
-from armtempo import moves, operate, virtual
+from armtempo import simulator
 from armtempo.link import open_board
 from armtempo.link.follow import Follower
+from armtempo.model import arm as arms
+from armtempo.planning import point_to_point
+from armtempo.robot import operate
 
 from tests import interpreters
 
@@ -25,9 +27,9 @@ def test_samples_wait_for_a_host_that_does_not_read() -> None:
         for joint in shipped.joints
     ]
     arm = replace(shipped, joints=tuple(joints))
-    motion = moves.straight("slow", operate.home_deg(arm), [180.0, -60.0, 40.0], arm)
+    motion = point_to_point.straight("slow", operate.home_deg(arm), [180.0, -60.0, 40.0], arm)
     with (
-        virtual.launch(interpreter=FASTEST) as process,
+        simulator.launch(interpreter=FASTEST) as process,
         open_board(process.port) as board,
     ):
         operate.configure(board, arm, replace=True)

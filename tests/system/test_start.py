@@ -13,7 +13,7 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
-from armtempo.interrupt import raised_by_signals
+from armtempo.robot.stop_request import raised_by_signals
 
 from tests.interpreters import ROOT
 
@@ -83,12 +83,12 @@ def test_the_installed_command_begins_there() -> None:
 
 def test_little_is_imported_before_an_interrupt_is_minded(whole: Watched) -> None:
     assert [name for name in whole.first if name.startswith("armtempo")] == ["armtempo", "armtempo.start"]
-    assert {"click", "numpy", "armtempo.planner"} <= set(whole.imported)
+    assert {"click", "numpy", "armtempo.planning.planner"} <= set(whole.imported)
 
 
 @pytest.mark.parametrize("number", range(MOMENTS))
 def test_an_interrupt_during_the_imports_ends_it_quietly(number: int, whole: Watched, tmp_path: Path) -> None:
-    most = whole.imported.index("armtempo.planner")  # what comes behind it, comes behind the search
+    most = whole.imported.index("armtempo.planning.planner")  # what comes behind it, comes behind the search
     after = 1 + int((number + random.Random(SEED + number).random()) / MOMENTS * most)
     run = Watched(tmp_path, ENDLESS, after, interrupt)
     what = f"seed {SEED}, after {whole.imported[after - 1]}, module {after}"

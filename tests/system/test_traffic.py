@@ -11,16 +11,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from armtempo import encode, moves, operate
 from armtempo.errors import BoardError
-from armtempo.interrupt import StopRequest
 from armtempo.link import open_board, traffic
 from armtempo.link.messages import Done, Event, Sample
 from armtempo.link.replay import ReplayTransport
 from armtempo.link.session import Session
 from armtempo.link.traffic import FROM_BOARD, TO_BOARD, Chunk
 from armtempo.link.transport import SerialTransport
-from armtempo.virtual import launch
+from armtempo.planning import point_to_point
+from armtempo.records import encode
+from armtempo.robot import operate
+from armtempo.robot.stop_request import StopRequest
+from armtempo.simulator import launch
 from armtempo_shared import limits, wire
 
 from tests import interpreters
@@ -60,7 +62,9 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     """Greeting, arm, home, upload, a refusal, a run, status, the store's commands; as ``--log-traffic`` writes it."""
     made = Recording(tmp_path_factory.mktemp("traffic") / "traffic.log")
     home_deg = operate.home_deg(boards.ARM)
-    data = encode.motion_record(moves.straight("go", home_deg, home_deg + AWAY_DEG, boards.ARM), boards.ARM)
+    data = encode.motion_record(
+        point_to_point.straight("go", home_deg, home_deg + AWAY_DEG, boards.ARM), boards.ARM
+    )
     starter = interpreters.starter(INTERPRETERS[-1])
     with launch(interpreter=starter) as process, open_board(process.port, made.path) as board:
         operate.configure(board, boards.ARM, replace=True)

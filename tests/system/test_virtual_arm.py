@@ -7,13 +7,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from armtempo import encode, homing, operate, planner
-from armtempo import job as jobs
-from armtempo.arm import Arm, JointModel, LimitSwitches
-from armtempo.interrupt import StopRequest
 from armtempo.link import open_board
 from armtempo.link.messages import Sample
-from armtempo.virtual import edgelog, launch
+from armtempo.model import job as jobs
+from armtempo.model.arm import Arm, JointModel, LimitSwitches
+from armtempo.planning import planner
+from armtempo.records import encode
+from armtempo.robot import homing, operate
+from armtempo.robot.stop_request import StopRequest
+from armtempo.simulator import edgelog, launch
 from armtempo_shared.limits import TICK_HZ
 
 from tests import interpreters

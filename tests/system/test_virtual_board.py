@@ -13,7 +13,7 @@ import pytest
 import serial
 from armtempo.errors import LinkError
 from armtempo.link.connect import open_board
-from armtempo.virtual import launch, launcher
+from armtempo.simulator import launch, launcher
 
 from tests import interpreters
 
@@ -61,7 +61,7 @@ def test_goes_with_its_context() -> None:
 def test_goes_with_its_launcher(tmp_path: Path) -> None:
     """A launcher that is killed leaves no process behind."""
     script = (
-        "import time\nfrom armtempo.virtual import launch\n"
+        "import time\nfrom armtempo.simulator import launch\n"
         "board = launch()\nprint(board.pid, flush=True)\ntime.sleep(60)"
     )
     with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as parent:

@@ -8,13 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo import encode, moves, operate
-from armtempo.arm import Arm, JointModel
-from armtempo.interrupt import StopRequest
 from armtempo.link import open_board
 from armtempo.link.follow import RunEnd
 from armtempo.link.messages import Status
-from armtempo.virtual import Fault, edgelog, launch
+from armtempo.model.arm import Arm, JointModel
+from armtempo.planning import point_to_point
+from armtempo.records import encode
+from armtempo.robot import operate
+from armtempo.robot.stop_request import StopRequest
+from armtempo.simulator import Fault, edgelog, launch
 from armtempo_shared.wire import ERROR_CODES
 
 from tests.system import boards
@@ -28,7 +30,7 @@ def run(
 ) -> tuple[RunEnd, Status]:
     """A short motion from home, and how the board stands after it."""
     home_deg = operate.home_deg(arm)
-    data = encode.motion_record(moves.straight("move", home_deg, TARGET_DEG, arm), arm)
+    data = encode.motion_record(point_to_point.straight("move", home_deg, TARGET_DEG, arm), arm)
     with launch(faults=faults, arm=model, edge_log=log) as process, open_board(process.port) as board:
         operate.configure(board, arm, replace=True)
         operate.home(board, arm)
@@ -91,7 +93,9 @@ def test_hang_makes_the_watchdog_bite() -> None:
         operate.configure(board, boards.ARM, replace=True)
         operate.home(board, boards.ARM)
         home_deg = operate.home_deg(boards.ARM)
-        data = encode.motion_record(moves.straight("move", home_deg, TARGET_DEG, boards.ARM), boards.ARM)
+        data = encode.motion_record(
+            point_to_point.straight("move", home_deg, TARGET_DEG, boards.ARM), boards.ARM
+        )
         stored = operate.store(board, "move", data)
         board.start(stored.name, stored.crc)
         before = board.info

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 import serial
-from armtempo.virtual import VirtualBoard, launch
+from armtempo.simulator import VirtualBoard, launch
 
 from tests import interpreters
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 import serial
-from armtempo.virtual import VirtualBoard, edgelog, launch
-from armtempo.virtual.folder import PREFIX
+from armtempo.simulator import VirtualBoard, edgelog, launch
+from armtempo.simulator.folder import PREFIX
 
 from tests import interpreters
 from tests.system.commandline import wait_for

@@ -9,10 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo import arm as arms
-from armtempo import encode, operate, planner
 from armtempo.deploy import program
-from armtempo.job import Job
+from armtempo.model import arm as arms
+from armtempo.model.job import Job
+from armtempo.planning import planner
+from armtempo.records import encode
+from armtempo.robot import operate
 from armtempo_shared.limits import TICK_HZ
 
 from tests import interpreters

@@ -14,7 +14,7 @@ import click
 
 from armtempo import __version__
 from armtempo.errors import ArmtempoError
-from armtempo.interrupt import raised_by_signals
+from armtempo.robot.stop_request import raised_by_signals
 from armtempo.start import INTERRUPTED
 
 COMMANDS = (

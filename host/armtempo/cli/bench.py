@@ -17,9 +17,9 @@ from armtempo.start import INTERRUPTED
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from armtempo.bench import Case, Problem
-    from armtempo.bench_store import Store
-    from armtempo.bench_table import Row
+    from armtempo.research.bench.cases import Case, Problem
+    from armtempo.research.bench.result_store import Store
+    from armtempo.research.bench.result_table import Row
 
 
 def _names(ctx: click.Context, parameter: click.Parameter, value: str) -> list[str]:
@@ -35,7 +35,7 @@ def _names(ctx: click.Context, parameter: click.Parameter, value: str) -> list[s
 
 def _sizes(ctx: click.Context, parameter: click.Parameter, value: str) -> list[int]:
     """Populations, separated by commas."""
-    from armtempo.job import POPULATION
+    from armtempo.model.job import POPULATION
 
     try:
         sizes = [int(size) for size in value.split(",")]
@@ -82,17 +82,17 @@ def command(
     ctx: click.Context, /, out: Path, workers: int | None, scheduler: str | None, plot: bool, **chosen: Any
 ) -> None:
     """Compare the search algorithms as the paper does in Table 4 and Fig. 6."""
-    from armtempo import bench, bench_table, bench_workers
-    from armtempo import job as jobs
-    from armtempo.bench_store import Store
+    from armtempo.model import job as jobs
+    from armtempo.research.bench import cases, result_table, worker_pool
+    from armtempo.research.bench.result_store import Store
 
     arm_path, job_path = chosen["arm_path"], chosen["job_path"]
     arm = options.load_arm(arm_path)
     job = jobs.load_job(job_path or jobs.default_path(), arm)
-    problem = bench.problem_of(arm, job, chosen["joint"], chosen["fitness"], chosen["iterations"])
-    wanted = bench.cases(chosen["algorithms"], chosen["populations"], range(1, chosen["seeds"] + 1))
+    problem = cases.problem_of(arm, job, chosen["joint"], chosen["fitness"], chosen["iterations"])
+    wanted = cases.cases(chosen["algorithms"], chosen["populations"], range(1, chosen["seeds"] + 1))
     store = Store(out, problem)
-    place = bench_workers.cluster(scheduler) if scheduler else bench_workers.local(workers)
+    place = worker_pool.cluster(scheduler) if scheduler else worker_pool.local(workers)
     try:
         _run(problem, wanted, store, place)
     except KeyboardInterrupt:
@@ -105,7 +105,7 @@ def command(
         )
         ctx.exit(INTERRUPTED)
     with_paper = chosen["joint"] == 1 and arm_path is None and job_path is None
-    found = bench_table.rows((store.runs[case] for case in wanted), problem.iterations)
+    found = result_table.rows((store.runs[case] for case in wanted), problem.iterations)
     _write(out, found, with_paper, plot)
 
 
@@ -113,26 +113,26 @@ def _run(
     problem: Problem, wanted: Sequence[Case], store: Store, place: AbstractContextManager[Executor]
 ) -> None:
     """The runs that are still missing."""
-    from armtempo import bench
+    from armtempo.research.bench import cases
 
     todo = [case for case in wanted if case not in store.runs]
     if not todo:
         return
     with Progress("searching") as progress, place as executor:
-        for number, run in enumerate(bench.execute(problem, todo, executor), 1):
+        for number, run in enumerate(cases.execute(problem, todo, executor), 1):
             store.add(run)
             progress(number, len(todo))
 
 
 def _write(out: Path, found: Sequence[Row], with_paper: bool, plot: bool) -> None:
     """Table and curves to the terminal and to files."""
-    from armtempo import bench_table
-    from armtempo.files import replace_text
+    from armtempo.formats.atomic_file import replace_text
+    from armtempo.research.bench import result_table
 
-    for line in bench_table.text(found, with_paper):
+    for line in result_table.text(found, with_paper):
         click.echo(line)
-    replace_text(out / "table.csv", bench_table.table_csv(found, with_paper))
-    replace_text(out / "convergence.csv", bench_table.curves_csv(found))
+    replace_text(out / "table.csv", result_table.table_csv(found, with_paper))
+    replace_text(out / "convergence.csv", result_table.curves_csv(found))
     written = ["table.csv", "convergence.csv"]
     if plot:
         written += _plot(out / "convergence.png", found)
@@ -141,10 +141,11 @@ def _write(out: Path, found: Sequence[Row], with_paper: bool, plot: bool) -> Non
 
 def _plot(path: Path, found: Sequence[Row]) -> list[str]:
     """Draws the curves; without matplotlib it says so, and the tables stand."""
-    from armtempo import bench_plot, plots
+    from armtempo.report import plots
+    from armtempo.research.bench import result_plot
 
     try:
-        plots.save(bench_plot.convergence(found), path)
+        plots.save(result_plot.convergence(found), path)
     except MissingPackageError as error:
         click.echo(f"no plot: {error}", err=True)
         return []

@@ -20,21 +20,24 @@ def command(out: Path, port: str, log_traffic: Path | None) -> None:
 
     Without --port a virtual board replays it, faster than in real time.
     """
-    from armtempo import arm as arms
-    from armtempo import job as jobs
-    from armtempo import operate, pipeline, planner, report, summary
+    from armtempo import pipeline
     from armtempo.errors import MissingPackageError
+    from armtempo.model import arm as arms
+    from armtempo.model import job as jobs
+    from armtempo.planning import planner
+    from armtempo.report import run_report, text_summary
+    from armtempo.robot import operate
 
     arm = arms.load_arm(arms.default_path())
     with Progress("planning") as progress:
         plan = planner.plan(arm, jobs.load_job(jobs.default_path(), arm), progress)
-    for line in summary.lines(plan):
+    for line in text_summary.lines(plan):
         click.echo(line)
     motion = pipeline.planned(plan)
     with options.board(port, log_traffic, arm) as board:
         operate.configure(board, arm, replace=True)
         folder = replay(board, port, motion, 1, out)
     try:
-        click.echo(f"report: {report.write(folder)}")
+        click.echo(f"report: {run_report.write(folder)}")
     except MissingPackageError as error:
         click.echo(f"no report: {error}, then: armtempo report {folder}", err=True)

@@ -28,8 +28,8 @@ import click
 )
 def command(trajectory: Path, kind: str, rate: float, frame_id: str, output: Path | None) -> None:
     """Write the trajectory file TRAJECTORY as CSV or as a ROS JointTrajectory, sampled at any rate."""
-    from armtempo import exchange, trajectory_file
-    from armtempo.files import replace_text
+    from armtempo.formats.atomic_file import replace_text
+    from armtempo.model import exchange, trajectory_file
 
     plan = trajectory_file.load(trajectory)
     text = exchange.to_csv(plan, rate) if kind == "csv" else exchange.to_ros(plan, rate, frame_id)

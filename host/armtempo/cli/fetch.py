@@ -25,8 +25,9 @@ def command(what: str | None, out: Path, arm_path: Path | None, port: str, log_t
     WHAT is what was run: a trajectory file, or the name of a motion on the board; without it the motion that
     the button starts. A run under way is followed to its end. The samples go into a new run folder, once.
     """
-    from armtempo import operate, pipeline
+    from armtempo import pipeline
     from armtempo.cli.run import motion_file, told
+    from armtempo.robot import operate
 
     file = motion_file(what) if what else None
     motion = pipeline.from_file(file, options.load_arm(arm_path) if arm_path else None) if file else None

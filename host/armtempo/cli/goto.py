@@ -24,9 +24,9 @@ def command(
     WHERE: angles such as '0,-60,40', a via point such as P0, or a trajectory file for its start. All
     joints move together, within their limits. The arm must be homed. Ctrl-C brakes.
     """
-    from armtempo import operate
-    from armtempo.interrupt import StopRequest
     from armtempo.link.ports import is_sim
+    from armtempo.robot import operate
+    from armtempo.robot.stop_request import StopRequest
 
     arm = options.load_arm(arm_path)
     target_deg = posture.parse(where, arm, job_path)

@@ -30,8 +30,8 @@ def command(
     it: the home posture of the arm file. Nothing moves; afterwards motions may start. With --switches the
     joints that have a switch of known angle move: to it, off it, and slowly to it again.
     """
-    from armtempo import homing, operate
-    from armtempo.interrupt import StopRequest
+    from armtempo.robot import homing, operate
+    from armtempo.robot.stop_request import StopRequest
 
     if switches and where is not None:
         raise click.UsageError("give either WHERE or --switches")

@@ -12,9 +12,9 @@ from armtempo.cli import options
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from armtempo.arm import Arm
     from armtempo.kinematics.geometry import Array
     from armtempo.kinematics.listing import Answer
+    from armtempo.model.arm import Arm
 
 Three = tuple[float, float, float]
 Four = tuple[float, float, float, float]
@@ -74,8 +74,8 @@ def _targets(
     matrix: str | None, position: Three | None, rpy: Three | None, quaternion: Four | None, poses: Path | None
 ) -> list[Array]:
     """The poses of the options; UsageError where they do not make exactly one of the three forms."""
-    from armtempo import pose
     from armtempo.kinematics import pose_file
+    from armtempo.model import pose
 
     forms = [matrix is not None, position is not None, poses is not None]
     if sum(forms) != 1:

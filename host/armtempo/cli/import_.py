@@ -23,9 +23,10 @@ from armtempo.cli import options
 )
 def command(table: Path, arm_path: Path | None, name: str | None, radians: bool, output: Path | None) -> None:
     """Make a job file from the CSV file TABLE: a line a via point, a column a driven joint."""
-    from armtempo import exchange, job, tomlcheck
     from armtempo.errors import InputError
-    from armtempo.files import replace_text
+    from armtempo.formats import toml_table
+    from armtempo.formats.atomic_file import replace_text
+    from armtempo.model import exchange, job
 
     arm = options.load_arm(arm_path)
     title = name or table.stem
@@ -33,6 +34,6 @@ def command(table: Path, arm_path: Path | None, name: str | None, radians: bool,
     if target.exists():
         raise InputError(f"{target} exists; choose another place with --output")
     text = exchange.job_text(title, exchange.via_from_csv(table, arm, radians))
-    job.of_table(tomlcheck.parse(text, str(table)), arm)
+    job.of_table(toml_table.parse(text, str(table)), arm)
     replace_text(target, text)
     click.echo(f"written: {target}; plan it with: armtempo plan --job {target}")

@@ -13,25 +13,25 @@ from armtempo.errors import ArmtempoError
 
 if TYPE_CHECKING:
     from armtempo.link.messages import Sample
-    from armtempo.liveplot import LivePlot
     from armtempo.pipeline import Motion
-    from armtempo.spline import Array
+    from armtempo.report.live_plot import LivePlot
+    from armtempo.splines.bspline import Array
 
 
 class Live:
     """A watcher of samples; used as a context. Without a display it says so and goes on without a window."""
 
     def __init__(self, motion: Motion, window: bool) -> None:
-        from armtempo import record
+        from armtempo.runs import run_folder
 
         self._motion = motion
-        self._scales = record.scales(motion.arm)
+        self._scales = run_folder.scales(motion.arm)
         self._progress = Progress("moving")
         self._started_s = time.monotonic()
         self._plot = self._window() if window else None
 
     def _window(self) -> LivePlot | None:
-        from armtempo.liveplot import LivePlot
+        from armtempo.report.live_plot import LivePlot
 
         try:
             return LivePlot(self._motion.trajectory, [scale.name for scale in self._scales])

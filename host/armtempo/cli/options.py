@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 if TYPE_CHECKING:
-    from armtempo.arm import Arm
     from armtempo.link import Board
     from armtempo.link.traffic import Sink
+    from armtempo.model.arm import Arm
 
 FC = TypeVar("FC", bound=Callable[..., Any] | click.Command)
 
@@ -69,7 +69,7 @@ out = click.option(
 
 def load_arm(path: Path | None) -> Arm:
     """The arm of ``--arm``."""
-    from armtempo import arm as arms
+    from armtempo.model import arm as arms
 
     return arms.load_arm(path or arms.default_path())
 

@@ -10,7 +10,7 @@ import click
 from armtempo.cli.progress import Progress
 
 if TYPE_CHECKING:
-    from armtempo.paper.claims import Claim
+    from armtempo.research.paper.claims import Claim
 
 
 @click.command()
@@ -28,8 +28,8 @@ def command(quick: bool, out: Path) -> None:
 
     The replays run on the virtual board.
     """
-    from armtempo.files import replace_text
-    from armtempo.paper import experiment, motions, postures, searches, sheet
+    from armtempo.formats.atomic_file import replace_text
+    from armtempo.research.paper import experiment, motions, postures, searches, sheet
 
     made = motions.plans()
     with Progress("searching") as progress:

@@ -37,9 +37,11 @@ def command(job_path: Path | None, arm_path: Path | None, output: Path | None, *
     """Plan a job and write its trajectory file."""
     from dataclasses import replace
 
-    from armtempo import checks, planner, summary, trajectory_file
-    from armtempo import job as jobs
     from armtempo.errors import PlanError
+    from armtempo.model import job as jobs
+    from armtempo.model import trajectory_file
+    from armtempo.planning import checks, planner
+    from armtempo.report import text_summary
 
     arm = options.load_arm(arm_path)
     job = jobs.load_job(job_path or jobs.default_path(), arm)
@@ -51,7 +53,7 @@ def command(job_path: Path | None, arm_path: Path | None, output: Path | None, *
         plan = planner.plan(arm, job, progress)
     target = output or Path(f"{job.name}.json")
     trajectory_file.save(plan, target)
-    for line in summary.lines(plan):
+    for line in text_summary.lines(plan):
         click.echo(line)
     click.echo(f"written: {target}")
     try:

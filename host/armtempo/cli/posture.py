@@ -11,8 +11,8 @@ import numpy as np
 from armtempo.errors import InputError
 
 if TYPE_CHECKING:
-    from armtempo.arm import Arm
-    from armtempo.spline import Array
+    from armtempo.model.arm import Arm
+    from armtempo.splines.bspline import Array
 
 
 def parse(text: str, arm: Arm, job_path: Path | None) -> Array:
@@ -20,7 +20,7 @@ def parse(text: str, arm: Arm, job_path: Path | None) -> Array:
 
     Raises InputError where the text is none of these, or does not fit the arm.
     """
-    from armtempo import moves
+    from armtempo.planning import point_to_point
 
     if re.fullmatch(r"[Pp]\d+", text):
         return _via(int(text[1:]), arm, job_path)
@@ -35,7 +35,7 @@ def parse(text: str, arm: Arm, job_path: Path | None) -> Array:
             f"{text!r} is no posture: give angles in degrees ('0,-60,40'), a via point of the job ('P0') "
             "or a trajectory file"
         ) from None
-    return moves.posture(angles_deg, arm)
+    return point_to_point.posture(angles_deg, arm)
 
 
 def words(angles_deg: Array) -> str:
@@ -44,8 +44,8 @@ def words(angles_deg: Array) -> str:
 
 
 def _via(index: int, arm: Arm, job_path: Path | None) -> Array:
-    from armtempo import job as jobs
-    from armtempo import planner
+    from armtempo.model import job as jobs
+    from armtempo.planning import planner
 
     job = jobs.load_job(job_path or jobs.default_path(), arm)
     via_deg, _ = planner.via_angles(arm, job)

@@ -12,7 +12,7 @@ from armtempo.cli import options
 if TYPE_CHECKING:
     from armtempo.link import Board
     from armtempo.pipeline import Motion
-    from armtempo.record import Repetition
+    from armtempo.runs.run_folder import Repetition
 
 
 @click.command()
@@ -32,7 +32,8 @@ def command(
     The arm must be homed ('armtempo home') and stand where the motion begins ('armtempo goto'); a virtual
     board sees to that itself. Between repetitions the arm returns along the same path. Ctrl-C brakes.
     """
-    from armtempo import operate, pipeline
+    from armtempo import pipeline
+    from armtempo.robot import operate
 
     file = motion_file(what)
     motion = pipeline.from_file(file, options.load_arm(arm_path) if arm_path else None) if file else None
@@ -60,7 +61,7 @@ def replay(board: Board, port: str, motion: Motion, repeat: int, out: Path, live
     """Upload, bring the arm to the start, replay, record, tell; gives the run folder."""
     from armtempo import pipeline
     from armtempo.cli.live import Live
-    from armtempo.interrupt import StopRequest
+    from armtempo.robot.stop_request import StopRequest
 
     with StopRequest() as stop:
         pipeline.prepare(board, port, motion, stop)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from armtempo.cli import options, posture
-from armtempo.columns import aligned
+from armtempo.formats.text_table import aligned
 
 if TYPE_CHECKING:
     from armtempo.pipeline import Motion

@@ -35,14 +35,14 @@ def _identity(info: Hello) -> list[str]:
 
 
 def _other(info: Hello) -> str:
-    from armtempo.boardfiles import own_crc
+    from armtempo.link.program_version import own_crc
 
     return "" if info.program_crc == own_crc() else "; another than the one installed here: 'armtempo deploy'"
 
 
 def lines(status: Status) -> list[str]:
     """State, fault and stand of each joint."""
-    from armtempo.operate import fault_name
+    from armtempo.robot.operate import fault_name
 
     found = [f"state     {status.state}"]
     if status.fault:

@@ -21,7 +21,8 @@ def command(
     file: Path, name: str | None, as_default: bool, arm_path: Path | None, port: str, log_traffic: Path | None
 ) -> None:
     """Store a trajectory file on the board."""
-    from armtempo import operate, pipeline
+    from armtempo import pipeline
+    from armtempo.robot import operate
 
     arm = options.load_arm(arm_path) if arm_path else None
     motion = pipeline.from_file(file, arm, name)

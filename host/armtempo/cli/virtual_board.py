@@ -65,7 +65,7 @@ def command(
 
     The port can be opened like a serial device, by armtempo (--port) and by any other program.
     """
-    from armtempo.virtual import launch
+    from armtempo.simulator import launch
 
     with launch(
         flash,

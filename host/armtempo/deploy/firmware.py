@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from armtempo.boardfiles import PACKAGES, own_crc
 from armtempo.deploy import package, program
 from armtempo.errors import LinkError
+from armtempo.link.program_version import PACKAGES, own_crc
 
 MANIFEST = "manifest.py"
 _OPTIMISED = 3

@@ -13,10 +13,10 @@ from typing import Any
 from armtempo_shared.program import STAMP
 from armtempo_shared.table import rows
 
-from armtempo import virtual
-from armtempo.boardfiles import PACKAGES, own_crc, package_folder
+from armtempo import simulator
 from armtempo.deploy.compact import Compact, compact, frames
 from armtempo.errors import InputError, LinkError
+from armtempo.link.program_version import PACKAGES, own_crc, package_folder
 
 ROOT = "/flash"
 LIBRARY = f"{ROOT}/lib"
@@ -128,7 +128,7 @@ def _handlers() -> set[str]:
 
 def _hardware_names() -> set[str]:
     """What methods of the hardware are called; the simulated hardware has them all."""
-    files = (Path(virtual.__file__).parent / "hardware").rglob("*.py")
+    files = (Path(simulator.__file__).parent / "hardware").rglob("*.py")
     nodes = [node for file in files for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))]
     return {node.name for node in nodes if isinstance(node, ast.FunctionDef)}
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armtempo.arm import Arm
+from armtempo.model.arm import Arm
 
 Array = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from armtempo.errors import InputError
-from armtempo.files import why
+from armtempo.formats.atomic_file import why
 from armtempo.kinematics.geometry import Array
-from armtempo.pose import LARGEST, checked, from_quaternion, from_rpy
+from armtempo.model.pose import LARGEST, checked, from_quaternion, from_rpy
 
 FORMS = {
     6: "x y z roll pitch yaw",

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from armtempo.arm import Arm
 from armtempo.kinematics.geometry import Array
+from armtempo.model.arm import Arm
 
 TOLERANCE_RAD = 1e-9
 """An angle this little outside its range is set onto the end of the range."""

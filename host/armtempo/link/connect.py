@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
-from armtempo.arm import Arm
-from armtempo.boardfiles import own_crc
 from armtempo.errors import BoardError, LinkError
 from armtempo.link import diagnose, ports, traffic
 from armtempo.link.board import Board
+from armtempo.link.program_version import own_crc
 from armtempo.link.session import NoAnswer, Session
 from armtempo.link.transport import SerialTransport, Transport
+from armtempo.model.arm import Arm
 
 _NOISY_TRIES = 10
 """Where something arrives that may be pieces of frames, ``hello`` is tried so often."""
@@ -90,9 +90,9 @@ def greet(
 @contextmanager
 def _virtual_port(port: str, arm: Arm | None) -> Iterator[str]:
     """A virtual board's port; where its program fails, the errors meanwhile end with its last words."""
-    from armtempo import virtual
+    from armtempo import simulator
 
-    with virtual.launch(ports.sim_flash(port), arm=arm) as board:
+    with simulator.launch(ports.sim_flash(port), arm=arm) as board:
         try:
             yield board.port
         except LinkError as error:

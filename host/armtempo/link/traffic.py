@@ -18,7 +18,7 @@ from typing import Any, Self
 from armtempo_shared import wire
 
 from armtempo.errors import InputError
-from armtempo.files import why
+from armtempo.formats.atomic_file import why
 from armtempo.link.transport import Transport
 
 HEADER = "# armtempo traffic 1"

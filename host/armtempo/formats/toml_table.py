@@ -1,0 +1,176 @@
+"""Reading TOML with every key checked: errors name the file, the key, the value and what is allowed."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import reprlib
+import sys
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from armtempo.errors import InputError
+from armtempo.formats.atomic_file import why
+
+_REQUIRED: Any = object()
+
+
+def read(path: Path | str) -> Table:
+    """The top table of a TOML file.
+
+    Raises InputError where the file is missing, unreadable or not TOML.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")  # some editors begin a file with a mark
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {why(error)}") from None
+    return parse(text, str(path))
+
+
+def parse(text: str, file: str) -> Table:
+    """The top table of TOML text; ``file`` names it in messages. Raises InputError where it is not TOML."""
+    try:
+        return Table(tomllib.loads(text), file)
+    except (ValueError, RecursionError) as error:  # not all of tomllib's are its own: numbers of 5000 digits
+        raise InputError(f"{file}: not valid TOML: {error}") from None
+
+
+class Table:
+    """One TOML table; each getter checks one key, ``done`` refuses the keys nobody asked for."""
+
+    def __init__(self, values: Mapping[str, Any], file: str, place: str = "") -> None:
+        self._values = values
+        self.file = file
+        self._place = place
+        self._asked: list[str] = []
+
+    def fail(self, key: str, allowed: str) -> InputError:
+        """The error for a key: say what is there and what is allowed."""
+        name = f"{self._place}{key}"
+        if key not in self._values:
+            return InputError(f"{self.file}: {name} is missing; it must be {allowed}")
+        value = reprlib.repr(self._values[key])
+        return InputError(f"{self.file}: {name} = {value} is not allowed; it must be {allowed}")
+
+    def has(self, key: str) -> bool:
+        """Whether the key is given."""
+        return key in self._values
+
+    def _get(self, key: str, default: Any, allowed: str) -> Any:
+        self._asked.append(key)
+        if key in self._values:
+            return self._values[key]
+        if default is _REQUIRED:
+            raise self.fail(key, allowed)
+        return default
+
+    def number(
+        self,
+        key: str,
+        default: float = _REQUIRED,
+        *,
+        above: float = -math.inf,
+        least: float = -math.inf,
+        most: float = math.inf,
+    ) -> float:
+        """A finite number with ``above`` < value, ``least`` <= value <= ``most``."""
+        allowed = "a number" + _range_text(above, least, most)
+        value = self._get(key, default, allowed)
+        if not _is_number(value) or not (value > above and least <= value <= most):
+            raise self.fail(key, allowed)
+        return float(value)
+
+    def integer(self, key: str, default: int = _REQUIRED, *, least: int, most: int) -> int:
+        """A whole number from ``least`` to ``most``."""
+        allowed = f"a whole number from {least} to {most}"
+        value = self._get(key, default, allowed)
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+            raise self.fail(key, allowed)
+        return value
+
+    def choice(self, key: str, choices: Sequence[Any], default: Any = _REQUIRED) -> Any:
+        """One of ``choices``."""
+        allowed = "one of " + ", ".join(repr(choice) for choice in choices)
+        value = self._get(key, default, allowed)
+        if not any(type(value) is type(choice) and value == choice for choice in choices):
+            raise self.fail(key, allowed)
+        return value
+
+    def boolean(self, key: str, default: bool) -> bool:
+        """True or false."""
+        return bool(self.choice(key, (True, False), default))
+
+    def text(self, key: str, default: str = _REQUIRED) -> str:
+        """A text that is not empty."""
+        value = self._get(key, default, "a text")
+        if not isinstance(value, str) or not value.strip():
+            raise self.fail(key, "a text that is not empty")
+        return value
+
+    def numbers(self, key: str, count: int, default: Any = _REQUIRED) -> tuple[float, ...]:
+        """A list of ``count`` finite numbers."""
+        allowed = f"a list of {count} numbers"
+        value = self._get(key, default, allowed)
+        if not isinstance(value, list | tuple) or len(value) != count or not all(map(_is_number, value)):
+            raise self.fail(key, allowed)
+        return tuple(float(number) for number in value)
+
+    def array(self, key: str, allowed: str) -> list[Any]:
+        """A list of anything, at least one entry."""
+        value = self._get(key, _REQUIRED, allowed)
+        if not isinstance(value, list) or not value:
+            raise self.fail(key, allowed)
+        return value
+
+    def table(self, key: str) -> Table | None:
+        """A table inside this one, or None where it is not given."""
+        value = self._get(key, None, "a table")
+        if value is None:
+            return None
+        if not isinstance(value, dict):
+            raise self.fail(key, "a table")
+        return Table(value, self.file, f"{self._place}{key}.")
+
+    def tables(self, key: str) -> list[Table]:
+        """A list of tables ([[key]]), at least one."""
+        entries = self.array(key, f"a list of tables, [[{key}]]")
+        if not all(isinstance(entry, dict) for entry in entries):
+            raise self.fail(key, f"a list of tables, [[{key}]]")
+        return [Table(entry, self.file, f"{self._place}{key}[{n}].") for n, entry in enumerate(entries, 1)]
+
+    def rest(self) -> dict[str, Any]:
+        """All values of the table, for keys that others check."""
+        self._asked.extend(self._values)
+        return dict(self._values)
+
+    def done(self) -> None:
+        """Raise InputError for the first key that no getter asked for."""
+        for key in self._values:
+            if key in self._asked:
+                continue
+            near = difflib.get_close_matches(key, self._asked, 1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            known = ", ".join(sorted(set(self._asked)))
+            raise InputError(f"{self.file}: {self._place}{key}: unknown key{hint} Known here: {known}")
+
+
+def _is_number(value: Any) -> bool:
+    """A finite number, and no whole one beyond the largest double."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return abs(value) <= sys.float_info.max
+
+
+def _range_text(above: float, least: float, most: float) -> str:
+    parts = []
+    if above > -math.inf:
+        parts.append(f"above {above:g}")
+    if least > -math.inf:
+        parts.append(f"of at least {least:g}")
+    if most < math.inf:
+        parts.append(f"of at most {most:g}")
+    return " " + " and ".join(parts) if parts else ""

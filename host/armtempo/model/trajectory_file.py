@@ -1,0 +1,109 @@
+"""The trajectory file: a plan as JSON, whole enough to run it and to plan it again."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from armtempo_shared.basis import BASIS
+
+from armtempo.errors import InputError
+from armtempo.formats import json_codec
+from armtempo.formats.atomic_file import replace_text, why
+from armtempo.model.arm import Joint
+from armtempo.model.plan import Plan
+from armtempo.splines.trajectory import JointSpline
+
+FORMAT = "armtempo trajectory"
+VERSION = 1
+
+
+def save(plan: Plan, path: Path | str) -> None:
+    """Writes the plan whole or not at all.
+
+    Raises InputError where the file cannot be written.
+    """
+    content = {"format": FORMAT, "version": VERSION, "plan": json_codec.encode(plan)}
+    text = json.dumps(content, indent=1, allow_nan=False)
+    replace_text(Path(path), text + "\n")
+
+
+def load(path: Path | str) -> Plan:
+    """The plan of a trajectory file.
+
+    Raises InputError for a file that is missing, cut, of another format or version, or holds a key, value or
+    shape that this program does not understand.
+    """
+    content = _read(path)
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise InputError(f"{path}: is not a trajectory file; make one with: armtempo plan")
+    if content.get("version") != VERSION:
+        raise InputError(
+            f"{path}: has version {content.get('version')!r}, this program reads version {VERSION}; "
+            "plan it again"
+        )
+    if content.keys() != {"format", "version", "plan"}:
+        raise InputError(f"{path}: unknown or missing key beside format, version and plan")
+    plan: Plan = json_codec.decode(Plan, content["plan"], f"{path}: plan")
+    _check(plan, path)
+    return plan
+
+
+def _read(path: Path | str) -> Any:
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {why(error)}") from None
+    try:
+        return json.loads(text, parse_constant=_refuse)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path}: damaged or cut: {error}; plan it again or copy it again") from None
+
+
+def _refuse(name: str) -> None:
+    raise ValueError(f"{name} is not a number")
+
+
+def _check(plan: Plan, path: Path | str) -> None:
+    """What the types cannot say: shapes, time that runs forward, one joint for each drive."""
+    joints, driven = plan.trajectory.joints, plan.arm.driven
+    if not joints or len(joints) != len(driven):
+        raise InputError(f"{path}: {len(joints)} joints in the trajectory, the arm drives {len(driven)}")
+    if plan.via_deg.shape[1:] != (len(driven),) or len(plan.extremes) != len(driven):
+        raise InputError(f"{path}: via_deg and extremes must have an entry for each of {len(driven)} joints")
+    for number, (joint, drive) in enumerate(zip(joints, driven, strict=True), 1):
+        _check_joint(joint, len(plan.via_deg) - 1, f"{path}: trajectory joint {number}")
+        _check_drive(drive, f"{path}: arm: {drive.name}")
+    if plan.trajectory.shared and any(
+        not np.array_equal(joint.time_points_s, joints[0].time_points_s) for joint in joints
+    ):
+        raise InputError(f"{path}: shared timing, but the joints' time control points differ")
+    if any(not 0 <= index < len(joints) for search in plan.searches for index in search.joints):
+        raise InputError(f"{path}: searches name a joint that there is not")
+
+
+def _check_drive(drive: Joint, where: str) -> None:
+    motor, encoder = drive.motor, drive.encoder
+    if drive.limits is None or min(drive.limits.values) <= 0:
+        raise InputError(f"{where}: has no limits above 0")
+    if motor is None or min(motor.steps_per_rev, motor.microsteps, motor.gear_ratio) <= 0:
+        raise InputError(f"{where}: its motor's figures must be above 0")
+    if encoder is not None and encoder.counts_per_rev <= 0:
+        raise InputError(f"{where}: its encoder's counts_per_rev must be above 0")
+
+
+def _check_joint(joint: JointSpline, segments: int, where: str) -> None:
+    if joint.degree not in BASIS or joint.refine < 1:
+        raise InputError(f"{where}: degree {joint.degree} with refine {joint.refine} is not known")
+    for what, points, pieces in (
+        ("angle", joint.angle_points_deg, segments),
+        ("time", joint.time_points_s, segments * joint.refine),
+    ):
+        if points.shape != (pieces + joint.degree,):
+            raise InputError(f"{where}: {points.size} {what} control points do not fit {pieces} segments")
+    if not np.all(np.diff(joint.time_points_s) > 0):
+        raise InputError(f"{where}: its time control points do not increase")

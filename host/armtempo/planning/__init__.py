@@ -1,0 +1,1 @@
+"""From via points to the shortest motion within the limits."""

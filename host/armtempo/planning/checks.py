@@ -1,0 +1,170 @@
+"""What a job and an arm must be before planning, and a plan after it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from armtempo_shared import motion
+from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS, MAX_STEP_RATE, MAX_STEP_RATE_SUM, TICK_HZ
+
+from armtempo import optimise
+from armtempo.errors import InputError, PlanError
+from armtempo.model.arm import Arm, Joint, Limits
+from armtempo.model.job import ITERATIONS, POPULATION, REFINE, Job
+from armtempo.splines import bspline, extremes
+from armtempo.splines.bspline import Array
+from armtempo.splines.extremes import Extremes
+from armtempo.splines.trajectory import JointSpline, Trajectory
+
+TOLERANCE = 1e-9
+"""What rounding may leave: largest excess over a limit, relative, and over a range, in degrees."""
+
+LONGEST_TICKS, LONGEST_SPAN_TICKS = 1 << 38, 1 << 36
+MOST_STEPS, MOST_SPAN_STEPS = 1 << 27, 1 << 24
+"""What the board's evaluator can hold: largest control point, and span of the degree + 1 of one segment
+(the same bounds stand in ``armtempo_board/check.py``; a test compares them)."""
+
+FITNESS = ("stretched", "penalised")
+"""Values of the job's parameter ``fitness``: ``stretched`` scales each candidate until it just keeps its
+limits, ``penalised`` is Eq. (21) as the paper has it."""
+
+
+def limits_of(arm: Arm) -> list[Limits]:
+    """The limits of the driven joints.
+
+    Raises InputError unless each is positive, and its speed one that the board can step.
+    """
+    limits = []
+    for joint in arm.driven:
+        if joint.limits is None:
+            raise InputError(f"arm {arm.name!r}: {joint.name} has a motor but no limits; add a limits table")
+        values = joint.limits.values
+        if not all(math.isfinite(value) and value > 0 for value in values):
+            raise InputError(
+                f"arm {arm.name!r}: the limits of {joint.name} must be positive numbers, not {values}"
+            )
+        _check_step_rate(arm, joint, joint.limits.speed_deg_s)
+        limits.append(joint.limits)
+    if not limits:
+        raise InputError(f"arm {arm.name!r}: no joint has a motor, so there is nothing to plan")
+    return limits
+
+
+def _check_step_rate(arm: Arm, joint: Joint, speed_deg_s: float) -> None:
+    assert joint.motor is not None
+    rate = speed_deg_s * joint.motor.steps_per_deg
+    if rate > MAX_STEP_RATE:
+        raise InputError(
+            f"arm {arm.name!r}: {joint.name} at its speed limit of {speed_deg_s:g} deg/s needs {rate:.0f} "
+            f"steps/s, the board does {MAX_STEP_RATE} at most; check the unit, lower the limit, or use "
+            "fewer microsteps"
+        )
+
+
+def check_job(arm: Arm, job: Job) -> None:
+    """Raises InputError for settings that the planner does not know or the board cannot hold."""
+    if job.timing not in ("per-joint", "shared"):
+        raise InputError(f"job {job.name!r}: timing {job.timing!r} must be 'per-joint' or 'shared'")
+    for name, (least, most) in (("refine", REFINE), ("population", POPULATION), ("iterations", ITERATIONS)):
+        if not least <= getattr(job, name) <= most:
+            raise InputError(
+                f"job {job.name!r}: {name} {getattr(job, name)} must be a whole number from {least} to {most}"
+            )
+    segments = len(job.via) - 1
+    if segments * job.refine > MAX_SEGMENTS:
+        raise InputError(
+            f"job {job.name!r}: {segments} segments with refine {job.refine} make more than the board's "
+            f"{MAX_SEGMENTS}; lower refine or use fewer via points"
+        )
+    size = motion.size(job.degree, len(arm.driven), job.timing == "shared", segments, job.refine)
+    if size > MAX_MOTION_BYTES:
+        raise InputError(
+            f"job {job.name!r}: its motion record would have {size} bytes, the board takes "
+            f"{MAX_MOTION_BYTES}; lower refine, use shared timing or fewer via points"
+        )
+    kind = job.parameters.get("fitness", FITNESS[0])
+    if kind not in FITNESS:
+        raise InputError(f"job {job.name!r}: fitness {kind!r} must be one of {', '.join(FITNESS)}")
+    optimise.parameters(job.optimiser)
+
+
+def check_via(arm: Arm, job: Job, via_deg: Array) -> None:
+    """Raises InputError for via angles (n + 1, J) that are no motion of this arm."""
+    if via_deg.ndim != 2 or len(via_deg) < 2 or via_deg.shape[1] != len(arm.driven):
+        raise InputError(
+            f"job {job.name!r}: needs at least 2 via points with {len(arm.driven)} angles each, "
+            "one for each driven joint"
+        )
+    if not np.all(np.isfinite(via_deg)):
+        raise InputError(f"job {job.name!r}: a via angle is not a finite number")
+    if np.all(np.ptp(via_deg, axis=0) <= TOLERANCE):
+        raise PlanError(
+            f"job {job.name!r}: all via points are the same, so nothing moves; change at least one angle"
+        )
+
+
+def check_ranges(arm: Arm, angle_points_deg: Array, degree: int) -> None:
+    """Raises PlanError where the path, also between the via points, leaves a joint's range."""
+    low, high = extremes.range_of(np.moveaxis(bspline.polynomials(angle_points_deg, degree), 2, 0))
+    for joint, lowest, highest in zip(arm.driven, low, high, strict=True):
+        least, most = joint.range_deg
+        room = TOLERANCE * max(1.0, abs(least), abs(most))
+        if lowest < least - room or highest > most + room:
+            raise PlanError(
+                f"{joint.name}: the path reaches {lowest:.7g} to {highest:.7g} degrees, its range is "
+                f"{least:g} to {most:g}; move the via points away from the end of the range, or add one "
+                "where it swings out"
+            )
+
+
+def check_reached(arm: Arm, reached: tuple[Extremes, ...]) -> None:
+    """The check that every plan passes: PlanError where a limit or the board's step rate is exceeded."""
+    rates = 0.0
+    for joint, extreme in zip(arm.driven, reached, strict=True):
+        assert joint.limits is not None
+        assert joint.motor is not None
+        if not np.all(extreme.values <= np.array(joint.limits.values) * (1 + TOLERANCE)):
+            raise PlanError(
+                f"{joint.name}: no plan was found that keeps its limits {joint.limits.values}, the best one "
+                f"reaches {extreme.values}; angles and limits are too far apart in size to compute with"
+            )
+        rates += extreme.speed_deg_s * joint.motor.steps_per_deg
+    if rates > MAX_STEP_RATE_SUM:
+        raise PlanError(
+            f"the joints together could need {rates:.0f} steps/s, the board does {MAX_STEP_RATE_SUM} at "
+            "most; lower the speed limits or use fewer microsteps"
+        )
+
+
+def check_held(trajectory: Trajectory, arm: Arm) -> None:
+    """Raises PlanError where a control point is beyond what the board's evaluator can hold."""
+    for joint_spline, joint in zip(trajectory.joints, arm.driven, strict=True):
+        where = f"trajectory {trajectory.name!r}, {joint.name}"
+        _check_times(where, joint_spline)
+        assert joint.motor is not None
+        steps = joint_spline.angle_points_deg * joint.motor.steps_per_deg
+        if np.max(np.abs(steps)) >= MOST_STEPS or _span(steps, joint_spline.degree) >= MOST_SPAN_STEPS:
+            raise PlanError(f"{where}: more steps than the board can count; use fewer microsteps")
+
+
+def _check_times(where: str, joint_spline: JointSpline) -> None:
+    ticks = joint_spline.time_points_s * TICK_HZ
+    if np.max(np.abs(ticks)) >= LONGEST_TICKS:
+        raise PlanError(
+            f"{where}: lasts {joint_spline.duration_s:.0f} s, the board counts to "
+            f"{LONGEST_TICKS / TICK_HZ:.0f} s; split it"
+        )
+    span = _span(ticks, joint_spline.degree)
+    if span >= LONGEST_SPAN_TICKS:
+        raise PlanError(
+            f"{where}: its time segments are so long that {joint_spline.degree} of them span "
+            f"{span / TICK_HZ:.0f} s, the board holds {LONGEST_SPAN_TICKS / TICK_HZ:.0f} s; raise refine or add "
+            "via points"
+        )
+
+
+def _span(points: Array, degree: int) -> float:
+    """Largest distance among the degree + 1 control points of one segment."""
+    segments = np.lib.stride_tricks.sliding_window_view(points, degree + 1)
+    return float(np.max(np.ptp(segments, axis=1)))

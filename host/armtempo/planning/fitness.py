@@ -1,0 +1,110 @@
+"""What a search minimises: motion time and excess over the limits, for a whole population at once.
+
+Angles are fixed, only the intervals X vary, so everything of the angle and of the basis is computed once,
+on a grid of u; a population then costs one matrix product and a few array operations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from armtempo.model.arm import Limits
+from armtempo.splines import bspline, time_axis
+from armtempo.splines.bspline import Array
+
+SAMPLES = 16
+"""Parts of a path segment between the grid points that the search looks at; the finished plan is checked
+without a grid."""
+_PENALTY = 30.0
+"""Seconds that the penalty of Eq. (21) charges where a limit is exceeded by as much again."""
+_TINY = 1e-300
+"""Keeps a flat stretch from dividing nothing by nothing."""
+
+
+class Fitness:
+    """Fitness of time intervals for one joint, or for several on one time axis.
+
+    ``angle_points_deg``: (n + degree, J) control points; ``limits``: one for each joint. A point to
+    evaluate has n intervals in seconds (m = n below).
+    """
+
+    def __init__(self, angle_points_deg: Array, degree: int, limits: Sequence[Limits]) -> None:
+        self.limits = np.array([limit.values for limit in limits])
+        pieces = bspline.polynomials(angle_points_deg, degree)
+        self.intervals = len(pieces)
+        u = np.linspace(0.0, 1.0, SAMPLES + 1)
+        grid = (len(u), -1, self.intervals, 1)  # (G, J, m, N): a population fills the last axis, the fastest
+        angles = [_on_grid(bspline.derivative(pieces, order), u) for order in (1, 2, 3)]
+        self._angles = [np.ascontiguousarray(angle).reshape(grid) for angle in angles]
+        self._times = _time_maps(self.intervals, degree, u)
+        self._shape = (3, len(u), 1, self.intervals, -1)
+
+    def ratios(self, intervals_s: Array) -> Array:
+        """|speed|, |acceleration|, |jerk| over their limits on the grid: (3, G, J, m, N) for X (N, m).
+
+        Eqs. (17) to (19), the last with the signs that differentiation gives.
+        """
+        t1, t2, t3 = (self._times @ intervals_s.T).reshape(self._shape)
+        q1, q2, q3 = self._angles
+        inverse = 1.0 / t1
+        square = inverse * inverse
+        result = np.empty((3, *q1.shape[:3], len(intervals_s)))
+        speed = np.multiply(q1, inverse, out=result[0])
+        acceleration = np.multiply(q2 - speed * t2, square, out=result[1])
+        np.multiply(q3 - speed * t3 - acceleration * (3.0 * t1 * t2), square * inverse, out=result[2])
+        np.abs(result, out=result)
+        result *= (1 / self.limits).T[:, None, :, None, None]
+        return result
+
+    def peaks(self, intervals_s: Array) -> Array:
+        """Largest ratios in each segment, (3, J, m, N): of the grid, and of parabolas through its points.
+
+        A parabola through three points whose top lies beyond the outer ones is cut down to less than those.
+        """
+        ratios = self.ratios(intervals_s)
+        left, middle, right = ratios[:, :-2], ratios[:, 1:-1], ratios[:, 2:]
+        slope = np.abs(left - right)
+        bend = 2.0 * middle
+        bend -= left
+        bend -= right
+        tops = np.maximum(bend, 0.5 * slope, out=bend)
+        tops += _TINY
+        np.divide(np.square(slope, out=slope), 8.0 * tops, out=tops)
+        tops += middle
+        return np.asarray(np.maximum(tops.max(axis=1), np.maximum(ratios[:, 0], ratios[:, -1])))
+
+    def penalised(self, intervals_s: Array) -> Array:
+        """Eq. (21): sum of X and weighted excess of each segment's extremes, (N,) for X (N, m).
+
+        The paper leaves its weights open; here each excess counts relative to its limit.
+        """
+        excess = np.maximum(self.peaks(intervals_s) - 1.0, 0.0).sum(axis=(0, 1, 2))
+        return np.asarray(intervals_s.sum(axis=1) + _PENALTY * excess)
+
+    def stretched(self, intervals_s: Array) -> Array:
+        """Motion time when X is stretched or shrunk until it just keeps the limits, (N,) for X (N, m)."""
+        return np.asarray(intervals_s.sum(axis=1) * self.stretch(intervals_s))
+
+    def stretch(self, intervals_s: Array) -> Array:
+        """The factor on X that brings it just within the limits, as far as the grid sees: (N,)."""
+        return stretch_of(self.peaks(intervals_s).max(axis=(1, 2)))
+
+
+def stretch_of(ratios: Array) -> Array:
+    """Least factor on time that brings ``ratios`` (3, ...) of speed, acceleration and jerk down to 1."""
+    return np.asarray(np.maximum(np.maximum(ratios[0], np.sqrt(ratios[1])), np.cbrt(ratios[2])))
+
+
+def _on_grid(pieces: Array, u: Array) -> Array:
+    """Values (G, J, m) of polynomials (m, k + 1, J) at each u of (G,)."""
+    powers = u[:, None] ** np.arange(pieces.shape[1])
+    return np.asarray(np.einsum("gp,mpj->gjm", powers, pieces))
+
+
+def _time_maps(count: int, degree: int, u: Array) -> Array:
+    """From intervals to t', t'', t''' on the grid, one below the other: (3 * G * m, m)."""
+    pieces = bspline.polynomials(np.ascontiguousarray(time_axis.step_map(count, degree).T), degree)
+    maps = [_on_grid(bspline.derivative(pieces, order), u).swapaxes(1, 2) for order in (1, 2, 3)]
+    return np.concatenate(maps).reshape(-1, count)

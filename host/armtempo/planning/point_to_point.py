@@ -1,0 +1,74 @@
+"""Moves that need no search: straight from posture to posture, and a motion backwards."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armtempo.errors import InputError
+from armtempo.model.arm import Arm, Joint
+from armtempo.splines import bspline, time_axis
+from armtempo.splines.bspline import Array
+from armtempo.splines.trajectory import JointSpline, Trajectory
+
+DEGREE = 5
+_PEAKS = (1.875, 10.0 / 3.0**0.5, 60.0)
+"""Peak speed, acceleration and jerk of 10 u³ - 15 u⁴ + 6 u⁵ over u in 0..1."""
+SHORTEST_S = 0.05
+"""A move takes at least this long, however small it is."""
+_MARGIN = 1.001
+"""The move is this much slower than the limits allow, so that rounding never exceeds them."""
+
+
+def straight(name: str, start_deg: ArrayLike, end_deg: ArrayLike, arm: Arm) -> Trajectory:
+    """The quintic from rest at ``start_deg`` (J,) to rest at ``end_deg`` (J,), all joints arriving together.
+
+    As fast as the limits of the slowest joint allow. Raises InputError where a posture has another number
+    of joints than the arm drives or leaves a joint's range.
+    """
+    start, end = posture(start_deg, arm), posture(end_deg, arm)
+    duration_s = max(
+        _duration_s(joint, abs(to - here)) for joint, here, to in zip(arm.driven, start, end, strict=True)
+    )
+    times = time_axis.control_points([duration_s], DEGREE)
+    joints = tuple(
+        JointSpline(DEGREE, 1, bspline.fit([here, to], DEGREE), times)
+        for here, to in zip(start, end, strict=True)
+    )
+    return Trajectory(name, joints, shared=True)
+
+
+def backwards(trajectory: Trajectory, name: str) -> Trajectory:
+    """The same motion from its end to its start; each joint begins at once."""
+    return Trajectory(name, tuple(_backwards(joint) for joint in trajectory.joints), trajectory.shared)
+
+
+def posture(angles_deg: ArrayLike, arm: Arm) -> Array:
+    """The angles as an array (J,); InputError where their number or a range does not fit the arm."""
+    found = np.asarray(angles_deg, dtype=float)
+    if found.shape != (len(arm.driven),):
+        raise InputError(f"a posture of arm {arm.name!r} has {len(arm.driven)} angles, not {found.size}")
+    for joint, angle in zip(arm.driven, found, strict=True):
+        low, high = joint.range_deg
+        if not low <= angle <= high:
+            raise InputError(f"{joint.name}: {angle:g} degrees is outside of its range {low:g} to {high:g}")
+    return found
+
+
+def _backwards(joint: JointSpline) -> JointSpline:
+    return JointSpline(
+        joint.degree,
+        joint.refine,
+        joint.angle_points_deg[::-1].copy(),
+        joint.duration_s - joint.time_points_s[::-1],
+    )
+
+
+def _duration_s(joint: Joint, distance_deg: float) -> float:
+    assert joint.limits is not None  # the loader requires it of driven joints
+    bounds = (joint.limits.speed_deg_s, joint.limits.acceleration_deg_s2, joint.limits.jerk_deg_s3)
+    needed = [
+        (peak * distance_deg / bound) ** (1.0 / order)
+        for order, (peak, bound) in enumerate(zip(_PEAKS, bounds, strict=True), start=1)
+    ]
+    return max(SHORTEST_S, _MARGIN * float(max(needed)))

@@ -1,0 +1,60 @@
+"""Shortest time of one joint between standstills under speed, acceleration and jerk limits, in closed form.
+
+A bound from below for every time law on a path: between two turning points of a joint its speed is zero at
+both ends, whatever the other joints do.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from armtempo.model.arm import Limits
+from armtempo.splines.bspline import Array
+
+
+def floor_s(angles_deg: Array, limits: Limits, at_rest: bool = True) -> float:
+    """Least time to pass ``angles_deg`` (turning points with both ends) in order.
+
+    At the first and the last the acceleration is zero too if ``at_rest``; at the others it is free, since a
+    joint may turn under full acceleration.
+    """
+    distances = np.abs(np.diff(angles_deg))
+    last = len(distances) - 1
+    return sum(
+        _stretch_s(float(distance), limits, at_rest and number == 0, at_rest and number == last)
+        for number, distance in enumerate(distances)
+    )
+
+
+def _stretch_s(distance: float, limits: Limits, from_rest: bool, to_rest: bool) -> float:
+    """Least time over one monotone stretch: up to some speed, perhaps hold it, and down again."""
+    low, high = 0.0, limits.speed_deg_s
+    up, way_up = _ramp(high, limits, from_rest)
+    down, way_down = _ramp(high, limits, to_rest)
+    if way_up + way_down <= distance:
+        return up + down + (distance - way_up - way_down) / high
+    for _ in range(60):
+        speed = 0.5 * (low + high)
+        up, way_up = _ramp(speed, limits, from_rest)
+        down, way_down = _ramp(speed, limits, to_rest)
+        low, high = (speed, high) if way_up + way_down < distance else (low, speed)
+    return up + down
+
+
+def _ramp(speed: float, limits: Limits, from_rest: bool) -> tuple[float, float]:
+    """Time and way from standstill to ``speed``, where the acceleration is zero.
+
+    It starts at zero too if ``from_rest``, else anywhere within its limit.
+    """
+    top, jerk = limits.acceleration_deg_s2, limits.jerk_deg_s3
+    ramps = 2.0 if from_rest else 1.0  # jerk phases; each changes the speed by a² / 2 J
+    peak = min(top, math.sqrt(2.0 * jerk * speed / ramps))
+    phase = peak / jerk
+    held = (speed - ramps * peak * phase / 2.0) / peak if peak > 0 else 0.0
+    time = held + ramps * phase
+    if from_rest:
+        return time, speed * time / 2.0
+    before = held * peak
+    return time, before * held / 2.0 + before * phase + peak * phase**2 / 3.0

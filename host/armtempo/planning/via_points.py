@@ -1,0 +1,196 @@
+"""From a job's poses, or a mix of poses and angles, to via angles of the driven joints.
+
+A pose asks for all joints of the arm, but only joints with a motor move; the others stay at ``home_deg``.
+So for each pose
+
+1. the ranges of the driven joints alone decide which solutions can be used;
+2. where the job gives ``posture_deg``, the solution nearest to it is taken; else one that reaches the pose
+   with the undriven joints at home comes first, and among equals the one nearest to the posture before;
+3. the driven joints take their angles from it. What the pose would need of the others, and how far the tool
+   misses it without, is said in a note.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armtempo.errors import InputError, PlanError
+from armtempo.kinematics import numerical
+from armtempo.kinematics.branches import Branch, branch_of
+from armtempo.kinematics.choice import Choice, choose
+from armtempo.kinematics.forward import forward
+from armtempo.kinematics.geometry import Array, Geometry
+from armtempo.kinematics.ranges import Ranges
+from armtempo.kinematics.shape import refusals
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job, Pose
+from armtempo.model.pose import checked
+
+MISS_MM = 0.01
+MISS_DEG = 0.01
+"""A tool this near to its pose has reached it."""
+
+
+@dataclass(frozen=True)
+class Note:
+    """Something about the via points that the user must know."""
+
+    kind: str
+    """"undriven": the pose needs joints without a motor; "branch": the arm changes its branch before it."""
+    via: int
+    """Number of the via point, from 1."""
+    text: str
+
+
+@dataclass(frozen=True)
+class Resolved:
+    """The via points as angles."""
+
+    via_deg: Array
+    """(n + 1, J): of the driven joints."""
+    notes: tuple[Note, ...]
+
+
+@dataclass(frozen=True)
+class _Setup:
+    """What all via points share."""
+
+    arm: Arm
+    geometry: Geometry
+    ranges: Ranges
+    """Of the driven joints; for the others, which stay, the whole turn about home."""
+    home: Array
+    """(joints,), rad."""
+    driven: NDArray[np.bool_]
+    closed_form: bool
+
+    @classmethod
+    def of(cls, arm: Arm) -> _Setup:
+        ends = [
+            joint.range_deg if joint.motor else (joint.home_deg - 180.0, joint.home_deg + 180.0)
+            for joint in arm.joints
+        ]
+        low, high = np.radians(ends).T
+        home = np.radians([joint.home_deg for joint in arm.joints])
+        driven = np.array([joint.motor is not None for joint in arm.joints])
+        geometry = Geometry.of(arm)
+        return cls(arm, geometry, Ranges(low, high), home, driven, not refusals(geometry))
+
+    def moved(self, angles: Array) -> Array:
+        """The posture with the driven joints at ``angles`` and the others at home."""
+        return np.where(self.driven, angles, self.home)
+
+    def miss(self, target: Array, angles: Array) -> tuple[float, float]:
+        """How far the tool stays from its pose if only the driven joints move: mm and degrees."""
+        tool = forward(self.geometry, self.moved(angles))
+        chord = float(np.linalg.norm(tool[:3, :3] - target[:3, :3]))
+        turn = 2.0 * math.degrees(math.asin(min(chord / math.sqrt(8.0), 1.0)))
+        return float(np.linalg.norm(tool[:3, 3] - target[:3, 3])), turn
+
+    def reaches(self, target: Array, angles: Array) -> bool:
+        """Whether the tool gets there if only the driven joints move."""
+        distance, turn = self.miss(target, angles)
+        return distance <= MISS_MM and turn <= MISS_DEG
+
+
+def resolve(arm: Arm, job: Job) -> Resolved:
+    """Turn every pose of ``job`` into angles, in order, each nearest to the one before.
+
+    Raises InputError for a via point that is no pose or has the wrong number of angles, PlanError with all
+    reasons for a pose that no solution reaches.
+    """
+    setup = _Setup.of(arm)
+    postures: list[Array] = []
+    notes: list[Note] = []
+    posture = setup.home
+    branch: Branch | None = None
+    for number, via in enumerate(job.via, 1):
+        where = f"job {job.name!r}, via {number}"
+        choice = None
+        if isinstance(via, Pose):
+            target = checked(via.matrix, where)
+            needed, choice = _solve(setup, target, via, posture, where)
+            notes += _undriven_note(setup, target, needed, number)
+        else:
+            needed = _spread(setup, via, where)
+        posture = setup.moved(needed)
+        postures.append(posture)
+        if setup.closed_form:
+            before, branch = branch, _branch(setup, posture, branch)
+            if before and Pose in (type(via), type(job.via[number - 2])):
+                notes += _branch_note(before, branch, choice, number)
+    return Resolved(np.degrees(np.array(postures)[:, setup.driven]), tuple(notes))
+
+
+def _spread(setup: _Setup, via: tuple[float, ...], where: str) -> Array:
+    """All joints, the driven ones at the angles of a via point."""
+    if len(via) != setup.driven.sum():
+        raise InputError(f"{where}: {len(via)} angles, but {setup.driven.sum()} joints have a motor")
+    posture = setup.home.copy()
+    posture[setup.driven] = np.radians(via)
+    return posture
+
+
+def _solve(setup: _Setup, target: Array, via: Pose, before: Array, where: str) -> tuple[Array, Choice | None]:
+    """All that the pose asks for, (joints,) in rad; the choice only where the closed form serves the arm."""
+    previous = before if via.posture_deg is None else _preferred(setup, via.posture_deg, where)
+    if not setup.closed_form:
+        found = numerical.solve(setup.geometry, target, setup.ranges, previous)
+        if not found.found:
+            raise PlanError(f"{where}: {found.reason}")
+        return found.angles_rad, None
+    choice = choose(setup.geometry, target, setup.ranges, previous)
+    usable = [candidate for candidate in choice.candidates if not candidate.rejections]
+    if not usable:
+        reasons = dict.fromkeys(r.text for candidate in choice.candidates for r in candidate.rejections)
+        raise PlanError(f"{where}: no posture reaches this pose: {'; '.join(reasons)}")
+    if via.posture_deg is None:
+        usable = [c for c in usable if setup.reaches(target, c.angles_rad)] or usable
+    return min(usable, key=lambda candidate: candidate.distance_rad).angles_rad, choice
+
+
+def _preferred(setup: _Setup, posture_deg: tuple[float, ...], where: str) -> Array:
+    if len(posture_deg) != len(setup.home):
+        raise InputError(f"{where}: posture_deg has {len(posture_deg)} angles, not {len(setup.home)}")
+    return np.radians(posture_deg)
+
+
+def _undriven_note(setup: _Setup, target: Array, needed: Array, number: int) -> list[Note]:
+    if setup.reaches(target, needed):
+        return []
+    needs = ", ".join(
+        f"{joint.name} at {angle:.4g} deg (stays at {joint.home_deg:g})"
+        for joint, angle in zip(setup.arm.joints, np.degrees(needed), strict=True)
+        if joint.motor is None and abs(angle - joint.home_deg) > MISS_DEG
+    )
+    distance, turn = setup.miss(target, needed)
+    text = (
+        f"via {number}: the pose needs joints that have no motor: {needs}; the tool misses the pose by "
+        f"{distance:.4g} mm and {turn:.4g} deg"
+    )
+    return [Note("undriven", number, text)]
+
+
+def _branch(setup: _Setup, posture: Array, before: Branch | None) -> Branch:
+    """The branch at a via point; where the arm stands between two, it still counts as on the one before."""
+    here = branch_of(setup.geometry, posture)
+    return here.after(before) if before else here
+
+
+def _branch_note(old: Branch, new: Branch, choice: Choice | None, number: int) -> list[Note]:
+    changed = old.differs(new)
+    if not changed:
+        return []
+    text = (
+        f"between via {number - 1} and via {number} the arm changes its branch ({', '.join(changed)}): from "
+        f"{old} to {new}, so the joints pass through a singular posture on the way"
+    )
+    for candidate in choice.candidates if choice else ():
+        if not old.differs(candidate.branch) and candidate.rejections:
+            text += f". Staying in {candidate.branch} is not possible: {candidate.rejections[0].text}"
+            break
+    return [Note("branch", number, text)]

@@ -1,0 +1,1 @@
+"""Arm and motion as the board takes them, and back."""

@@ -1,0 +1,147 @@
+"""From degrees and seconds to the board's steps, counts and ticks: arm record and motion record."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from armtempo_shared import armrecord, limits, motion
+from numpy.typing import NDArray
+
+from armtempo.errors import InputError
+from armtempo.model.arm import Arm, Joint
+from armtempo.planning import checks
+from armtempo.splines.trajectory import Trajectory
+
+_TICKS_PER_US = limits.TICK_HZ / 1e6
+
+
+def arm_record(arm: Arm) -> bytes:
+    """What the board must know of the arm (layout: ``armtempo_shared.armrecord``).
+
+    Raises InputError where a figure does not fit the board.
+    """
+    return armrecord.pack(_head(arm), [_joint(joint) for joint in arm.driven])
+
+
+def motion_record(trajectory: Trajectory, arm: Arm, brake_s: float = 0.0) -> bytes:
+    """What the board replays (layout: ``armtempo_shared.motion``), tied to the arm by its crc.
+
+    ``brake_s``: time in which the motion may brake to rest anywhere (0: not at all).
+    Raises InputError where trajectory and arm do not fit each other or the record's number range, PlanError
+    where the board could not hold the numbers.
+    """
+    if len(trajectory.joints) != len(arm.driven):
+        raise InputError(
+            f"trajectory {trajectory.name!r} has {len(trajectory.joints)} joints, "
+            f"arm {arm.name!r} drives {len(arm.driven)}; plan it for this arm"
+        )
+    angles = [
+        _fixed(spline.angle_points_deg * steps_per_deg(joint), limits.STEP_FRACTION_BITS)
+        for spline, joint in zip(trajectory.joints, arm.driven, strict=True)
+    ]
+    axes = trajectory.joints[:1] if trajectory.shared else trajectory.joints
+    times = [_fixed(spline.time_points_s * limits.TICK_HZ, limits.TICK_FRACTION_BITS) for spline in axes]
+    checks.check_held(trajectory, arm)
+    first = trajectory.joints[0]
+    segments = len(first.angle_points_deg) - first.degree
+    brake_ticks = round(brake_s * limits.TICK_HZ)
+    crc = armrecord.unpack(arm_record(arm))[2]
+    return motion.pack(first.degree, angles, times, segments, first.refine, brake_ticks, crc)
+
+
+def steps_per_deg(joint: Joint) -> float:
+    """Step pulses per degree of a driven joint."""
+    if joint.motor is None:
+        raise InputError(f"{joint.name} has no motor; give it a [joint.motor] table in the arm file")
+    return joint.motor.steps_per_deg
+
+
+def counts_per_deg(joint: Joint) -> float:
+    """Encoder counts per degree of the joint.
+
+    Raises InputError where the joint has no encoder.
+    """
+    return float(counts_per_step(joint)) * steps_per_deg(joint)
+
+
+def counts_per_step(joint: Joint) -> Fraction:
+    """Encoder counts per step pulse, exactly as the arm file's decimals say."""
+    if joint.motor is None or joint.encoder is None:
+        raise InputError(f"{joint.name} has no encoder; give it a [joint.encoder] table in the arm file")
+    gear = Fraction(str(joint.motor.gear_ratio))
+    counts = Fraction(joint.encoder.counts_per_rev)
+    if joint.encoder.on == "motor":
+        counts *= gear
+    return counts / (joint.motor.steps_per_rev * joint.motor.microsteps * gear)
+
+
+def _fixed(points: NDArray[np.float64], bits: int) -> list[int]:
+    """Control points as integers with ``bits`` fraction bits."""
+    scaled = np.rint(points * 2.0**bits)
+    if not np.all(np.abs(scaled) < 2.0**62):
+        raise InputError("a control point is too large for the board; check limits and via points")
+    return [int(value) for value in scaled]
+
+
+def _head(arm: Arm) -> dict[str, Any]:
+    safety, driver = arm.safety, arm.driver
+    flags = 0
+    for flag, wanted in (
+        (armrecord.FLAG_ENABLE_HIGH, driver.enable_active == "high"),
+        (armrecord.FLAG_ESTOP_RELEASES, safety.estop_releases_enable),
+        (armrecord.FLAG_STOP_ON_LINK_LOSS, safety.on_link_loss == "stop"),
+        (armrecord.FLAG_ESTOP_ACTIVE_HIGH, safety.estop_active == "high"),
+        (armrecord.FLAG_ESTOP_FITTED, safety.estop_fitted),
+    ):
+        flags |= flag if wanted else 0
+    ticks = {
+        f"{name}_ticks": round(getattr(driver, f"{name}_us") * _TICKS_PER_US)
+        for name in ("pulse", "low", "dir_setup", "dir_hold")
+    }
+    return {"flags": flags, "link_timeout_ms": safety.link_timeout_ms, **ticks}
+
+
+def _joint(joint: Joint) -> dict[str, Any]:
+    motor, encoder, switches = joint.motor, joint.encoder, joint.switches
+    assert motor is not None  # arm.driven
+    per_step = counts_per_step(joint) if encoder else Fraction(0)
+    if max(abs(per_step.numerator), per_step.denominator) >= 2**31:
+        raise InputError(f"{joint.name}: the ratio of encoder counts to steps is too odd for the board")
+    following = encoder.following_error_deg * counts_per_deg(joint) if encoder else 0.0
+    low, high = (round(angle * motor.steps_per_deg) for angle in joint.range_deg)
+    if max(abs(low), abs(high)) >= 2**30:
+        raise InputError(f"{joint.name}: its range is {high - low} steps, more than the board can count")
+    return {
+        "channel": motor.channel - 1,
+        "dir_inverted": int(motor.direction < 0),
+        "encoder": encoder.channel - 1 if encoder else armrecord.NONE,
+        "encoder_inverted": int(encoder is not None and encoder.direction < 0),
+        "counts_num": per_step.numerator,
+        "counts_den": per_step.denominator,
+        "min_steps": low,
+        "max_steps": high,
+        "max_rate": _max_rate(joint),
+        "following_counts": round(following),
+        "limit_low": armrecord.NONE if switches.low is None else switches.low - 1,
+        "limit_high": armrecord.NONE if switches.high is None else switches.high - 1,
+        "limit_active_high": int(switches.active == "high"),
+        "spare": 0,
+    }
+
+
+def _max_rate(joint: Joint) -> int:
+    """The joint's speed limit in steps/s with a little room for rounding.
+
+    Raises InputError where the board cannot step that fast.
+    """
+    assert joint.limits is not None  # the loader requires it
+    assert joint.motor is not None
+    rate = joint.limits.speed_deg_s * joint.motor.steps_per_deg
+    if rate > limits.MAX_STEP_RATE:
+        raise InputError(
+            f"{joint.name}: speed_deg_s = {joint.limits.speed_deg_s:g} means {rate:.0f} steps/s; "
+            f"the board makes at most {limits.MAX_STEP_RATE}. Check the unit, microsteps and gear ratio"
+        )
+    return int(rate * 1.01) + 1

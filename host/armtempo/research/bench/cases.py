@@ -1,0 +1,119 @@
+"""Searches compared, as in Table 4 and Fig. 6: one problem, many algorithms, populations and seeds."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator
+from concurrent.futures import Executor, as_completed
+from dataclasses import dataclass
+
+import numpy as np
+
+from armtempo import optimise
+from armtempo.errors import InputError
+from armtempo.model.arm import Arm, Limits
+from armtempo.model.job import Job
+from armtempo.planning import planner
+from armtempo.planning.fitness import Fitness
+from armtempo.splines import bspline
+from armtempo.splines.bspline import Array
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What every search gets: the intervals of one joint's path, judged by ``armtempo.fitness``."""
+
+    joint: str
+    via_deg: tuple[float, ...]
+    degree: int
+    limits: Limits
+    bounds_s: tuple[float, float]
+    fitness: str
+    """A method of ``Fitness``: ``"stretched"`` or ``"penalised"``."""
+    iterations: int
+
+    def function(self) -> optimise.Function:
+        """Fitness (N,) of intervals (N, m)."""
+        points = bspline.fit(np.array(self.via_deg)[:, None], self.degree)
+        judge: optimise.Function = getattr(Fitness(points, self.degree, [self.limits]), self.fitness)
+        return judge
+
+
+@dataclass(frozen=True, order=True)
+class Case:
+    """One run of the comparison."""
+
+    algorithm: str
+    population: int
+    seed: int
+
+
+@dataclass(frozen=True)
+class Run:
+    """What came of a case."""
+
+    case: Case
+    intervals_s: tuple[float, ...]
+    evaluations: int
+    seconds: float
+    """Of computing (the thread's own CPU time, so that other work on the machine does not count)."""
+    improvements: tuple[tuple[int, float], ...]
+    """The iterations (0: first population) that found better, and what."""
+
+    @property
+    def best_s(self) -> float:
+        """The fitness reached."""
+        return self.improvements[-1][1]
+
+    def history(self, iterations: int) -> Array:
+        """Best fitness after each iteration: (iterations + 1,)."""
+        when = np.array([iteration for iteration, _ in self.improvements])
+        values = np.array([value for _, value in self.improvements])
+        return np.asarray(values[np.searchsorted(when, np.arange(iterations + 1), side="right") - 1])
+
+
+def problem_of(arm: Arm, job: Job, joint: int, fitness: str, iterations: int) -> Problem:
+    """The search for the intervals of driven joint ``joint``, counted from 1, of a job.
+
+    Raises InputError where there is no such joint, or it has no limits or stands still in this job.
+    """
+    if not 1 <= joint <= len(arm.driven):
+        raise InputError(f"joint {joint}: arm {arm.name!r} has the driven joints 1 to {len(arm.driven)}")
+    driven = arm.driven[joint - 1]
+    angles_deg, _ = planner.via_angles(arm, job)
+    via = angles_deg[:, joint - 1]
+    if driven.limits is None:
+        raise InputError(f"arm {arm.name!r}: {driven.name} has no limits; add a limits table")
+    if np.ptp(via) == 0.0:
+        raise InputError(
+            f"job {job.name!r}: {driven.name} does not move, so there is nothing to search; choose another"
+        )
+    angles = tuple(float(angle) for angle in via)
+    return Problem(driven.name, angles, job.degree, driven.limits, job.bounds_s, fitness, iterations)
+
+
+def cases(algorithms: Iterable[str], populations: Iterable[int], seeds: Iterable[int]) -> list[Case]:
+    """Every combination once, those that take longest first, so that all workers end together."""
+    seeds, algorithms = list(seeds), list(algorithms)
+    chosen = {Case(a, p, s) for p in populations for s in seeds for a in algorithms}
+    return sorted(chosen, key=lambda case: (-case.population, case.seed, case.algorithm))
+
+
+def solve(problem: Problem, case: Case) -> Run:
+    """Runs one case. The same case gives the same run, but for its seconds, wherever it runs."""
+    function = problem.function()
+    bounds = [problem.bounds_s] * (len(problem.via_deg) - 1)
+    rng = np.random.default_rng(case.seed)
+    start = time.thread_time()
+    found = optimise.minimise(function, bounds, rng, case.population, problem.iterations, case.algorithm)
+    seconds = time.thread_time() - start
+    better = [0, *(np.flatnonzero(np.diff(found.history) < 0) + 1)]
+    improvements = tuple((int(at), float(found.history[at])) for at in better)
+    return Run(case, tuple(float(x) for x in found.x), found.evaluations, seconds, improvements)
+
+
+def execute(problem: Problem, todo: Iterable[Case], executor: Executor) -> Iterator[Run]:
+    """Runs the cases on the executor's workers, and yields each run as it comes."""
+    futures = [executor.submit(solve, problem, case) for case in todo]
+    for future in as_completed(futures):
+        yield future.result()

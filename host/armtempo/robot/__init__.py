@@ -1,0 +1,1 @@
+"""What is done with a board: configure, home, move, replay, stop."""

@@ -1,0 +1,140 @@
+"""Reading run folders back."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armtempo.errors import RunFolderError
+from armtempo.runs.run_folder import FORMAT, META, TRAJECTORY, VERSION, JointScale
+
+Array = NDArray[np.float64]
+
+_LARGEST = 2.0**53
+"""Beyond it a column of whole numbers is not exact."""
+_LONGEST_S = 86_400.0
+"""A day; no motion lasts that long on the board."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """One repetition: N samples of J joints."""
+
+    file: str
+    state: str
+    """How it ended: see the states in ``record``."""
+    index: NDArray[np.int64]
+    """(N,), from 0; a jump is a gap."""
+    time_s: Array
+    """(N,)"""
+    commanded_steps: NDArray[np.int64]
+    """(N, J)"""
+    commanded_deg: Array
+    """(N, J)"""
+    angle_deg: Array
+    """(N, J), from the encoders; NaN for a joint without one."""
+    problem: str = ""
+    """Why there are no samples, where the file cannot be read."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run folder's content."""
+
+    path: Path
+    meta: dict[str, Any]
+    joints: tuple[JointScale, ...]
+    repetitions: tuple[Samples, ...]
+
+    @property
+    def trajectory_path(self) -> Path | None:
+        """The plan that was run, where it is known."""
+        path = self.path / TRAJECTORY
+        return path if path.is_file() else None
+
+
+def load(path: Path) -> Run:
+    """A run folder, whole or cut short; RunFolderError where it is none or contradicts itself.
+
+    A repetition whose file is missing or damaged is there without samples and says why in ``problem``.
+    """
+    meta = _meta(path / META)
+    try:
+        joints = tuple(_scale(**joint) for joint in meta["joints"])
+        entries = [(str(entry["file"]), str(entry["state"])) for entry in meta["repetitions"]]
+        meta |= {key: str(meta[key]) for key in ("name", "started")}
+    except (KeyError, TypeError, ValueError) as error:
+        raise RunFolderError(f"{path / META}: {error} is missing or wrong; the folder is damaged") from error
+    return Run(path, meta, joints, tuple(_samples(path / file, state, joints) for file, state in entries))
+
+
+def _scale(name: str, steps_per_deg: float, counts_per_deg: float) -> JointScale:
+    return JointScale(str(name), float(steps_per_deg), float(counts_per_deg))
+
+
+def _meta(path: Path) -> dict[str, Any]:
+    try:
+        meta = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise RunFolderError(f"{path.parent} is not a run folder: {path.name}: {error.strerror}") from error
+    except ValueError as error:
+        raise RunFolderError(f"{path}: damaged: {error}") from error
+    if not isinstance(meta, dict) or meta.get("format") != FORMAT:
+        raise RunFolderError(f"{path}: not the description of an armtempo run")
+    if meta.get("version") != VERSION:
+        raise RunFolderError(f"{path}: version {meta.get('version')}; this armtempo reads {VERSION}")
+    return meta
+
+
+def _samples(path: Path, state: str, joints: tuple[JointScale, ...]) -> Samples:
+    try:
+        return _parsed(path, state, joints, _rows(path))
+    except OSError as error:
+        problem = f"missing ({error.strerror})"
+    except ValueError as error:
+        problem = f"damaged ({error})"
+    return replace(_parsed(path, state, joints, []), problem=problem)
+
+
+def _parsed(path: Path, state: str, joints: tuple[JointScale, ...], rows: list[dict[str, str]]) -> Samples:
+    """The samples in the rows of a file; ValueError where a value is missing, no number, or beyond reason."""
+    table = {name: [row[name] or "" for row in rows] for name in (rows[0] if rows else ())}
+
+    def column(name: str, largest: float) -> Array:
+        if rows and name not in table:
+            raise ValueError(f"column {name} is missing")
+        values = np.array(table.get(name, []), dtype=float)
+        if not np.all(np.abs(values) <= largest):
+            raise ValueError(f"column {name} holds what no run can give")
+        return values
+
+    def joint_columns(name: str) -> Array:
+        cells = [column(f"j{number}_{name}", _LARGEST) for number in range(1, len(joints) + 1)]
+        return np.array(cells).reshape(len(joints), len(rows)).T
+
+    angle_deg = np.full((len(rows), len(joints)), np.nan)
+    for number, joint in enumerate(joints):
+        if joint.counts_per_deg:
+            angle_deg[:, number] = column(f"j{number + 1}_angle_deg", _LARGEST)
+    return Samples(
+        path.name,
+        state,
+        column("index", _LARGEST).astype(np.int64),
+        column("time_s", _LONGEST_S),
+        joint_columns("commanded_steps").astype(np.int64),
+        joint_columns("commanded_deg"),
+        angle_deg,
+    )
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
+    """The whole lines of a sample file; what an interrupt left of the last one is dropped."""
+    text = path.read_text(encoding="utf-8")
+    whole = text[: text.rfind("\n") + 1]
+    return list(csv.DictReader(whole.splitlines()))

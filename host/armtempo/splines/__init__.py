@@ -1,0 +1,1 @@
+"""Splines: B-spline and Bernstein form, the time axis, trajectories, proven bounds of their extremes."""

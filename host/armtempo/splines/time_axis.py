@@ -1,0 +1,95 @@
+"""The time axis: time over u as a uniform B-spline whose control points increase, so time never turns.
+
+Its control points are 0, X1, X1 + X2, ... of the intervals X, mirrored at both ends; then t = 0 at the
+start, t = sum of X at the end, and t' is a B-spline of the positive X, hence positive everywhere.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armtempo.splines import bspline
+from armtempo.splines.bspline import Array
+
+_NEWTON_STEPS = 60
+"""More than enough: each step at least halves the bracket, and Newton doubles the digits."""
+
+
+def control_points(intervals_s: ArrayLike, degree: int) -> Array:
+    """Time control points (..., m + degree) of the intervals (..., m)."""
+    intervals = np.asarray(intervals_s, dtype=float)
+    edge = (degree - 1) // 2
+    steps = intervals[..., mirrored(intervals.shape[-1], edge)]
+    points = np.zeros((*intervals.shape[:-1], intervals.shape[-1] + degree))
+    np.cumsum(steps, axis=-1, out=points[..., 1:])
+    return np.asarray(points - points[..., edge : edge + 1])
+
+
+def mirrored(count: int, edge: int) -> NDArray[np.intp]:
+    """Indices 0..count-1 with ``edge`` more on each side, mirrored: 1 0 0 1 2 ... for edge 2."""
+    return np.pad(np.arange(count), edge, mode="symmetric")
+
+
+@cache
+def free_map(count: int, degree: int) -> Array:
+    """The linear map from all differences of control points, (count + degree - 1), to control points.
+
+    Gives a refined axis the freedom that the mirrored ends take away; t = 0 at the start still.
+    Shape (count + degree - 1, count + degree).
+    """
+    differences = count + degree - 1
+    points = np.zeros((differences, count + degree))
+    points[:, 1:] = np.cumsum(np.eye(differences), axis=1)
+    start = points[:, : degree + 1] @ bspline.basis(degree)[0]
+    matrix = np.asarray(points - start[:, None])
+    matrix.setflags(write=False)
+    return matrix
+
+
+def refined(differences_s: Array, parts: int, degree: int) -> Array:
+    """Differences of the control points of the same axis with each segment cut into ``parts``.
+
+    ``differences_s``: (m + degree - 1,). Returns (m * parts + degree - 1,). They are the coefficients of t',
+    a spline of degree - 1, which a finer knot row takes over by ``degree`` sums over ``parts`` neighbours.
+    """
+    mask = np.ones(1)
+    for _ in range(degree):
+        mask = np.convolve(mask, np.full(parts, 1.0 / parts))
+    spread = np.zeros(len(differences_s) * parts)
+    spread[::parts] = differences_s
+    first = (degree - 1) * (parts - 1)
+    count = (len(differences_s) - degree + 1) * parts + degree - 1
+    return np.asarray(np.convolve(spread, mask)[first : first + count])
+
+
+@cache
+def step_map(count: int, degree: int) -> Array:
+    """The linear map from intervals to control points: (count, count + degree)."""
+    matrix = control_points(np.eye(count), degree)
+    matrix.setflags(write=False)
+    return matrix
+
+
+def parameter(coefficients: Array, time_s: Array) -> tuple[NDArray[np.intp], Array]:
+    """Segment and u in [0, 1] at which the time axis passes ``time_s`` (any shape, clamped to its range).
+
+    ``coefficients``: (m, degree + 1), seconds in power basis. Newton within a bracket.
+    """
+    starts = coefficients[:, 0]
+    segment = np.clip(np.searchsorted(starts, time_s, side="right") - 1, 0, len(starts) - 1)
+    slope = bspline.derivative(coefficients)
+    low, high = np.zeros(time_s.shape), np.ones(time_s.shape)
+    u = np.full(time_s.shape, 0.5)
+    for _ in range(_NEWTON_STEPS):
+        error = bspline.evaluate(coefficients, segment, u) - time_s
+        low, high = np.where(error <= 0, u, low), np.where(error >= 0, u, high)
+        step = u - error / bspline.evaluate(slope, segment, u)
+        step = np.where((step >= low) & (step <= high), step, 0.5 * (low + high))
+        done = np.max(np.abs(step - u), initial=0.0) < 1e-15
+        u = step
+        if done:
+            break
+    return segment, u

@@ -1,0 +1,96 @@
+"""A planned motion as splines over time: angle and its derivatives at any time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armtempo.splines import bspline, time_axis
+from armtempo.splines.bspline import Array
+
+
+@dataclass(frozen=True, eq=False)
+class JointSpline:
+    """One joint: angle over u and time over u, both uniform B-splines of the same degree.
+
+    With n path segments and refinement R, ``angle_points_deg`` has shape (n + degree,) and
+    ``time_points_s`` shape (n * R + degree,).
+    """
+
+    degree: int
+    refine: int
+    angle_points_deg: Array
+    time_points_s: Array
+
+    @cached_property
+    def angle_polynomials(self) -> Array:
+        """Angle over each time segment, power basis: (n * R, degree + 1)."""
+        return bspline.subdivide(bspline.polynomials(self.angle_points_deg, self.degree), self.refine)
+
+    @cached_property
+    def time_polynomials(self) -> Array:
+        """Time over each time segment, power basis: (n * R, degree + 1)."""
+        return bspline.polynomials(self.time_points_s, self.degree)
+
+    @cached_property
+    def duration_s(self) -> float:
+        """Time at the end."""
+        return float(self.time_polynomials[-1].sum())
+
+    @cached_property
+    def via_times_s(self) -> Array:
+        """When the joint passes each via point: (n + 1,)."""
+        return np.append(self.time_polynomials[:: self.refine, 0], self.duration_s)
+
+    def __call__(self, time_s: ArrayLike, order: int = 0) -> Array:
+        """Angle (order 0), speed, acceleration or jerk (order 3) in deg, deg/s, deg/s², deg/s³.
+
+        ``time_s`` of any shape gives an array of that shape. Outside [0, duration] the joint rests:
+        first or last angle, derivatives 0. Eqs. (17) to (19), the last one as differentiation gives it.
+        """
+        time = np.asarray(time_s, dtype=float)
+        segment, u = time_axis.parameter(self.time_polynomials, time)
+        value = derivatives(self.angle_polynomials, self.time_polynomials, segment, u, order)
+        if order > 0:
+            value = np.where((time < 0) | (time > self.duration_s), 0.0, value)
+        return value
+
+
+def derivatives(angle: Array, time: Array, segment: NDArray[np.intp], u: Array, order: int) -> Array:
+    """The ``order``-th derivative of angle by time at (segment, u), from power coefficients of both."""
+
+    def at(coefficients: Array, n: int) -> Array:
+        return bspline.evaluate(bspline.derivative(coefficients, n), segment, u)
+
+    if order == 0:
+        return at(angle, 0)
+    t1 = at(time, 1)
+    speed = at(angle, 1) / t1
+    if order == 1:
+        return speed
+    t2 = at(time, 2)
+    acceleration = (at(angle, 2) - speed * t2) / t1**2
+    if order == 2:
+        return acceleration
+    return (at(angle, 3) - 3 * acceleration * t1 * t2 - speed * at(time, 3)) / t1**3
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """All joints of a motion; with shared timing all joints hold the same ``time_points_s``."""
+
+    name: str
+    joints: tuple[JointSpline, ...]
+    shared: bool
+
+    @property
+    def duration_s(self) -> float:
+        """Time at which the last joint arrives."""
+        return max(joint.duration_s for joint in self.joints)
+
+    def __call__(self, time_s: ArrayLike, order: int = 0) -> Array:
+        """Like ``JointSpline.__call__``, all joints in the last axis: (..., J)."""
+        return np.stack([joint(time_s, order) for joint in self.joints], axis=-1)
