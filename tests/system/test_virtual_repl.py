@@ -58,7 +58,7 @@ def test_code_errors_and_platform(bare: VirtualBoard) -> None:
     error = mpremote(bare, "exec", "print('before'); 1 / 0", code=1)
     assert error.startswith("before\n")
     assert error.rstrip().endswith("ZeroDivisionError: divide by zero")
-    assert "simulator" not in error
+    assert "virtual_board" not in error
 
 
 def test_main_starts_with_a_reset_and_is_interrupted(bare: VirtualBoard) -> None:

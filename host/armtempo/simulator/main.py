@@ -20,10 +20,11 @@ def prepare():
     sys.path[0:0] = folders
     if sys.implementation.name != "micropython":
         import additions  # noqa: F401
-    from simulator import modules, session
+    from virtual_board import session
+    from virtual_board.firmware import builtin_modules
 
-    modules.replace()
-    modules.replace_sys()
+    builtin_modules.replace()
+    builtin_modules.replace_sys()
     sys.path[:] = path
     return session, folders
 

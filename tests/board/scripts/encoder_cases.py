@@ -6,7 +6,7 @@ from armtempo_board import access
 from armtempo_board.encoders import Encoder
 from armtempo_board.following import Following
 from engine_rig import TICK_HZ, Motion, Rig, Steps, arm, cases, row
-from simulator import standalone
+from virtual_board import standalone
 
 SEED = 20263
 

@@ -4,7 +4,7 @@ import random
 
 from armtempo_shared import armrecord, codes
 from engine_rig import FEWER, HEAD, TICK_HZ, Evaluator, Motion, Rig, Steps, arm, cases, row
-from simulator import inputs
+from virtual_board.firmware import external_interrupts
 
 FREEZE_TICKS = 84 * 20
 SEED = 20261
@@ -85,14 +85,14 @@ def estop_anywhere():
         assert rig.engine.known == (0 if releases else 7)
         assert not rig.engine.clear()
         assert rig.engine.load(MOTION)[0] == codes.FAULT_PENDING
-        inputs.set_level("E15", 1)
+        external_interrupts.set_level("E15", 1)
         rig.turn()
         if number % 4 == 0:
             again(rig)
 
 
 def press():
-    inputs.set_level("E15", 0)
+    external_interrupts.set_level("E15", 0)
 
 
 def estop_at_rest():
@@ -100,11 +100,11 @@ def estop_at_rest():
     rig = Rig(arm(1), flags=armrecord.FLAG_ESTOP_FITTED | armrecord.FLAG_ESTOP_ACTIVE_HIGH)
     rig.turn()
     assert rig.engine.fault == 0
-    inputs.set_level("E15", 1)
+    external_interrupts.set_level("E15", 1)
     rig.turn()
     assert rig.engine.fault == codes.ESTOP
     assert not rig.engine.clear()
-    inputs.set_level("E15", 0)
+    external_interrupts.set_level("E15", 0)
     assert rig.engine.clear()
     rig.turn()
     assert rig.engine.fault == 0
@@ -197,7 +197,7 @@ def limit_switches():
         for homing in (0, 1):
             rig = Rig(joints)
             rig.start(MOTION, homing)
-            rig.board.at(rig.zero() + moment, lambda name=name: inputs.set_level(name, 1))
+            rig.board.at(rig.zero() + moment, lambda name=name: external_interrupts.set_level(name, 1))
             rig.run_to(MOTION.duration + TICK_HZ)
             if trips:
                 assert rig.pulses[1].last_rise <= rig.zero() + moment + FREEZE_TICKS
@@ -212,7 +212,7 @@ def limit_tripped_before():
     """A joint that turns towards a switch that is tripped already is stopped by the main loop."""
     joints = [row(channel=0, limit_high=1)]
     rig = Rig(joints)
-    inputs.set_level("D9", 0)
+    external_interrupts.set_level("D9", 0)
     rig.start(Motion(TICK_HZ // 10, Steps((1000, 400, 2000, -1), (2_000_000, 400, 2000, 1))))
     rig.run_to(TICK_HZ)
     stopped_one(rig, codes.LIMIT_SWITCH)
@@ -299,7 +299,7 @@ def close_and_anew():
     motion = Motion(1_000_000, Steps((1000, 4000, 200, 1)), Steps((1000, 4000, 200, -1)))
     first.run(motion)
     assert first.commanded() == [200, -200] == first.stepped()
-    inputs.set_level("E15", 0)
+    external_interrupts.set_level("E15", 0)
     first.turn()
     assert engine.fault == codes.ESTOP
 

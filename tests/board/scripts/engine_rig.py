@@ -5,7 +5,8 @@ from array import array
 
 from arm_rows import HEAD, arm, row  # noqa: F401
 from armtempo_board import points, stretch, walker
-from simulator import motors, standalone, the
+from virtual_board import machine_state, standalone
+from virtual_board.arm import motors
 
 TICK_HZ = 84_000_000
 FEWER = 3 if "short" in sys.argv else 1
@@ -236,7 +237,7 @@ class Rig:
             armtempo_board.ends = Evaluator
             armtempo_board.check.check = Evaluator.check
             armtempo_board.engine.forget = lambda: None  # what stands in for the evaluator stays
-        self.arm = the.arm = motors.Arm(self.board, pins, lambda: (self.head, joints), 1, ())
+        self.arm = machine_state.arm = motors.Arm(self.board, pins, lambda: (self.head, joints), 1, ())
         self.pins = pins
         self.pulses = [
             Pulses(self, joint, pins.STEP[joint["channel"]][0], pins.STEP[joint["channel"]][6])

@@ -2,12 +2,12 @@
 
 import sys
 
-from simulator import standalone
+from virtual_board import standalone
 
 standalone.start(flash=sys.argv[1], program=sys.path[:])
 
 from armtempo_board import pins  # noqa: E402
-from simulator import setup  # noqa: E402
+from virtual_board import setup  # noqa: E402
 
 setup.connect(pins)
 import armtempo_board  # noqa: E402

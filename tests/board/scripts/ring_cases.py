@@ -2,8 +2,8 @@
 
 from array import array
 
-import simulator.standalone  # noqa: F401
 import uctypes
+import virtual_board.standalone  # noqa: F401
 from armtempo_board import access, stretch
 from armtempo_board.ring import size
 from engine_rig import cases

@@ -11,9 +11,9 @@ from binascii import crc32
 import traps
 import whole_board
 from armtempo_shared import wire
-from simulator import the
-from simulator.board import TICKS_PER_MS
-from simulator.flash import real_open
+from virtual_board import machine_state
+from virtual_board.chip.flash import real_open
+from virtual_board.chip.processor import TICKS_PER_MS
 
 FLASHES, PROGRAM, HOME, DURATION, CASES = whole_board.arguments()
 FEWER = int(CASES.pop()) if CASES and CASES[-1].isdigit() else 1
@@ -52,7 +52,7 @@ class Trial:
         ``alive``: the host is there meanwhile.
         """
         world = self.world
-        while alive and the.board.timers[2].running:
+        while alive and machine_state.board.timers[2].running:
             yield from world.status()
             yield from world.wait(100)
         yield from world.still()
@@ -105,7 +105,7 @@ def case_underrun(world):
 
 
 def lose(ms):
-    the.board.lost_ticks = int(ms * TICKS_PER_MS)
+    machine_state.board.lost_ticks = int(ms * TICKS_PER_MS)
 
 
 def case_host_disappears_and_the_motion_goes_on(world):
@@ -118,7 +118,7 @@ def case_host_disappears_and_the_motion_goes_on(world):
         world.type(half[: trial.numbers.randrange(0, len(half))])
         yield from world.wait(trial.numbers.randrange(0, 3000))
         (_, _, _, state, *_), _ = yield from world.hello(1000 + number)
-        assert wire.STATES[state] == ("moving" if the.board.timers[2].running else "idle")
+        assert wire.STATES[state] == ("moving" if machine_state.board.timers[2].running else "idle")
         status = yield from trial.end("")
         world.events.clear()
         yield from world.ask("samples", (0, status["samples_kept"]))
@@ -135,10 +135,10 @@ def case_host_disappears_and_the_arm_stops(world):
     for _ in range(12 // FEWER):
         yield from trial.begin()
         gone = trial.moment()
-        while the.board.now < world.zero + gone and the.board.timers[2].running:
+        while machine_state.board.now < world.zero + gone and machine_state.board.timers[2].running:
             yield from world.status()
             yield from world.wait(trial.numbers.randrange(10, 500))
-        gone = the.board.now
+        gone = machine_state.board.now
         status = yield from trial.end("link_lost", "")
         assert status["known"] == KNOWN
         if status["fault"]:
@@ -154,7 +154,7 @@ def case_stop(world):
     for number in range(40 // FEWER):
         at = trial.moment(DURATION + 4_000_000) if number % 4 else trial.moment(0)
         yield from trial.begin()
-        yield from world.until(lambda at=at: the.board.now >= world.zero + at)
+        yield from world.until(lambda at=at: machine_state.board.now >= world.zero + at)
         for now in (number & 1, number >> 1 & 1):
             kind, fields, _ = yield from world.answer("stop", (now,))
             assert kind == "ok" or wire.ERRORS[fields[1]][0] == "not_moving"
@@ -216,8 +216,8 @@ def case_watchdog(world):
     yield from world.hello()
     for _ in range(6 // FEWER or 1):
         yield from trial.begin(trial.moment(), hang)
-        board, counters, zero = the.board, world.counters, world.zero
-        yield from world.until(lambda board=board: the.board is not board, 20_000)
+        board, counters, zero = machine_state.board, world.counters, world.zero
+        yield from world.until(lambda board=board: machine_state.board is not board, 20_000)
         last = max([counter.last for counter in counters])
         assert last < max(board.hung + 60 * TICKS_PER_MS, zero), (last, board.hung, zero)
         assert board.now - board.hung <= 8100 * TICKS_PER_MS
@@ -234,8 +234,8 @@ def case_watchdog(world):
 
 
 def hang():
-    the.board.hung = the.board.now
-    the.board.lost_ticks = 1 << 50
+    machine_state.board.hung = machine_state.board.now
+    machine_state.board.lost_ticks = 1 << 50
 
 
 def case_interrupt_delayed(world):
@@ -251,7 +251,7 @@ def case_interrupt_delayed(world):
         for late_us in (40, 90, 130, 400, 3000):
             trial.what = "turn at %d, %d us late" % (turn, late_us)
             at = turn - zero - 84 * 5
-            yield from trial.begin(at, lambda late_us=late_us: the.board.stand_still(84 * late_us))
+            yield from trial.begin(at, lambda late_us=late_us: machine_state.board.stand_still(84 * late_us))
             status = yield from trial.end("internal", "")
             assert late_us >= 90 or not status["fault"], trial.what
             assert late_us <= 110 or (status["fault"] and status["known"] == 0), trial.what
@@ -267,7 +267,7 @@ class Turns:
         """From now on."""
         self.ticks = []
         for _, pin in whole_board.STEP_AND_DIR:
-            the.board.pins.line(pin).sinks.append(self)
+            machine_state.board.pins.line(pin).sinks.append(self)
 
     def edges(self, line, before, count, times, origin):
         """A DIR pin turned."""
@@ -278,12 +278,12 @@ def case_interrupt_dies(world):
     """An exception in the compare interrupt: MicroPython never calls it again."""
     trial = Trial(world)
     yield from world.hello()
-    interrupt = the.board.callbacks[(2, 4)]
+    interrupt = machine_state.board.callbacks[(2, 4)]
     for _ in range(16 // FEWER):
-        yield from trial.begin(trial.moment(), lambda: the.board.callbacks.pop((2, 4)))
+        yield from trial.begin(trial.moment(), lambda: machine_state.board.callbacks.pop((2, 4)))
         status = yield from trial.end("internal")
         assert status["known"] == 0
-        the.board.callbacks[(2, 4)] = interrupt
+        machine_state.board.callbacks[(2, 4)] = interrupt
         yield from trial.clear()
     return trial.seen
 

@@ -5,7 +5,7 @@ Every case asserts, and its name is printed when it holds. Arguments: see ``whol
 
 import whole_board
 from armtempo_shared import wire
-from simulator import the
+from virtual_board import machine_state
 
 FLASHES, PROGRAM, HOME, DURATION, CASES = whole_board.arguments()
 GO = whole_board.read(FLASHES + "/finish/armtempo/go.atm")
@@ -44,15 +44,15 @@ def typed(world, line, ms=5000):
 
 def alive(world, ms):
     """No reset comes for so long."""
-    board = the.board
+    board = machine_state.board
     yield from world.wait(ms)
-    assert the.board is board
+    assert machine_state.board is board
 
 
 def case_boot_leaves_a_serial_port_only(world):
     yield from world.hello()
-    assert the.settings["usb_mode"] == "VCP"
-    assert the.settings["reset_cause"] == 1
+    assert machine_state.settings["usb_mode"] == "VCP"
+    assert machine_state.settings["reset_cause"] == 1
 
 
 def case_watchdog_runs_with_the_program_and_is_fed_at_the_prompt(world):
@@ -87,9 +87,9 @@ def case_soft_reset_starts_the_program_again(world):
     status = yield from world.status()
     assert (status["state"], status["fault"], status["known"]) == ("unhomed", "", 0)
     yield from alive(world, 2 * BITE_MS)
-    the.board.lost_ticks = 1 << 50
-    board = the.board
-    yield from world.until(lambda: the.board is not board, 2 * BITE_MS)
+    machine_state.board.lost_ticks = 1 << 50
+    board = machine_state.board
+    yield from world.until(lambda: machine_state.board is not board, 2 * BITE_MS)
     yield from world.hello(3)
     status = yield from world.status()
     assert status["fault"] == "watchdog"
@@ -98,8 +98,8 @@ def case_soft_reset_starts_the_program_again(world):
 def case_unfed_it_bites_at_the_prompt(world):
     yield from prompt(world)
     yield from typed(world, "import pyb; pyb.Timer(7).deinit()")
-    board = the.board
-    yield from world.until(lambda: the.board is not board, 2 * BITE_MS)
+    board = machine_state.board
+    yield from world.until(lambda: machine_state.board is not board, 2 * BITE_MS)
     yield from world.hello()
     status = yield from world.status()
     assert status["fault"] == "watchdog"
@@ -121,7 +121,7 @@ def case_nobody_gets_to_the_prompt_while_it_moves(world):
         yield from world.home(HOME)
         before = world.steps()
         yield from world.ask("start", (0, wire.record_crc(GO)), "go")
-        while the.board.now < world.zero + MOVES_TICKS:
+        while machine_state.board.now < world.zero + MOVES_TICKS:
             world.type(words)
             yield from world.wait(numbers.randrange(100, 300))
             assert not world.attached, words
@@ -176,10 +176,12 @@ def case_ctrl_c_stops_a_replay_wherever_it_comes(world):
         declared = world.steps()
         yield from typed(world, "program.app.home(7, %s)" % HOME)
         world.type(b"armtempo_board.replay('go')\r")
-        yield from world.until(lambda: the.board.timers[2].running)
+        yield from world.until(lambda: machine_state.board.timers[2].running)
         yield from world.wait(numbers.randrange(0, 2300))
-        running = the.board.timers[2].running
-        assert the.serial.interrupt_char == -1 or not running  # KeyboardInterrupt could come anywhere
+        running = machine_state.board.timers[2].running
+        assert (
+            machine_state.serial.interrupt_char == -1 or not running
+        )  # KeyboardInterrupt could come anywhere
         world.type(b"\x03")
         if number & 1:
             yield from world.wait(numbers.randrange(1, 300))

@@ -7,7 +7,7 @@ import sys
 
 import whole_board
 from armtempo_shared import armrecord, wire
-from simulator import the
+from virtual_board import machine_state
 
 FLASHES, PROGRAM, HOME, _, CASES = whole_board.arguments()
 STEADY_MS = 30
@@ -36,7 +36,7 @@ def moved(world, runs):
     yield from world.wait(100)
     yield from world.still()
     yield from world.wait(300)
-    assert not the.board.timers[2].running
+    assert not machine_state.board.timers[2].running
     status = yield from world.status()
     assert status["run"] == runs, status
     start = HOME if status["known"] else [0, 0, 0]
@@ -132,7 +132,7 @@ def case_while_it_moves_the_button_does_nothing(world):
 
 def case_with_a_fault_pending_nothing_moves(world):
     yield from ready(world)
-    the.board.crash = True
+    machine_state.board.crash = True
     yield from world.wait(50)
     assert world.led() == "fault"
     notices(world)
@@ -151,8 +151,8 @@ def case_with_a_fault_pending_nothing_moves(world):
 
 def bounce(world, level, ms, numbers):
     """The contact goes to and fro before it stays at a level; each time for less than it takes to count."""
-    end = the.board.now + ms * whole_board.TICKS_PER_MS
-    while the.board.now < end:
+    end = machine_state.board.now + ms * whole_board.TICKS_PER_MS
+    while machine_state.board.now < end:
         level = 1 - level
         world.press(level)
         yield from world.wait(numbers.randrange(1, STEADY_MS - 5))

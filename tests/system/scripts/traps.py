@@ -2,7 +2,7 @@
 
 import sys
 
-from simulator import the
+from virtual_board import machine_state
 
 
 class Planned(Exception):
@@ -25,7 +25,7 @@ class Trap:
 
         def trapped(*arguments, **named):
             self.calls += 1
-            if not self.armed or the.board.serving:
+            if not self.armed or machine_state.board.serving:
                 return self.function(*arguments, **named)
             self.armed = False
             if self.behind:

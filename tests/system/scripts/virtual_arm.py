@@ -1,12 +1,12 @@
 """The stepper model by itself, case by case; each asserts and prints its name."""
 
-from simulator import standalone
+from virtual_board import standalone
 
 # isort: split
 from math import cos, exp, pi, sin, sqrt
 
-from simulator.noise import Noise
-from simulator.stepper import Stepper
+from virtual_board.arm.noise import Noise
+from virtual_board.arm.stepper import Stepper
 
 MS = 84_000
 MODEL = {

@@ -5,11 +5,14 @@ Argument: a scratch folder.
 
 import sys
 
-from simulator import standalone, the  # replaces time, os, uctypes, micropython; so before everything else
-from simulator.board import TICKS_PER_US
-from simulator.flash import real_open
-from simulator.inputs import set_level
-from simulator.reset import Reset
+from virtual_board import (  # replaces time, os, uctypes, micropython; so before everything else
+    machine_state,
+    standalone,
+)
+from virtual_board.chip.flash import real_open
+from virtual_board.chip.processor import TICKS_PER_US
+from virtual_board.chip.reset import Reset
+from virtual_board.firmware.external_interrupts import set_level
 
 # isort: split
 import os
@@ -38,7 +41,7 @@ def put(block: ptr32, word: int, value: int):
 
 def edges(path):
     """{pin: [ticks]} of an edge log, and the tick of TIM2's last start."""
-    the.edges.flush()
+    machine_state.edges.flush()
     with real_open(path, "rb") as file:
         data = file.read()
     at, found, start = 4, {}, None
@@ -136,7 +139,7 @@ def match_count(preload, late):
     if not late:
         ring[1] = 3000
     board.spend(0)  # what the calls before owe
-    board.spend(1500 - the.board.timers[2].count(board.timers[2].total) + (1 << 32))
+    board.spend(1500 - machine_state.board.timers[2].count(board.timers[2].total) + (1 << 32))
     ring[1] = 3000
     board.spend(3000)
     return len(edges(SCRATCH + "/preload")[0][15])
@@ -162,7 +165,7 @@ def case_stale_ring_entries_do_not_match():
 def case_forced_modes_act_at_once():
     standalone.start()
     counters()
-    line = the.board.pins.line("A15")
+    line = machine_state.board.pins.line("A15")
     mode = stm.TIM2 + stm.TIM_CCMR1
     for setting, level in ((5, 1), (0, 1), (4, 0), (0, 0)):
         mem32[mode] = setting << 4
@@ -274,7 +277,7 @@ def case_interrupts_wait_while_off():
 
 def case_usb_buffers():
     standalone.start()
-    port, line = pyb.USB_VCP(), the.serial
+    port, line = pyb.USB_VCP(), machine_state.serial
     line.received.extend(b"hello")
     assert port.any() and port.recv(3, timeout=0) == b"hel"
     buffer = bytearray(8)

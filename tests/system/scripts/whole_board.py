@@ -10,14 +10,15 @@ import sys
 if sys.implementation.name != "micropython":
     import additions  # noqa: F401
 from armtempo_shared import armrecord, wire
-from simulator import modules, motors, pace, session, the  # noqa: F401  motors: with the armrecord of the sources
-from simulator.board import TICKS_PER_MS, print_exception
-from simulator.flash import real_open
-from simulator.inputs import set_level
-from simulator.serial import Line, Serial
-from simulator.standalone import DEFAULTS
+from virtual_board import machine_state, pace, session
+from virtual_board.chip.flash import real_open
+from virtual_board.chip.processor import TICKS_PER_MS, print_exception
+from virtual_board.firmware import builtin_modules
+from virtual_board.firmware.external_interrupts import set_level
+from virtual_board.firmware.usb_serial import Line, Serial
+from virtual_board.standalone import DEFAULTS
 
-modules.replace_sys()
+builtin_modules.replace_sys()
 pace.Pace._elapsed_us = lambda self: 0  # no real time comes in
 
 TICK_HZ = 84_000_000
@@ -75,12 +76,12 @@ class World(Line):
         self._parser = wire.Parser()
         self._sequence = 0
         self._planned = None
-        if the.board:
+        if machine_state.board:
             self.counters = [
-                Counter(the.board, *pins, joint["dir_inverted"])
+                Counter(machine_state.board, *pins, joint["dir_inverted"])
                 for pins, joint in zip(STEP_AND_DIR, self.arm[1])
             ]
-            the.board.worlds.append(self)
+            machine_state.board.worlds.append(self)
             if self._boot:
                 self._boot(self)
 
@@ -124,7 +125,7 @@ class World(Line):
             self.zero = now + timer.modulus - timer.count(0)
             if self._planned:
                 planned, self._planned = self._planned, None
-                the.board.at(self.zero + planned[0], planned[1])
+                machine_state.board.at(self.zero + planned[0], planned[1])
 
     def input_changed(self, line, level, now):
         """Nothing to do."""
@@ -139,7 +140,7 @@ class World(Line):
 
     def led(self):
         """What the LEDs show; one alone must be lit."""
-        lit = [name for name in LEDS if the.board.pins.line(name).level]
+        lit = [name for name in LEDS if machine_state.board.pins.line(name).level]
         assert len(lit) == 1, lit
         return LEDS[lit[0]]
 
@@ -147,15 +148,15 @@ class World(Line):
 
     def wait(self, ms):
         """Let time pass."""
-        end = the.board.now + ms * TICKS_PER_MS
-        while the.board.now < end:
+        end = machine_state.board.now + ms * TICKS_PER_MS
+        while machine_state.board.now < end:
             yield
 
     def until(self, condition, ms=3000):
         """Wait until it holds."""
-        end = the.board.now + ms * TICKS_PER_MS
+        end = machine_state.board.now + ms * TICKS_PER_MS
         while not condition():
-            assert the.board.now < end, "waited in vain"
+            assert machine_state.board.now < end, "waited in vain"
             yield
 
     def type(self, data):
@@ -185,8 +186,8 @@ class World(Line):
         data = wire.frame(self._sequence, entry[1], wire.encode(entry, values, tail))
         for _ in range(ANSWERS):
             self.type(data)
-            end = the.board.now + REPEAT_MS * TICKS_PER_MS
-            while not self.frames and the.board.now < end:
+            end = machine_state.board.now + REPEAT_MS * TICKS_PER_MS
+            while not self.frames and machine_state.board.now < end:
                 yield
             if self.frames:
                 break
@@ -220,7 +221,7 @@ class World(Line):
 
     def still(self):
         """Wait until no counter runs."""
-        yield from self.until(lambda: not the.board.timers[2].running, 30_000)
+        yield from self.until(lambda: not machine_state.board.timers[2].running, 30_000)
 
 
 class Numbers:
@@ -256,8 +257,8 @@ def run(story, flash, program, boot=None):
 
     ``flash``: the folder that is its flash; ``program``: where the board's packages are.
     """
-    the.board = the.arm = the.flash = the.edges = None
-    the.serial = world = World(story, boot, flash)
+    machine_state.board = machine_state.arm = machine_state.flash = machine_state.edges = None
+    machine_state.serial = world = World(story, boot, flash)
     try:
         session.run(dict(DEFAULTS, flash=flash, sources=SOURCES, program=program), [])
     finally:

@@ -2,7 +2,7 @@
 
 import micropython as _own
 from micropython import *  # noqa: F403
-from simulator import the
+from virtual_board import machine_state
 
 const = _own.const
 
@@ -13,9 +13,9 @@ def alloc_emergency_exception_buf(size):
 
 def kbd_intr(char):
     """Which byte interrupts the program; -1 none."""
-    the.serial.interrupt_char = char
+    machine_state.serial.interrupt_char = char
 
 
 def schedule(function, argument):
     """Call soon, outside interrupts."""
-    the.board.schedule(function, argument)
+    machine_state.board.schedule(function, argument)

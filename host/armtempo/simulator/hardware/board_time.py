@@ -1,6 +1,6 @@
 """The board program's ``time``: MicroPython's functions, on virtual time."""
 
-from simulator import the
+from virtual_board import machine_state
 
 _PERIOD = 1 << 30
 _EPOCH_S = 820454400  # 2026-01-01, in seconds since 2000
@@ -8,12 +8,12 @@ _EPOCH_S = 820454400  # 2026-01-01, in seconds since 2000
 
 def ticks_ms():
     """Milliseconds, modulo 2**30."""
-    return the.pace.milliseconds()
+    return machine_state.pace.milliseconds()
 
 
 def ticks_us():
     """Microseconds, modulo 2**30."""
-    return the.pace.microseconds()
+    return machine_state.pace.microseconds()
 
 
 ticks_cpu = ticks_us
@@ -31,27 +31,27 @@ def ticks_add(ticks, delta):
 
 def sleep_us(us):
     """Wait."""
-    the.pace.sleep_us(us)
+    machine_state.pace.sleep_us(us)
 
 
 def sleep_ms(ms):
     """Wait."""
-    the.pace.sleep_us(1000 * ms)
+    machine_state.pace.sleep_us(1000 * ms)
 
 
 def sleep(seconds):
     """Wait."""
-    the.pace.sleep_us(int(seconds * 1000000))
+    machine_state.pace.sleep_us(int(seconds * 1000000))
 
 
 def time():
     """Seconds since 2000, from an unset clock."""
-    return _EPOCH_S + the.pace.milliseconds() // 1000
+    return _EPOCH_S + machine_state.pace.milliseconds() // 1000
 
 
 def time_ns():
     """Nanoseconds, to the microsecond."""
-    return _EPOCH_S * 1000000000 + the.pace.microseconds() * 1000
+    return _EPOCH_S * 1000000000 + machine_state.pace.microseconds() * 1000
 
 
 def localtime(seconds=None):

@@ -1,10 +1,11 @@
 """MicroPython's ``machine`` of the STM32 port, as far as the board program uses it."""
 
-from simulator import memory, the
-from simulator import reset as _reset
-from simulator.board import CALL_TICKS
-from simulator.gpio_api import Pin  # noqa: F401
-from simulator.watchdog import WDT  # noqa: F401
+from virtual_board import machine_state
+from virtual_board.chip import memory
+from virtual_board.chip import reset as _reset
+from virtual_board.chip.processor import CALL_TICKS
+from virtual_board.chip.watchdog import WDT  # noqa: F401
+from virtual_board.firmware.pin_api import Pin  # noqa: F401
 
 PWRON_RESET, HARD_RESET, WDT_RESET, DEEPSLEEP_RESET, SOFT_RESET = 1, 2, 3, 4, 0
 
@@ -16,7 +17,7 @@ class _Memory:
         self._mask = (1 << 8 * size) - 1
 
     def __getitem__(self, where):
-        the.board.call()
+        machine_state.board.call()
         shift = 8 * (where & 3)
         value = memory.words[memory.word_at(where)] >> shift & self._mask
         return value - (1 << 32) if value >> 31 else value
@@ -26,7 +27,7 @@ class _Memory:
         shift = 8 * (where & 3)
         kept = memory.words[at] & ~(self._mask << shift)
         memory.words[at] = (kept | (value & self._mask) << shift) & memory.MASK
-        the.board.wrote()
+        machine_state.board.wrote()
 
 
 mem8 = _Memory(1)
@@ -36,7 +37,7 @@ mem32 = _Memory(4)
 
 def idle():
     """Sleep until the next interrupt; SysTick comes every millisecond."""
-    the.pace.idle()
+    machine_state.pace.idle()
 
 
 def freq():
@@ -46,26 +47,26 @@ def freq():
 
 def unique_id():
     """Twelve bytes that differ between boards."""
-    return the.settings["unique_id"]
+    return machine_state.settings["unique_id"]
 
 
 def reset_cause():
     """Why the program was started."""
-    return the.settings["reset_cause"]
+    return machine_state.settings["reset_cause"]
 
 
 def disable_irq():
     """Hold interrupts back; returns the state before for ``enable_irq``."""
-    before = not the.board.masked
-    the.board.masked = True
+    before = not machine_state.board.masked
+    machine_state.board.masked = True
     return before
 
 
 def enable_irq(state=True):
     """Let interrupts through again."""
-    the.board.masked = not state
+    machine_state.board.masked = not state
     if state:
-        the.board.spend(CALL_TICKS)
+        machine_state.board.spend(CALL_TICKS)
 
 
 def soft_reset():

@@ -3,11 +3,11 @@
 from machine import disable_irq, enable_irq, freq, unique_id  # noqa: F401
 from machine import idle as wfi  # noqa: F401
 from machine import reset as hard_reset  # noqa: F401
-from simulator import the
-from simulator.gpio_api import Pin
-from simulator.inputs import ExtInt
-from simulator.serial import USB_VCP
-from simulator.timer_api import Timer, TimerChannel  # noqa: F401
+from virtual_board import machine_state
+from virtual_board.firmware.external_interrupts import ExtInt
+from virtual_board.firmware.pin_api import Pin
+from virtual_board.firmware.timer_api import Timer, TimerChannel  # noqa: F401
+from virtual_board.firmware.usb_serial import USB_VCP
 
 _LED_PINS = ("PD14", "PD12", "PD13", "PD15")
 
@@ -60,14 +60,14 @@ class Flash:
 def usb_mode(mode=None, *args, **kwargs):
     """Read or set what the USB port shows itself as."""
     if mode is None:
-        return the.settings.get("usb_mode", "VCP+MSC")
-    the.settings["usb_mode"] = mode
+        return machine_state.settings.get("usb_mode", "VCP+MSC")
+    machine_state.settings["usb_mode"] = mode
     return None
 
 
 def main(name):
     """Which file is run after ``boot.py``."""
-    the.settings["main"] = name
+    machine_state.settings["main"] = name
 
 
 def have_cdc():
@@ -77,17 +77,17 @@ def have_cdc():
 
 def millis():
     """Milliseconds since power-up."""
-    return the.pace.milliseconds()
+    return machine_state.pace.milliseconds()
 
 
 def delay(ms):
     """Wait."""
-    the.pace.sleep_us(1000 * ms)
+    machine_state.pace.sleep_us(1000 * ms)
 
 
 def udelay(us):
     """Wait."""
-    the.pace.sleep_us(us)
+    machine_state.pace.sleep_us(us)
 
 
 def country(code=None):

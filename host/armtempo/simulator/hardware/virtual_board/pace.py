@@ -8,10 +8,10 @@ that a host which is busy for a moment loses no more than with a real board.
 
 import time
 
-from simulator import the
-from simulator.board import TICKS_PER_MS, TICKS_PER_US
-from simulator.flash import real_open
-from simulator.reset import PowerOff
+from virtual_board import machine_state
+from virtual_board.chip.flash import real_open
+from virtual_board.chip.processor import TICKS_PER_MS, TICKS_PER_US
+from virtual_board.chip.reset import PowerOff
 
 _HORIZON_TICKS = 500 * TICKS_PER_MS
 _NAP_MS = 5
@@ -41,8 +41,8 @@ class Pace:
     def _first_millisecond(self):
         """The program has begun to let time pass: whoever waits for the board may know."""
         self._board.millisecond = self._millisecond
-        if the.options["up"]:
-            real_open(the.options["up"], "w").close()
+        if machine_state.options["up"]:
+            real_open(machine_state.options["up"], "w").close()
         self._millisecond()
 
     def _millisecond(self):
@@ -54,7 +54,7 @@ class Pace:
             raise KeyboardInterrupt
         if not self._board.moving(_HORIZON_TICKS):
             self._nap()
-        elif self._speed or (the.arm and the.arm.watches_host) or self._serial.stuck():
+        elif self._speed or (machine_state.arm and machine_state.arm.watches_host) or self._serial.stuck():
             self._keep_pace(self._speed or 1)
         else:
             self._free = True
@@ -71,8 +71,8 @@ class Pace:
             self._serial.wait(_NAP_MS)
             self._serial.pump()
         slept_ms = min(self._elapsed_us() // 1000, 10 * _NAP_MS)
-        if the.edges:
-            the.edges.flush()
+        if machine_state.edges:
+            machine_state.edges.flush()
         board = self._board
         if slept_ms > 1:
             board.next_ms = board.now + 10 * _NAP_MS * TICKS_PER_MS

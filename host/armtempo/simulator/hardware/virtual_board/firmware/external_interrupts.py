@@ -1,8 +1,8 @@
 """External interrupts (``pyb.ExtInt``) and the levels that the world puts on input pins."""
 
-from simulator import the
-from simulator.board import CALL_TICKS
-from simulator.gpio_api import Pin
+from virtual_board import machine_state
+from virtual_board.chip.processor import CALL_TICKS
+from virtual_board.firmware.pin_api import Pin
 
 _RISING, _FALLING = 1, 2
 
@@ -19,14 +19,14 @@ class ExtInt:
         pin.init(Pin.IN, pull)
         self._line = pin.line.number
         self._edges = (mode >> 20) & 3
-        known = the.board.extints.get(self._line)
+        known = machine_state.board.extints.get(self._line)
         if known is not None and callback is not None and known.wired is not pin.line:
             raise ValueError("ExtInt vector %d is already in use" % self._line)
         self.wired = pin.line
         self.enabled = callback is not None
-        the.board.extints[self._line] = self
-        the.board.callbacks[("exti", self._line)] = (callback, self._line)
-        the.board.call()
+        machine_state.board.extints[self._line] = self
+        machine_state.board.callbacks[("exti", self._line)] = (callback, self._line)
+        machine_state.board.call()
 
     def line(self):
         """The line number."""
@@ -42,24 +42,24 @@ class ExtInt:
 
     def swint(self):
         """Trigger the callback by software."""
-        the.board.pend("exti", self._line)
-        the.board.spend(CALL_TICKS)
+        machine_state.board.pend("exti", self._line)
+        machine_state.board.spend(CALL_TICKS)
 
     def edge(self, rising):
         """The pin changed."""
         if self.enabled and self._edges & (_RISING if rising else _FALLING):
-            the.board.pend("exti", self._line)
+            machine_state.board.pend("exti", self._line)
 
 
 def set_level(name, level):
     """The world drives an input pin to 0 or 1, or lets go of it (None)."""
-    line = the.board.pins.line(name)
+    line = machine_state.board.pins.line(name)
     before = line.read()
     line.external = level
     after = line.read()
     line.port.refresh()
     if before != after:
-        the.board.input_changed(line, after)
-        extint = the.board.extints.get(line.number)
+        machine_state.board.input_changed(line, after)
+        extint = machine_state.board.extints.get(line.number)
         if extint is not None and extint.wired is line:
             extint.edge(after == 1)

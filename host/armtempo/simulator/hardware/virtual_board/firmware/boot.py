@@ -6,9 +6,11 @@ gets a fresh one.
 
 import sys
 
-from simulator import flash, inputs, the
-from simulator.board import TICKS_PER_MS
-from simulator.gpio_api import Pin
+from virtual_board import machine_state
+from virtual_board.chip import flash
+from virtual_board.chip.processor import TICKS_PER_MS
+from virtual_board.firmware import external_interrupts
+from virtual_board.firmware.pin_api import Pin
 
 NORMAL, SAFE, FACTORY = 1, 2, 3
 BOOT_ERROR, MAIN_ERROR = 4, 3
@@ -29,7 +31,7 @@ def choose_mode(board, held_ms):
     """How to start, by the button that is held for so long from the reset on; the LEDs count along."""
     if not held_ms:
         return NORMAL
-    inputs.set_level(_BUTTON, 1)
+    external_interrupts.set_level(_BUTTON, 1)
     release = board.now + int(held_ms * TICKS_PER_MS)
     mode = NORMAL
     while _held(board, mode, release):
@@ -48,7 +50,7 @@ def _held(board, mode, release):
     for _ in range(_SHOWN_MS // _LOOK_MS):
         board.stand_still(_LOOK_MS * TICKS_PER_MS)
         if board.now >= release:
-            inputs.set_level(_BUTTON, None)
+            external_interrupts.set_level(_BUTTON, None)
             return False
     return True
 
@@ -66,28 +68,28 @@ def flash_error(times):
         for red in (1, 0):
             Pin(_RED, Pin.OUT_PP).value(red)
             Pin(_GREEN, Pin.OUT_PP).value(1 - red)
-            the.board.stand_still(250 * TICKS_PER_MS)
+            machine_state.board.stand_still(250 * TICKS_PER_MS)
     Pin(_GREEN, Pin.OUT_PP).value(0)
 
 
 def mount(mode, path):
     """Mount flash and SD card; ``path``: the folders before and behind theirs on ``sys.path``."""
-    if mode == FACTORY or the.flash.damage == flash.NO_FILE_SYSTEM:
+    if mode == FACTORY or machine_state.flash.damage == flash.NO_FILE_SYSTEM:
         _make_file_system()
-    the.flash.mounts = {"/flash": the.flash.root}
-    the.flash.cwd = "/flash"
-    card = the.options["sd_card"]
-    if card and not flash.exists(the.flash.root + "/SKIPSD"):
-        the.flash.mounts["/sd"] = card
-        the.flash.cwd = "/sd"
+    machine_state.flash.mounts = {"/flash": machine_state.flash.root}
+    machine_state.flash.cwd = "/flash"
+    card = machine_state.options["sd_card"]
+    if card and not flash.exists(machine_state.flash.root + "/SKIPSD"):
+        machine_state.flash.mounts["/sd"] = card
+        machine_state.flash.cwd = "/sd"
     before, behind = path
     sys.path[:] = before + _library_folders() + behind
 
 
 def _make_file_system():
-    the.flash.format()
+    machine_state.flash.format()
     for name, text in _FACTORY_FILES.items():
-        with flash.real_open(the.flash.root + "/" + name, "w") as file:
+        with flash.real_open(machine_state.flash.root + "/" + name, "w") as file:
             file.write(text)
 
 
@@ -95,7 +97,7 @@ def _library_folders():
     """Where the interpreter finds modules, the card first."""
     folders = []
     for point in ("/sd", "/flash"):
-        root = the.flash.mounts.get(point)
-        if root and not (point == "/flash" and the.flash.damage):
+        root = machine_state.flash.mounts.get(point)
+        if root and not (point == "/flash" and machine_state.flash.damage):
             folders += [root, root + "/lib"]
     return folders

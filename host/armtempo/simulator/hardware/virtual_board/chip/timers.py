@@ -1,8 +1,8 @@
 """Timers: counting, update events, start by trigger, encoder mode (RM0090 chapters 17 and 18)."""
 
-from simulator import memory
-from simulator.compare import Channel
-from simulator.timer_registers import ARR, CNT, CR1, CR2, DIER, EGR, NEVER, PSC, SMCR, SR
+from virtual_board.chip import memory
+from virtual_board.chip.compare import Channel
+from virtual_board.chip.timer_registers import ARR, CNT, CR1, CR2, DIER, EGR, NEVER, PSC, SMCR, SR
 
 _REBASE = 1 << 27
 

@@ -1,6 +1,7 @@
 """``pyb.Pin`` (which is also ``machine.Pin``) on the simulated ports."""
 
-from simulator import gpio, memory, the
+from virtual_board import machine_state
+from virtual_board.chip import gpio, memory
 
 _PULL_NONE, _PULL_UP, _PULL_DOWN = 0, 1, 2
 
@@ -20,7 +21,7 @@ class Pin:
         if isinstance(name, Pin):
             name = name.name()
         try:
-            self.line = the.board.pins.line(name)
+            self.line = machine_state.board.pins.line(name)
         except (ValueError, IndexError, TypeError):
             raise ValueError("Pin(%r) doesn't exist" % name)
         if mode is not None:
@@ -36,15 +37,15 @@ class Pin:
         _field(at + gpio.PUPDR, 2, number, pull or 0)
         _field(at + gpio.OTYPER, 1, number, mode >> 4)
         _field(at + gpio.MODER, 2, number, mode & 3)
-        the.board.wrote()
+        machine_state.board.wrote()
 
     def value(self, level=None):
         """Read the pin, or drive it."""
         if level is None:
-            the.board.call()
+            machine_state.board.call()
             return self.line.read()
         _field(self.line.port.at + gpio.ODR, 1, self.line.number, 1 if level else 0)
-        the.board.wrote()
+        machine_state.board.wrote()
         return None
 
     __call__ = value

@@ -15,8 +15,8 @@ swings fast; each step sees the mean of what was commanded in it, so a pulse cou
 
 from math import asin, ceil, cos, pi, sin, sqrt
 
-from simulator.motors import Motor
-from simulator.noise import Noise
+from virtual_board.arm.motors import Motor
+from virtual_board.arm.noise import Noise
 
 _DT_TICKS = 84_000
 _DT_S = 0.001

@@ -7,7 +7,7 @@ back.
 
 import select
 
-from simulator import the
+from virtual_board import machine_state
 
 BUFFER = 1024
 _CHUNK = 512
@@ -104,7 +104,7 @@ class Serial(Line):
             found = data.find(bytes((self.interrupt_char,)))
             if found >= 0:
                 data = data[:found] + data[found + 1 :]
-                the.board.interrupted = True
+                machine_state.board.interrupted = True
         self.received.extend(data if self.rts else data[:room])
 
 
@@ -114,7 +114,7 @@ class USB_VCP:
     RTS, CTS, IRQ_RX = 1, 2, 1
 
     def __init__(self, id=0):
-        self._line = the.serial
+        self._line = machine_state.serial
 
     def init(self, flow=-1):
         """Set flow control: RTS holds the host back, CTS makes ``write`` write only what fits."""
@@ -128,12 +128,12 @@ class USB_VCP:
 
     def isconnected(self):
         """Whether a host has opened the port."""
-        the.board.call()
-        return not the.settings.get("cable_out", False)
+        machine_state.board.call()
+        return not machine_state.settings.get("cable_out", False)
 
     def any(self):
         """Whether bytes wait."""
-        the.board.call()
+        machine_state.board.call()
         return bool(self._line.received)
 
     def recv(self, data, timeout=5000):
@@ -142,9 +142,9 @@ class USB_VCP:
         waited = 0
         while len(self._line.received) < wanted and waited < timeout:
             before = len(self._line.received)
-            the.pace.idle()
+            machine_state.pace.idle()
             waited = waited + 1 if len(self._line.received) == before else 0
-        the.board.call()
+        machine_state.board.call()
         got = self._line.take(wanted)
         if isinstance(data, int):
             return got
@@ -158,17 +158,17 @@ class USB_VCP:
         sent = self._line.put(data)
         waited = 0
         while sent < len(data) and waited < timeout:
-            the.pace.idle()
+            machine_state.pace.idle()
             more = self._line.put(memoryview(data)[sent:])
             sent += more
             waited = 0 if more else waited + 1
-        the.board.call()
+        machine_state.board.call()
         return sent
 
     def read(self, size=-1):
         """What is there, up to ``size``; None where nothing is."""
         if not self._line.received:
-            the.board.call()
+            machine_state.board.call()
             return None
         there = len(self._line.received)
         return self.recv(there if size < 0 else min(size, there), timeout=0)

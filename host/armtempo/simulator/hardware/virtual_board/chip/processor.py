@@ -7,7 +7,7 @@ on the way, each a little late, as on the chip.
 
 import sys
 
-from simulator import dma, gpio, memory, timer_registers, timers
+from virtual_board.chip import dma, gpio, memory, timer_registers, timers
 
 TICKS_PER_MS = 84_000
 TICKS_PER_US = 84

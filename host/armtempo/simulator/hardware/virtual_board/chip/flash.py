@@ -10,7 +10,7 @@ files still open for writing empty, and the board starts again.
 
 import os
 
-from simulator.reset import Reset
+from virtual_board.chip.reset import Reset
 
 BLOCK = 512
 _WRITE_MS = 1

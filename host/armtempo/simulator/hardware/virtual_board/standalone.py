@@ -11,8 +11,10 @@ import sys
 if sys.implementation.name != "micropython":
     import additions  # noqa: F401
 
-from simulator import flash, modules, setup, the
-from simulator.serial import Line
+from virtual_board import machine_state, setup
+from virtual_board.chip import flash
+from virtual_board.firmware import builtin_modules
+from virtual_board.firmware.usb_serial import Line
 
 DEFAULTS = {
     "flash": ".",
@@ -37,11 +39,11 @@ DEFAULTS = {
 
 def start(cause=1, line=None, **options):
     """Power up; ``line`` is the serial line, with nobody at the other end by default."""
-    the.serial = line or Line()
-    the.edges = the.flash = None
+    machine_state.serial = line or Line()
+    machine_state.edges = machine_state.flash = None
     setup.power_up(dict(DEFAULTS, **options), cause)
-    builtins.open = the.flash.open if "flash" in options else flash.real_open
-    return the.board
+    builtins.open = machine_state.flash.open if "flash" in options else flash.real_open
+    return machine_state.board
 
 
-modules.replace()
+builtin_modules.replace()

@@ -1,6 +1,6 @@
 """DMA1: circular streams that feed timers' compare registers (RM0090 chapter 10)."""
 
-from simulator import memory
+from virtual_board.chip import memory
 
 # (stream, channel selection): timer and its compare channels that ask for a transfer (RM0090 10.3.3)
 REQUESTS = {

@@ -1,8 +1,9 @@
 """``pyb.Timer`` and its channels on the simulated timers, with the firmware's register habits (timer.c)."""
 
-from simulator import gpio, memory, the, timer_registers
-from simulator.board import _RCC_TIMERS, CALL_TICKS
-from simulator.gpio_api import Pin
+from virtual_board import machine_state
+from virtual_board.chip import gpio, memory, timer_registers
+from virtual_board.chip.processor import _RCC_TIMERS, CALL_TICKS
+from virtual_board.firmware.pin_api import Pin
 
 _ENCODER = {9: 1, 10: 2, 11: 3}
 _OC_MODES = {0: 6, 1: 7, 2: 0, 3: 1, 4: 2, 5: 3, 6: 5, 7: 4}
@@ -22,20 +23,20 @@ class Timer:
     RISING, FALLING, BOTH = 0, 2, 10
 
     def __new__(cls, number, *args, **kwargs):
-        known = the.board.api.get(number)
+        known = machine_state.board.api.get(number)
         if known is None:
-            if number not in the.board.timers:
+            if number not in machine_state.board.timers:
                 raise ValueError("Timer(%d) doesn't exist on the virtual board" % number)
             known = super().__new__(cls)
             known._made = False
-            the.board.api[number] = known
+            machine_state.board.api[number] = known
         return known
 
     def __init__(self, number, *args, **kwargs):
         if not self._made:
             self._made = True
             self._number = number
-            self._model = the.board.timers[number]
+            self._model = machine_state.board.timers[number]
             self._channels = {}
         if args or kwargs:
             self.init(*args, **kwargs)
@@ -55,10 +56,10 @@ class Timer:
         memory.words[at + timer_registers.ARR] = period & (self._model.full - 1)
         memory.words[at + timer_registers.CR1] = 0x80
         memory.words[at + timer_registers.EGR] = 1
-        the.board.sync()
+        machine_state.board.sync()
         _change(at + timer_registers.CR1, 1, 1)
         self.callback(callback)
-        the.board.spend(20 * CALL_TICKS)
+        machine_state.board.spend(20 * CALL_TICKS)
 
     def _from_freq(self, freq):
         clocks = self.source_freq() // int(freq)
@@ -75,7 +76,7 @@ class Timer:
         self._channels.clear()
         memory.words[self._model.at + timer_registers.CCER] = 0
         memory.words[self._model.at + timer_registers.CR1] = 0
-        the.board.wrote()
+        machine_state.board.wrote()
 
     def source_freq(self):
         """Clock of the timer before its prescaler, in Hz."""
@@ -88,23 +89,23 @@ class Timer:
     def interrupt(self, flag, function):
         """Set or clear the callback of one interrupt flag."""
         if function is None:
-            the.board.callbacks.pop((self._number, flag), None)
+            machine_state.board.callbacks.pop((self._number, flag), None)
             _change(self._model.at + timer_registers.DIER, 1 << flag, 0)
         else:
-            the.board.callbacks[(self._number, flag)] = (function, self)
+            machine_state.board.callbacks[(self._number, flag)] = (function, self)
             _change(self._model.at + timer_registers.SR, 1 << flag, 0)
             _change(self._model.at + timer_registers.DIER, 0, 1 << flag)
-        the.board.wrote()
+        machine_state.board.wrote()
 
     def register(self, at, value=None):
         """Read a register (signed, as the firmware does) or write it."""
         where = self._model.at + at
         if value is None:
-            the.board.call()
+            machine_state.board.call()
             value = memory.words[where]
             return value - (1 << 32) if value >> 31 else value
         memory.words[where] = value & memory.MASK
-        the.board.wrote()
+        machine_state.board.wrote()
         return None
 
     def counter(self, value=None):
@@ -135,7 +136,7 @@ class Timer:
             channel.setup_compare(_OC_MODES[mode], compare, polarity, callback)
         else:
             raise ValueError("the virtual board has no such channel mode")
-        the.board.spend(20 * CALL_TICKS)
+        machine_state.board.spend(20 * CALL_TICKS)
         return channel
 
     def _route(self, pin):

@@ -2,7 +2,7 @@
 
 from armtempo_shared import armrecord
 
-from simulator.inputs import set_level
+from virtual_board.firmware.external_interrupts import set_level
 
 
 class Switch:

@@ -4,7 +4,7 @@ import errno
 import io
 import sys
 
-from simulator import the
+from virtual_board import machine_state
 
 _CTRL_A, _CTRL_B, _CTRL_C, _CTRL_D, _CTRL_E = 1, 2, 3, 4, 5
 _BANNER = "MicroPython v%d.%d.%d; virtual board STM32F4DISC with STM32F407\r\n"
@@ -21,15 +21,15 @@ def send(text):
     """Send text or bytes to the host; waits while it does not read."""
     data = text.encode() if isinstance(text, str) else text
     view = memoryview(data)
-    sent = the.serial.put(view)
+    sent = machine_state.serial.put(view)
     while sent < len(data):
-        the.pace.idle()
-        sent += the.serial.put(view[sent:])
+        machine_state.pace.idle()
+        sent += machine_state.serial.put(view[sent:])
 
 
 def show(text):
     """What a program prints: to the host while the REPL has the port, else to the log."""
-    if the.serial.attached:
+    if machine_state.serial.attached:
         send(text.replace("\n", "\r\n"))
     else:
         sys.stderr.write(text)
@@ -73,8 +73,8 @@ class Repl:
 
     def run(self):
         """Serve the host until it asks for a soft reset."""
-        the.serial.interrupt_char = -1  # at the prompt Ctrl-C is a byte like others
-        the.board.interrupted = False
+        machine_state.serial.interrupt_char = -1  # at the prompt Ctrl-C is a byte like others
+        machine_state.board.interrupted = False
         try:
             while True:
                 if self.raw:
@@ -90,23 +90,23 @@ class Repl:
 
     def _run(self, action, log=False):
         """Run something with Ctrl-C on; True where it raised nothing."""
-        the.serial.interrupt_char = _CTRL_C
+        machine_state.serial.interrupt_char = _CTRL_C
         try:
             action()
             return True
         except SystemExit:
             raise SoftReset
         except (Exception, KeyboardInterrupt) as error:
-            the.serial.interrupt_char = -1
+            machine_state.serial.interrupt_char = -1
             text = traceback(error)
             if log:
                 sys.stderr.write(text)
             self._end_of_output()
-            the.serial.attached = True
+            machine_state.serial.attached = True
             send(text.replace("\n", "\r\n"))
             return False
         finally:
-            the.serial.interrupt_char = -1
+            machine_state.serial.interrupt_char = -1
 
     def _end_of_output(self):
         """In raw mode the host waits for this between output and errors."""
@@ -118,9 +118,9 @@ class Repl:
 
     def _bytes(self, most):
         """What has come, at least one byte."""
-        while not the.serial.received:
-            the.pace.idle()
-        return the.serial.take(most)
+        while not machine_state.serial.received:
+            machine_state.pace.idle()
+        return machine_state.serial.take(most)
 
     def _byte(self):
         return self._bytes(1)[0]

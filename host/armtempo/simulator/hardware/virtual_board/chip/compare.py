@@ -4,8 +4,8 @@ Between two looks at a timer its channels cannot influence one another, so each 
 of that stretch in one tight loop (``Channel.match``): that loop is what an edge costs.
 """
 
-from simulator import memory
-from simulator.timer_registers import CCER, CCMR1, CCR1, DIER, NEVER, SR
+from virtual_board.chip import memory
+from virtual_board.chip.timer_registers import CCER, CCMR1, CCR1, DIER, NEVER, SR
 
 DMA_DELAY_TICKS = 6
 """A compare value that comes this close behind its predecessor is too late (bus delay)."""

@@ -2,8 +2,9 @@
 
 from armtempo_shared import armrecord
 
-from simulator import gpio, switches
-from simulator.inputs import set_level
+from virtual_board.arm import switches
+from virtual_board.chip import gpio
+from virtual_board.firmware.external_interrupts import set_level
 
 
 class Motor:
@@ -126,7 +127,7 @@ class Arm:
         if number < len(self._angles):
             joint = dict(joint, start_deg=self._angles[number])
         if joint.get("model") and joint["model"]["holding_torque_nm"]:
-            from simulator.stepper import Stepper
+            from virtual_board.arm.stepper import Stepper
 
             return Stepper(step, direction, enable, encoder, joint, 100 * self._seed + number)
         return Motor(step, direction, enable, encoder, joint)

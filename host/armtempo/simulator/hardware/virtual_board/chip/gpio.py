@@ -1,6 +1,6 @@
 """GPIO ports: pins driven by the program or a timer, pins read by the program (RM0090 chapter 8)."""
 
-from simulator import memory
+from virtual_board.chip import memory
 
 MODER, OTYPER, OSPEEDR, PUPDR, IDR, ODR, BSRR = range(7)
 AFR = 8

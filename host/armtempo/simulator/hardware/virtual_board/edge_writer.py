@@ -3,7 +3,7 @@
 import struct
 from array import array
 
-from simulator.flash import real_open
+from virtual_board.chip.flash import real_open
 
 MAGIC = b"ATE1"
 EDGES, COUNTER, INPUT, RESET = 1, 2, 3, 4

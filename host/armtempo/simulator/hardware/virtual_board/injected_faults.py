@@ -1,7 +1,8 @@
 """Things that go wrong at a given time of a motion, as the options ask for."""
 
-from simulator import inputs, the
-from simulator.board import TICKS_PER_MS
+from virtual_board import machine_state
+from virtual_board.chip.processor import TICKS_PER_MS
+from virtual_board.firmware import external_interrupts
 
 _TICK_HZ = 84_000_000
 _HALF = 1 << 31
@@ -38,24 +39,24 @@ def _stall(board, fault):
 
 
 def _input(board, fault):
-    inputs.set_level(fault["name"], fault["level"])
+    external_interrupts.set_level(fault["name"], fault["level"])
 
 
 def _block(board, fault):
-    the.arm.motors[fault["joint"]].blocked = True
+    machine_state.arm.motors[fault["joint"]].blocked = True
 
 
 def _slip(board, fault):
-    the.arm.motors[fault["joint"]].slip(fault["counts"])
+    machine_state.arm.motors[fault["joint"]].slip(fault["counts"])
 
 
 def _silence(board, fault):
-    the.serial.silent = True
+    machine_state.serial.silent = True
     board.at(board.now + int(fault["ms"] * TICKS_PER_MS), _speak)
 
 
 def _speak():
-    the.serial.silent = False
+    machine_state.serial.silent = False
 
 
 def _hang(board, fault):

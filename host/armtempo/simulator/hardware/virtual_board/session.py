@@ -3,9 +3,11 @@
 import builtins
 import sys
 
-from simulator import firmware, memory, setup, the, timer_registers
-from simulator.repl import Repl, SoftReset, board_print
-from simulator.reset import PowerOff, Reset
+from virtual_board import machine_state, setup
+from virtual_board.chip import memory, timer_registers
+from virtual_board.chip.reset import PowerOff, Reset
+from virtual_board.firmware import boot
+from virtual_board.firmware.repl import Repl, SoftReset, board_print
 
 _POWER_ON, _SOFT = 1, 0
 
@@ -19,7 +21,7 @@ def run(options, hardware):
     cause = _POWER_ON
     while True:
         mode = setup.power_up(options, cause)
-        builtins.open = the.flash.open
+        builtins.open = machine_state.flash.open
         try:
             _live(options, before, mode, path)
         except Reset as reset:
@@ -27,26 +29,26 @@ def run(options, hardware):
             _forget(before)
         except PowerOff:
             break
-    if the.edges:
-        the.edges.flush()
+    if machine_state.edges:
+        machine_state.edges.flush()
 
 
 def _live(options, before, mode, path):
     """Run the program, then the prompt, again after each soft reset, which ends the safe mode."""
     raw = False
     while True:
-        firmware.mount(mode, path)
-        if the.arm is None or the.arm.board is not the.board:
-            setup.connect(the.pins)
+        boot.mount(mode, path)
+        if machine_state.arm is None or machine_state.arm.board is not machine_state.board:
+            setup.connect(machine_state.pins)
         repl = Repl(raw)
         try:
-            if mode != firmware.SAFE:
+            if mode != boot.SAFE:
                 _start(options, repl)
         except SoftReset:
             pass
         repl.run()
         raw = repl.raw
-        mode = firmware.NORMAL
+        mode = boot.NORMAL
         _soft_reset()
         _forget(before)
 
@@ -54,17 +56,17 @@ def _live(options, before, mode, path):
 def _start(options, repl):
     """boot.py, and where that went well main.py, unless the host talks to the raw REPL."""
     if not _execute(options, repl, "boot.py"):
-        firmware.flash_error(firmware.BOOT_ERROR)
+        boot.flash_error(boot.BOOT_ERROR)
     elif not repl.raw and not _execute(options, repl, "main.py"):
-        firmware.flash_error(firmware.MAIN_ERROR)
+        boot.flash_error(boot.MAIN_ERROR)
 
 
 def _execute(options, repl, name):
     """Run a file of flash or card, or of the program that is not deployed; False where it raises."""
-    folders = [the.flash.cwd] + [folder + "/armtempo_board" for folder in options["program"]]
+    folders = [machine_state.flash.cwd] + [folder + "/armtempo_board" for folder in options["program"]]
     for folder in folders:
         try:
-            with the.flash.open(folder + "/" + name) as file:
+            with machine_state.flash.open(folder + "/" + name) as file:
                 text = file.read()
         except OSError:
             continue
@@ -74,7 +76,7 @@ def _execute(options, repl, name):
 
 def _soft_reset():
     """What the firmware does between two runs: timers it made stop, callbacks go; registers stay."""
-    board = the.board
+    board = machine_state.board
     for number in board.api:
         at = board.timers[number].at
         memory.words[at + timer_registers.CR1] = memory.words[at + timer_registers.CCER] = memory.words[
@@ -86,9 +88,9 @@ def _soft_reset():
     board.pending = []
     board.masked = False
     board.sync()
-    the.serial.attached = True
-    the.serial.rts = the.serial.cts = False
-    the.settings["reset_cause"] = _SOFT
+    machine_state.serial.attached = True
+    machine_state.serial.rts = machine_state.serial.cts = False
+    machine_state.settings["reset_cause"] = _SOFT
 
 
 def _forget(before):

@@ -1,0 +1,1 @@
+"""The virtual board underneath the board program: the chip, MicroPython's firmware, and the arm."""

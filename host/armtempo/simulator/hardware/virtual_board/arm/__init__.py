@@ -1,0 +1,1 @@
+"""The arm on the board's pins: motors, encoders, limit switches."""
