@@ -123,7 +123,7 @@ def test_unreadable_file_system_until_it_is_formatted(flash: Path) -> None:
 def test_folder_of_a_killed_launcher_is_swept_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     code = (
-        "from armtempo import virtual as v; import time; print(v.launch().port, flush=True); time.sleep(99)"
+        "from armtempo import simulator as v; import time; print(v.launch().port, flush=True); time.sleep(99)"
     )
     environment = {**os.environ, "TMPDIR": str(tmp_path)}
     launcher = subprocess.Popen(
