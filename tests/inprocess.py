@@ -24,7 +24,12 @@ FAULTS = ("lose", "double", "flip", "delay", "cut")
 _DELAY_S = 0.03
 _SAMPLE_S = 0.1
 _TURNS = 3
-_IMPORTED_LATER = ("armtempo_board", "armtempo_board.ends", "armtempo_board.store", "armtempo_board.storing")
+_IMPORTED_LATER = (
+    "armtempo_board.heap",
+    "armtempo_board.motion.endpoints",
+    "armtempo_board.storage.store",
+    "armtempo_board.app.store_commands",
+)
 _USB_BUFFER = 1024
 _STEP_S = 0.01
 
@@ -96,8 +101,9 @@ class Pipe:
     def start_board(self) -> None:
         """Power up: a new program on the same flash."""
         with board_modules():
-            from armtempo_board import store, storing  # noqa: F401  the program imports them when it needs them
-            from armtempo_board.app import App
+            from armtempo_board.app import store_commands  # noqa: F401  the program imports them when it needs them
+            from armtempo_board.app.app import App
+            from armtempo_board.storage import store  # noqa: F401  the program imports them when it needs them
 
             self._later = {name: sys.modules[name] for name in _IMPORTED_LATER}
             self.port = stand_in.Port()

@@ -25,16 +25,15 @@ sys.path[:0] = [str(ROOT)] + [
 ]
 
 import micropython  # noqa: E402, F401  (puts ptr32 and its like into place)
-from armtempo_board import (  # noqa: E402
+from armtempo_board.stepgen import (  # noqa: E402
+    bezier,
     braking,
-    cell,
-    cells,
-    crossing,
-    parts,
-    points,
-    stretch,
-    traverse,
-    walker,
+    interval_steps,
+    newton,
+    step_generator,
+    step_queue,
+    subdivision,
+    subintervals,
 )
 from armtempo_shared.motion import Motion  # noqa: E402
 
@@ -56,16 +55,15 @@ machine code over its lines. A call in it takes CALL more."""
 CALL = 250
 """Instructions of calling one compiled function from another (see board/docs/hardware.md)."""
 
-COMPILED = (points, cell, crossing, stretch, braking)
-ALL = (*COMPILED, parts, cells, traverse, walker)
+COMPILED = (bezier, subdivision, newton, step_queue, braking)
+ALL = (*COMPILED, subintervals, interval_steps, step_generator)
 
 
 class Count:
     """Runs walkers with their compiled functions on the emulated core, and counts."""
 
     def __init__(self) -> None:
-        folder = ROOT / "board" / "armtempo_board"
-        self.machine = Machine(*(folder / f"{module.__name__.split('.')[1]}.py" for module in COMPILED))
+        self.machine = Machine(*(Path(str(module.__file__)) for module in COMPILED))
         self.on = False
         self.verify = False
         self.lines: Counter[str] = Counter()
@@ -97,7 +95,7 @@ class Count:
     def walk(self, record: bytes, joint: int, skip: int, steps: int, batch: int = 512) -> dict[str, float]:
         """Instructions per step of ``steps`` steps behind the first ``skip``, in batches of entries."""
         motion = Motion(record)
-        subject = walker.Walker()
+        subject = step_generator.Walker()
         ring = array("I", bytes(4096))
         subject.load(motion, joint, oracle.start_steps(motion, joint), 168, 20_000)
         head = self._fill(subject, ring, 0, skip, batch)
@@ -122,7 +120,9 @@ class Count:
             "longest": self.longest,
         }
 
-    def _fill(self, subject: walker.Walker, ring: array[int], head: int, steps: int, batch: int) -> int:
+    def _fill(
+        self, subject: step_generator.Walker, ring: array[int], head: int, steps: int, batch: int
+    ) -> int:
         end = head + 2 * steps
         self.longest = 0.0
         while head < end and (subject.waits() or not subject.ended):
@@ -152,11 +152,11 @@ class Count:
         """Instructions of the loop that writes a step's two entries, groups of 16 steps."""
         counts = []
         for steps in (128, 384):
-            state = array("i", bytes(4 * stretch.STATE_SIZE))
+            state = array("i", bytes(4 * step_queue.STATE_SIZE))
             settings = {
-                stretch.FIRST: 252 << 22, stretch.SECOND: 1 << 29, stretch.THIRD: 1 << 29, stretch.POWER: 9,
-                stretch.SHIFT: 13, stretch.GROUP: 16, stretch.CARRY: 5, stretch.STEPS: steps,
-                stretch.UNTIL_1024: 1 << 28, stretch.PULSE: 168,
+                step_queue.FIRST: 252 << 22, step_queue.SECOND: 1 << 29, step_queue.THIRD: 1 << 29, step_queue.POWER: 9,
+                step_queue.SHIFT: 13, step_queue.GROUP: 16, step_queue.CARRY: 5, step_queue.STEPS: steps,
+                step_queue.UNTIL_1024: 1 << 28, step_queue.PULSE: 168,
             }  # fmt: skip
             for place, value in settings.items():
                 state[place] = value

@@ -31,8 +31,8 @@ def _offsets(module: str) -> dict[str, int]:
     return {name: int(number) for name, number in found}
 
 
-AT = _offsets("access.py")
-QUEUE = _offsets("stretch.py")
+AT = _offsets("hardware/isr.py")
+QUEUE = _offsets("stepgen/step_queue.py")
 
 
 def _words(count: int) -> array[int]:
@@ -60,7 +60,7 @@ def _block(joints: int, made: int = 20) -> array[int]:
 
 @pytest.fixture(scope="module")
 def machine() -> Machine:
-    return Machine(BOARD / "access.py", BOARD / "stretch.py")
+    return Machine(BOARD / "hardware" / "isr.py", BOARD / "stepgen" / "step_queue.py")
 
 
 def _cost(machine: Machine, name: str, *arguments: array[int] | int) -> int:

@@ -22,7 +22,7 @@ def quiet(text: str) -> None: ...
 
 def test_modules_are_what_the_board_imports() -> None:
     names = set(program.modules())
-    assert {"armtempo_board/app.py", "armtempo_board/__init__.py", "armtempo_shared/motion.py"} <= names
+    assert {"armtempo_board/app/app.py", "armtempo_board/__init__.py", "armtempo_shared/motion.py"} <= names
     assert not {"armtempo_board/main.py", "armtempo_shared/wire.py", "armtempo_shared/meanings.py"} & names
     assert program.stamp() == f"{own_crc():08x}\n".encode()
 
@@ -37,7 +37,7 @@ def test_compiled_files_fit_the_smallest_board() -> None:
 
 def test_sources_go_where_there_is_room() -> None:
     library = changes.choose(replace(BOARD, free_blocks=2000, free_heap=200_000), False, quiet)
-    assert "/flash/lib/armtempo_board/app.py" in library
+    assert "/flash/lib/armtempo_board/app/app.py" in library
     told: list[str] = []
     library = changes.choose(replace(BOARD, free_blocks=2000), False, told.append)
     assert "/flash/lib/armtempo_board/core.mpy" in library
@@ -125,7 +125,7 @@ def test_firmware_folder_holds_the_program_and_its_hash(tmp_path: Path) -> None:
     told: dict[str, int] = {}
     exec((folder / "armtempo_shared" / "firmware.py").read_text(), told)
     assert told["CRC"] == own_crc()
-    assert "import CRC" in (folder / "armtempo_shared" / "program.py").read_text()
+    assert "import CRC" in (folder / "armtempo_shared" / "program_hash.py").read_text()
 
 
 def test_missing_compiler_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

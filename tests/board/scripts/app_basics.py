@@ -6,7 +6,7 @@ import stand_in
 
 stand_in.install()
 
-from armtempo_board.app import App  # noqa: E402
+from armtempo_board.app.app import App  # noqa: E402
 
 port = stand_in.Port()
 app = App(port, sys.argv[1])

@@ -64,7 +64,7 @@ class Failing:
 
 
 def case_a_failing_led_freezes_what_moves():
-    from armtempo_board import program
+    from armtempo_board.app import program
 
     app, host = connected()
     start(host)

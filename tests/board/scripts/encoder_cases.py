@@ -2,9 +2,9 @@
 
 import random
 
-from armtempo_board import access
-from armtempo_board.encoders import Encoder
-from armtempo_board.following import Following
+from armtempo_board.hardware import isr
+from armtempo_board.hardware.encoders import Encoder
+from armtempo_board.motion.following_error import Following
 from engine_rig import TICK_HZ, Motion, Rig, Steps, arm, cases, row
 from virtual_board import standalone
 
@@ -93,7 +93,7 @@ def unread_counter():
     board = standalone.start()
     encoder = Encoder(1, 0)
     board.timers[3].turn(-1)
-    assert access.read_counter(encoder.address) == 0xFFFF
+    assert isr.read_counter(encoder.address) == 0xFFFF
 
 
 cases(

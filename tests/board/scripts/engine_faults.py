@@ -144,19 +144,19 @@ def written_too_late():
 
 def with_slow_emit(rig):
     """Run to the end; whatever is written to the first joint's ring takes 30 ms."""
-    from armtempo_board import feeder
+    from armtempo_board.motion import ring_feeder
 
-    emit = feeder.emit
+    emit = ring_feeder.emit
 
     def slow_emit(*arguments):
         emit(*arguments)
         if arguments[1] is rig.engine._joints[0].ring.words:
             rig.board.stand_still(84 * 30_000)
 
-    feeder.emit = slow_emit
+    ring_feeder.emit = slow_emit
     while rig.engine.moving:
         rig.turn()
-    feeder.emit = emit
+    ring_feeder.emit = emit
 
 
 def interrupt_gone():
@@ -164,12 +164,12 @@ def interrupt_gone():
     for moment in (-500_000, 300_000, 9_000_000):
         rig = Rig(arm(3))
         import stm
-        from armtempo_board import access
+        from armtempo_board.hardware import isr
         from machine import mem32
 
         rig.start(LONG)
         rig.run_to(moment)
-        mem32[stm.TIM6 + 4 * access.DIER] = 0
+        mem32[stm.TIM6 + 4 * isr.DIER] = 0
         while rig.engine.moving:
             rig.turn()
         stopped(rig, codes.INTERNAL, rig.engine.fault_joint)

@@ -4,14 +4,14 @@ import sys
 from array import array
 
 from arm_rows import HEAD, arm, row  # noqa: F401
-from armtempo_board import points, stretch, walker
+from armtempo_board.stepgen import bezier, step_generator, step_queue
 from virtual_board import machine_state, standalone
 from virtual_board.arm import motors
 
 TICK_HZ = 84_000_000
 FEWER = 3 if "short" in sys.argv else 1
 """Repetitions are divided by it; the emulated interpreter is slow."""
-SLOTS = stretch.STATE_SIZE - 13 * stretch.QUEUE_ROOM
+SLOTS = step_queue.STATE_SIZE - 13 * step_queue.QUEUE_ROOM
 
 
 class Steps:
@@ -52,27 +52,26 @@ class Motion:
 class Walker:
     """Takes the place of the evaluator's walker."""
 
-    waits = walker.Walker.waits
-    latest_k = walker.Walker.latest_k
-    write = walker.Walker.write
+    waits = step_generator.Walker.waits
+    latest_k = step_generator.Walker.latest_k
+    write = step_generator.Walker.write
 
     def __init__(self):
         self.ended = True
         self.at_turn = False
         self.direction = 1
-        self.state = array("i", bytes(4 * stretch.STATE_SIZE))
+        self.state = array("i", bytes(4 * step_queue.STATE_SIZE))
 
-    def lend(self):
-        """Nothing to lend."""
+    subintervals = None
 
     def load(self, motion, joint, position, pulse, gap):
         """Stand before the first step."""
         self._steps = motion.joints[joint]
         self._place = [0, 0]
         state = self.state
-        state[stretch.PULSE] = pulse
-        state[stretch.STEPS] = state[stretch.LATEST_1024] = 0
-        state[stretch.OUT] = state[stretch.IN]
+        state[step_queue.PULSE] = pulse
+        state[step_queue.STEPS] = state[step_queue.LATEST_1024] = 0
+        state[step_queue.OUT] = state[step_queue.IN]
         self.at_turn = False
         first = self._steps.at(self._place)
         self.ended = first is None
@@ -80,7 +79,7 @@ class Walker:
 
     def next_1024(self):
         """Time of the next step, in 1024 ticks."""
-        return stretch.upcoming(self.state)
+        return step_queue.upcoming(self.state)
 
     def turn(self):
         """Go on in the other direction."""
@@ -89,8 +88,8 @@ class Walker:
 
     def prepare(self, until):
         """Queue steps as the evaluator's walker does: the first of a block by itself, the others in stretches."""
-        self.state[stretch.UNTIL_1024] = until
-        while not self.ended and not self.at_turn and stretch.wanted(self.state):
+        self.state[step_queue.UNTIL_1024] = until
+        while not self.ended and not self.at_turn and step_queue.wanted(self.state):
             time, direction = self._steps.at(self._place)
             if direction != self.direction:
                 self.at_turn = True
@@ -99,7 +98,7 @@ class Walker:
             steps = 1
             if self._place[1]:
                 steps = max(1, min(count - self._place[1], 1024, (1 << 27) // gap))
-            stretch.single(self.state, (time >> 12) + points.BIAS, time & 4095)
+            step_queue.single(self.state, (time >> 12) + bezier.BIAS, time & 4095)
             if steps > 1:
                 self._lengthen(time, gap, steps)
             self._steps.go_on(self._place, steps)
@@ -108,13 +107,13 @@ class Walker:
     def _lengthen(self, time, gap, steps):
         """The stretch queued last has so many steps, all as far apart."""
         state = self.state
-        place = SLOTS + 13 * ((state[stretch.IN] - 1) % stretch.QUEUE_ROOM)
+        place = SLOTS + 13 * ((state[step_queue.IN] - 1) % step_queue.QUEUE_ROOM)
         base = (time - gap) & 0xFFFFFFFF
         base -= base >> 31 << 32
         words = (0, gap, 1 << 29, 1 << 29, 0, 0, base, 0, 0, 16, 0, steps, (time - gap) >> 10)
         for word, value in enumerate(words):
             state[place + word] = value
-        state[stretch.LATEST_1024] = (time + (steps - 1) * gap) >> 10
+        state[step_queue.LATEST_1024] = (time + (steps - 1) * gap) >> 10
 
 
 class Pulses:
@@ -227,23 +226,24 @@ class Rig:
         self.board = standalone.start()
         self.board.worlds.append(self)
         self._zero = 0
-        import armtempo_board.check
-        import armtempo_board.engine
-        import armtempo_board.joint
-        from armtempo_board import pins
+        import armtempo_board.motion.engine
+        import armtempo_board.motion.joint
+        import armtempo_board.motion.motion_check
+        from armtempo_board import heap
+        from armtempo_board.hardware import pins
 
         if planned:
-            armtempo_board.joint.Walker = Walker
-            armtempo_board.ends = Evaluator
-            armtempo_board.check.check = Evaluator.check
-            armtempo_board.engine.forget = lambda: None  # what stands in for the evaluator stays
+            armtempo_board.motion.joint.Walker = Walker
+            armtempo_board.motion.endpoints = Evaluator
+            armtempo_board.motion.motion_check.check = Evaluator.check
+            heap.forget = lambda: None  # what stands in for the evaluator stays
         self.arm = machine_state.arm = motors.Arm(self.board, pins, lambda: (self.head, joints), 1, ())
         self.pins = pins
         self.pulses = [
             Pulses(self, joint, pins.STEP[joint["channel"]][0], pins.STEP[joint["channel"]][6])
             for joint in joints
         ]
-        self.engine = armtempo_board.engine.Engine(self.head, joints)
+        self.engine = armtempo_board.motion.engine.Engine(self.head, joints)
         self.engine.home((1 << len(joints)) - 1, [0] * len(joints))
 
     # a world for the board

@@ -14,9 +14,10 @@ import stand_in
 
 stand_in.install()
 
-import armtempo_board.app  # noqa: E402
-from armtempo_board import frames, link, store  # noqa: E402
-from armtempo_board.app import App  # noqa: E402
+from armtempo_board import heap  # noqa: E402
+from armtempo_board.app.app import App  # noqa: E402
+from armtempo_board.link import frame_reader, serial_link  # noqa: E402
+from armtempo_board.storage import store  # noqa: E402
 from armtempo_shared import wire  # noqa: E402
 from armtempo_shared.table import rows  # noqa: E402
 
@@ -39,7 +40,7 @@ def speed_up():
         to, at = places & 0x7FFF, places >> 15
         target[to : to + count] = source[at : at + count]
 
-    frames.seal, frames.copy, link.seal, link.copy = seal, copy, seal, copy
+    frame_reader.seal, frame_reader.copy, serial_link.seal, serial_link.copy = seal, copy, seal, copy
 
 
 class Stream:
@@ -118,7 +119,7 @@ def board():
     """A configured and homed board with "feed" stored, on a flash in memory."""
     chip = flash.Flash()
     store.os, store.open = chip, chip.open
-    armtempo_board.app.forget = lambda: None  # a store that is imported anew would be on the real flash
+    heap.forget = lambda: None  # a store that is imported anew would be on the real flash
     port = stand_in.Port()
     app = App(port, "/flash")
     host = stand_in.Host(app, port)

@@ -2,7 +2,7 @@
 
 import sys
 
-from armtempo_board.check import check
+from armtempo_board.motion.motion_check import check
 from armtempo_shared.motion import Motion
 
 

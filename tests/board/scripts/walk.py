@@ -10,15 +10,15 @@ import sys
 from array import array
 
 import micropython
-from armtempo_board import check as checking
-from armtempo_board import rates
-from armtempo_board.walker import Walker
+from armtempo_board.motion import motion_check as checking
+from armtempo_board.motion import rate_check
+from armtempo_board.stepgen.step_generator import Walker
 from armtempo_shared.motion import Motion
 
 MASK = 1023
 NEVER = 1 << 28
 checking.MAX_STEP_RATE = 333_000  # the evaluator is tried beyond what the program's loop keeps up with
-rates.MAX_STEP_RATE_SUM = 1_000_000
+rate_check.MAX_STEP_RATE_SUM = 1_000_000
 FREE = {"min_steps": -50000000, "max_steps": 50000000, "max_rate": 336330}
 
 

@@ -1,0 +1,118 @@
+"""Starts the board program on the hardware: serial port, watchdog, LEDs, button."""
+
+import os
+
+import armtempo_shared
+import machine
+import micropython
+import pyb
+from armtempo_shared import codes
+from micropython import const
+
+import armtempo_board
+from armtempo_board import heap
+from armtempo_board.app.app import App
+from armtempo_board.app.button import Button
+from armtempo_board.app.leds import Leds
+from armtempo_board.app.watchdog import Watchdog, bit
+from armtempo_board.errors import Refused
+from armtempo_board.stepgen import bezier, step_generator  # noqa: F401  the deepest first: nested imports cost stack
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
+ROOT = "/flash/armtempo"
+_CTRL_C = const(3)
+_EXCEPTION_BUFFER = const(100)
+_SELDOM = const(7)  # while something moves, LEDs, watchdog and button in every eighth turn only
+
+app: "Any" = None
+"""The program's App, kept when it is left for the REPL."""
+
+
+def main(root: str = ROOT) -> None:
+    """Run until somebody asks for the REPL."""
+    global app
+    micropython.alloc_emergency_exception_buf(_EXCEPTION_BUFFER)
+    leds = Leds()
+    button = Button()  # before the engine, which may take its pin for a sixth joint
+    port = pyb.USB_VCP()
+    app = app or _build(port, root)
+    app.enter()
+    watchdog = Watchdog()
+    _detach(port)
+    try:
+        run(leds, button, watchdog)
+    finally:
+        watchdog.leave()
+        _attach(port)
+    print("armtempo ended; Ctrl-D starts it again")
+
+
+def _build(port: "pyb.USB_VCP", root: str) -> App:
+    """The App; what only its making needs is forgotten again, for the sake of the heap."""
+    built = App(port, root, _crc(), _fault_at_start())
+    built.forget_store()
+    heap.forget()
+    return built
+
+
+def _crc() -> int:
+    from armtempo_shared.program_hash import program_crc  # here, so that it can be forgotten
+
+    return int(program_crc(*_folders()))
+
+
+def run(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
+    """Turn until somebody asks for the REPL; whatever ends the loop, nothing goes on moving without it."""
+    try:
+        while True:
+            app.turn()
+            try:
+                if app.left():
+                    break
+                _look_around(leds, button, watchdog)
+            except Exception as error:
+                app.fail(error)
+    finally:
+        app.halt()
+
+
+def _look_around(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
+    if app.moving() and app.turns & _SELDOM:
+        return
+    leds.show(app.state())
+    watchdog.feed()
+    pressed = button.pressed()  # a press while something moves is over and done with
+    if app.moving():
+        return
+    if pressed:
+        _replay_default()
+    machine.idle()
+
+
+def _fault_at_start() -> int:
+    return codes.WATCHDOG if bit() else 0
+
+
+def _replay_default() -> None:
+    try:
+        app.begin(app.store().default(), 0)
+    except Refused as refused:
+        app.events.note("button: refused, error %d" % refused.code)
+
+
+def _detach(port: "Any") -> None:
+    os.dupterm(None, 1)
+    micropython.kbd_intr(-1)
+    port.init(flow=pyb.USB_VCP.RTS | pyb.USB_VCP.CTS)  # without CTS a write waits for the host
+
+
+def _attach(port: "Any") -> None:
+    micropython.kbd_intr(_CTRL_C)
+    os.dupterm(port, 1)
+
+
+def _folders() -> "list[str]":
+    return [path.rsplit("/", 1)[0] for path in (armtempo_board.__file__, armtempo_shared.__file__)]

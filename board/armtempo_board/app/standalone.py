@@ -1,0 +1,83 @@
+"""``armtempo_board.replay("feed")``: one stored motion from the REPL, without a host."""
+
+import micropython
+import pyb
+from armtempo_shared import codes
+from micropython import const
+
+from armtempo_board.app import program
+from armtempo_board.app.app import App
+from armtempo_board.app.watchdog import Watchdog
+from armtempo_board.errors import Refused
+from armtempo_board.motion import endpoints
+
+_NO_JOINT = const(255)
+_CTRL_C = const(3)
+
+
+class _Nobody:
+    """Takes the place of the serial port, which is the REPL's."""
+
+    def readinto(self, buffer: bytearray, count: int) -> None:
+        """Nothing comes."""
+
+    def write(self, buffer: bytearray, start: int, count: int) -> None:
+        """Nothing is taken."""
+
+
+def replay(name: str = "", root: str = program.ROOT) -> None:
+    """Run a stored trajectory, the default where no name is given, and say how it ended.
+
+    Where the position is unknown the arm must stand where the motion begins: calling this declares it.
+    Ctrl-C brakes, a second one freezes.
+    """
+    app = program.app or App(_Nobody(), root)
+    program.app = app
+    port, app.link.stream = app.link.stream, _Nobody()
+    watchdog = Watchdog()
+    micropython.kbd_intr(-1)  # KeyboardInterrupt could come in the midst of anything
+    try:
+        _begin(app, name or app.store().default())
+        _follow(app, watchdog)
+        steps = [app.engine.commanded(joint) for joint in range(app.joints)]
+        print("fault: " + _name(app.fault()) if app.fault() else "done", "at steps", steps)
+    except Refused as refused:
+        where = "" if refused.joint == _NO_JOINT else "joint %d" % (refused.joint + 1)
+        print("refused:", _name(refused.code), where, refused.value or "")
+    finally:
+        app.halt()
+        micropython.kbd_intr(_CTRL_C)
+        watchdog.leave()
+        app.link.stream = port
+
+
+def _begin(app: "App", name: str) -> None:
+    if app.engine and not app.fault():
+        motion = app.load(name)
+        unknown = app.everyone() & ~app.known()
+        if unknown:
+            print("taking the posture of the arm as the start of", name)
+            starts = [endpoints.start_offset(motion, joint, 0) for joint in range(app.joints)]
+            app.home(unknown, starts)
+    app.begin(name, 0)
+
+
+def _follow(app: "App", watchdog: "Watchdog") -> None:
+    port = pyb.USB_VCP()
+    byte = bytearray(1)
+    presses = 0
+    while app.moving():
+        app.turn()
+        watchdog.feed()
+        if port.readinto(byte) and byte[0] == _CTRL_C and app.moving():
+            app.stop(presses)
+            presses = 1
+    app.turn()
+
+
+def _name(code: int) -> str:
+    """Of a refusal or fault, as in ``codes``."""
+    for name in dir(codes):
+        if getattr(codes, name) == code:
+            return name.lower()
+    return str(code)

@@ -1,0 +1,158 @@
+"""The board's end of the serial link: frames in, replies and events out; never waits, never allocates.
+
+A host that stops reading only fills ``out``: replies then wait in ``reply``, events in the queues they
+come from, and the motion loop goes on.
+"""
+
+import time
+from struct import pack_into
+
+from armtempo_shared.messages import MAX_PAYLOAD, OVERHEAD, SYNC
+from micropython import const
+
+from armtempo_board.buffers import TABLE, copy, places, same, seal
+from armtempo_board.link.frame_reader import FrameReader
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
+PAYLOAD = const(5)  # index of the payload in a frame
+_OUT_SIZE = const(700)
+_ESCAPE_QUIET_MS = const(50)
+_CTRL_C = const(3)
+_CONTROLS = b"\r\x03"
+
+
+class Link:
+    """``poll`` gives commands; ``answer`` and ``event`` queue frames; ``flush`` hands them to the port."""
+
+    def __init__(self, stream: "Any") -> None:
+        self.stream = stream
+        self.reader = FrameReader()
+        self.reply = bytearray(MAX_PAYLOAD + OVERHEAD)
+        self.out = bytearray(_OUT_SIZE)
+        self.heard_ms: "Any" = 0  # when the last good frame came
+        self.escape = False  # somebody outside of any frame asks for the REPL
+        self._begin = 0
+        self._end = 0
+        self._reply_size = 0  # of the last reply; 0: none yet
+        self._reply_waits = False
+        self._request = bytearray(6)  # sequence, message id and check of the command that it answers
+        self._events = 0
+        self._controls = 0  # CR and Ctrl-C since the last good frame; -1: other bytes among them
+        self._interrupt = False  # whether one of them was Ctrl-C
+        self._control_ms = 0
+
+    def poll(self) -> bool:
+        """Whether a command that has not been acted on stands in ``reader.data``."""
+        now_ms = time.ticks_ms()
+        reader = self.reader
+        if not reader.poll(self.stream, now_ms):
+            self._watch_escape(reader.outside, now_ms)
+            return False
+        self._controls = 0
+        self._interrupt = False
+        self.heard_ms = now_ms
+        if self._repeated():
+            self._reply_waits = True
+            return False
+        return not self._reply_waits  # an answer still waits for room: the host repeats its command
+
+    def answer(self, number: int, size: int) -> None:
+        """Send the reply whose payload of ``size`` bytes stands in ``reply``."""
+        self._reply_size = 0  # should this fail, the host's repeat is acted on
+        self._remember()
+        self._reply_size = self._finish(self.reply, 0, self._request[0], number, size)
+        self._reply_waits = True
+
+    def room(self, size: int) -> bool:
+        """Whether an event with so many bytes of payload fits into ``out`` now; replies go first."""
+        self._queue_reply()
+        return not self._reply_waits and self._fits(size + OVERHEAD)
+
+    def payload(self) -> int:
+        """Index in ``out`` where the next event's payload is to be put."""
+        return self._end + PAYLOAD
+
+    def event(self, number: int, size: int) -> None:
+        """Send the event whose payload was put at ``payload()``; ask ``room()`` before."""
+        self._end += self._finish(self.out, self._end, self._events, number, size)
+        self._events = (self._events + 1) & 0xFF
+
+    def flush(self) -> None:
+        """Hand to the port what it takes."""
+        self._queue_reply()
+        if self._begin == self._end:
+            return
+        taken = self.stream.write(self.out, self._begin, self._end - self._begin)
+        if taken:
+            self._begin += taken
+            if self._begin == self._end:
+                self._begin = self._end = 0
+
+    def forget(self) -> None:
+        """A new host: drop what was meant for the old one."""
+        self._begin = self._end = 0
+        self._reply_waits = False
+
+    def idle(self) -> bool:
+        """Whether nothing is under way in either direction."""
+        return self._begin == self._end and not self._reply_waits and self.reader.empty()
+
+    def _finish(self, buffer: bytearray, start: int, sequence: int, number: int, size: int) -> int:
+        pack_into("<BHBB", buffer, start, SYNC, size, sequence, number)
+        seal(TABLE, buffer, start + 1 | (start + PAYLOAD + size) << 15, 0)
+        return size + OVERHEAD
+
+    def _fits(self, size: int) -> bool:
+        if self._end + size > _OUT_SIZE and self._begin:
+            copy(self.out, self.out, places(0, self._begin), self._end - self._begin)
+            self._end -= self._begin
+            self._begin = 0
+        return self._end + size <= _OUT_SIZE
+
+    def _queue_reply(self) -> None:
+        if self._reply_waits and self._fits(self._reply_size):
+            copy(self.out, self.reply, places(self._end, 0), self._reply_size)
+            self._end += self._reply_size
+            self._reply_waits = False
+
+    def _remember(self) -> None:
+        data = self.reader.data
+        copy(self._request, data, places(0, 3), 2)
+        copy(self._request, data, places(2, PAYLOAD + self.reader.length()), 4)
+
+    def _repeated(self) -> bool:
+        """Whether the frame is the one that was answered last: same number, same content."""
+        if not self._reply_size:
+            return False
+        data = self.reader.data
+        check = PAYLOAD + self.reader.length()
+        return bool(
+            same(self._request, data, places(0, 3), 2) and same(self._request, data, places(2, check), 4)
+        )
+
+    def _watch_escape(self, byte: int, now_ms: "Any") -> None:
+        """Tell a Ctrl-C (of mpremote, or typed twice) from noise: nothing but CR and Ctrl-C, after quiet.
+
+        Three in a row are enough at once, also right behind a frame: mpremote's Ctrl-A follows, is sent once,
+        and is the prompt's.
+        """
+        quiet = time.ticks_diff(now_ms, self._control_ms) >= _ESCAPE_QUIET_MS
+        if byte < 0:
+            needed = 2 if quiet else 3
+        else:
+            needed = 3
+            self._control_ms = now_ms
+            self._count_control(byte, quiet)
+        if self._controls >= needed and self._interrupt:
+            self.escape = True
+            self._controls = -1  # said once: asking while it moves is not kept for later
+
+    def _count_control(self, byte: int, quiet: bool) -> None:
+        if byte not in _CONTROLS:
+            self._controls = -1
+        elif self._controls > 0 or quiet:
+            self._controls = max(0, self._controls) + 1
+            self._interrupt = self._interrupt or byte == _CTRL_C
