@@ -1,61 +1,71 @@
 """What the board does for each command of the message table; refusals are raised as ``Refused``.
 
-While a motion runs only ``hello``, ``status``, ``samples`` and ``stop`` are taken, and the last three
-allocate nothing. The commands about the store are in ``storing.py``, which is imported when one comes.
+While a motion runs only the commands of ``_WHILE_MOVING`` are taken, and all of them but ``hello`` allocate nothing.
+The commands about the store are in ``store_commands.py``, which is imported when one comes.
 """
 
 from struct import calcsize, pack_into, unpack_from
 
 from armtempo_shared import codes, limits
-from armtempo_shared.messages import PROTOCOL_VERSION
+from armtempo_shared.messages import NO_JOINT, NUMBER_AT, PAYLOAD_AT, PROTOCOL_VERSION
 from micropython import const
 
 from armtempo_board.buffers import u32
 from armtempo_board.errors import Refused
-from armtempo_board.link.serial_link import PAYLOAD
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from typing import Any
 
-    from armtempo_board.app.app import App
+    from armtempo_board.app.controller import Controller
+    from armtempo_board.link.serial_link import SerialLink
 
-_ANSWER = const(6)  # index in the reply frame of what follows the command's number
-_HELLO = const(0x01)
-_WHILE_MOVING = b"\x01\x02\x22\x30"  # hello, status, stop, samples
-_TICKS = const(8)  # index of the ticks in the answer to status
+_WHILE_MOVING = ("hello", "status", "stop", "samples")
+_BYTES_PER_POSITION = const(4)
+_BYTES_OF_INDEX = const(4)  # of a sample
+_ANSWER_AT = const(6)  # in a reply: its payload begins with the command's number
+# a row of the commands: what acts on it, formats of its fields and of its answer's, its tail
+_HANDLER = const(0)
+_FIELDS = const(1)
+_ANSWER = const(2)
+_TAIL = const(3)
 
 
 class Commands:
     """Acts on the frame in ``link.reader`` and leaves the reply with the link."""
 
-    def __init__(self, app: "App", rows: "Callable[[str], list[Any]]") -> None:
-        """``rows`` of the message table."""
-        self.app = app
-        self._link = app.link
+    def __init__(self, controller: "Controller", link: "SerialLink") -> None:
+        from armtempo_shared.table import offset, rows  # here, so that it can be forgotten
+
+        self.controller = controller
         self.greeted = False  # a host has said hello
+        self.leaving = False  # somebody has asked for the REPL
+        self._link = link
         self._session = 0
         self._table: "dict[int, Any]" = {}
-        answers = rows("A")
+        while_moving = bytearray()
         kept: "dict[str, str]" = {}  # one string for all that are equal, for the sake of the heap
-        for place, (name, number, form, _, tail) in enumerate(rows("C")):
-            answer = answers[place][2]
+        for command, answer in zip(rows("C"), rows("A")):
+            name, number, fields, _, tail = command
+            _, _, values, _, _ = answer
             handler = getattr(self, "_" + name, name)
             self._table[number] = (
                 handler,
-                kept.setdefault(form, form),
-                kept.setdefault(answer, answer),
+                kept.setdefault(fields, fields),
+                kept.setdefault(values, values),
                 tail,
             )
-        ok, error = rows("R")
-        self._ok = ok[1]
-        self._error = error[1]
-        self._error_form = error[2]
+            if name in _WHILE_MOVING:
+                while_moving.append(number)
+            if name == "hello":
+                self._hello_number = number
+        self._while_moving = bytes(while_moving)
+        self._ticks_at = _ANSWER_AT + offset("A", "status", "ticks")
+        (_, self._ok, _, _, _), (_, self._error, self._error_fields, _, _) = rows("R")
 
     def act(self) -> None:
         """Act on one command."""
-        number = self._link.reader.data[4]
+        number = self._link.reader.data[NUMBER_AT]
         try:
             self._dispatch(number)
         except Refused as refused:
@@ -66,38 +76,38 @@ class Commands:
         if row is None:
             return self._refuse(number, codes.UNKNOWN_COMMAND)
         length = self._link.reader.length()
-        fixed = calcsize(row[1])
-        if length < fixed or (length > fixed and not row[3]):
+        fixed = calcsize(row[_FIELDS])
+        if length < fixed or (length > fixed and not row[_TAIL]):
             return self._refuse(number, codes.MALFORMED)
-        if not self.greeted and number != _HELLO:
+        if not self.greeted and number != self._hello_number:
             return self._refuse(number, codes.NO_SESSION)
-        if self.app.moving() and number not in _WHILE_MOVING:
+        if self.controller.moving() and number not in self._while_moving:
             return self._refuse(number, codes.BUSY)
-        self._link.reply[PAYLOAD] = number
-        self.app.refill()
-        size = self._store(row, length) if isinstance(row[0], str) else row[0](row, length)
-        self.app.refill()
-        self._link.answer(self._ok, 1 + (size or 0))
+        self._link.reply[PAYLOAD_AT] = number
+        self.controller.refill()
+        handler = row[_HANDLER]
+        size = self._store(handler, row, length) if isinstance(handler, str) else handler(row, length)
+        self.controller.refill()
+        self._link.answer(self._ok, _ANSWER_AT - PAYLOAD_AT + (size or 0))
 
-    def _store(self, row: tuple, length: int) -> "int | None":
+    def _store(self, name: str, row: tuple, length: int) -> "int | None":
         from armtempo_board.app import store_commands  # here, so that it can be forgotten
 
-        handler: "Callable[[Commands, Any, int], int | None]" = getattr(store_commands, row[0])
-        return handler(self, row, length)
+        return getattr(store_commands, name)(self, row, length)  # type: ignore[no-any-return]
 
-    def _refuse(self, number: int, code: int, joint: int = 255, value: int = 0) -> None:
-        pack_into(self._error_form, self._link.reply, PAYLOAD, number, code, joint, value)
-        self._link.answer(self._error, calcsize(self._error_form))
+    def _refuse(self, number: int, code: int, joint: int = NO_JOINT, value: int = 0) -> None:
+        pack_into(self._error_fields, self._link.reply, PAYLOAD_AT, number, code, joint, value)
+        self._link.answer(self._error, calcsize(self._error_fields))
 
     # for those who act on a command
 
     def fields(self, row: tuple) -> tuple:
         """The fields of the command that stands in the reader."""
-        return unpack_from(row[1], self._link.reader.data, PAYLOAD)
+        return unpack_from(row[_FIELDS], self._link.reader.data, PAYLOAD_AT)
 
     def tail(self, row: tuple, length: int) -> bytes:
         """What comes behind its fields."""
-        return bytes(self._link.reader.data[PAYLOAD + calcsize(row[1]) : PAYLOAD + length])
+        return bytes(self._link.reader.data[PAYLOAD_AT + calcsize(row[_FIELDS]) : PAYLOAD_AT + length])
 
     def text(self, row: tuple, length: int) -> str:
         """The same as text; refuses what is none."""
@@ -108,12 +118,12 @@ class Commands:
 
     def reply(self, row: tuple, *values: int) -> int:
         """Put the fields of the answer into the reply; their size."""
-        pack_into(row[2], self._link.reply, _ANSWER, *values)
-        return calcsize(row[2])
+        pack_into(row[_ANSWER], self._link.reply, _ANSWER_AT, *values)
+        return calcsize(row[_ANSWER])
 
     def reply_tail(self, size: int, tail: bytes) -> int:
         """Put the tail of the answer behind fields of ``size`` bytes; the size of all."""
-        self._link.reply[_ANSWER + size : _ANSWER + size + len(tail)] = tail
+        self._link.reply[_ANSWER_AT + size : _ANSWER_AT + size + len(tail)] = tail
         return size + len(tail)
 
     # session
@@ -124,86 +134,89 @@ class Commands:
             raise Refused(codes.PROTOCOL, value=PROTOCOL_VERSION)
         if not self.greeted or session != self._session:
             self._begin_session(session)
-        app = self.app
-        app.look_around()
+        controller = self.controller
+        controller.measure_free()
         size = self.reply(
             row,
             PROTOCOL_VERSION,
-            app.joints,
+            controller.joints,
             limits.MAX_ENCODERS,
-            app.state(),
+            controller.state(),
             limits.TICK_HZ,
             limits.MAX_STEP_RATE,
             limits.MAX_STEP_RATE_SUM,
-            app.free_flash,
-            app.free_heap,
-            app.arm_crc,
-            app.program_crc,
-            app.boot,
+            controller.free_flash,
+            controller.free_heap,
+            controller.arm_crc,
+            controller.program_crc,
+            controller.boot,
         )
-        return self.reply_tail(size, app.board_id)
+        return self.reply_tail(size, controller.board_id)
 
     def _begin_session(self, session: int) -> None:
         self.greeted = True
         self._session = session
         self._link.forget()
-        self.app.samples.skip()
-        self.app.forget_store()
+        self.controller.samples.skip()
+        self.controller.forget_store()
 
     def _status(self, row: tuple, length: int) -> int:
-        app = self.app
+        controller = self.controller
         reply = self._link.reply
-        samples = app.samples
+        samples = controller.samples
         pack_into(
-            row[2],
+            row[_ANSWER],
             reply,
-            _ANSWER,
-            app.state(),
-            app.fault(),
-            app.fault_joint(),
-            app.known(),
-            app.run_number,
+            _ANSWER_AT,
+            controller.state(),
+            controller.fault(),
+            controller.fault_joint(),
+            controller.known(),
+            controller.run_number,
             0,
             samples.next - samples.first,
             samples.lost,
             self._link.reader.bad,
         )
-        size = calcsize(row[2])
-        return size + app.stand(reply, _ANSWER + _TICKS, _ANSWER + size)
+        size = calcsize(row[_ANSWER])
+        return size + controller.put_snapshot(reply, self._ticks_at, _ANSWER_AT + size)
 
     def _leave(self, row: tuple, length: int) -> None:
-        self.app.leave()
+        self.leaving = True
 
     # motion
 
     def _home(self, row: tuple, length: int) -> None:
         (mask,) = self.fields(row)
-        joints = self.app.joints
-        self.app.check_ready()
-        if length - calcsize(row[1]) != 4 * joints or mask >> joints:
+        joints = self.controller.joints
+        self.controller.check_ready()
+        fixed = calcsize(row[_FIELDS])
+        if length - fixed != _BYTES_PER_POSITION * joints or mask >> joints:
             raise Refused(codes.MALFORMED)
-        self.app.home(mask, unpack_from("<%di" % joints, self._link.reader.data, PAYLOAD + calcsize(row[1])))
+        steps = unpack_from("<%di" % joints, self._link.reader.data, PAYLOAD_AT + fixed)
+        self.controller.home(mask, steps)
 
     def _start(self, row: tuple, length: int) -> int:
         flags, crc = self.fields(row)
         name = self.text(row, length)
-        self.app.begin(name, flags, crc)
-        return self.reply(row, self.app.run_number, self.app.duration)
+        self.controller.begin(name, flags, crc)
+        return self.reply(row, self.controller.run_number, self.controller.duration_ticks)
 
     def _stop(self, row: tuple, length: int) -> int:
-        if not self.app.moving():
+        if not self.controller.moving():
             raise Refused(codes.NOT_MOVING)
-        self.app.stop(self._link.reader.data[PAYLOAD])
+        self.controller.stop(self._link.reader.data[PAYLOAD_AT])
         return 0
 
     def _clear(self, row: tuple, length: int) -> None:
-        self.app.clear()
+        self.controller.clear()
 
     def _samples(self, row: tuple, length: int) -> int:
         data = self._link.reader.data
-        samples = self.app.samples
-        acknowledged = u32(data, PAYLOAD)
+        samples = self.controller.samples
+        acknowledged = u32(data, PAYLOAD_AT)
+        wanted_at = PAYLOAD_AT + _BYTES_OF_INDEX
         samples.acknowledge(acknowledged)
-        samples.again(acknowledged, data[PAYLOAD + 4] | data[PAYLOAD + 5] << 8)
-        pack_into(row[2], self._link.reply, _ANSWER, samples.first, samples.next - samples.first)
-        return calcsize(row[2])
+        samples.send_again(acknowledged, data[wanted_at] | data[wanted_at + 1] << 8)
+        pack_into(row[_ANSWER], self._link.reply, _ANSWER_AT, samples.first, samples.next - samples.first)
+        return calcsize(row[_ANSWER])

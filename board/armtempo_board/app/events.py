@@ -1,4 +1,4 @@
-"""What the board tells unasked: samples, then the end of the run or its fault; notices."""
+"""What the board sends unasked: samples, then the end of the run or its fault; notices."""
 
 from struct import calcsize, pack_into
 
@@ -7,47 +7,38 @@ from micropython import const
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from typing import Any
+    from armtempo_board.app.controller import Controller
+    from armtempo_board.link.serial_link import SerialLink
 
-    from armtempo_board.app.app import App
-
-_SAMPLE_HEAD = "<II"  # run and index; the rest of the fields stands in the slot
-_SAMPLE_HEAD_SIZE = const(8)
-_DONE_TICKS = const(4)  # index of the ticks in done
-_FAULT_TICKS = const(6)  # and in fault
+_BYTES_PER_JOINT = const(8)
 
 
 class Events:
-    """Pushes what is waiting as the link takes it."""
+    """Hands the link what is waiting, as the link has room."""
 
-    def __init__(self, app: "App", rows: "Callable[[str], list[Any]]") -> None:
-        """``rows`` of the message table."""
-        self._app = app
-        events = rows("E")
-        self._numbers = bytes([row[1] for row in events])  # sample, done, fault, notice
-        self._forms = (events[1][2], events[2][2])  # of done and fault
-        self._noted = 0  # the fault that was told last
+    def __init__(self, controller: "Controller", link: "SerialLink") -> None:
+        from armtempo_shared.table import offset, rows  # here, so that it can be forgotten
+
+        self._controller = controller
+        self._link = link
+        found = {name: (number, layout) for name, number, layout, _, _ in rows("E")}
+        self._sample, self._sample_layout = found["sample"]
+        self._slot_at = offset("E", "sample", "ticks")  # of what the sample buffer keeps
+        self._done = found["done"] + (offset("E", "done", "ticks"),)
+        self._fault = found["fault"] + (offset("E", "fault", "ticks"),)
+        self._notice_number, _ = found["notice"]
+        self._noted = 0  # the fault that was noted last
+        self._fault_waits = False
         self._notice = b""
-        self.clear()
-
-    def clear(self) -> None:
-        """A new run begins."""
-        self._done = False
-        self._fault = False
-
-    def note_done(self) -> None:
-        """The run has ended without a fault."""
-        self._done = True
 
     def note_fault(self, code: int) -> None:
-        """Called every turn with the pending fault (0: none); tells each once."""
+        """Called every turn with the pending fault (0: none); each is sent once."""
         if code != self._noted:
             self._noted = code
-            self._fault = code != 0
+            self._fault_waits = code != 0
 
     def note(self, text: str) -> None:
-        """Keep words for the host; the last ones, which say what is wrong, where more come than go."""
+        """Keep the end of a text for the host, as it says what is wrong; until that is sent, others are dropped."""
         if not self._notice:
             self._notice = text.encode()[-MAX_PAYLOAD:]
 
@@ -55,48 +46,52 @@ class Events:
         """Hand the link what is waiting and has room, one sample at most; whether there was one."""
         if self._push_sample():
             return True
-        if self._app.samples.waiting() < 0:
+        if self._controller.samples.waiting() < 0:
             self._push_end()
         self._push_notice()
         return False
 
     def _push_sample(self) -> bool:
-        samples = self._app.samples
+        samples = self._controller.samples
         index = samples.waiting()
-        if index < 0 or not self._app.link.room(_SAMPLE_HEAD_SIZE + samples.size):
+        size = self._slot_at + samples.size
+        link = self._link
+        if index < 0 or not link.room(size):
             return False
-        link = self._app.link
         at = link.payload()
-        pack_into(_SAMPLE_HEAD, link.out, at, self._app.run_number, index)
-        samples.take(index, link.out, at + _SAMPLE_HEAD_SIZE)
-        link.event(self._numbers[0], _SAMPLE_HEAD_SIZE + samples.size)
+        pack_into(self._sample_layout, link.out, at, self._controller.run_number, index, 0, 0)
+        samples.take(index, link.out, at + self._slot_at)
+        link.event(self._sample, size)
         return True
 
     def _push_end(self) -> None:
-        if self._done and self._room(0):
-            self._done = False
-            samples = self._app.samples
-            self._put(0, _DONE_TICKS, self._app.run_number, 0, samples.next, samples.lost)
-        if self._fault and self._room(1):
-            self._fault = False
-            app = self._app
-            self._put(1, _FAULT_TICKS, app.run_number, app.fault(), app.fault_joint(), 0)
+        controller = self._controller
+        if controller.done and self._room(self._done):
+            controller.done = False
+            samples = controller.samples
+            self._put(self._done, controller.run_number, 0, samples.next, samples.lost)
+        if self._fault_waits and self._room(self._fault):
+            self._fault_waits = False
+            self._put(self._fault, controller.run_number, controller.fault(), controller.fault_joint(), 0)
 
-    def _room(self, kind: int) -> int:
-        return self._app.link.room(calcsize(self._forms[kind]) + 8 * self._app.joints)
+    def _room(self, event: "tuple[int, str, int]") -> int:
+        _, layout, _ = event
+        return self._link.room(calcsize(layout) + _BYTES_PER_JOINT * self._controller.joints)
 
-    def _put(self, kind: int, ticks: int, *values: int) -> None:
-        link = self._app.link
+    def _put(self, event: "tuple[int, str, int]", *values: int) -> None:
+        """``values``: of the event's fields; the ticks, which are 0 there, and the joints are put in here."""
+        number, layout, ticks_at = event
+        link = self._link
         at = link.payload()
-        pack_into(self._forms[kind], link.out, at, *values)
-        size = calcsize(self._forms[kind])
-        size += self._app.stand(link.out, at + ticks, at + size)
-        link.event(self._numbers[1 + kind], size)
+        pack_into(layout, link.out, at, *values)
+        size = calcsize(layout)
+        size += self._controller.put_snapshot(link.out, at + ticks_at, at + size)
+        link.event(number, size)
 
     def _push_notice(self) -> None:
-        link = self._app.link
+        link = self._link
         if self._notice and link.room(len(self._notice)):
             at = link.payload()
             link.out[at : at + len(self._notice)] = self._notice
-            link.event(self._numbers[3], len(self._notice))
+            link.event(self._notice_number, len(self._notice))
             self._notice = b""

@@ -1,17 +1,10 @@
 """The four LEDs: green idle, blue moving, orange position unknown or not configured, red fault."""
 
-from armtempo_shared import messages
 from pyb import Pin
 
 _GREEN, _ORANGE, _RED, _BLUE = 0, 1, 2, 3
-_LED_OF_STATE = {
-    messages.UNCONFIGURED: _ORANGE,
-    messages.UNHOMED: _ORANGE,
-    messages.IDLE: _GREEN,
-    messages.MOVING: _BLUE,
-    messages.BRAKING: _BLUE,
-    messages.FAULT: _RED,
-}
+_LED_OF_STATE = bytes((_ORANGE, _ORANGE, _GREEN, _BLUE, _BLUE, _RED))
+"""By the state's number: unconfigured, unhomed, idle, moving, braking, fault (``messages.STATES``)."""
 
 
 class Leds:

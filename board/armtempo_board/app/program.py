@@ -9,6 +9,8 @@ import pyb
 from armtempo_shared import codes
 from micropython import const
 
+from armtempo_board.stepgen import step_generator  # isort: skip  # noqa: F401  nested imports cost stack: the deepest first
+
 import armtempo_board
 from armtempo_board import heap
 from armtempo_board.app.app import App
@@ -16,7 +18,6 @@ from armtempo_board.app.button import Button
 from armtempo_board.app.leds import Leds
 from armtempo_board.app.watchdog import Watchdog, bit
 from armtempo_board.errors import Refused
-from armtempo_board.stepgen import bezier, step_generator  # noqa: F401  the deepest first: nested imports cost stack
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 ROOT = "/flash/armtempo"
 _CTRL_C = const(3)
 _EXCEPTION_BUFFER = const(100)
-_SELDOM = const(7)  # while something moves, LEDs, watchdog and button in every eighth turn only
+_EIGHTH_TURN = const(7)  # while something moves, LEDs, watchdog and button come in every eighth turn only
 
 app: "Any" = None
 """The program's App, kept when it is left for the REPL."""
@@ -53,7 +54,7 @@ def main(root: str = ROOT) -> None:
 def _build(port: "pyb.USB_VCP", root: str) -> App:
     """The App; what only its making needs is forgotten again, for the sake of the heap."""
     built = App(port, root, _crc(), _fault_at_start())
-    built.forget_store()
+    built.controller.forget_store()
     heap.forget()
     return built
 
@@ -72,20 +73,22 @@ def run(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
             try:
                 if app.left():
                     break
-                _look_around(leds, button, watchdog)
+                _serve_panel(leds, button, watchdog)
             except Exception as error:
                 app.fail(error)
     finally:
-        app.halt()
+        app.controller.halt()
 
 
-def _look_around(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
-    if app.moving() and app.turns & _SELDOM:
+def _serve_panel(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
+    """LEDs, watchdog, button."""
+    controller = app.controller
+    if controller.moving() and app.turns & _EIGHTH_TURN:
         return
-    leds.show(app.state())
+    leds.show(controller.state())
     watchdog.feed()
-    pressed = button.pressed()  # a press while something moves is over and done with
-    if app.moving():
+    pressed = button.pressed()  # a press while something moves does nothing, then or later
+    if controller.moving():
         return
     if pressed:
         _replay_default()
@@ -98,7 +101,7 @@ def _fault_at_start() -> int:
 
 def _replay_default() -> None:
     try:
-        app.begin(app.store().default(), 0)
+        app.controller.begin(app.controller.store().default(), 0)
     except Refused as refused:
         app.events.note("button: refused, error %d" % refused.code)
 

@@ -1,30 +1,30 @@
 """Samples of the current or last run, kept in one fixed buffer until the host has them.
 
-A slot holds what the ``sample`` event carries behind run and index: ticks (8 bytes), flags (1), then
+A sample is kept as the ``sample`` event carries it behind run and index: ticks (8 bytes), flags (1), then
 commanded steps and encoder counts of each joint (4 and 4).
 """
 
 from micropython import const
 
-from armtempo_board.buffers import copy, places, spread
+from armtempo_board.buffers import copy, pack_offsets, sample_to_wire
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from array import array
 
-_FLAGS = const(8)  # index of the flags in a slot
-_HEAD = const(9)  # ticks, flags
+_BYTES_PER_JOINT = const(8)
 
 
-class Samples:
-    """First in, first out; the oldest gives way where the memory ends, and is counted in ``lost``."""
+class SampleBuffer:
+    """First in, first out; where the memory ends the oldest is dropped, and counted in ``lost``."""
 
-    def __init__(self, joints: int, memory: int) -> None:
-        """``memory``: bytes to keep samples in."""
-        self.size = _HEAD + 8 * joints
+    def __init__(self, joints: int, memory: int, flags_at: int) -> None:
+        """``memory``: bytes to keep samples in; ``flags_at``: bytes of a sample before its flags."""
+        self.flags_at = flags_at
+        self.size = flags_at + 1 + _BYTES_PER_JOINT * joints
         self._joints = joints
-        self._places = memory // self.size
-        self._buffer = bytearray(self._places * self.size)
+        self._capacity = memory // self.size
+        self._buffer = bytearray(self._capacity * self.size)
         self.clear()
 
     def clear(self) -> None:
@@ -38,13 +38,14 @@ class Samples:
 
     def add(self, raw: "array[int]", flags: int) -> None:
         """Keep one: ``raw`` as the engine fills it; ``flags`` of the sample event."""
-        if self.next - self.first == self._places:
+        if self.next - self.first == self._capacity:
             self.first += 1
             self.lost += 1
             self.sent = max(self.sent, self.first)
-        at = self.next % self._places * self.size
-        spread(self._buffer, raw, places(at, at + _HEAD), self._joints)
-        self._buffer[at + _FLAGS] = flags
+        at = self.next % self._capacity * self.size
+        flags_at = at + self.flags_at
+        sample_to_wire(self._buffer, raw, pack_offsets(at, flags_at + 1), self._joints)
+        self._buffer[flags_at] = flags
         self.next += 1
 
     def acknowledge(self, index: int) -> None:
@@ -56,7 +57,7 @@ class Samples:
         self.sent = self.next
         self._again = self._again_end = 0
 
-    def again(self, index: int, count: int) -> None:
+    def send_again(self, index: int, count: int) -> None:
         """Send up to ``count`` from ``index`` on again."""
         self._again = max(index, self.first)
         self._again_end = min(index + count, self.sent)
@@ -70,7 +71,7 @@ class Samples:
 
     def take(self, index: int, target: bytearray, at: int) -> None:
         """Copy the sample ``waiting`` named to target[at:]; it counts as sent."""
-        copy(target, self._buffer, places(at, index % self._places * self.size), self.size)
+        copy(target, self._buffer, pack_offsets(at, index % self._capacity * self.size), self.size)
         if index == self.sent:
             self.sent += 1
         else:

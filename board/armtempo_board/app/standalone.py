@@ -3,7 +3,7 @@
 import micropython
 import pyb
 from armtempo_shared import codes
-from micropython import const
+from armtempo_shared.messages import NO_JOINT
 
 from armtempo_board.app import program
 from armtempo_board.app.app import App
@@ -11,8 +11,11 @@ from armtempo_board.app.watchdog import Watchdog
 from armtempo_board.errors import Refused
 from armtempo_board.motion import endpoints
 
-_NO_JOINT = const(255)
-_CTRL_C = const(3)
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from armtempo_board.app.controller import Controller
+
+_CTRL_C = b"\x03"
 
 
 class _Nobody:
@@ -31,46 +34,46 @@ def replay(name: str = "", root: str = program.ROOT) -> None:
     Where the position is unknown the arm must stand where the motion begins: calling this declares it.
     Ctrl-C brakes, a second one freezes.
     """
-    app = program.app or App(_Nobody(), root)
-    program.app = app
+    app = program.app = program.app or App(_Nobody(), root)
+    controller = app.controller
     port, app.link.stream = app.link.stream, _Nobody()
     watchdog = Watchdog()
     micropython.kbd_intr(-1)  # KeyboardInterrupt could come in the midst of anything
     try:
-        _begin(app, name or app.store().default())
+        _begin(controller, name or controller.store().default())
         _follow(app, watchdog)
-        steps = [app.engine.commanded(joint) for joint in range(app.joints)]
-        print("fault: " + _name(app.fault()) if app.fault() else "done", "at steps", steps)
+        steps = [controller.engine.commanded(joint) for joint in range(controller.joints)]
+        print("fault: " + _name(controller.fault()) if controller.fault() else "done", "at steps", steps)
     except Refused as refused:
-        where = "" if refused.joint == _NO_JOINT else "joint %d" % (refused.joint + 1)
+        where = "" if refused.joint == NO_JOINT else "joint %d" % (refused.joint + 1)
         print("refused:", _name(refused.code), where, refused.value or "")
     finally:
-        app.halt()
-        micropython.kbd_intr(_CTRL_C)
+        controller.halt()
+        micropython.kbd_intr(ord(_CTRL_C))
         watchdog.leave()
         app.link.stream = port
 
 
-def _begin(app: "App", name: str) -> None:
-    if app.engine and not app.fault():
-        motion = app.load(name)
-        unknown = app.everyone() & ~app.known()
+def _begin(controller: "Controller", name: str) -> None:
+    if controller.engine and not controller.fault():
+        motion = controller.load(name)
+        unknown = controller.everyone() & ~controller.known()
         if unknown:
             print("taking the posture of the arm as the start of", name)
-            starts = [endpoints.start_offset(motion, joint, 0) for joint in range(app.joints)]
-            app.home(unknown, starts)
-    app.begin(name, 0)
+            starts = [endpoints.start_offset(motion, joint, 0) for joint in range(controller.joints)]
+            controller.home(unknown, starts)
+    controller.begin(name, 0)
 
 
 def _follow(app: "App", watchdog: "Watchdog") -> None:
     port = pyb.USB_VCP()
     byte = bytearray(1)
     presses = 0
-    while app.moving():
+    while app.controller.moving():
         app.turn()
         watchdog.feed()
-        if port.readinto(byte) and byte[0] == _CTRL_C and app.moving():
-            app.stop(presses)
+        if port.readinto(byte) and byte == _CTRL_C and app.controller.moving():
+            app.controller.stop(presses)
             presses = 1
     app.turn()
 

@@ -9,14 +9,13 @@ from array import array
 import micropython
 import stm
 from armtempo_shared import codes
+from armtempo_shared.messages import NO_JOINT
 from machine import disable_irq, enable_irq
-from micropython import const
 from pyb import ExtInt, Pin
 
 from armtempo_board.hardware import isr
 from armtempo_board.hardware.sampler import Sampler
 
-_NOBODY = const(255)
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -86,7 +85,7 @@ class Inputs:
     @micropython.viper
     def _on_estop(self, line: object) -> object:
         self._freeze()
-        isr.trip(self._block, codes.ESTOP, _NOBODY)
+        isr.trip(self._block, codes.ESTOP, NO_JOINT)
         if self.releases:
             self.enable_pin.value(1 - int(self._on))
 

@@ -51,7 +51,6 @@ class Ring:
         self._at = at
         self._mode = registers.stream_mode(dma_channel)
         self.timer = getattr(stm, "TIM%d" % timer)
-        self._compare = isr.CCR1 + compare - 1
         # addresses are large integers: made once, here
         self._registers = registers.stream_address(stream)
         self._ndtr = self._registers + 4 * isr.STREAM_NDTR
@@ -66,7 +65,7 @@ class Ring:
         block, at = self._block, self._at
         self.state[isr.NDTR_AT] = (self._ndtr - stm.DMA1) // 4
         block[at + isr.ON_TIM5] = timer == 5
-        block[at + isr.CCR_AT] = self._compare
+        block[at + isr.CCR_AT] = isr.CCR1 + compare - 1
         block[at + isr.CCMR_AT] = isr.CCMR1 + (compare - 1) // 2
         block[at + isr.MODE_SHIFT] = 12 if compare % 2 == 0 else 4
         block[at + isr.ON_PORT_B] = pin[0] == "B"
@@ -134,7 +133,7 @@ class Ring:
         """Keep the compare value of a dry output far from the counter."""
         if isr.until_k(self.timer, self.state, isr.FAR) < 1 << 20:
             self.mark_now()
-            isr.push_away(self.timer, self._compare, self.state)
+            isr.push_away(self.timer, self._block[self._at + isr.CCR_AT], self.state)
 
     def mark_now(self) -> None:
         """Count the last entry as being now: the output is dry, only turns of DIR are measured from it."""

@@ -1,32 +1,31 @@
-"""Finds frames in what the host sends, byte by byte in one fixed buffer, allocating nothing.
+"""Finds frames in what the host sends, in one fixed buffer; allocates nothing.
 
-The frame layout is that of ``armtempo_shared.wire``. Never reads beyond the end of the frame that it is
-in, and single bytes outside of frames, so that what follows stays with the port's own buffer.
+The frame layout is that of ``armtempo_shared.wire``. It never reads beyond the end of the frame that it is in, and
+outside of frames one byte at a time, so that what follows a frame stays in the port's own buffer.
 """
 
 import time
 
-from armtempo_shared.messages import MAX_PAYLOAD, OVERHEAD, SYNC
+from armtempo_shared.messages import LENGTH_AT, MAX_PAYLOAD, OVERHEAD, PAYLOAD_AT, SYNC
 from micropython import const
 
-from armtempo_board.buffers import CHECK, TABLE, copy, places, seal
+from armtempo_board.buffers import CHECK, CRC_TABLE, apply_crc, copy, pack_offsets
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-_HEAD = const(5)  # SYNC, length, sequence, message id
-_QUIET_MS = const(50)  # half a frame, then nothing for so long: its rest is not coming
-_TURNS = const(8)  # reads or rejected candidates in one poll: bounds its time
-_PIECE = const(64)
+_QUIET_MS = const(50)  # a frame that stays incomplete for so long is given up
+_ATTEMPTS = const(8)  # reads and rejected frames in one poll: bounds its time
+_PIECE = const(64)  # bytes read at once
 
 
 class FrameReader:
-    """``poll`` until it says True; then the frame stands in ``data``, its payload from ``PAYLOAD`` on."""
+    """``poll`` until it says True; then the frame stands in ``data``."""
 
     def __init__(self) -> None:
         self.data = bytearray(MAX_PAYLOAD + OVERHEAD)
-        self.bad = 0  # stretches of bytes passed over
+        self.bad = 0  # runs of bytes that were passed over
         self.outside = -1  # last byte that came outside of any frame; -1: none in this poll
         self._filled = 0
         self._whole = 0  # length of the whole frame that stands in data, 0: none
@@ -48,7 +47,7 @@ class FrameReader:
         if self._whole:
             self._drop(self._whole)
             self._whole = 0
-        for _ in range(_TURNS):
+        for _ in range(_ATTEMPTS):
             missing = self._missing()
             if missing == 0:
                 if self._accept():
@@ -59,21 +58,27 @@ class FrameReader:
 
     def _missing(self) -> int:
         """Bytes still needed to judge the frame that begins at data[0]."""
-        if self._filled < _HEAD:
-            return 1 if self._filled == 0 else _HEAD - self._filled
-        length = self.data[1] | self.data[2] << 8
+        if self._filled < PAYLOAD_AT:
+            return 1 if self._filled == 0 else PAYLOAD_AT - self._filled
+        length = self._announced()
         if length > MAX_PAYLOAD:
             return 0
         return max(0, length + OVERHEAD - self._filled)
 
+    def _announced(self) -> int:
+        """Payload bytes that the frame's head tells of."""
+        return self.data[LENGTH_AT] | self.data[LENGTH_AT + 1] << 8
+
     def _accept(self) -> bool:
-        length = self.data[1] | self.data[2] << 8
-        if length <= MAX_PAYLOAD and seal(TABLE, self.data, 1 | (length + _HEAD) << 15, CHECK):
-            self._whole = length + OVERHEAD
-            self._skipping = False
-            return True
-        self._reject()
-        return False
+        length = self._announced()
+        if length > MAX_PAYLOAD or not apply_crc(
+            CRC_TABLE, self.data, pack_offsets(LENGTH_AT, PAYLOAD_AT + length), CHECK
+        ):
+            self._reject()
+            return False
+        self._whole = length + OVERHEAD
+        self._skipping = False
+        return True
 
     def _read(self, stream: "Any", missing: int, now_ms: "Any") -> bool:
         """Take up to ``missing`` bytes; False where none are there."""
@@ -84,11 +89,12 @@ class FrameReader:
                 return True
             return False
         self._heard_ms = now_ms
-        if self._filled == 0 and self._piece[0] != SYNC:
-            self.outside = self._piece[0]
+        first = self._piece[0]
+        if self._filled == 0 and first != SYNC:
+            self.outside = first
             self._skip()
             return True
-        copy(self.data, self._piece, places(self._filled, 0), count)
+        copy(self.data, self._piece, pack_offsets(self._filled, 0), count)
         self._filled += count
         return True
 
@@ -107,11 +113,11 @@ class FrameReader:
 
     def _drop(self, count: int) -> None:
         self._filled -= count
-        copy(self.data, self.data, places(0, count), self._filled)
+        copy(self.data, self.data, pack_offsets(0, count), self._filled)
         at = 0
         while at < self._filled and self.data[at] != SYNC:
             at += 1
         if at:
             self._skip()
             self._filled -= at
-            copy(self.data, self.data, places(0, at), self._filled)
+            copy(self.data, self.data, pack_offsets(0, at), self._filled)

@@ -1,30 +1,31 @@
-"""The board's end of the serial link: frames in, replies and events out; never waits, never allocates.
+"""The board's end of the serial link: commands in, replies and events out. It never waits and never allocates.
 
-A host that stops reading only fills ``out``: replies then wait in ``reply``, events in the queues they
-come from, and the motion loop goes on.
+Where a host stops reading, ``out`` fills up. Then the reply waits in ``reply``, events wait where they come from,
+and the main loop goes on.
 """
 
 import time
 from struct import pack_into
 
-from armtempo_shared.messages import MAX_PAYLOAD, OVERHEAD, SYNC
+from armtempo_shared.messages import LENGTH_AT, MAX_PAYLOAD, OVERHEAD, PAYLOAD_AT, SEQUENCE_AT, SYNC
 from micropython import const
 
-from armtempo_board.buffers import TABLE, copy, places, same, seal
+from armtempo_board.buffers import APPEND, CRC_TABLE, apply_crc, copy, equal, pack_offsets
 from armtempo_board.link.frame_reader import FrameReader
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-PAYLOAD = const(5)  # index of the payload in a frame
 _OUT_SIZE = const(700)
+_SEQUENCE_AND_NUMBER = const(2)  # bytes
+_CRC = const(4)  # bytes
 _ESCAPE_QUIET_MS = const(50)
 _CTRL_C = const(3)
 _CONTROLS = b"\r\x03"
 
 
-class Link:
+class SerialLink:
     """``poll`` gives commands; ``answer`` and ``event`` queue frames; ``flush`` hands them to the port."""
 
     def __init__(self, stream: "Any") -> None:
@@ -33,13 +34,13 @@ class Link:
         self.reply = bytearray(MAX_PAYLOAD + OVERHEAD)
         self.out = bytearray(_OUT_SIZE)
         self.heard_ms: "Any" = 0  # when the last good frame came
-        self.escape = False  # somebody outside of any frame asks for the REPL
+        self.escape = False  # Ctrl-C outside of any frame: somebody asks for the REPL
         self._begin = 0
         self._end = 0
         self._reply_size = 0  # of the last reply; 0: none yet
         self._reply_waits = False
-        self._request = bytearray(6)  # sequence, message id and check of the command that it answers
-        self._events = 0
+        self._answered = bytearray(_SEQUENCE_AND_NUMBER + _CRC)  # of the command that it answers
+        self._events = 0  # sequence number of the next
         self._controls = 0  # CR and Ctrl-C since the last good frame; -1: other bytes among them
         self._interrupt = False  # whether one of them was Ctrl-C
         self._control_ms = 0
@@ -63,7 +64,8 @@ class Link:
         """Send the reply whose payload of ``size`` bytes stands in ``reply``."""
         self._reply_size = 0  # should this fail, the host's repeat is acted on
         self._remember()
-        self._reply_size = self._finish(self.reply, 0, self._request[0], number, size)
+        sequence = self.reader.data[SEQUENCE_AT]
+        self._reply_size = self._finish(self.reply, 0, sequence, number, size)
         self._reply_waits = True
 
     def room(self, size: int) -> bool:
@@ -73,7 +75,7 @@ class Link:
 
     def payload(self) -> int:
         """Index in ``out`` where the next event's payload is to be put."""
-        return self._end + PAYLOAD
+        return self._end + PAYLOAD_AT
 
     def event(self, number: int, size: int) -> None:
         """Send the event whose payload was put at ``payload()``; ask ``room()`` before."""
@@ -102,42 +104,44 @@ class Link:
 
     def _finish(self, buffer: bytearray, start: int, sequence: int, number: int, size: int) -> int:
         pack_into("<BHBB", buffer, start, SYNC, size, sequence, number)
-        seal(TABLE, buffer, start + 1 | (start + PAYLOAD + size) << 15, 0)
+        apply_crc(CRC_TABLE, buffer, pack_offsets(start + LENGTH_AT, start + PAYLOAD_AT + size), APPEND)
         return size + OVERHEAD
 
     def _fits(self, size: int) -> bool:
         if self._end + size > _OUT_SIZE and self._begin:
-            copy(self.out, self.out, places(0, self._begin), self._end - self._begin)
+            copy(self.out, self.out, pack_offsets(0, self._begin), self._end - self._begin)
             self._end -= self._begin
             self._begin = 0
         return self._end + size <= _OUT_SIZE
 
     def _queue_reply(self) -> None:
         if self._reply_waits and self._fits(self._reply_size):
-            copy(self.out, self.reply, places(self._end, 0), self._reply_size)
+            copy(self.out, self.reply, pack_offsets(self._end, 0), self._reply_size)
             self._end += self._reply_size
             self._reply_waits = False
 
     def _remember(self) -> None:
         data = self.reader.data
-        copy(self._request, data, places(0, 3), 2)
-        copy(self._request, data, places(2, PAYLOAD + self.reader.length()), 4)
+        crc_at = PAYLOAD_AT + self.reader.length()
+        copy(self._answered, data, pack_offsets(0, SEQUENCE_AT), _SEQUENCE_AND_NUMBER)
+        copy(self._answered, data, pack_offsets(_SEQUENCE_AND_NUMBER, crc_at), _CRC)
 
     def _repeated(self) -> bool:
         """Whether the frame is the one that was answered last: same number, same content."""
         if not self._reply_size:
             return False
         data = self.reader.data
-        check = PAYLOAD + self.reader.length()
+        crc_at = PAYLOAD_AT + self.reader.length()
         return bool(
-            same(self._request, data, places(0, 3), 2) and same(self._request, data, places(2, check), 4)
+            equal(self._answered, data, pack_offsets(0, SEQUENCE_AT), _SEQUENCE_AND_NUMBER)
+            and equal(self._answered, data, pack_offsets(_SEQUENCE_AND_NUMBER, crc_at), _CRC)
         )
 
     def _watch_escape(self, byte: int, now_ms: "Any") -> None:
-        """Tell a Ctrl-C (of mpremote, or typed twice) from noise: nothing but CR and Ctrl-C, after quiet.
+        """Tell a Ctrl-C (of mpremote, or typed twice) from noise: nothing but CR and Ctrl-C came, after quiet.
 
-        Three in a row are enough at once, also right behind a frame: mpremote's Ctrl-A follows, is sent once,
-        and is the prompt's.
+        Three in a row count at once, also right behind a frame. mpremote sends Ctrl-A after them, once, and the
+        prompt is to get it.
         """
         quiet = time.ticks_diff(now_ms, self._control_ms) >= _ESCAPE_QUIET_MS
         if byte < 0:
@@ -148,7 +152,7 @@ class Link:
             self._count_control(byte, quiet)
         if self._controls >= needed and self._interrupt:
             self.escape = True
-            self._controls = -1  # said once: asking while it moves is not kept for later
+            self._controls = -1  # told once; one that comes while something moves is not kept
 
     def _count_control(self, byte: int, quiet: bool) -> None:
         if byte not in _CONTROLS:

@@ -23,11 +23,13 @@ from array import array
 import stm
 from armtempo_shared import codes
 from armtempo_shared.limits import TICK_HZ
+from armtempo_shared.messages import NO_JOINT
 from armtempo_shared.motion import Motion
 from machine import mem32
 from micropython import const
 
 from armtempo_board import heap
+from armtempo_board.errors import Refused
 from armtempo_board.hardware import isr
 from armtempo_board.hardware.encoders import Encoder, NoEncoder
 from armtempo_board.hardware.inputs import Inputs
@@ -40,7 +42,6 @@ from armtempo_board.motion.ring_feeder import Feeder
 LEAD_TICKS = const(1680000)
 """Time from the start of the counters to time 0: 20 ms, in which drivers switch on and DIR settles."""
 
-NO_JOINT = const(255)
 _PREFILLS = const(32)
 _ROUNDS = const(8)  # while queues have room, this work comes before all other, so often
 _BRAKE_MARGIN_K = const(2048)  # 25 ms, in which all joints are told
@@ -69,7 +70,7 @@ class Engine:
         self._readings = Readings(self._sampler, self._joints, self._encoders, slots)
         self._following = [Following(row) for row in joints]
         self._inputs = Inputs(head, joints, self._sampler)
-        Feeder(self._inputs, self._joints)  # its timer keeps it
+        Feeder(self._inputs, self._joints, self._block)  # its timer keeps it
         registers.apply(registers.PRIORITIES)
         self.limits = [{name: row[name] for name in _LIMITS} for row in joints]
         self._pulse_us = head["pulse_ticks"] // (TICK_HZ // 1000000) + _PULSE_SPARE_US
@@ -97,11 +98,9 @@ class Engine:
                 self._encoders[number].declare(self._following[number].expected(steps[number]))
         self.known |= mask
 
-    def load(self, motion: Motion) -> "tuple[int, int, int] | None":
-        """Check a motion and fill the rings; None, or (code, joint, value) where it is refused."""
-        refused = self._refusal(motion)
-        if refused:
-            return refused
+    def load(self, motion: Motion) -> None:
+        """Check a motion and fill the rings; Refused where something is wrong."""
+        self._check(motion)
         self._inputs.enable(True)
         self._set_clock(-LEAD_TICKS)
         self._end_ticks = self.duration_ticks
@@ -114,34 +113,30 @@ class Engine:
             self._inputs.watch(number, 1)
             self._prefill(joint)
         self.finished = False
-        return None
 
-    def _refusal(self, motion: Motion) -> "tuple[int, int, int] | None":
+    def _check(self, motion: Motion) -> None:
         if self.moving:
-            return codes.BUSY, NO_JOINT, 0
+            raise Refused(codes.BUSY)
         self._look()
         if self.fault:
-            return codes.FAULT_PENDING, self.fault_joint, self.fault
-        refused = self._judge(motion)
-        if refused:
-            return refused
+            raise Refused(codes.FAULT_PENDING, self.fault_joint, self.fault)
+        self._check_splines(motion)
         heap.forget()
         from armtempo_board.motion import endpoints  # here, so that it can be forgotten
 
         self.duration_ticks = endpoints.duration_ticks(motion)
         for number, joint in enumerate(self._joints):
             if not self.known >> number & 1:
-                return codes.UNHOMED, number, 0
+                raise Refused(codes.UNHOMED, number)
             off = endpoints.start_offset(motion, number, joint.position(joint.ring.matches()))
             if off:
-                return codes.WRONG_START, number, off
-        return None
+                raise Refused(codes.WRONG_START, number, off)
 
-    def _judge(self, motion: Motion) -> "tuple[int, int, int] | None":
+    def _check_splines(self, motion: Motion) -> None:
         from armtempo_board.motion.motion_check import check  # here, so that it can be forgotten
 
         joint = self._joints[0]
-        return check(motion, self.limits, joint.gap_ticks, joint.walker.subintervals)
+        check(motion, self.limits, joint.gap_ticks, joint.walker.subintervals)
 
     def _prefill(self, joint: Joint) -> None:
         now_k = self._clock()

@@ -34,23 +34,22 @@ class Joint:
         from armtempo_board.hardware import pins  # here, so that it can be forgotten
 
         self._sampler = sampler
-        self.block = sampler.block
+        block = sampler.block
         self._at = sampler.joint_at(number)
-        self.ring = Ring(row["channel"], self.block, self._at, size(row["max_rate"]))
+        self.ring = Ring(row["channel"], block, self._at, size(row["max_rate"]))
         self.walker = Walker()
         self._inverted = row["dir_inverted"]
-        self._pulse = head["pulse_ticks"]
         self._turn_delay = head["dir_hold_ticks"] + _TURN_SLACK
         self.gap_ticks = max(
-            self._pulse + self._turn_delay + _TURN_SLACK + head["dir_setup_ticks"],
-            self._pulse + head["low_ticks"],
+            head["pulse_ticks"] + self._turn_delay + _TURN_SLACK + head["dir_setup_ticks"],
+            head["pulse_ticks"] + head["low_ticks"],
         )
         name = pins.STEP[row["channel"]][6]
         self._dir = Pin(name, Pin.OUT_PP, value=0)
-        self.block[self._at + isr.DIR_BIT] = 1 << int(name[1:])
-        self.block[isr.PULSE] = self._pulse
-        self.block[isr.SLACK] = _TURN_SLACK
-        self.block[isr.SETUP] = head["dir_setup_ticks"]
+        block[self._at + isr.DIR_BIT] = 1 << int(name[1:])
+        block[isr.PULSE] = head["pulse_ticks"]
+        block[isr.SLACK] = _TURN_SLACK
+        block[isr.SETUP] = head["dir_setup_ticks"]
         self._turn_steps = array("i", [0] * _TURNS)
         self._direction = 1
         self._reset(0)
@@ -67,7 +66,7 @@ class Joint:
     def load(self, motion: Motion, number: int) -> None:
         """Stand before a motion; the clock stands before 0."""
         position = self._base
-        self.walker.load(motion, number, position, self._pulse, self.gap_ticks)
+        self.walker.load(motion, number, position, self._sampler.block[isr.PULSE], self.gap_ticks)
         self._direction = self.walker.direction
         self._dir.value((self._direction > 0) ^ self._inverted)
         self.ring.release()  # a motion may have been loaded and never started
@@ -114,7 +113,7 @@ class Joint:
         """Queue the turn of DIR that the walker stands at; False while the queue is full."""
         if self._turns_in - self._turns_out >= _TURNS:
             return False
-        if not isr.add_turn(self.block, self.ring.state, self._at, self._turn_delay):
+        if not isr.add_turn(self._sampler.block, self.ring.state, self._at, self._turn_delay):
             return False
         self._turn_steps[self._turns_in & (_TURNS - 1)] = self.ring.made() >> 1
         self._turns_in += 1

@@ -10,6 +10,7 @@ from armtempo_shared import codes
 from armtempo_shared.limits import MAX_STEP_RATE, TICK_FRACTION_BITS, TICK_HZ
 from micropython import const
 
+from armtempo_board.errors import Refused
 from armtempo_board.motion import rate_check
 from armtempo_board.stepgen import bezier, subdivision
 from armtempo_board.stepgen.subintervals import Subintervals
@@ -36,8 +37,8 @@ def check(
     joints: "list[dict[str, int]]",
     gap_ticks: int = GAP_TICKS,
     parts: "Subintervals | None" = None,
-) -> "tuple[int, int, int] | None":
-    """None, or (code, joint, value) of the first thing wrong.
+) -> None:
+    """Refused where something is wrong, with the joint and a value.
 
     ``joints``: the joints' rows of the arm record; ``gap_ticks``: see ``Walker.load``. ``parts``: lent for
     the walk through the motion, for the sake of the heap.
@@ -47,9 +48,7 @@ def check(
     """
     parts = parts or Subintervals()
     for joint in range(motion.joints):
-        wrong = _numbers(motion, joint)
-        if wrong:
-            return wrong[0], joint, wrong[1]
+        _check_numbers(motion, joint)
         parts.load(motion, joint)
         judge = Judge(parts, joints[joint], gap_ticks)
         while found := parts.measure():
@@ -57,13 +56,13 @@ def check(
             if code == _SPLIT:
                 parts.split()
             elif code:
-                return code, joint, judge.value
+                raise Refused(code, joint, judge.value)
             else:
                 parts.skip()
-    return rate_check.check_sum(motion, joints, parts)
+    rate_check.check_sum(motion, joints, parts)
 
 
-def _numbers(motion: "Motion", joint: int) -> "tuple[int, int] | None":
+def _check_numbers(motion: "Motion", joint: int) -> None:
     """Increasing time control points, and all numbers within what the evaluator can hold."""
     count = motion.degree + 1
     for offset, segments, is_time in (
@@ -75,14 +74,13 @@ def _numbers(motion: "Motion", joint: int) -> "tuple[int, int] | None":
             if is_time:
                 for i in range(count - 1):
                     if control[i] >= control[i + 1]:
-                        return codes.TIME_ORDER, segment + i + 1
+                        raise Refused(codes.TIME_ORDER, joint, segment + i + 1)
             span = max(control) - min(control)
             most = max(max(control), -min(control))
             if span >> bezier.LOW_BITS + 24 or most >> bezier.LOW_BITS + 27:
-                return codes.TOO_LONG, most
+                raise Refused(codes.TOO_LONG, joint, most)
             if is_time and most >> TICK_FRACTION_BITS >= LONGEST_TICKS:
-                return codes.TOO_LONG, most >> TICK_FRACTION_BITS
-    return None
+                raise Refused(codes.TOO_LONG, joint, most >> TICK_FRACTION_BITS)
 
 
 class Judge:

@@ -7,6 +7,7 @@ from armtempo_shared import codes
 from armtempo_shared.limits import MAX_STEP_RATE_SUM, TICK_HZ
 from micropython import const
 
+from armtempo_board.errors import Refused
 from armtempo_board.stepgen import bezier, subdivision
 
 TYPE_CHECKING = False
@@ -86,20 +87,19 @@ def _rate(parts: "Subintervals", steps: int, ticks: int) -> int:
     return min((steps * TICK_HZ << up) // (ticks << parts.angle_local[subdivision.SCALE]), TICK_HZ)
 
 
-def check_sum(
-    motion: "Motion", joints: "list[dict[str, int]]", parts: "Subintervals"
-) -> "tuple[int, int, int] | None":
-    """None, or (too_fast, 255, rate) where all joints together may step too fast in one of many time spans."""
+def check_sum(motion: "Motion", joints: "list[dict[str, int]]", parts: "Subintervals") -> None:
+    """Refused (too_fast, no joint, rate) where all joints together may step too fast in one of many time spans."""
     limit = MAX_STEP_RATE_SUM + MAX_STEP_RATE_SUM // 100
     if sum([row["max_rate"] for row in joints]) <= limit:
-        return None
+        return
     longest = max([_end_high(motion, joint) for joint in range(motion.joints)])
     width = longest // _BINS + 1
     sums = array("I", bytes(4 * (_BINS + 1)))
     for joint in range(motion.joints):
         _add(parts, motion, joint, width, sums)
     worst = max(sums)
-    return (codes.TOO_FAST, 255, worst) if worst > limit else None
+    if worst > limit:
+        raise Refused(codes.TOO_FAST, value=worst)
 
 
 def _end_high(motion: "Motion", joint: int) -> int:

@@ -1,4 +1,7 @@
-"""From raw samples to samples: ticks, commanded steps and encoder counts, kept until they are fetched."""
+"""From raw samples to samples, kept until they are fetched.
+
+The words of a sample are named in ``buffers.py``.
+"""
 
 from array import array
 

@@ -19,12 +19,17 @@ from armtempo_board.stepgen.step_queue import emit
 _PERIOD = const(42000)
 
 
-class Feeder:
-    """``inputs`` freezes all where a ring was written too late."""
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from array import array
 
-    def __init__(self, inputs: Inputs, joints: "list[Joint]") -> None:
+
+class Feeder:
+    """``inputs`` freezes all where a ring was written too late; ``block``: the memory that the interrupts share."""
+
+    def __init__(self, inputs: Inputs, joints: "list[Joint]", block: "array[int]") -> None:
         self._inputs = inputs
-        self._block = joints[0].block
+        self._block = block
         self._words = [joint.ring.words for joint in joints]
         self._masks = [joint.ring.entries - 1 for joint in joints]
         self._states = [joint.ring.state for joint in joints]

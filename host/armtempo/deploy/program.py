@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import subprocess
 import tempfile
+from collections.abc import Iterable
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -130,10 +131,17 @@ def _handlers() -> set[str]:
 
 
 def _hardware_names() -> set[str]:
-    """What methods of the hardware are called; the simulated hardware has them all."""
-    files = (Path(simulator.__file__).parent / "hardware").rglob("*.py")
-    nodes = [node for file in files for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))]
-    return {node.name for node in nodes if isinstance(node, ast.FunctionDef)}
+    """What methods of the hardware are called: the stand-ins for its modules have them all, and what they import."""
+    folder = Path(simulator.__file__).parent / "hardware"
+    files = list(folder.glob("*.py"))
+    imports = [node for node in _nodes(files) if isinstance(node, ast.ImportFrom)]
+    files += [file for node in imports if (file := folder / f"{str(node.module).replace('.', '/')}.py").exists()]
+    names = {node.name for node in _nodes(files) if isinstance(node, ast.FunctionDef)}
+    return {name for name in names if not name.startswith("_")}
+
+
+def _nodes(files: Iterable[Path]) -> list[ast.AST]:
+    return [node for file in files for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))]
 
 
 def _named(node: ast.AST) -> list[str]:

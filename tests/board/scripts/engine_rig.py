@@ -4,6 +4,7 @@ import sys
 from array import array
 
 from arm_rows import HEAD, arm, row  # noqa: F401
+from armtempo_board.errors import Refused
 from armtempo_board.stepgen import bezier, step_generator, step_queue
 from virtual_board import machine_state, standalone
 from virtual_board.arm import motors
@@ -201,7 +202,8 @@ class Evaluator:
     @staticmethod
     def check(motion, joints, gap_ticks, parts):
         """The refusal that a test has set."""
-        return Evaluator.refusal
+        if Evaluator.refusal:
+            raise Refused(*Evaluator.refusal)
 
     @staticmethod
     def duration_ticks(motion):
@@ -268,9 +270,16 @@ class Rig:
         self.samples = []
         for pulses, steps in zip(self.pulses, motion.joints):
             pulses.expect(steps)
-        refused = self.engine.load(motion)
-        assert refused is None, refused
+        self.engine.load(motion)
         self.engine.start(homing)
+
+    def refusal(self, motion):
+        """(code, joint, value) where it cannot be loaded, else None."""
+        try:
+            self.engine.load(motion)
+        except Refused as refused:
+            return refused.code, refused.joint, refused.value
+        return None
 
     def trusting(self):
         """The steps of this motion are not planned here: do not watch them."""

@@ -27,9 +27,9 @@ IDS = [row[1] for row in rows("C")]
 
 
 def speed_up():
-    """On CPython: the same as the viper functions in ``octets``, by its own fast means."""
+    """On CPython: the same as the viper functions in ``buffers``, by its own fast means."""
 
-    def seal(table, data, places, there):
+    def apply_crc(table, data, places, there):
         start, end = places & 0x7FFF, places >> 15
         crc = crc32(memoryview(data)[start:end])
         if not there:
@@ -40,7 +40,8 @@ def speed_up():
         to, at = places & 0x7FFF, places >> 15
         target[to : to + count] = source[at : at + count]
 
-    frame_reader.seal, frame_reader.copy, serial_link.seal, serial_link.copy = seal, copy, seal, copy
+    frame_reader.apply_crc = serial_link.apply_crc = apply_crc
+    frame_reader.copy = serial_link.copy = copy
 
 
 class Stream:
@@ -160,7 +161,7 @@ while given < FRAMES:
             idle += 1
             stand_in.Clock.now_ms += 1
         app.link.flush()
-    assert app.engine.calls.count("start") == 0, "a motion started"
-    assert app.fault() == 0
+    assert app.controller.engine.calls.count("start") == 0, "a motion started"
+    assert app.controller.fault() == 0
 print(given, acted, app.link.reader.bad)
 print(len([n for n in IDS if reached.get(n)]) == len(IDS))

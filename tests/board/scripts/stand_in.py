@@ -83,7 +83,10 @@ class Engine:
 
     def load(self, motion):
         self.calls.append("load")
-        return self.refusal
+        if self.refusal:
+            from armtempo_board.errors import Refused
+
+            raise Refused(*self.refusal)
 
     def start(self, homing=False):
         self.calls.append("start")

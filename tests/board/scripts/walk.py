@@ -10,6 +10,7 @@ import sys
 from array import array
 
 import micropython
+from armtempo_board.errors import Refused
 from armtempo_board.motion import motion_check as checking
 from armtempo_board.motion import rate_check
 from armtempo_board.stepgen.step_generator import Walker
@@ -63,7 +64,11 @@ def main(pulse, gap, room, start, length, *records):
     for record in records:
         with open(record, "rb") as file:
             motion = Motion(file.read())
-        wrong = checking.check(motion, [FREE] * motion.joints, int(gap))
+        wrong = None
+        try:
+            checking.check(motion, [FREE] * motion.joints, int(gap))
+        except Refused as refused:
+            wrong = (refused.code, refused.joint, refused.value)
         print(wrong)
         with open(record + ".steps", "wb") as out:
             for joint in range(0 if wrong else motion.joints):

@@ -174,7 +174,7 @@ def case_ctrl_c_stops_a_replay_wherever_it_comes(world):
     yield from typed(world, "program = armtempo_board.load_program()")
     for number in range(12):
         declared = world.steps()
-        yield from typed(world, "program.app.home(7, %s)" % HOME)
+        yield from typed(world, "program.app.controller.home(7, %s)" % HOME)
         world.type(b"armtempo_board.replay('go')\r")
         yield from world.until(lambda: machine_state.board.timers[2].running)
         yield from world.wait(numbers.randrange(0, 2300))
