@@ -12,9 +12,11 @@ _OFFSET_BITS = const(15)
 _OFFSET_MASK = const((1 << 15) - 1)
 _CRC_INIT = const(16)  # index in the table: what a crc begins with, and is inverted with
 _CRC_BYTES = const(4)
+_NIBBLE = const(15)
 _RESIDUE = const(0x2144DF1C)  # the crc32 of anything with its crc32 behind it
 _BYTES_OF_TICKS = const(8)
 _BYTES_OF_STEPS = const(4)
+_BYTES_OF_U32 = const(4)
 TICKS_LOW = const(0)
 TICKS_HIGH = const(1)
 COMMANDED = const(2)
@@ -57,8 +59,8 @@ def apply_crc(table: ptr32, data: ptr8, offsets: int, present: int) -> int:
     crc = uint(table[_CRC_INIT])
     while at < end:
         crc ^= data[at]
-        crc = uint((crc >> 4) ^ table[crc & 15])
-        crc = uint((crc >> 4) ^ table[crc & 15])
+        crc = uint((crc >> 4) ^ table[crc & _NIBBLE])
+        crc = uint((crc >> 4) ^ table[crc & _NIBBLE])
         at += 1
     crc ^= uint(table[_CRC_INIT])
     good = 1 if int(crc) == _RESIDUE else 0
@@ -120,4 +122,9 @@ def sample_to_wire(target: ptr8, sample: ptr8, offsets: int, joints: int) -> obj
 
 def u32(data: "bytes | bytearray", at: int) -> int:
     """The unsigned word at data[at:at+4]; allocates only where it is 2**30 or more."""
-    return data[at] | data[at + 1] << 8 | data[at + 2] << 16 | data[at + 3] << 24
+    value = 0
+    at += _BYTES_OF_U32
+    for _ in range(_BYTES_OF_U32):
+        at -= 1
+        value = value << 8 | data[at]
+    return value

@@ -12,6 +12,16 @@ STEP_FRACTION_BITS = 28
 SAMPLE_TICKS = TICK_HZ // 10
 """Ticks between two samples: 0.1 s exactly."""
 
+LONGEST_TICKS = 1 << 38
+"""A time control point is below it, a little under an hour: units of 1024 ticks stay small integers of the board."""
+LONGEST_SPAN_TICKS = 1 << 36
+"""The time control points of a segment differ by less."""
+
+MOST_STEPS = 1 << 27
+"""An angle control point is below it."""
+MOST_SPAN_STEPS = 1 << 24
+"""The angle control points of a segment differ by less."""
+
 MAX_JOINTS = 6
 MAX_ENCODERS = 4
 MAX_SEGMENTS = 512

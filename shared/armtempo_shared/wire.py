@@ -9,7 +9,7 @@ nothing in it is acted on. The host sends commands; the board answers each with 
 carrying the command's sequence number. A repeated frame is answered again from memory but not acted on
 again. Events come from the board unasked, under their own sequence numbers.
 
-The board has its own frame finder, which allocates nothing (``armtempo_board/frames.py``); a test feeds
+The board has its own frame finder, which allocates nothing (``armtempo_board/link/frame_reader.py``); a test feeds
 both the same bytes.
 """
 

@@ -49,7 +49,7 @@ LINE = 800
 instructions of a run less those of the compiled functions, per line): 770 in the cruise, 770 in the shipped motion."""
 
 NATIVE_LINE = 12
-"""Instructions of a line of ``traverse``, which is compiled, but calls other functions, so it runs on CPython here: its
+"""Instructions of a line of ``queue_steps``. It is compiled, but calls other functions, so it runs on CPython here: its
 machine code over its lines. A call in it takes CALL more."""
 
 CALL = 250
@@ -60,7 +60,7 @@ ALL = (*COMPILED, subintervals, interval_steps, step_generator)
 
 
 class Count:
-    """Runs walkers with their compiled functions on the emulated core, and counts."""
+    """Runs generators with their compiled functions on the emulated core, and counts."""
 
     def __init__(self) -> None:
         self.machine = Machine(*(Path(str(module.__file__)) for module in COMPILED))
@@ -80,7 +80,7 @@ class Count:
         def call(*arguments: Any) -> Any:
             if not self.on:
                 return original(*arguments)
-            if sys._getframe(1).f_code.co_name == "traverse":
+            if sys._getframe(1).f_code.co_name == "queue_steps":
                 self.native += CALL
             if not self.verify:
                 return self.machine.run(name, *arguments)
@@ -95,7 +95,7 @@ class Count:
     def walk(self, record: bytes, joint: int, skip: int, steps: int, batch: int = 512) -> dict[str, float]:
         """Instructions per step of ``steps`` steps behind the first ``skip``, in batches of entries."""
         motion = Motion(record)
-        subject = step_generator.Walker()
+        subject = step_generator.StepGenerator()
         ring = array("I", bytes(4096))
         subject.load(motion, joint, oracle.start_steps(motion, joint), 168, 20_000)
         head = self._fill(subject, ring, 0, skip, batch)
@@ -121,7 +121,7 @@ class Count:
         }
 
     def _fill(
-        self, subject: step_generator.Walker, ring: array[int], head: int, steps: int, batch: int
+        self, subject: step_generator.StepGenerator, ring: array[int], head: int, steps: int, batch: int
     ) -> int:
         end = head + 2 * steps
         self.longest = 0.0
@@ -142,7 +142,7 @@ class Count:
         if "armtempo_board" not in code.co_filename or code.co_name in ("write", "waits"):
             return None
         if event == "line":
-            if code.co_name == "traverse":
+            if code.co_name == "queue_steps":
                 self.native += NATIVE_LINE
             else:
                 self.lines[code.co_name] += 1
@@ -152,11 +152,11 @@ class Count:
         """Instructions of the loop that writes a step's two entries, groups of 16 steps."""
         counts = []
         for steps in (128, 384):
-            state = array("i", bytes(4 * step_queue.STATE_SIZE))
+            state = array("i", bytes(4 * step_queue.QUEUE_SIZE))
             settings = {
                 step_queue.FIRST: 252 << 22, step_queue.SECOND: 1 << 29, step_queue.THIRD: 1 << 29, step_queue.POWER: 9,
                 step_queue.SHIFT: 13, step_queue.GROUP: 16, step_queue.CARRY: 5, step_queue.STEPS: steps,
-                step_queue.UNTIL_1024: 1 << 28, step_queue.PULSE: 168,
+                step_queue.UNTIL_KITICKS: 1 << 28, step_queue.PULSE: 168,
             }  # fmt: skip
             for place, value in settings.items():
                 state[place] = value
@@ -172,7 +172,7 @@ def measure() -> dict[str, dict[str, float]]:
     cruise = motions.steady(333_000)
     figures = {"kernel": {"compiled": count.kernel()}}
     figures["cruise"] = count.walk(cruise, 0, 3_000, 33_400)
-    figures["cruise"]["stretches"] = 2 * count.machine.calls["differences"]
+    figures["cruise"]["stretches"] = 2 * count.machine.calls["put_cubics"]
     figures["ramp"] = count.walk(motions.cruise(333_000), 0, 10_000, 10_000)
     for joint in range(3):
         figures[f"shipped joint {joint + 1}"] = count.walk(motions.feeding(), joint, 0, 20_000, 128)

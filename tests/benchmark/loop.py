@@ -127,7 +127,9 @@ class Board:
             name: places[name]
             for name in ("allocated", "at_compare", "at_feed", "feed_ticks", "looks_per_ms")
         }
-        self._settings |= {name.split(".")[1]: _short(name) for name in ("isr.matches", "newton.enter")}
+        self._settings |= {
+            name.split(".")[1]: _short(name) for name in ("isr.matches", "newton.set_interval")
+        }
 
     def run(self, case: Case, cycles: float) -> Run:
         """Run a motion; a fault may end it."""

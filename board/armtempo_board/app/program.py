@@ -118,4 +118,4 @@ def _attach(port: "Any") -> None:
 
 
 def _folders() -> "list[str]":
-    return [path.rsplit("/", 1)[0] for path in (armtempo_board.__file__, armtempo_shared.__file__)]
+    return [path[: path.rindex("/")] for path in (armtempo_board.__file__, armtempo_shared.__file__)]

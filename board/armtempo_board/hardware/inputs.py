@@ -1,7 +1,7 @@
 """E-stop and limit switches: hard interrupts that freeze the outputs; and the ENABLE output.
 
-From the edge to frozen outputs it takes at most 20 us (see docs/hardware.md). The pull resistors draw towards
-the tripped level, so a switch that opens when it trips also trips when its wire breaks.
+How long it takes from the edge to frozen outputs: docs/hardware.md. The pull resistors draw towards the tripped level,
+so a switch that opens when it trips also trips when its wire breaks.
 """
 
 from array import array
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 
 class Inputs:
-    """``sampler`` lends its block; ``head`` and ``joints`` are the arm record's."""
+    """``head`` and ``joints``: the arm record's; ``sampler`` has the memory that the interrupts share."""
 
     def __init__(self, head: "dict[str, int]", joints: "list[dict[str, int]]", sampler: Sampler) -> None:
-        from armtempo_shared import armrecord  # here, so that they can be forgotten
+        from armtempo_shared import armrecord  # here, so that it can be forgotten
 
         from armtempo_board.hardware import pins
 
@@ -63,16 +63,16 @@ class Inputs:
                 if switch == none:
                     continue
                 fitted[switch] = joint["limit_active_high"]
-                self._add_pair(number, joint, int(pins.LIMIT[switch][1:]), positive)
+                self._add_pair(number, joint, pins.line(pins.LIMIT[switch]), positive)
         for switch, level in fitted.items():
             pin = self._hook(pins.LIMIT[switch], level, self._on_limit)  # type: ignore[arg-type]
-            self._limits.append((pin, level, int(pins.LIMIT[switch][1:])))
+            self._limits.append((pin, level, pins.line(pins.LIMIT[switch])))
 
     def _add_pair(self, number: int, joint: "dict[str, int]", line: int, positive: int) -> None:
         from armtempo_board.hardware import pins  # here, so that it can be forgotten
 
         at = isr.PAIR_WORDS * self._count
-        direction = int(pins.STEP[joint["channel"]][6][1:])
+        direction = pins.line(pins.DIR[joint["channel"]])
         for word, value in enumerate((line, direction, positive ^ joint["dir_inverted"], number, 0)):
             self._pairs[at + word] = value
         self._count += 1
@@ -85,16 +85,16 @@ class Inputs:
     @micropython.viper
     def _on_estop(self, line: object) -> object:
         self._freeze()
-        isr.trip(self._block, codes.ESTOP, NO_JOINT)
+        isr.set_fault(self._block, codes.ESTOP, NO_JOINT)
         if self.releases:
             self.enable_pin.value(1 - int(self._on))
 
     @micropython.viper
     def _on_limit(self, line: object) -> object:
-        joint = int(isr.towards(self._pairs, self._count, line, isr.directions(self._port)))
+        joint = int(isr.joint_towards(self._pairs, self._count, line, isr.output_levels(self._port)))
         if joint:
             self._freeze()
-            isr.trip(self._block, codes.LIMIT_SWITCH, joint - 1)
+            isr.set_fault(self._block, codes.LIMIT_SWITCH, joint - 1)
 
     def trip_estop(self) -> None:
         """As the E-stop's interrupt does."""
@@ -116,8 +116,8 @@ class Inputs:
     def watch(self, joint: int, moves: int) -> None:
         """Whether the joint moves: a switch stops it only then."""
         for pair in range(self._count):
-            if self._pairs[isr.PAIR_WORDS * pair + 3] == joint:
-                self._pairs[isr.PAIR_WORDS * pair + 4] = moves
+            if self._pairs[isr.PAIR_WORDS * pair + isr.PAIR_JOINT] == joint:
+                self._pairs[isr.PAIR_WORDS * pair + isr.PAIR_MOVES] = moves
 
     def estop_active(self) -> bool:
         """Whether the E-stop is tripped at this moment."""

@@ -1,9 +1,11 @@
-"""Viper code that reaches registers: rings, the compare interrupt, the freeze. Allocates nothing.
+"""Compiled code that reaches registers: rings, the compare interrupt, the freeze. Allocates nothing.
 
-The offsets here are the only home of the register layout (word offsets; RM0090). ``block`` is the
-memory shared by the main loop and the interrupts; its layout follows the offsets. Costs are instructions of
-the Cortex-M4 (see docs/hardware.md); the same code runs on 64-bit interpreters, where words do not wrap and
-loads are not sign-extended, so every difference of two times is cut to size before it is judged.
+One file, as the compiler puts constants in only within a file. The offsets here are the only home of the register
+layout (in words; RM0090). ``block`` is the memory that the main loop and the interrupts share; its layout follows the
+offsets. Costs are instructions of the Cortex-M4 (docs/hardware.md). The same code runs on 64-bit interpreters, where
+words do not wrap and loads are not sign-extended; so every difference of two times is cut to size before it is judged.
+
+Ki ticks are 1024 ticks (12.2 us): the counter in them has 22 bits, which are a small integer.
 """
 
 import micropython
@@ -36,25 +38,25 @@ ODR = const(5)
 BSRR = const(6)
 
 # words of the block
-NEXT = const(0)  # time of the next sample
-LEFT = const(1)  # samples still to come before the last one
-END = const(2)  # time of the last sample
-DONE = const(3)  # the last sample has been taken
-TAKEN = const(4)  # raw samples taken
-READ = const(5)  # raw samples converted
-LOST = const(6)  # raw samples that found no room
+NEXT_SAMPLE = const(0)  # time of the next sample
+SAMPLES_LEFT = const(1)  # samples still to come before the last one
+LAST_SAMPLE = const(2)  # time of the last sample
+SAMPLES_DONE = const(3)  # the last sample has been taken
+RAW_IN = const(4)  # raw samples taken
+RAW_OUT = const(5)  # raw samples converted
+RAW_LOST = const(6)  # raw samples that found no room
 NOW = const(7)  # counter when the interrupt came
 FROZEN = const(8)  # outputs are frozen
 FROZEN_AT = const(9)  # counter at that moment
 FAULT = const(10)
 FAULT_JOINT = const(11)
-HIGH = const(12)  # bit a joint: its STEP was high when frozen, so the step begun was finished
-PULSE = const(13)  # STEP high time
+STEP_HIGH = const(12)  # bit a joint: its STEP was high when frozen, so the step begun was finished
+PULSE_TICKS = const(13)  # STEP high time
 JOINTS = const(14)
 ENCODERS = const(15)
-LATE = const(16)  # a DIR turn came too late
-SLACK = const(17)  # how late it may come
-SETUP = const(18)  # DIR stable before a rising edge
+TURN_LATE = const(16)  # a DIR turn came too late
+TURN_SLACK_TICKS = const(17)  # how late it may come
+DIR_SETUP_TICKS = const(18)  # DIR stable before a rising edge
 BLOCK_HEAD = const(19)
 # words of a joint in the block, behind the head
 DIR_BIT = const(0)
@@ -71,41 +73,62 @@ TURN_ROOM = const(8)
 RING = const(17)  # the state of its ring:
 JOINT_WORDS = const(26)
 # words of a ring's state
-MADE = const(0)  # entries written since the stream was started
-LOADS = const(1)  # words that the stream has handed on since; as many matches have been
-FIRST = const(2)  # NDTR right after the start
-LAST = const(3)  # time of the last entry written
-FAR = const(4)  # the far-away entry behind it
+WRITTEN = const(0)  # entries written since the stream was started
+MATCHED = const(1)  # words that the stream has handed on since; so many matches have been
+NDTR_AT_START = const(2)  # NDTR right after the start
+LAST_TIME = const(3)  # time of the last entry written
+FAR_TIME = const(4)  # the far-away entry behind it
 MASK = const(5)  # entries of the ring less 1; they are a power of two, so that an index is a mask away
 NDTR_AT = const(6)  # word offset of its stream's NDTR in DMA1
 FED = const(7)  # the interrupt writes to the ring; it ends that when the ring has run dry
 ROOM = const(8)  # entries that may be written now
 STATE_WORDS = const(9)
 
-# a limit switch and a joint: line, DIR bit, DIR level that moves towards it, joint, whether it moves
+# words of a pair of limit switch and joint
+PAIR_LINE = const(0)  # of the switch
+PAIR_DIR_BIT = const(1)
+PAIR_LEVEL = const(2)  # of DIR, that moves towards the switch
+PAIR_JOINT = const(3)
+PAIR_MOVES = const(4)  # whether the joint moves
 PAIR_WORDS = const(5)
-# a raw sample: counter, matches a joint (6), encoder counter (4)
+# words of a raw sample
+RAW_COUNTER = const(0)
+RAW_MATCHES = const(1)  # six, one a joint
+RAW_ENCODERS = const(7)  # four counters
 RAW_WORDS = const(11)
-RAW_ROOM = const(4)  # 0.4 s; the main loop comes every few milliseconds
+RAW_ROOM = const(4)  # raw samples: 0.4 s; the main loop comes every few milliseconds
+
+# as in step_queue.py: words of the queue
+_PULSE = const(17)
+_HEAD = const(18)
+
+# SAMPLE_TICKS of limits.py
 _SAMPLE_TICKS = const(8400000)
-_LATEST = const(84)  # 1 us: a compare value nearer than that may be missed
-SPARE = const(8)  # entries of a ring behind the matched one that stay readable, and the far-away entry
-_GUARD = const(32768)  # 390 us: entries are only added behind a rising edge that is further away,
-_PLENTY = const(3145728)  # but not 37 ms away,
-_MOST = const(512)  # and so many at most, which takes less than the 390 us
+
+_FIRST_ENTRY = const(0)
+_HERE = const(0)  # the word at which a pointer stands
+_PORT_A = const(0)
+_PORT_B = const(1)
+_LEAST_AHEAD_TICKS = const(84)  # 1 us: a compare value nearer than that may be missed
+_CALL_TICKS = const(336)  # 4 us
+# entries of a ring behind the matched one that stay readable, and the far-away entry
+SPARE_ENTRIES = const(8)
+_GUARD_TICKS = const(32768)  # 390 us: entries are only added behind a rising edge that is further away,
+_FAR_AHEAD_TICKS = const(3145728)  # but not 37 ms away,
+_MOST_ENTRIES = const(512)  # and so many at most, which takes less than the 390 us
 # from the mode 7 down
 _TO_TOGGLE = const(4)  # to 3
 _TO_FORCED_LOW = const(3)  # to 4
 
 
 @micropython.viper
-def clock_k(timer: ptr32) -> int:
+def counter_kiticks(timer: ptr32) -> int:
     """The counter in units of 1024 ticks, 22 bits."""
     return (timer[CNT] >> 10) & 0x3FFFFF
 
 
 @micropython.viper
-def in_step(timer2: ptr32, timer5: ptr32) -> int:
+def counters_agree(timer2: ptr32, timer5: ptr32) -> int:
     """1 where both counters show the same time, as far as reads one after the other can tell; else 0.
 
     0 also where an interrupt came between the reads.
@@ -118,7 +141,7 @@ def in_step(timer2: ptr32, timer5: ptr32) -> int:
 
 
 @micropython.viper
-def word_k(words: ptr32, at: int) -> int:
+def word_kiticks(words: ptr32, at: int) -> int:
     """A counter value kept in an array, in units of 1024 ticks, 22 bits."""
     return (words[at] >> 10) & 0x3FFFFF
 
@@ -136,7 +159,7 @@ def read_counter(timer: ptr32) -> int:
 
 
 @micropython.viper
-def until_k(timer: ptr32, words: ptr32, at: int) -> int:
+def kiticks_until(timer: ptr32, words: ptr32, at: int) -> int:
     """Units of 1024 ticks from now until the time ``words[at]``; negative when it has passed."""
     gap = ((words[at] - timer[CNT]) >> 10) & 0x3FFFFF
     if gap >= 0x200000:
@@ -148,15 +171,15 @@ def until_k(timer: ptr32, words: ptr32, at: int) -> int:
 def matches(state: ptr32, dma: ptr32) -> int:
     """Matches of a ring since its stream was started.
 
-    Fewer than the ring has entries can have come since LOADS was written, so the difference is unambiguous, also where
-    the interrupt writes LOADS meanwhile.
+    Fewer than the ring has entries can have come since MATCHED was written. So the difference is unambiguous, also
+    where the interrupt writes MATCHED meanwhile.
     """
-    loads = state[LOADS]
-    return loads + ((state[FIRST] - dma[state[NDTR_AT]] - loads) & state[MASK])
+    matched = state[MATCHED]
+    return matched + ((state[NDTR_AT_START] - dma[state[NDTR_AT]] - matched) & state[MASK])
 
 
 @micropython.viper
-def hungry(block: ptr32, dma: ptr32, timer: ptr32) -> int:
+def rings_to_refill(block: ptr32, dma: ptr32, timer: ptr32) -> int:
     """Look after all rings; a bit for each joint to whose ring entries are to be added now, ROOM at most.
 
     That is where a quarter is free. -1: there is nothing to look after. 130 instructions and 76 a joint, 123 where
@@ -164,7 +187,7 @@ def hungry(block: ptr32, dma: ptr32, timer: ptr32) -> int:
     """
     found = 0
     fed = 0
-    now = timer[CNT] + block[PULSE] + _GUARD
+    now = timer[CNT] + block[PULSE_TICKS] + _GUARD_TICKS
     joint = 0 if block[FROZEN] else block[JOINTS]
     block = ptr32(int(block) + 4 * (BLOCK_HEAD + RING) + joint * (4 * JOINT_WORDS))
     while joint:
@@ -172,38 +195,43 @@ def hungry(block: ptr32, dma: ptr32, timer: ptr32) -> int:
         block = ptr32(int(block) - 4 * JOINT_WORDS)
         if block[FED]:
             fed = 1
-            block[LOADS] = ((block[FIRST] - dma[block[NDTR_AT]] - block[LOADS]) & block[MASK]) + block[LOADS]
-            room = block[LOADS] - block[MADE]
+            block[MATCHED] = (
+                (block[NDTR_AT_START] - dma[block[NDTR_AT]] - block[MATCHED]) & block[MASK]
+            ) + block[MATCHED]
+            room = block[MATCHED] - block[WRITTEN]
             if room:
                 room += block[MASK] + 1
-                if room > block[MASK] >> 2 and ((block[LAST] - now) & 0x3FFFFFFF) < _PLENTY - _GUARD:
+                if (
+                    room > block[MASK] >> 2
+                    and ((block[LAST_TIME] - now) & 0x3FFFFFFF) < _FAR_AHEAD_TICKS - _GUARD_TICKS
+                ):
                     found |= 1 << joint
-                    room -= SPARE
+                    room -= SPARE_ENTRIES
                     block[ROOM] = room
-                    if room > _MOST:
-                        block[ROOM] = _MOST
+                    if room > _MOST_ENTRIES:
+                        block[ROOM] = _MOST_ENTRIES
             else:
                 block[FED] = 0
     return found if fed else -1
 
 
 @micropython.viper
-def written(state: ptr32, ring: ptr32, timer: ptr32, queue: ptr32) -> int:
+def note_written(state: ptr32, ring: ptr32, timer: ptr32, queue: ptr32) -> int:
     """Take in what was written up to the queue's HEAD, and write the far-away entry behind it; 1: it came too late.
 
     Entry 0 goes into the compare register by hand, so the stream begins with entry 1 and runs over the
     words behind it: word 0 is repeated behind the end.
     """
     late = 0
-    made = queue[18]
-    if made != state[MADE]:
-        late = ((state[LAST] - queue[17] - timer[CNT]) >> 31) & 1
-        state[MADE] = made
-        state[LAST] = ring[(made - 1) & state[MASK]]
+    made = queue[_HEAD]
+    if made != state[WRITTEN]:
+        late = ((state[LAST_TIME] - queue[_PULSE] - timer[CNT]) >> 31) & 1
+        state[WRITTEN] = made
+        state[LAST_TIME] = ring[(made - 1) & state[MASK]]
         half = 1
-        state[FAR] = (half << 31) + state[LAST]
-        ring[made & state[MASK]] = state[FAR]
-        ring[state[MASK] + 1] = ring[0]
+        state[FAR_TIME] = (half << 31) + state[LAST_TIME]
+        ring[made & state[MASK]] = state[FAR_TIME]
+        ring[state[MASK] + 1] = ring[_FIRST_ENTRY]
     return late
 
 
@@ -215,8 +243,8 @@ def arm_channel(block: ptr32, timer: ptr32, ring: ptr32, at: int) -> int:
     """
     if block[FROZEN]:
         return 0
-    first = ring[0]
-    due = first - block[SETUP]
+    first = ring[_FIRST_ENTRY]
+    due = first - block[DIR_SETUP_TICKS]
     block = ptr32(int(block) + 4 * at)
     if (
         block[TURNS_IN] != block[TURNS_OUT]
@@ -229,7 +257,7 @@ def arm_channel(block: ptr32, timer: ptr32, ring: ptr32, at: int) -> int:
     mode = block[CCMR_AT]
     timer[mode] = (timer[mode] | (7 << block[MODE_SHIFT])) - (_TO_TOGGLE << block[MODE_SHIFT])
     timer[DIER] = timer[DIER] | (bit << 8)
-    return ((first - timer[CNT] - _LATEST) >> 31) & 1
+    return ((first - timer[CNT] - _LEAST_AHEAD_TICKS) >> 31) & 1
 
 
 @micropython.viper
@@ -247,13 +275,13 @@ def push_away(timer: ptr32, compare: int, state: ptr32) -> object:
     half = 1
     far = timer[CNT] + (half << 31)
     timer[compare] = far
-    state[FAR] = far
+    state[FAR_TIME] = far
 
 
 @micropython.viper
-def mark(timer: ptr32, state: ptr32) -> object:
+def set_last_to_now(timer: ptr32, state: ptr32) -> object:
     """Count the last entry as being now."""
-    state[LAST] = timer[CNT]
+    state[LAST_TIME] = timer[CNT]
 
 
 @micropython.viper
@@ -263,22 +291,22 @@ def add_turn(block: ptr32, state: ptr32, at: int, delay: int) -> int:
     given = block[TURNS_IN]
     if ((given - block[TURNS_OUT]) & 0xFF) >= TURN_ROOM:
         return 0
-    block[TURN_TIMES + (given & (TURN_ROOM - 1))] = state[LAST] + delay
+    block[TURN_TIMES + (given & (TURN_ROOM - 1))] = state[LAST_TIME] + delay
     block[TURNS_IN] = (given + 1) & 0xFF
     return 1
 
 
 @micropython.viper
-def call_soon(timer: ptr32) -> object:
+def interrupt_soon(timer: ptr32) -> object:
     """Have the compare interrupt come in 4 us, to look at what was queued."""
     while True:
-        timer[CCR4] = timer[CNT] + 336
+        timer[CCR4] = timer[CNT] + _CALL_TICKS
         if ((timer[CCR4] - timer[CNT]) >> 31) & 1 == 0:
             break
 
 
 @micropython.viper
-def serve(block: ptr32, timer: ptr32, port: ptr32) -> int:
+def serve_compare(block: ptr32, timer: ptr32, port: ptr32) -> int:
     """The compare interrupt: turn the DIR pins that are due; 1 when a sample is due, else arm for the next.
 
     185 instructions and 24 a joint; a turn of DIR takes almost as much again.
@@ -300,8 +328,8 @@ def serve(block: ptr32, timer: ptr32, port: ptr32) -> int:
                         bit <<= 16
                     turned |= bit
                     block[TURNS_OUT] = (block[TURNS_OUT] + 1) & 0xFF
-                    if ((gap + head[SLACK]) >> 31) & 1:
-                        head[LATE] = 1
+                    if ((gap + head[TURN_SLACK_TICKS]) >> 31) & 1:
+                        head[TURN_LATE] = 1
                     soonest = 0
                 else:
                     gap &= 0x3FFFFFFF
@@ -311,8 +339,8 @@ def serve(block: ptr32, timer: ptr32, port: ptr32) -> int:
         block = head
         if turned:
             port[BSRR] = turned
-        if not block[DONE]:
-            gap = block[NEXT] - now
+        if not block[SAMPLES_DONE]:
+            gap = block[NEXT_SAMPLE] - now
             if ((gap - 1) >> 31) & 1:
                 block[NOW] = now
                 return 1
@@ -327,15 +355,15 @@ def serve(block: ptr32, timer: ptr32, port: ptr32) -> int:
 
 
 @micropython.viper
-def take(raw: ptr32, block: ptr32, dma: ptr32, encoders: object) -> object:
+def take_sample(raw: ptr32, block: ptr32, dma: ptr32, encoders: object) -> object:
     """Store a raw sample and find the time of the next. 160 instructions, 40 a joint, 100 an encoder."""
-    n = block[TAKEN]
-    if ((n - block[READ]) & 0xFF) >= RAW_ROOM:
-        block[LOST] = block[LOST] + 1
+    n = block[RAW_IN]
+    if ((n - block[RAW_OUT]) & 0xFF) >= RAW_ROOM:
+        block[RAW_LOST] = block[RAW_LOST] + 1
     else:
-        block[TAKEN] = (n + 1) & 0xFF
+        block[RAW_IN] = (n + 1) & 0xFF
         raw = ptr32(int(raw) + (n & (RAW_ROOM - 1)) * (4 * RAW_WORDS))
-        raw[0] = block[NOW]
+        raw[RAW_COUNTER] = block[NOW]
         head = block
         n = block[JOINTS]
         raw = ptr32(int(raw) + 4 * n)
@@ -343,23 +371,25 @@ def take(raw: ptr32, block: ptr32, dma: ptr32, encoders: object) -> object:
         while n:
             n -= 1
             block = ptr32(int(block) - 4 * JOINT_WORDS)
-            raw[0] = ((block[FIRST] - dma[block[NDTR_AT]] - block[LOADS]) & block[MASK]) + block[LOADS]
+            raw[_HERE] = (
+                (block[NDTR_AT_START] - dma[block[NDTR_AT]] - block[MATCHED]) & block[MASK]
+            ) + block[MATCHED]
             raw = ptr32(int(raw) - 4)
         block = head
         n = block[ENCODERS]
         while n:
             n -= 1
-            raw[7 + n] = ptr32(encoders[n])[CNT]  # type: ignore[index]
-    n = block[LEFT]
+            raw[RAW_ENCODERS + n] = ptr32(encoders[n])[CNT]  # type: ignore[index]
+    n = block[SAMPLES_LEFT]
     if n:
         n -= 1
-        block[LEFT] = n
+        block[SAMPLES_LEFT] = n
         if n:
-            block[NEXT] = block[NEXT] + _SAMPLE_TICKS
+            block[NEXT_SAMPLE] = block[NEXT_SAMPLE] + _SAMPLE_TICKS
         else:
-            block[NEXT] = block[END]
+            block[NEXT_SAMPLE] = block[LAST_SAMPLE]
     else:
-        block[DONE] = 1
+        block[SAMPLES_DONE] = 1
 
 
 @micropython.viper
@@ -393,8 +423,8 @@ def freeze(block: ptr32, timer2: ptr32, timer5: ptr32) -> int:
 @micropython.viper
 def finish_pulses(block: ptr32, timer2: ptr32, timer5: ptr32, ports: object) -> object:
     """After ``freeze``: a STEP pin that is high gets its falling edge, one that is low is held low."""
-    port_a = ptr32(ports[0])  # type: ignore[index]
-    port_b = ptr32(ports[1])  # type: ignore[index]
+    port_a = ptr32(ports[_PORT_A])  # type: ignore[index]
+    port_b = ptr32(ports[_PORT_B])  # type: ignore[index]
     head = block
     high = 0
     joint = block[JOINTS]
@@ -410,15 +440,15 @@ def finish_pulses(block: ptr32, timer2: ptr32, timer5: ptr32, ports: object) -> 
             port = port_b
         if (port[IDR] >> block[PIN_BIT]) & 1:
             high |= 1 << joint
-            timer[block[CCR_AT]] = timer[CNT] + head[PULSE]
+            timer[block[CCR_AT]] = timer[CNT] + head[PULSE_TICKS]
         else:
             mode = block[CCMR_AT]
             timer[mode] = (timer[mode] | (7 << block[MODE_SHIFT])) - (_TO_FORCED_LOW << block[MODE_SHIFT])
-    head[HIGH] = high
+    head[STEP_HIGH] = high
 
 
 @micropython.viper
-def trip(block: ptr32, code: int, joint: int) -> object:
+def set_fault(block: ptr32, code: int, joint: int) -> object:
     """Note a fault; the first one stays."""
     if not block[FAULT]:
         block[FAULT] = code
@@ -426,17 +456,21 @@ def trip(block: ptr32, code: int, joint: int) -> object:
 
 
 @micropython.viper
-def towards(pairs: ptr32, count: int, line: int, levels: int) -> int:
+def joint_towards(pairs: ptr32, count: int, line: int, levels: int) -> int:
     """1 + the active joint that moves towards the switch on ``line``, or 0; ``levels`` of the DIR port."""
     while count:
-        if pairs[0] == line and pairs[4] and ((levels >> pairs[1]) & 1) == pairs[2]:
-            return pairs[3] + 1
+        if (
+            pairs[PAIR_LINE] == line
+            and pairs[PAIR_MOVES]
+            and ((levels >> pairs[PAIR_DIR_BIT]) & 1) == pairs[PAIR_LEVEL]
+        ):
+            return pairs[PAIR_JOINT] + 1
         pairs = ptr32(int(pairs) + 4 * PAIR_WORDS)
         count -= 1
     return 0
 
 
 @micropython.viper
-def directions(port: ptr32) -> int:
+def output_levels(port: ptr32) -> int:
     """Levels that the program drives the DIR port to."""
     return port[ODR]

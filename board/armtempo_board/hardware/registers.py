@@ -120,7 +120,7 @@ def stream_address(stream: int) -> int:
 
 def stream_flags(stream: int) -> "tuple[int, int]":
     """(address, value) that make a stream forget what it signalled: else it cannot be started (10.5.3)."""
-    return stm.DMA1 + (12 if stream > 3 else 8), 0x3D << _FLAG_SHIFT[stream & 3]
+    return stm.DMA1 + (12 if stream > 3 else 8), 0x3D << _FLAG_SHIFT[stream % len(_FLAG_SHIFT)]
 
 
 def apply(rows: "tuple[tuple[str, int, int, int], ...]") -> None:

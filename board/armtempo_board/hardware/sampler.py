@@ -15,8 +15,8 @@ from pyb import Timer
 from armtempo_board.hardware import isr
 
 _LOW32 = 0xFFFFFFFF
-_QUIET_K = const(80)  # 1 ms
-_DEAD_K = const(-40)  # 0.5 ms ago
+_QUIET_KITICKS = const(80)  # 1 ms
+_DEAD_KITICKS = const(-40)  # 0.5 ms ago
 
 
 class Sampler:
@@ -28,7 +28,7 @@ class Sampler:
         self.raw = array("I", bytearray(4 * isr.RAW_WORDS * isr.RAW_ROOM))
         self.block[isr.JOINTS] = joints
         self.block[isr.ENCODERS] = len(counters)
-        self.block[isr.DONE] = 1
+        self.block[isr.SAMPLES_DONE] = 1
         self._counters = counters
         self._timer2 = stm.TIM2
         self._directions = stm.GPIOE
@@ -44,8 +44,8 @@ class Sampler:
     @micropython.viper
     def _interrupt(self, timer: object) -> object:
         # 9 us before the first pin turns (see docs/hardware.md)
-        while int(isr.serve(self.block, self._timer2, self._directions)):
-            isr.take(self.raw, self.block, self._dma, self._counters)
+        while int(isr.serve_compare(self.block, self._timer2, self._directions)):
+            isr.take_sample(self.raw, self.block, self._dma, self._counters)
 
     def joint_at(self, joint: int) -> int:
         """Place of a joint's words in the block."""
@@ -57,13 +57,13 @@ class Sampler:
         for joint in range(block[isr.JOINTS]):
             at = self.joint_at(joint)
             block[at + isr.TURNS_OUT] = block[at + isr.TURNS_IN]
-        for word in (isr.TAKEN, isr.READ, isr.LOST, isr.FROZEN, isr.HIGH, isr.LATE):
+        for word in (isr.RAW_IN, isr.RAW_OUT, isr.RAW_LOST, isr.FROZEN, isr.STEP_HIGH, isr.TURN_LATE):
             block[word] = 0
-        block[isr.NEXT] = 0
+        block[isr.NEXT_SAMPLE] = 0
         self._regular = -(-duration_ticks // SAMPLE_TICKS)  # samples before the last
-        block[isr.LEFT] = self._regular
-        block[isr.END] = duration_ticks & _LOW32
-        block[isr.DONE] = 0
+        block[isr.SAMPLES_LEFT] = self._regular
+        block[isr.LAST_SAMPLE] = duration_ticks & _LOW32
+        block[isr.SAMPLES_DONE] = 0
         mem32[self._timer2 + 4 * isr.CCR4] = 0
         mem32[self._timer2 + 4 * isr.SR] = 0
         mem32[self._timer2 + 4 * isr.DIER] = 1 << 4
@@ -71,24 +71,27 @@ class Sampler:
     def end_at(self, ticks: int) -> None:
         """The motion ends at another time than planned. Call it while no sample is due."""
         block = self.block
-        begun = self._regular - block[isr.LEFT]
+        begun = self._regular - block[isr.SAMPLES_LEFT]
         self._regular = max(-(-ticks // SAMPLE_TICKS), begun)
         left = self._regular - begun
-        block[isr.END] = ticks & _LOW32
-        block[isr.NEXT] = (begun * SAMPLE_TICKS if left else ticks) & _LOW32
-        block[isr.LEFT] = left
-        isr.call_soon(self._timer2)
+        block[isr.LAST_SAMPLE] = ticks & _LOW32
+        block[isr.NEXT_SAMPLE] = (begun * SAMPLE_TICKS if left else ticks) & _LOW32
+        block[isr.SAMPLES_LEFT] = left
+        isr.interrupt_soon(self._timer2)
 
     def waits(self) -> bool:
         """Whether raw samples are to be converted."""
-        return self.block[isr.TAKEN] != self.block[isr.READ]
+        return self.block[isr.RAW_IN] != self.block[isr.RAW_OUT]
 
     def quiet(self) -> bool:
         """Whether all raw samples are converted and the next is at least 1 ms away."""
         block = self.block
         if self.waits():
             return False
-        return block[isr.DONE] != 0 or isr.until_k(self._timer2, block, isr.NEXT) >= _QUIET_K
+        return (
+            block[isr.SAMPLES_DONE] != 0
+            or isr.kiticks_until(self._timer2, block, isr.NEXT_SAMPLE) >= _QUIET_KITICKS
+        )
 
     def overdue(self, joint: int) -> bool:
         """Whether a sample or a turn of the joint was due long ago: the interrupt comes no more."""
@@ -96,28 +99,31 @@ class Sampler:
         at = self.joint_at(joint)
         out = block[at + isr.TURNS_OUT]
         turn = at + isr.TURN_TIMES + (out & (isr.TURN_ROOM - 1))
-        if out != block[at + isr.TURNS_IN] and isr.until_k(self._timer2, block, turn) < _DEAD_K:
+        if out != block[at + isr.TURNS_IN] and isr.kiticks_until(self._timer2, block, turn) < _DEAD_KITICKS:
             return True
-        return block[isr.DONE] == 0 and isr.until_k(self._timer2, block, isr.NEXT) < _DEAD_K
+        return (
+            block[isr.SAMPLES_DONE] == 0
+            and isr.kiticks_until(self._timer2, block, isr.NEXT_SAMPLE) < _DEAD_KITICKS
+        )
 
     def done(self) -> bool:
         """Whether the last sample has been taken and converted."""
-        return self.block[isr.DONE] != 0 and not self.waits()
+        return self.block[isr.SAMPLES_DONE] != 0 and not self.waits()
 
     def next_raw(self) -> int:
         """Place of the oldest raw sample in ``raw``, or -1; ``drop`` it when it has been converted."""
-        read = self.block[isr.READ]
-        if read == self.block[isr.TAKEN]:
+        read = self.block[isr.RAW_OUT]
+        if read == self.block[isr.RAW_IN]:
             return -1
         return (read & (isr.RAW_ROOM - 1)) * isr.RAW_WORDS
 
     def drop(self) -> None:
         """The oldest raw sample has been converted."""
-        self.block[isr.READ] = (self.block[isr.READ] + 1) & 0xFF
+        self.block[isr.RAW_OUT] = (self.block[isr.RAW_OUT] + 1) & 0xFF
 
     def take_now(self) -> None:
         """Store a raw sample of this moment, the last; the interrupt must be off."""
         block = self.block
         block[isr.NOW] = mem32[self._timer2 + 4 * isr.CNT] & _LOW32
-        block[isr.LEFT] = 0
-        isr.take(self.raw, block, self._dma, self._counters)
+        block[isr.SAMPLES_LEFT] = 0
+        isr.take_sample(self.raw, block, self._dma, self._counters)

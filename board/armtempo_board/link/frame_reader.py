@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 _QUIET_MS = const(50)  # a frame that stays incomplete for so long is given up
 _ATTEMPTS = const(8)  # reads and rejected frames in one poll: bounds its time
 _PIECE = const(64)  # bytes read at once
+_FIRST = const(0)
 
 
 class FrameReader:
@@ -89,7 +90,7 @@ class FrameReader:
                 return True
             return False
         self._heard_ms = now_ms
-        first = self._piece[0]
+        first = self._piece[_FIRST]
         if self._filled == 0 and first != SYNC:
             self.outside = first
             self._skip()

@@ -1,7 +1,7 @@
-"""What an encoder should show, and how far it is off."""
+"""Following error: how far an encoder is from where the commanded steps should have brought it."""
 
 
-class Following:
+class FollowingError:
     """``row``: the joint's part of the arm record."""
 
     def __init__(self, row: "dict[str, int]") -> None:
@@ -14,13 +14,13 @@ class Following:
         self.limit = 0 if row["encoder"] == armrecord.NONE else row["following_counts"]
 
     def expected(self, steps: int) -> int:
-        """Counts that belong to a commanded position; small parts, so that nothing is allocated."""
+        """Counts that belong to a commanded position; in small integers, so that nothing is allocated."""
         whole = steps // self._denominator
         part = steps - whole * self._denominator
         return whole * self._numerator + part * self._numerator // self._denominator
 
-    def lost(self, steps: int, counts: int) -> bool:
-        """Whether the joint is further from its command than the arm file allows."""
+    def is_exceeded(self, steps: int, counts: int) -> bool:
+        """Whether the joint is further from its command than the arm file allows; without a limit it never is."""
         return self.limit > 0 and abs(counts - self.expected(steps)) > self.limit
 
 

@@ -1,4 +1,4 @@
-"""Step rates of parts against a limit."""
+"""Step rates of subintervals against a limit."""
 
 from array import array
 
@@ -8,7 +8,15 @@ from armtempo_shared.limits import MAX_STEP_RATE_SUM, TICK_HZ
 from micropython import const
 
 from armtempo_board.errors import Refused
-from armtempo_board.stepgen import bezier, subdivision
+from armtempo_board.stepgen.bezier import BIAS, HIGH, LAST_HIGH, LOW_BITS
+from armtempo_board.stepgen.subdivision import (
+    DIFFERENCE_BIAS,
+    FIRST_DIFFERENCE,
+    LAST_DIFFERENCE,
+    LEAST,
+    MOST,
+    SCALE,
+)
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -16,11 +24,19 @@ if TYPE_CHECKING:
 
     from armtempo_board.stepgen.subintervals import Subintervals
 
-SLOWER = 1
-UNDECIDED = 0
-FASTER = -1
-_BINS = const(128)
-_D_BIAS = const(1 << 29)
+SLOWER = const(1)
+UNDECIDED = const(0)
+FASTER = const(-1)
+
+# as in subdivision.py: measures
+_FIRST_DIFFERENCE = const(1)
+_LAST_DIFFERENCE = const(5)
+_DIFFERENCE_BIAS = const(1 << 29)
+
+_HALF_MASK = const((1 << 15) - 1)
+_POINT_BYTES = const(8)
+_SPANS = const(128)  # of time, in which the joints' rates are summed
+_HIGH_TICKS_BITS = const(12)  # a high word of time counts 2**12 ticks
 
 
 def scaled(rate: int) -> "tuple[int, int]":
@@ -33,98 +49,95 @@ def scaled(rate: int) -> "tuple[int, int]":
 
 @micropython.viper
 def compare(angle: ptr32, time: ptr32, mantissa: int, shift: int) -> int:
-    """Whether a part keeps a rate: its differences against those of time * mantissa / 2**(30 - shift).
+    """Whether a subinterval keeps a rate: its differences against those of time * mantissa / 2**(30 - shift).
 
-    At the ends the differences are the rate itself: FASTER there is certain.
+    ``angle``, ``time``: its measures. At the ends the differences are the rate itself: FASTER there is certain.
     """
-    found = 1
+    found = SLOWER
     high = mantissa >> 15
-    low = mantissa & ((1 << 15) - 1)
-    i = 1
-    while i < 6:
-        step = angle[i] - _D_BIAS
+    low = mantissa & _HALF_MASK
+    i = _FIRST_DIFFERENCE
+    while i <= _LAST_DIFFERENCE:
+        step = angle[i] - _DIFFERENCE_BIAS
         if step < 0:
             step = 0 - step
-        tick = time[i] - _D_BIAS
+        tick = time[i] - _DIFFERENCE_BIAS
         if tick < 0:
-            return 0
-        most = (tick >> 15) * high + (((tick & ((1 << 15) - 1)) * high) >> 15) + (((tick >> 15) * low) >> 15)
+            return UNDECIDED
+        most = (tick >> 15) * high + (((tick & _HALF_MASK) * high) >> 15) + (((tick >> 15) * low) >> 15)
         if shift >= 0:
             step = (step >> shift) if shift < 31 else 0
         else:
             most = (most >> (0 - shift)) if shift > -31 else 0
         if step > most + 4:
-            found = 0
-            if i == 1 or i == 5:
-                return -1
+            found = UNDECIDED
+            if i == _FIRST_DIFFERENCE or i == _LAST_DIFFERENCE:  # noqa: SIM109  viper knows no tuples
+                return FASTER
         i += 1
     return found
 
 
-def highest(parts: "Subintervals") -> int:
-    """A bound of the part's rate in steps/s."""
-    angle, time = parts.angle_local, parts.time_local
-    most = max(abs(angle[subdivision.LEAST] - _D_BIAS), abs(angle[subdivision.MOST] - _D_BIAS))
-    return _rate(parts, most, time[subdivision.LEAST] - _D_BIAS)
+def highest(interval: "Subintervals") -> int:
+    """An upper bound of the subinterval's rate in steps/s."""
+    angle, time = interval.angle_measures, interval.time_measures
+    most = max(abs(angle[LEAST] - DIFFERENCE_BIAS), abs(angle[MOST] - DIFFERENCE_BIAS))
+    return _rate(interval, most, time[LEAST] - DIFFERENCE_BIAS)
 
 
-def at_ends(parts: "Subintervals") -> int:
-    """The greater of the part's rates at its two ends, in steps/s."""
-    angle, time = parts.angle_local, parts.time_local
-    return max(
-        [
-            _rate(parts, abs(angle[i] - _D_BIAS), time[i] - _D_BIAS)
-            for i in (subdivision.STEPS, subdivision.STEPS + 4)
-        ]
-    )
+def at_ends(interval: "Subintervals") -> int:
+    """The greater of the subinterval's rates at its two ends, in steps/s."""
+    angle, time = interval.angle_measures, interval.time_measures
+    rates = [
+        _rate(interval, abs(angle[i] - DIFFERENCE_BIAS), time[i] - DIFFERENCE_BIAS)
+        for i in (FIRST_DIFFERENCE, LAST_DIFFERENCE)
+    ]
+    return max(rates)
 
 
-def _rate(parts: "Subintervals", steps: int, ticks: int) -> int:
+def _rate(interval: "Subintervals", steps: int, ticks: int) -> int:
     """Differences of angle and time, in their local units, as steps/s."""
     if ticks <= 0:
         return TICK_HZ
-    up = parts.time_local[subdivision.SCALE] - 12
-    return min((steps * TICK_HZ << up) // (ticks << parts.angle_local[subdivision.SCALE]), TICK_HZ)
+    up = interval.time_measures[SCALE] - _HIGH_TICKS_BITS
+    return min((steps * TICK_HZ << up) // (ticks << interval.angle_measures[SCALE]), TICK_HZ)
 
 
-def check_sum(motion: "Motion", joints: "list[dict[str, int]]", parts: "Subintervals") -> None:
-    """Refused (too_fast, no joint, rate) where all joints together may step too fast in one of many time spans."""
+def check_sum(motion: "Motion", joints: "list[dict[str, int]]", interval: "Subintervals") -> None:
+    """Refused (too_fast, no joint, rate) where all joints together may step too fast in one of many spans of time."""
     limit = MAX_STEP_RATE_SUM + MAX_STEP_RATE_SUM // 100
     if sum([row["max_rate"] for row in joints]) <= limit:
         return
     longest = max([_end_high(motion, joint) for joint in range(motion.joints)])
-    width = longest // _BINS + 1
-    sums = array("I", bytes(4 * (_BINS + 1)))
+    width = longest // _SPANS + 1
+    sums = array("I", bytes(4 * (_SPANS + 1)))
     for joint in range(motion.joints):
-        _add(parts, motion, joint, width, sums)
+        _add(interval, motion, joint, width, sums)
     worst = max(sums)
     if worst > limit:
         raise Refused(codes.TOO_FAST, value=worst)
 
 
 def _end_high(motion: "Motion", joint: int) -> int:
-    parts_end = motion.time_offset(joint) + 8 * (motion.segments * motion.refine + motion.degree) - 1
-    data = motion.data
-    high = 0
-    for i in range(4):
-        high = high << 8 | data[parts_end - i]
-    return int(high << 4 | data[parts_end - 4] >> 4) + 1
+    """The last time control point in 4096 ticks, rounded up."""
+    at = motion.time_offset(joint) + _POINT_BYTES * (motion.segments * motion.refine + motion.degree - 1)
+    return (int.from_bytes(motion.data[at : at + _POINT_BYTES], "little") >> LOW_BITS) + 1
 
 
-def _add(parts: "Subintervals", motion: "Motion", joint: int, width: int, sums: "array[int]") -> None:
-    """Add the joint's highest rate in each time span of ``width`` * 4096 ticks."""
-    peaks = array("I", bytes(4 * (_BINS + 1)))
-    parts.load(motion, joint)
-    while parts.measure():
-        whole = parts.angle_local[subdivision.SCALE] and parts.time_local[subdivision.SCALE]
-        if not whole or parts.time[5] - parts.time[0] > width:
-            parts.split()
+def _add(interval: "Subintervals", motion: "Motion", joint: int, width: int, sums: "array[int]") -> None:
+    """Add the joint's highest rate in each span of ``width`` * 4096 ticks."""
+    peaks = array("I", bytes(4 * (_SPANS + 1)))
+    interval.load(motion, joint)
+    while interval.measure():
+        is_measured = interval.angle_measures[SCALE] and interval.time_measures[SCALE]
+        begin, end = interval.time[HIGH], interval.time[LAST_HIGH]
+        if not is_measured or end - begin > width:
+            interval.split()
             continue
-        rate = highest(parts)
-        first = max(parts.time[0] - bezier.BIAS, 0) // width
-        last = min((parts.time[5] - bezier.BIAS) // width, _BINS)
+        rate = highest(interval)
+        first = max(begin - BIAS, 0) // width
+        last = min((end - BIAS) // width, _SPANS)
         for i in range(first, last + 1):
             peaks[i] = max(peaks[i], rate)
-        parts.skip()
-    for i in range(_BINS + 1):
+        interval.skip()
+    for i in range(_SPANS + 1):
         sums[i] += peaks[i]

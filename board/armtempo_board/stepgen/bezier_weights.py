@@ -1,7 +1,9 @@
-"""Eq. (15) turned into Bezier points: what each control point adds to them. Needed once a degree."""
+"""Eq. (15) turned into Bezier points: the weight of each control point in each of them. Needed once a degree."""
 
 from armtempo_shared.basis import BASIS, FACTORIAL
 
+_DEGREE = 5  # of the Bezier points
+_DIVISOR = 120  # weights are times 120, so that all are whole
 _BINOMIAL = (
     (1, 0, 0, 0, 0, 0),
     (1, 1, 0, 0, 0, 0),
@@ -18,11 +20,11 @@ def table(degree: int) -> bytes:
     A power coefficient a_j adds C(i, j) / C(5, j) a_j to Bezier point i. First byte: number of control points.
     """
     found = bytearray([degree + 1])
-    for point in range(6):
+    for point in range(_DEGREE + 1):
         for control in range(degree + 1):
             total = 0
             for power in range(degree + 1):
-                factor = 120 // FACTORIAL[degree] * BASIS[degree][power][control]
-                total += _BINOMIAL[point][power] * factor // _BINOMIAL[5][power]
+                factor = _DIVISOR // FACTORIAL[degree] * BASIS[degree][power][control]
+                total += _BINOMIAL[point][power] * factor // _BINOMIAL[_DEGREE][power]
             found.append(total)
     return bytes(found)

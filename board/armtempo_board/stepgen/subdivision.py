@@ -1,71 +1,108 @@
-"""Brings the parts of a joint's motion, one after the other: halves the pieces of time and angle, measures both
-in a block scale of their own, in single words, and judges whether the part can be solved.
+"""Subdivision of a joint's motion: halves the Bezier pieces of time and angle, measures both, and judges the result.
 
-An array of pieces holds six, 13 words each: the one that is looked at, four right halves by their level modulo
-4, and the root. A right half comes with the left one; it is kept, as it is the next to be looked at or halved.
-The last word of a kept one tells where it stands, as a node: 2**level + index among the 2**level parts.
-One of an earlier segment is never taken for one of this: before a right half is looked for, what both were
-halved from has been halved in this segment, which put it into its place.
+The subintervals are those of a binary tree over a time segment; a node's number is 2**level + index. An array of pieces
+has six places of 13 words: the piece that is looked at, four right halves by their level modulo 4, and the root. A
+right half comes with the left one and is kept, as it is the next to be looked at or halved. The last word of a place
+tells the node. A right half of an earlier segment is never taken for one of this: before it is looked for, the piece
+that both come from has been halved in this segment, which has put the new one into its place.
 
-Signed values in arrays are stored with a bias, see points.py.
+A piece is measured in block floating point: differences of neighbouring points as single words, with a scale of their
+own. Signed values in arrays are stored with a bias, see bezier.py.
 """
 
 import micropython
 from micropython import const
 
-# what is measured
-SCALE = 0  # fraction bits f of the local unit, 2**-f high units; 0: the piece is too large
-STEPS = 1  # five differences of neighbouring points, local units, + DIFFERENCE_BIAS
-LEAST = 6  # least and largest of these
-MOST = 7
-LOWEST = 8  # least and largest position (high + BIAS of the points, rounded) in the hull, if it was looked at
-HIGHEST = 9
-# the state of the walk: with the measures of time
-MOVE = 10  # what is done before the next part is looked at
-NODE = 11  # the part
-LEVEL = 10  # with those of angle: its level
-LOCAL_SIZE = 12
-PIECES_SIZE = 78
+# measures of a piece
+SCALE = const(0)  # fraction bits f of the differences, in 2**-f high units; 0: the piece is too large
+FIRST_DIFFERENCE = const(1)  # the first of five differences of neighbouring points, + DIFFERENCE_BIAS,
+LAST_DIFFERENCE = const(5)  # and the last
+LEAST = const(6)  # least and greatest of these
+MOST = const(7)
+# least and greatest position (high + BIAS of the points, rounded) in the hull, if that was looked at
+LOWEST = const(8)
+HIGHEST = const(9)
+# the state of the walk through the tree: with the measures of time
+MOVE = const(10)  # what is done before the next subinterval is looked at
+NODE = const(11)
+# with those of angle
+LEVEL = const(10)
+MEASURES_SIZE = const(12)
 DIFFERENCE_BIAS = 1 << 29
 
+# words of an array of pieces
+PLACE_WORDS = const(13)
+_PLACE_NODE = const(12)  # behind the piece
+ROOT = const(65)
+PIECES_SIZE = const(78)
+
 # moves
-STAY = 0
-SKIP = 1  # go on behind the part, with one twice as long where the grid allows it
-SPLIT = 2  # go on with its first half
+STAY = const(0)
+SKIP = const(1)  # go on behind the subinterval, with one twice as long where the grid allows it
+SPLIT = const(2)  # go on with its first half
 
-# what ``Subintervals.measure`` gives, but for a 1
-STRAIGHT = 2  # the differences of angle have one sign and are within a factor of two
-EVEN = 8  # those of time are positive, and so, too
+# results of a search
+NOT_YET = const(0)  # no step so far: go on
+MONOTONE = const(1)  # steps in it, all in one direction
+AT_START = const(2)  # steps, all of them at its start
+END = const(3)
 
-_D_BIAS = const(1 << 29)
-_WORK = const(12)  # for one call: a part is 2, halving its pieces once 2 more
-_LARGE = const(13)  # least scale of any piece
-_TIME_SCALE = const(17)  # least scale of a cell's time: 2**23 ticks fill 28 bits
-_NONE = const(29)
+# what a measurement tells. Steady: the differences have one sign and are within a factor of two
+MEASURED = const(1)
+ANGLE_STEADY = const(2)
+TIME_STEADY = const(8)  # and they are positive
+
+# as in bezier.py: words of a piece, six high and six low ones; a pointer to a point finds its two and those of the next
+_HIGH_0 = const(0)
+_HIGH_1 = const(1)
+_HIGH_2 = const(2)
+_HIGH_3 = const(3)
+_HIGH_4 = const(4)
+_HIGH_5 = const(5)
+_LOW_0 = const(6)
+_LOW_1 = const(7)
+_LOW_2 = const(8)
+_LOW_3 = const(9)
+_LOW_4 = const(10)
+_LOW_5 = const(11)
+_HIGH = const(0)
+_NEXT_HIGH = const(1)
+_LAST_HIGH = const(5)
+_LOW = const(6)
+_NEXT_LOW = const(7)
+_LAST_LOW = const(11)
+
+_BIAS = const(1 << 29)
+_WORK = const(12)  # for one call: a subinterval is 2, halving its pieces once 2 more
+_LEAST_SCALE = const(13)  # of any piece
+_LEAST_TIME_SCALE = const(17)  # of a subinterval that is solved: 2**23 ticks fill 28 bits
+_TOO_LONG = const(29)  # above every scale: the angle of a subinterval that is too long does not matter
 _DEEPEST = const(27)
-_SHORTEST = const(2)  # ticks
+_SHORTEST_TICKS = const(2)
 
 
 @micropython.viper
-def seek(
-    piece: ptr32, here: ptr32, local: ptr32, other_local: ptr32, position: int, reversal_ticks: int
+def search(
+    piece: ptr32, point: ptr32, measures: ptr32, other_measures: ptr32, position: int, min_ticks: int
 ) -> int:
-    """Look at parts until one holds steps, or it is enough for one call. A verdict (subintervals.py).
+    """Look at subintervals until one holds steps, or it is enough for one call. Gives one of the results above.
 
-    ``piece`` and ``local``: pieces and measures of time; ``here`` and ``other_local``: those of angle. ``position``
-    (+ points.BIAS): where the steps so far lead; 0: only measure the next part, and give 4 * (1 + STRAIGHT + EVEN).
+    ``piece`` and ``measures``: those of time; ``point`` and ``other_measures``: pieces and measures of angle.
+    ``position`` (+ bezier.BIAS): where the steps so far lead; 0: only measure the next subinterval, and give 4 times
+    what that tells. ``min_ticks``: see ``Subintervals``.
     """
-    other = here
-    node = local[11]
-    level = other_local[10]
-    move = local[10]
+    other = point
+    node = measures[NODE]
+    level = other_measures[LEVEL]
+    move = measures[MOVE]
     work = _WORK
-    found = 0
+    found = NOT_YET
     while work > 0:
         work -= 2
-        below = move >> 1  # levels from the part back up to the piece it is halved from, which begins ``at``
-        at = 0
-        if below:  # split: it is the one that was looked at
+        # The next subinterval in the tree, and the nearest one above it whose piece is kept
+        halvings = move >> 1  # from that piece down to the subinterval
+        source = 0  # where the piece stands, in bytes
+        if halvings:  # split: it is the one that was looked at
             node <<= 1
             level += 1
         else:
@@ -73,83 +110,84 @@ def seek(
                 node += 1
                 if node >> level == 2:
                     node >>= 1
-                    move = 0
-                    found = 3
+                    move = STAY
+                    found = END
                     break
                 if not node & 1:
                     node >>= 1
                     level -= 1
-            while below < level:
-                at = (((level - below) & 3) + 1) * 52
-                here = ptr32(int(piece) + at)
-                if here[12] == node >> below:
+            while halvings < level:
+                source = (((level - halvings) & 3) + 1) * (4 * PLACE_WORDS)
+                point = ptr32(int(piece) + source)
+                if point[_PLACE_NODE] == node >> halvings:
                     break
-                below += 1
+                halvings += 1
             else:
-                at = 260
-        least_scale = _TIME_SCALE if position else _LARGE
-        heading = 0
-        turn = 2
-        while turn:  # time, then angle
-            here = ptr32(int(piece) + at)
-            fetch = at
-            todo = below
+                source = 4 * ROOT
+        least_scale = _LEAST_TIME_SCALE if position else _LEAST_SCALE
+        steady = 0
+        passes = 2
+        while passes:  # time, then angle
+            # Bezier subdivision: copy the kept piece, halve it down to the subinterval
+            point = ptr32(int(piece) + source)
+            is_copied = source
+            left = halvings
             while True:
-                if fetch:
-                    piece[0] = here[0]
-                    piece[1] = here[1]
-                    piece[2] = here[2]
-                    piece[3] = here[3]
-                    piece[4] = here[4]
-                    piece[5] = here[5]
-                    piece[6] = here[6]
-                    piece[7] = here[7]
-                    piece[8] = here[8]
-                    piece[9] = here[9]
-                    piece[10] = here[10]
-                    piece[11] = here[11]
-                if not todo:
+                if is_copied:
+                    piece[_HIGH_0] = point[_HIGH_0]
+                    piece[_HIGH_1] = point[_HIGH_1]
+                    piece[_HIGH_2] = point[_HIGH_2]
+                    piece[_HIGH_3] = point[_HIGH_3]
+                    piece[_HIGH_4] = point[_HIGH_4]
+                    piece[_HIGH_5] = point[_HIGH_5]
+                    piece[_LOW_0] = point[_LOW_0]
+                    piece[_LOW_1] = point[_LOW_1]
+                    piece[_LOW_2] = point[_LOW_2]
+                    piece[_LOW_3] = point[_LOW_3]
+                    piece[_LOW_4] = point[_LOW_4]
+                    piece[_LOW_5] = point[_LOW_5]
+                if not left:
                     break
-                # by de Casteljau: the left half stays in place, point by point of the right one comes out at its end
-                todo -= 1
+                # de Casteljau at 1/2: the left half stays in place; points of the right half come out at its end
+                left -= 1
                 work -= 1
-                kept = ptr32(int(piece) + (((level - todo) & 3) + 1) * 52)
-                i = node >> todo
-                fetch = i & 1
-                kept[12] = i | 1
-                i = 5
+                kept = ptr32(int(piece) + (((level - left) & 3) + 1) * (4 * PLACE_WORDS))
+                i = node >> left
+                is_copied = i & 1
+                kept[_PLACE_NODE] = i | 1
+                i = _LAST_HIGH
                 while True:
-                    kept[5] = piece[5]
-                    kept[11] = piece[11]
+                    kept[_LAST_HIGH] = piece[_LAST_HIGH]
+                    kept[_LAST_LOW] = piece[_LAST_LOW]
                     if not i:
                         break
-                    here = ptr32(int(piece) + 16)
+                    point = ptr32(int(piece) + 4 * _HIGH_4)
                     k = i
                     while k:
-                        # the mean: half of bit 28 moves down, the carry of the low words or an odd sum of the high
-                        low = here[6] + 1 + here[7]
-                        high = here[0] + here[1]
-                        here[7] = (((high & 1) << 28) ^ low) >> 1
-                        here[1] = ((low >> 28) + high) >> 1
-                        here = ptr32(int(here) - 4)
+                        # The mean of two points, rounded: bit 28 of the low sum and an odd high sum carry over
+                        low = point[_LOW] + 1 + point[_NEXT_LOW]
+                        high = point[_HIGH] + point[_NEXT_HIGH]
+                        point[_NEXT_LOW] = (((high & 1) << 28) ^ low) >> 1
+                        point[_NEXT_HIGH] = ((low >> 28) + high) >> 1
+                        point = ptr32(int(point) - 4)
                         k -= 1
                     kept = ptr32(int(kept) - 4)
                     i -= 1
-                here = ptr32(int(kept) + 20)
-            # the hull: of the high words, then, where it matters, of the rounded positions
+                point = ptr32(int(kept) + 4 * _HIGH_5)
+            # The convex hull: of the high words, then, where it matters, of the rounded positions
             bits = 28
             while True:
-                least = _D_BIAS
+                least = _BIAS
                 most = 0
-                here = piece
+                point = piece
                 i = 6
                 while i:
-                    high = (here[6] >> bits) + here[0]
+                    high = (point[_LOW] >> bits) + point[_HIGH]
                     if high < least:
                         least = high
                     if high > most:
                         most = high
-                    here = ptr32(int(here) + 4)
+                    point = ptr32(int(point) + 4)
                     i -= 1
                 if bits & 1:
                     break
@@ -157,81 +195,81 @@ def seek(
                 span = most - least
                 if span > 1 and position:
                     break
-            local[8] = least
-            local[9] = most
+            measures[LOWEST] = least
+            measures[HIGHEST] = most
+            # The differences, in the finest scale in which they fit a word
             scale = 28
             while span:
                 span >>= 1
                 scale -= 1
-            if scale < _LARGE:
+            if scale < _LEAST_SCALE:
                 scale = 0
-            local[0] = scale
-            even = heading
-            heading = 0
+            measures[SCALE] = scale
+            time_steady = steady
+            steady = 0
             if scale >= least_scale:
-                least_scale = _LARGE
+                least_scale = _LEAST_SCALE
                 bits = 28 - scale
-                # from behind, as the pointer stands
                 last = 0
-                low = _D_BIAS
-                high = 0 - _D_BIAS
+                low = _BIAS
+                high = 0 - _BIAS
                 i = 6
-                while i:
+                while i:  # from the last point on, where the pointer stands
                     i -= 1
-                    here = ptr32(int(here) - 4)
-                    span = ((here[0] - least) << scale) + (here[6] >> bits)
+                    point = ptr32(int(point) - 4)
+                    span = ((point[_HIGH] - least) << scale) + (point[_LOW] >> bits)
                     last -= span
                     if i < 5:
-                        local[i + 1] = last + _D_BIAS
+                        measures[i + FIRST_DIFFERENCE] = last + _BIAS
                         if last < low:
                             low = last
                         if last > high:
                             high = last
                     last = span
-                local[6] = low + _D_BIAS
-                local[7] = high + _D_BIAS
-                # true of positive differences, of negative ones below, of nothing but zeros both
+                measures[LEAST] = low + _BIAS
+                measures[MOST] = high + _BIAS
+                # 1: steady and rising, -1: steady and falling, 0: neither, or all differences are zero
                 if low + low >= high:
-                    heading = 1
+                    steady = 1
                 if low >= high + high:
-                    heading -= 1
+                    steady -= 1
             else:
-                least_scale = _NONE  # the part is too long: its angle does not matter
-            here = piece
+                least_scale = _TOO_LONG
+            point = piece
             piece = other
-            other = here
-            here = local
-            local = other_local
-            other_local = here
-            turn -= 1
-        # judge it
-        move = 1
+            other = point
+            point = measures
+            measures = other_measures
+            other_measures = point
+            passes -= 1
+        # Judge it: pass over, split or stop. ``piece`` is that of time again, ``other`` that of angle
+        move = SKIP
         if position:
-            high = other[5] + (other[11] >> 27) - position
+            high = other[_LAST_HIGH] + (other[_LAST_LOW] >> 27) - position  # steps to its end
             if least == most:
                 if least != position:
-                    move = 2
-                    if local[0]:
-                        move = 1
-                        found = 2
-            elif local[0] < _TIME_SCALE:
-                move = 2
-            elif heading and even > 0:
-                if high * heading > 0:
-                    found = 1
+                    move = SPLIT
+                    if measures[SCALE]:
+                        move = SKIP
+                        found = AT_START
+            elif measures[SCALE] < _LEAST_TIME_SCALE:
+                move = SPLIT
+            elif steady and time_steady > 0:
+                if high * steady > 0:
+                    found = MONOTONE
             else:
-                low = ((piece[5] - piece[0]) << 12) + ((piece[11] - piece[6]) >> 16)
-                if high or low > reversal_ticks or other[0] + (other[6] >> 27) != position:
-                    move = 2
-                    if low <= _SHORTEST or level >= _DEEPEST:
-                        move = 1
+                low = ((piece[_LAST_HIGH] - piece[_HIGH]) << 12) + ((piece[_LAST_LOW] - piece[_LOW]) >> 16)
+                if high or low > min_ticks or other[_HIGH] + (other[_LOW] >> 27) != position:
+                    move = SPLIT
+                    if low <= _SHORTEST_TICKS or level >= _DEEPEST:
+                        move = SKIP
                         if high:
-                            found = 2
+                            found = AT_START
         else:
-            found = ((even + 1) << 4) + ((heading & 1) << 3) + 4
+            found = ((time_steady + 1) << 4) + ((steady & 1) << 3) + 4
         if found:
             break
-    local[10] = move
-    local[11] = node
-    other_local[10] = level
+    measures[MOVE] = move
+    measures[NODE] = node
+    other_measures[LEVEL] = level
     return found

@@ -28,6 +28,11 @@ _ARM = "arm.ata"
 _DEFAULT = "default.txt"
 _NEW = ".new"
 _ENOSPC = const(28)
+_ERRNO = const(0)  # of an exception's arguments
+_ST_SIZE = const(6)  # of os.stat
+_F_BSIZE = const(0)  # of os.statvfs
+_F_BAVAIL = const(3)
+_CRC_BYTES = const(4)
 _PIECE = const(512)
 _MOST_FREE = const(0x3FFFFFFF)
 
@@ -101,7 +106,7 @@ class Store:
             stat = os.statvfs(self._root)
         except OSError:
             return 0
-        return min(stat[0] * stat[3], _MOST_FREE)
+        return min(stat[_F_BSIZE] * stat[_F_BAVAIL], _MOST_FREE)
 
     def names(self) -> "list[str]":
         """Names of the stored trajectories, sorted."""
@@ -241,7 +246,7 @@ class Store:
     def _size_of(self, file_name: str) -> int:
         """Bytes of a file; NOT_FOUND."""
         try:
-            return os.stat(self._path(file_name))[6]
+            return os.stat(self._path(file_name))[_ST_SIZE]
         except OSError:
             raise Refused(codes.NOT_FOUND)
 
@@ -273,7 +278,10 @@ class Store:
 
     def _check(self, name: str, crc: int) -> None:
         data = self._read(name + _NEW)
-        if int.from_bytes(data[-4:], "little") != crc or crc32(memoryview(data)[:-4]) != crc:
+        if (
+            int.from_bytes(data[-_CRC_BYTES:], "little") != crc
+            or crc32(memoryview(data)[:-_CRC_BYTES]) != crc
+        ):
             raise Refused(codes.BAD_CHECKSUM)
         if not _whole(name, data):
             raise Refused(codes.BAD_RECORD)
@@ -309,4 +317,4 @@ class Store:
         try:
             return function(*arguments)
         except OSError as error:
-            raise Refused(codes.FLASH_FULL if error.args[0] == _ENOSPC else codes.FLASH_ERROR)
+            raise Refused(codes.FLASH_FULL if error.args[_ERRNO] == _ENOSPC else codes.FLASH_ERROR)

@@ -4,7 +4,7 @@ import random
 
 from armtempo_board.hardware import isr
 from armtempo_board.hardware.encoders import Encoder
-from armtempo_board.motion.following_error import Following
+from armtempo_board.motion.following_error import FollowingError
 from engine_rig import TICK_HZ, Motion, Rig, Steps, arm, cases, row
 from virtual_board import standalone
 
@@ -46,15 +46,15 @@ def declared():
 def expected_counts():
     """The quotient rounds down, wherever the joint stands; the sign of the ratio counts."""
     for numerator, denominator in ((5, 16), (-5, 16), (80, 256), (4000, 12800), (7, 1), (0, 5)):
-        following = Following(
+        following = FollowingError(
             row(encoder=0, counts_num=numerator, counts_den=denominator, following_counts=10)
         )
         for steps in (0, 1, -1, 15, 16, -16, 17, 123456, -123457, 999999):
             exact = steps * numerator / denominator
             assert exact - 1 < following.expected(steps) <= exact
-    assert not following.lost(100, 10) and following.lost(100, -11)
-    assert not Following(row(following_counts=10, encoder=255)).lost(100, -1000)
-    assert not Following(row(following_counts=0, encoder=1)).lost(100, -1000)
+    assert not following.is_exceeded(100, 10) and following.is_exceeded(100, -11)
+    assert not FollowingError(row(following_counts=10, encoder=255)).is_exceeded(100, -1000)
+    assert not FollowingError(row(following_counts=0, encoder=1)).is_exceeded(100, -1000)
 
 
 def at_full_speed():

@@ -12,7 +12,7 @@ from virtual_board.arm import motors
 TICK_HZ = 84_000_000
 FEWER = 3 if "short" in sys.argv else 1
 """Repetitions are divided by it; the emulated interpreter is slow."""
-SLOTS = step_queue.STATE_SIZE - 13 * step_queue.QUEUE_ROOM
+SLOTS = step_queue.QUEUE_SIZE - 13 * step_queue.CAPACITY
 
 
 class Steps:
@@ -50,18 +50,18 @@ class Motion:
         self.joints = joints
 
 
-class Walker:
-    """Takes the place of the evaluator's walker."""
+class StepGenerator:
+    """Takes the place of the evaluator's generator."""
 
-    waits = step_generator.Walker.waits
-    latest_k = step_generator.Walker.latest_k
-    write = step_generator.Walker.write
+    waits = step_generator.StepGenerator.waits
+    latest_kiticks = step_generator.StepGenerator.latest_kiticks
+    write = step_generator.StepGenerator.write
 
     def __init__(self):
         self.ended = True
         self.at_turn = False
         self.direction = 1
-        self.state = array("i", bytes(4 * step_queue.STATE_SIZE))
+        self.queue = array("i", bytes(4 * step_queue.QUEUE_SIZE))
 
     subintervals = None
 
@@ -69,18 +69,18 @@ class Walker:
         """Stand before the first step."""
         self._steps = motion.joints[joint]
         self._place = [0, 0]
-        state = self.state
+        state = self.queue
         state[step_queue.PULSE] = pulse
-        state[step_queue.STEPS] = state[step_queue.LATEST_1024] = 0
+        state[step_queue.STEPS] = state[step_queue.LATEST_KITICKS] = 0
         state[step_queue.OUT] = state[step_queue.IN]
         self.at_turn = False
         first = self._steps.at(self._place)
         self.ended = first is None
         self.direction = 1 if first is None else first[1]
 
-    def next_1024(self):
+    def next_kiticks(self):
         """Time of the next step, in 1024 ticks."""
-        return step_queue.upcoming(self.state)
+        return step_queue.next_kiticks(self.queue)
 
     def turn(self):
         """Go on in the other direction."""
@@ -88,9 +88,9 @@ class Walker:
         self.at_turn = False
 
     def prepare(self, until):
-        """Queue steps as the evaluator's walker does: the first of a block by itself, the others in stretches."""
-        self.state[step_queue.UNTIL_1024] = until
-        while not self.ended and not self.at_turn and step_queue.wanted(self.state):
+        """Queue steps as the evaluator's does: the first of a block by itself, the others as cubics."""
+        self.queue[step_queue.UNTIL_KITICKS] = until
+        while not self.ended and not self.at_turn and step_queue.has_room(self.queue):
             time, direction = self._steps.at(self._place)
             if direction != self.direction:
                 self.at_turn = True
@@ -99,22 +99,22 @@ class Walker:
             steps = 1
             if self._place[1]:
                 steps = max(1, min(count - self._place[1], 1024, (1 << 27) // gap))
-            step_queue.single(self.state, (time >> 12) + bezier.BIAS, time & 4095)
+            step_queue.put_single(self.queue, (time >> 12) + bezier.BIAS, time & 4095)
             if steps > 1:
                 self._lengthen(time, gap, steps)
             self._steps.go_on(self._place, steps)
             self.ended = self._steps.at(self._place) is None
 
     def _lengthen(self, time, gap, steps):
-        """The stretch queued last has so many steps, all as far apart."""
-        state = self.state
-        place = SLOTS + 13 * ((state[step_queue.IN] - 1) % step_queue.QUEUE_ROOM)
+        """The item queued last has so many steps, all as far apart."""
+        state = self.queue
+        place = SLOTS + 13 * ((state[step_queue.IN] - 1) % step_queue.CAPACITY)
         base = (time - gap) & 0xFFFFFFFF
         base -= base >> 31 << 32
         words = (0, gap, 1 << 29, 1 << 29, 0, 0, base, 0, 0, 16, 0, steps, (time - gap) >> 10)
         for word, value in enumerate(words):
             state[place + word] = value
-        state[step_queue.LATEST_1024] = (time + (steps - 1) * gap) >> 10
+        state[step_queue.LATEST_KITICKS] = (time + (steps - 1) * gap) >> 10
 
 
 class Pulses:
@@ -197,7 +197,7 @@ class Evaluator:
 
     refusal = None
     offset = 0
-    Walker = Walker
+    StepGenerator = StepGenerator
 
     @staticmethod
     def check(motion, joints, gap_ticks, parts):
@@ -229,20 +229,20 @@ class Rig:
         self.board.worlds.append(self)
         self._zero = 0
         import armtempo_board.motion.engine
-        import armtempo_board.motion.joint
+        import armtempo_board.motion.joint_drive
         import armtempo_board.motion.motion_check
         from armtempo_board import heap
         from armtempo_board.hardware import pins
 
         if planned:
-            armtempo_board.motion.joint.Walker = Walker
+            armtempo_board.motion.joint_drive.StepGenerator = StepGenerator
             armtempo_board.motion.endpoints = Evaluator
             armtempo_board.motion.motion_check.check = Evaluator.check
             heap.forget = lambda: None  # what stands in for the evaluator stays
         self.arm = machine_state.arm = motors.Arm(self.board, pins, lambda: (self.head, joints), 1, ())
         self.pins = pins
         self.pulses = [
-            Pulses(self, joint, pins.STEP[joint["channel"]][0], pins.STEP[joint["channel"]][6])
+            Pulses(self, joint, pins.STEP[joint["channel"]][0], pins.DIR[joint["channel"]])
             for joint in joints
         ]
         self.engine = armtempo_board.motion.engine.Engine(self.head, joints)

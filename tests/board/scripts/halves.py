@@ -33,7 +33,7 @@ def walk(motion, joint, parts, number):
     parts.load(motion, joint)
     count = deepest = 0
     while parts.measure():
-        node, level = parts.time_local[subdivision.NODE], parts.angle_local[subdivision.LEVEL]
+        node, level = parts.time_measures[subdivision.NODE], parts.angle_measures[subdivision.LEVEL]
         assert node >> level == 1
         for pieces in (parts.angle, parts.time):
             assert list(pieces)[:12] == halved(pieces, node, level), (joint, node, level)

@@ -99,7 +99,7 @@ def run(joints, brake_at):
     while engine.moving:
         now += STEP_TICKS
         move_to(now, streams)
-        if engine._block[isr.DONE] or (brake_at and now > brake_at):
+        if engine._block[isr.SAMPLES_DONE] or (brake_at and now > brake_at):
             engine.brake() if brake_at else engine.service()
             brake_at = 0
         else:

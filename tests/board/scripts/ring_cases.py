@@ -27,29 +27,29 @@ def counting_matches():
     """NDTR counts down and starts again; every match is counted whatever the number since the last look."""
     for entries, first in ((1024, 1024), (1024, 1023), (64, 64), (128, 127)):
         state, dma = ring_state(entries), words(60)
-        state[isr.FIRST] = first
+        state[isr.NDTR_AT_START] = first
         state[isr.NDTR_AT] = 35
         total = 0
         for jump in (0, 1, 2, entries - 1, 0, entries // 2 - 1, entries - 1, entries - 24, 7) * 3:
             total += jump
             dma[35] = (first - total) % entries or entries
             assert isr.matches(state, dma) == total
-            state[isr.LOADS] = total
+            state[isr.MATCHED] = total
 
 
 def ready(entries, made, matched, last, now):
     """A block whose second joint has a fed ring, the ring's state in it, DMA, timer."""
     block, dma, timer = words(BLOCK), words(60), words(18)
     block[isr.JOINTS] = 2
-    block[isr.PULSE] = 100
+    block[isr.PULSE_TICKS] = 100
     at = isr.BLOCK_HEAD + isr.JOINT_WORDS + isr.RING
     state = memoryview(block)[at : at + isr.STATE_WORDS]
     state[isr.MASK] = entries - 1
-    state[isr.FIRST] = entries
+    state[isr.NDTR_AT_START] = entries
     state[isr.NDTR_AT] = 35
-    state[isr.MADE] = made
+    state[isr.WRITTEN] = made
     state[isr.FED] = 1
-    state[isr.LAST] = last & 0xFFFFFFFF
+    state[isr.LAST_TIME] = last & 0xFFFFFFFF
     dma[35] = (entries - matched) % entries or entries
     timer[isr.CNT] = now & 0xFFFFFFFF
     return block, state, dma, timer
@@ -74,38 +74,38 @@ def when_to_write():
     ):
         block, state, dma, timer = ready(entries, made, matched, last, now)
         if matched > entries:
-            state[isr.LOADS] = matched - entries // 2
-        assert isr.hungry(block, dma, timer) == 2 * hungry, (made, matched, last, now)
+            state[isr.MATCHED] = matched - entries // 2
+        assert isr.rings_to_refill(block, dma, timer) == 2 * hungry, (made, matched, last, now)
         assert state[isr.FED] == fed
-        assert state[isr.LOADS] == matched
+        assert state[isr.MATCHED] == matched
         if hungry:
             assert state[isr.ROOM] == min(entries - 8 - (made - matched), 512)
         if not fed:
-            assert isr.hungry(block, dma, timer) == -1
+            assert isr.rings_to_refill(block, dma, timer) == -1
         block[isr.FROZEN] = 1
-        assert isr.hungry(block, dma, timer) == -1
+        assert isr.rings_to_refill(block, dma, timer) == -1
 
 
 def written_and_wrapped():
     """The far-away entry stands behind the newest, the first word is repeated behind the end; too late is told."""
     for entries in (64, 256, 1024):
         _, state, _, timer = ready(entries, 0, 0, 1000, 0)
-        queue = words(step_queue.STATE_SIZE)
+        queue = words(step_queue.QUEUE_SIZE)
         queue[step_queue.PULSE] = 100
         ring = words(entries + 1)
         made = 0
         for count in (2, entries - 24, 20, 2, entries - 16, 16, 2, 0):
-            before = state[isr.LAST]
+            before = state[isr.LAST_TIME]
             for n in range(count):
                 ring[(made + n) % entries] = (made + n) * 3_000_000 & 0xFFFFFFFF
             queue[step_queue.HEAD] = made + count
             timer[isr.CNT] = (before - 100 + (count == 20)) & 0xFFFFFFFF
-            assert isr.written(state, ring, timer, queue) == (count == 20)
+            assert isr.note_written(state, ring, timer, queue) == (count == 20)
             made += count
             last = (made - 1) * 3_000_000 & 0xFFFFFFFF
-            assert state[isr.MADE] == made
-            assert state[isr.LAST] == last
-            assert ring[made % entries] == last ^ 0x80000000 == state[isr.FAR]
+            assert state[isr.WRITTEN] == made
+            assert state[isr.LAST_TIME] == last
+            assert ring[made % entries] == last ^ 0x80000000 == state[isr.FAR_TIME]
             assert ring[entries] == ring[0]
 
 
@@ -126,10 +126,10 @@ def times_across_the_wrap():
     times = words(1)
     for now in (0, 5, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, 0xFFFFF000):
         timer[isr.CNT] = now
-        assert isr.clock_k(timer) == now >> 10
-        for gap_k in (0, 1, 16, 1000, (1 << 21) - 1, -1, -16, -(1 << 20)):
-            times[0] = (now + 1024 * gap_k) & 0xFFFFFFFF
-            assert isr.until_k(timer, times, 0) == gap_k, (now, gap_k)
+        assert isr.counter_kiticks(timer) == now >> 10
+        for gap_kiticks in (0, 1, 16, 1000, (1 << 21) - 1, -1, -16, -(1 << 20)):
+            times[0] = (now + 1024 * gap_kiticks) & 0xFFFFFFFF
+            assert isr.kiticks_until(timer, times, 0) == gap_kiticks, (now, gap_kiticks)
 
 
 def due_or_not():
@@ -137,32 +137,32 @@ def due_or_not():
     for now in (0, 1000, 0x7FFFFFF0, 0xFFFFFFF0):
         block, timer, port, state = words(BLOCK), words(18), words(8), words(isr.STATE_WORDS)
         block[isr.JOINTS] = 2
-        block[isr.SLACK] = 100
+        block[isr.TURN_SLACK_TICKS] = 100
         timer[isr.CNT] = now
         for joint in range(2):
             block[isr.BLOCK_HEAD + joint * isr.JOINT_WORDS + isr.DIR_BIT] = 1 << (7 + joint)
         second = isr.BLOCK_HEAD + isr.JOINT_WORDS
-        block[isr.NEXT] = (now + 900) & 0xFFFFFFFF
-        state[isr.LAST] = (now - 50) & 0xFFFFFFFF
+        block[isr.NEXT_SAMPLE] = (now + 900) & 0xFFFFFFFF
+        state[isr.LAST_TIME] = (now - 50) & 0xFFFFFFFF
         assert isr.add_turn(block, state, isr.BLOCK_HEAD, 50)
         assert isr.add_turn(block, state, second, 51)
         assert isr.add_turn(block, state, second, 400)
-        assert isr.serve(block, timer, port) == 0
+        assert isr.serve_compare(block, timer, port) == 0
         assert port[isr.BSRR] == 1 << 7
         port[isr.ODR] = 1 << 7
         assert timer[isr.CCR4] == (now + 1) & 0xFFFFFFFF
         timer[isr.CNT] = (now + 20) & 0xFFFFFFFF
-        assert isr.serve(block, timer, port) == 0
+        assert isr.serve_compare(block, timer, port) == 0
         assert port[isr.BSRR] == 1 << 8
         port[isr.ODR] = 3 << 7
         assert timer[isr.CCR4] == (now + 350) & 0xFFFFFFFF
-        assert block[isr.LATE] == 0
+        assert block[isr.TURN_LATE] == 0
         timer[isr.CNT] = (now + 460) & 0xFFFFFFFF
-        assert isr.serve(block, timer, port) == 0
+        assert isr.serve_compare(block, timer, port) == 0
         assert port[isr.BSRR] == 1 << (8 + 16)
-        assert block[isr.LATE] == 1
+        assert block[isr.TURN_LATE] == 1
         timer[isr.CNT] = (now + 900) & 0xFFFFFFFF
-        assert isr.serve(block, timer, port) == 1
+        assert isr.serve_compare(block, timer, port) == 1
         assert block[isr.NOW] == timer[isr.CNT]
 
 
@@ -170,7 +170,7 @@ def turn_queue():
     """Eight turns fit; the ninth waits."""
     block, state = words(BLOCK), words(isr.STATE_WORDS)
     for n in range(isr.TURN_ROOM):
-        state[isr.LAST] = 1000 * n
+        state[isr.LAST_TIME] = 1000 * n
         assert isr.add_turn(block, state, isr.BLOCK_HEAD, 5)
     assert not isr.add_turn(block, state, isr.BLOCK_HEAD, 5)
     block[isr.BLOCK_HEAD + isr.TURNS_OUT] = 1
@@ -182,27 +182,27 @@ def sample_times():
     block, raw, dma, encoder = words(BLOCK), words(isr.RAW_ROOM * isr.RAW_WORDS), words(60), words(18)
     at = isr.BLOCK_HEAD + isr.RING
     block[at + isr.MASK] = 63
-    block[at + isr.FIRST] = 64
+    block[at + isr.NDTR_AT_START] = 64
     block[at + isr.NDTR_AT] = 35
-    block[at + isr.LOADS] = 60
+    block[at + isr.MATCHED] = 60
     block[isr.JOINTS] = 1
     block[isr.ENCODERS] = 1
-    block[isr.LEFT] = 3
-    block[isr.END] = 20_000_000
+    block[isr.SAMPLES_LEFT] = 3
+    block[isr.LAST_SAMPLE] = 20_000_000
     dma[35] = 51
     encoder[isr.CNT] = 65535
     times = []
     for n in range(4):
-        times.append(block[isr.NEXT])
-        assert not block[isr.DONE]
+        times.append(block[isr.NEXT_SAMPLE])
+        assert not block[isr.SAMPLES_DONE]
         block[isr.NOW] = 1000 + n
-        isr.take(raw, block, dma, (uctypes.addressof(encoder),))
+        isr.take_sample(raw, block, dma, (uctypes.addressof(encoder),))
     assert times == [0, 8_400_000, 16_800_000, 20_000_000]
-    assert block[isr.DONE]
+    assert block[isr.SAMPLES_DONE]
     assert list(raw[11:13]) == [1001, 77] and raw[18] == 65535
     for _ in range(20):
-        isr.take(raw, block, dma, (uctypes.addressof(encoder),))
-    assert (block[isr.TAKEN], block[isr.LOST]) == (isr.RAW_ROOM, 24 - isr.RAW_ROOM)
+        isr.take_sample(raw, block, dma, (uctypes.addressof(encoder),))
+    assert (block[isr.RAW_IN], block[isr.RAW_LOST]) == (isr.RAW_ROOM, 24 - isr.RAW_ROOM)
     assert raw[0] == 1000
 
 
@@ -213,7 +213,7 @@ def late_first_step():
     block[at + isr.CCR_AT] = isr.CCR1 + 1
     block[at + isr.CCMR_AT] = isr.CCMR1
     block[at + isr.MODE_SHIFT] = 12
-    block[isr.SETUP] = 420
+    block[isr.DIR_SETUP_TICKS] = 420
     timer[isr.CNT] = 0xFFFFFFF0
     for first, turn, late in (
         (200, None, 0),
@@ -253,7 +253,7 @@ def counters_in_step():
         (1000, 900, 0),
     ):
         first[isr.CNT], second[isr.CNT] = a, b
-        assert isr.in_step(first, second) == agree, (a, b)
+        assert isr.counters_agree(first, second) == agree, (a, b)
 
 
 def towards_a_switch():
@@ -262,7 +262,7 @@ def towards_a_switch():
     port = words(8)
     for line, levels, found in ((8, 1 << 7, 1), (8, 1 << 10, 0), (8, 0, 3), (9, 0, 0), (10, 1 << 7, 0)):
         port[isr.ODR] = levels
-        assert isr.towards(pairs, 3, line, isr.directions(port)) == found
+        assert isr.joint_towards(pairs, 3, line, isr.output_levels(port)) == found
 
 
 cases(
