@@ -1,4 +1,4 @@
-"""The heap: when it is collected, and what the next collection may have."""
+"""The heap: when it is collected, and which modules are given up."""
 
 import gc
 import sys
@@ -20,17 +20,17 @@ _ONLY_FOR_SET_UP = (
 
 
 def collect_often(often: bool = True) -> None:
-    """Whether the heap is collected long before it is full, so that it does not fall to pieces.
+    """Whether the heap is collected long before it is full, which keeps large blocks free.
 
-    While a motion runs it is not: what MicroPython allocates for calls is given back at once, but it counts, and a
-    collection would come every few turns of the loop and take longer than the rings last.
+    Not while a motion runs: what MicroPython allocates for a call is freed at its end, but counts.
+    Collections would come every few turns of the loop, and take longer than the rings last.
     """
     if hasattr(gc, "threshold"):
         gc.threshold((gc.mem_free() + gc.mem_alloc()) // 64 if often else -1)
 
 
 def forget() -> None:
-    """Let the next collection have the modules that only set-up or the start of a motion needs.
+    """Give up the modules that only set-up or the start of a motion needs; the next collection frees them.
 
     They are imported inside of functions, never at the head of a module, and never while a motion runs.
     """

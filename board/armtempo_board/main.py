@@ -2,7 +2,7 @@
 
 import micropython
 
-micropython.kbd_intr(-1)  # what a host sends may hold a Ctrl-C, which must not end the start
+micropython.kbd_intr(-1)  # a Ctrl-C in what a host sends must not end the start
 
 from armtempo_board import start  # noqa: E402
 

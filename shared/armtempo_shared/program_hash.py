@@ -11,7 +11,8 @@ _PIECE = 512
 
 
 def program_crc(board: str, shared: str) -> int:
-    """The hash of the program in two package folders; that of the stamp where there is one."""
+    """The hash of the program, by the files of its two packages; that of the stamp where there is one."""
+    board, shared = [path[: path.rindex("/")] for path in (board, shared)]
     try:
         with open(board + "/" + STAMP) as file:
             return int(file.read().strip(), 16)

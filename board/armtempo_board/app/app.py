@@ -26,7 +26,7 @@ _MOST_FAILURES = const(10)  # turns of the loop that fail one after the other; t
 
 
 class App:
-    """Holds the parts together; ``stream`` is the serial port, ``root`` the folder of the store.
+    """Puts the parts together; ``stream`` is the serial port, ``root`` the folder of the store.
 
     ``fault``: what is pending from the start, 0 for none.
     """
@@ -48,7 +48,7 @@ class App:
         self.link.forget()
 
     def left(self) -> int:
-        """Whether somebody has asked for the REPL, and the reply is out."""
+        """Whether a host has asked for the REPL, and the reply is out."""
         return self.commands.leaving and self.link.idle()
 
     def turn(self) -> None:

@@ -1,4 +1,4 @@
-"""The replay button, or a level on its pin: high starts the default trajectory."""
+"""The replay button, or a level on its pin: high starts the default motion."""
 
 import time
 
@@ -9,7 +9,7 @@ _STEADY_MS = const(30)
 
 
 class Button:
-    """``pressed`` says True once for each press that lasts long enough."""
+    """``pressed`` is True once for each press that lasts long enough."""
 
     def __init__(self) -> None:
         from armtempo_board.hardware import pins  # here, so that it can be forgotten

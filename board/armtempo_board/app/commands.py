@@ -39,12 +39,12 @@ class Commands:
 
         self.controller = controller
         self.greeted = False  # a host has said hello
-        self.leaving = False  # somebody has asked for the REPL
+        self.leaving = False  # a host has asked for the REPL
         self._link = link
         self._session = 0
         self._table: "dict[int, Any]" = {}
         while_moving = bytearray()
-        kept: "dict[str, str]" = {}  # one string for all that are equal, for the sake of the heap
+        kept: "dict[str, str]" = {}  # one string for all that are equal, to save heap
         for command, answer in zip(rows("C"), rows("A")):
             name, number, fields, _, tail = command
             _, _, values, _, _ = answer

@@ -16,7 +16,7 @@ from armtempo_board import heap
 from armtempo_board.app.app import App
 from armtempo_board.app.button import Button
 from armtempo_board.app.leds import Leds
-from armtempo_board.app.watchdog import Watchdog, bit
+from armtempo_board.app.watchdog import Watchdog, has_reset
 from armtempo_board.errors import Refused
 
 TYPE_CHECKING = False
@@ -29,11 +29,11 @@ _EXCEPTION_BUFFER = const(100)
 _EIGHTH_TURN = const(7)  # while something moves, LEDs, watchdog and button come in every eighth turn only
 
 app: "Any" = None
-"""The program's App, kept when it is left for the REPL."""
+"""The program's App; it is kept when the program is left for the REPL."""
 
 
 def main(root: str = ROOT) -> None:
-    """Run until somebody asks for the REPL."""
+    """Run until a host asks for the REPL."""
     global app
     micropython.alloc_emergency_exception_buf(_EXCEPTION_BUFFER)
     leds = Leds()
@@ -52,21 +52,19 @@ def main(root: str = ROOT) -> None:
 
 
 def _build(port: "pyb.USB_VCP", root: str) -> App:
-    """The App; what only its making needs is forgotten again, for the sake of the heap."""
-    built = App(port, root, _crc(), _fault_at_start())
+    """The App; what only its set-up needs is forgotten again, to save heap."""
+    from armtempo_shared.program_hash import program_crc  # here, so that it can be forgotten
+
+    crc = program_crc(armtempo_board.__file__, armtempo_shared.__file__)
+    del program_crc
+    built = App(port, root, crc, codes.WATCHDOG if has_reset() else 0)
     built.controller.forget_store()
     heap.forget()
     return built
 
 
-def _crc() -> int:
-    from armtempo_shared.program_hash import program_crc  # here, so that it can be forgotten
-
-    return int(program_crc(*_folders()))
-
-
 def run(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
-    """Turn until somebody asks for the REPL; whatever ends the loop, nothing goes on moving without it."""
+    """Turn the loop until a host asks for the REPL. Whatever ends it, nothing goes on moving then."""
     try:
         while True:
             app.turn()
@@ -95,10 +93,6 @@ def _serve_panel(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
     machine.idle()
 
 
-def _fault_at_start() -> int:
-    return codes.WATCHDOG if bit() else 0
-
-
 def _replay_default() -> None:
     try:
         app.controller.begin(app.controller.store().default(), 0)
@@ -115,7 +109,3 @@ def _detach(port: "Any") -> None:
 def _attach(port: "Any") -> None:
     micropython.kbd_intr(_CTRL_C)
     os.dupterm(port, 1)
-
-
-def _folders() -> "list[str]":
-    return [path[: path.rindex("/")] for path in (armtempo_board.__file__, armtempo_shared.__file__)]

@@ -1,4 +1,4 @@
-"""``armtempo_board.replay("feed")``: one stored motion from the REPL, without a host."""
+"""``armtempo_board.replay("feed")``: runs one stored motion from the REPL, without a host."""
 
 import micropython
 import pyb
@@ -19,7 +19,7 @@ _CTRL_C = b"\x03"
 
 
 class _Nobody:
-    """Takes the place of the serial port, which is the REPL's."""
+    """Takes the place of the serial port, which the REPL uses."""
 
     def readinto(self, buffer: bytearray, count: int) -> None:
         """Nothing comes."""
@@ -29,7 +29,7 @@ class _Nobody:
 
 
 def replay(name: str = "", root: str = program.ROOT) -> None:
-    """Run a stored trajectory, the default where no name is given, and say how it ended.
+    """Run a stored motion, the default where no name is given, and print how it ended.
 
     Where the position is unknown the arm must stand where the motion begins: calling this declares it.
     Ctrl-C brakes, a second one freezes.

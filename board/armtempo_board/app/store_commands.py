@@ -58,7 +58,7 @@ def put_commit(commands: "Commands", row: tuple, length: int) -> None:
 
 
 def list(commands: "Commands", row: tuple, length: int) -> int:
-    """One of the stored trajectories, and how many there are."""
+    """One of the stored motions, and how many there are."""
     (index,) = commands.fields(row)
     store = commands.controller.store()
     names = store.names()
@@ -81,12 +81,12 @@ def list(commands: "Commands", row: tuple, length: int) -> int:
 
 
 def remove(commands: "Commands", row: tuple, length: int) -> None:
-    """Remove a trajectory."""
+    """Remove a motion."""
     commands.controller.store().remove(commands.text(row, length))
 
 
 def rename(commands: "Commands", row: tuple, length: int) -> None:
-    """Give a trajectory another name."""
+    """Give a motion another name."""
     (old_length,) = commands.fields(row)
     names = commands.text(row, length)
     commands.controller.store().rename(names[:old_length], names[old_length:])
@@ -103,5 +103,5 @@ def get(commands: "Commands", row: tuple, length: int) -> int:
 
 
 def set_default(commands: "Commands", row: tuple, length: int) -> None:
-    """Make a trajectory the one that the button starts."""
+    """Make a motion the one that the button starts."""
     commands.controller.store().set_default(commands.text(row, length))

@@ -1,7 +1,7 @@
 """The watchdog: resets the chip when the loop hangs.
 
-Once started the hardware cannot be stopped, so whoever leaves the program for the REPL leaves a timer
-behind that feeds it; ``boot.py`` does the same after a soft reset.
+The hardware cannot be stopped once it is started. So a timer feeds it from when the program is left for the REPL;
+``boot.py`` does the same after a soft reset.
 """
 
 import machine
@@ -18,7 +18,7 @@ _kept = None
 
 
 class Watchdog:
-    """Starts with the loop, never before: a program that fails on the way there leaves a usable REPL."""
+    """Starts with the loop, not before: a program that fails before that leaves a usable REPL."""
 
     def __init__(self) -> None:
         self._watchdog = machine.WDT(timeout=_TIMEOUT_MS)
@@ -31,8 +31,8 @@ class Watchdog:
         keep_fed()
 
 
-def bit() -> bool:
-    """Whether the last reset was its doing."""
+def has_reset() -> bool:
+    """Whether it made the last reset."""
     return machine.reset_cause() == machine.WDT_RESET
 
 

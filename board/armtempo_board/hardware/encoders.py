@@ -9,8 +9,7 @@ from armtempo_board.hardware import isr
 class Encoder:
     """One encoder input. ``inverted``: it counts down when the joint's angle grows.
 
-    A reading is right while the encoder moves less than 32 768 counts between two of them: one every 32 ms at
-    a million counts a second.
+    Read it at least every 32 768 counts: at a million counts a second every 32 ms.
     """
 
     def __init__(self, channel: int, inverted: int) -> None:
@@ -30,7 +29,7 @@ class Encoder:
         self.take(isr.read_counter(self.address))
 
     def take(self, counter: int) -> None:
-        """Go on to a reading of the counter; readings come in their order."""
+        """Count up to a reading of the counter; readings come in their order."""
         moved = (counter - self._last) & 0xFFFF
         if moved >= 0x8000:
             moved -= 0x10000

@@ -49,7 +49,7 @@ class Inputs:
         mode = ExtInt.IRQ_RISING if level else ExtInt.IRQ_FALLING
         pull = Pin.PULL_UP if level else Pin.PULL_DOWN
         pin = Pin(name, Pin.IN, pull=pull)
-        ExtInt(pin, mode, pull, None)  # an earlier engine's hook would be refused its successor
+        ExtInt(pin, mode, pull, None)  # removes an earlier engine's callback: a line takes only one
         ExtInt(pin, mode, pull, callback)
         return pin
 
@@ -108,13 +108,13 @@ class Inputs:
         enable_irq(before)
 
     def poll(self) -> None:
-        """What the interrupts would have missed: a switch that was tripped before the joint turned to it."""
+        """A switch that tripped before the joint turned towards it: its interrupt came too early."""
         for pin, level, line in self._limits:
             if pin.value() == level:
                 self._on_limit(line)
 
     def watch(self, joint: int, moves: int) -> None:
-        """Whether the joint moves: a switch stops it only then."""
+        """A switch stops a joint only while it moves: ``moves`` 1 or 0."""
         for pair in range(self._count):
             if self._pairs[isr.PAIR_WORDS * pair + isr.PAIR_JOINT] == joint:
                 self._pairs[isr.PAIR_WORDS * pair + isr.PAIR_MOVES] = moves
@@ -128,7 +128,7 @@ class Inputs:
         self.enable_pin.value(self._on if on else 1 - self._on)
 
     def close(self) -> None:
-        """Let go of the interrupts; drivers off."""
+        """Remove the interrupts' callbacks; drivers off."""
         self.enable(False)
         for pin, _, _ in self._limits:
             ExtInt(pin, ExtInt.IRQ_RISING, Pin.PULL_NONE, None)

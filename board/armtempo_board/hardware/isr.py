@@ -47,40 +47,39 @@ RAW_OUT = const(5)  # raw samples converted
 RAW_LOST = const(6)  # raw samples that found no room
 NOW = const(7)  # counter when the interrupt came
 FROZEN = const(8)  # outputs are frozen
-FROZEN_AT = const(9)  # counter at that moment
-FAULT = const(10)
-FAULT_JOINT = const(11)
-STEP_HIGH = const(12)  # bit a joint: its STEP was high when frozen, so the step begun was finished
-PULSE_TICKS = const(13)  # STEP high time
-JOINTS = const(14)
-ENCODERS = const(15)
-TURN_LATE = const(16)  # a DIR turn came too late
-TURN_SLACK_TICKS = const(17)  # how late it may come
-DIR_SETUP_TICKS = const(18)  # DIR stable before a rising edge
-BLOCK_HEAD = const(19)
+FAULT = const(9)
+FAULT_JOINT = const(10)
+STEP_HIGH = const(11)  # bit a joint: its STEP was high when frozen, so the pulse was finished
+PULSE_TICKS = const(12)  # STEP high time
+JOINTS = const(13)
+ENCODERS = const(14)
+TURN_LATE = const(15)  # a turn of DIR came too late
+TURN_SLACK_TICKS = const(16)  # how late it may come
+DIR_SETUP_TICKS = const(17)  # DIR stable before a rising edge
+BLOCK_HEAD = const(18)
 # words of a joint in the block, behind the head
-DIR_BIT = const(0)
-TURNS_IN = const(1)
-TURNS_OUT = const(2)
-ON_TIM5 = const(3)
-CCR_AT = const(4)
-CCMR_AT = const(5)
-MODE_SHIFT = const(6)
-ON_PORT_B = const(7)
+DIR_BIT = const(0)  # in the DIR port
+TURNS_IN = const(1)  # turns of DIR that were queued,
+TURNS_OUT = const(2)  # and made
+ON_TIM5 = const(3)  # else on TIM2
+CCR_AT = const(4)  # word of its compare register in the timer
+CCMR_AT = const(5)  # and of the register that has its mode,
+MODE_SHIFT = const(6)  # with the mode's place there
+ON_PORT_B = const(7)  # its STEP pin; else on port A
 PIN_BIT = const(8)
-TURN_TIMES = const(9)
-TURN_ROOM = const(8)
-RING = const(17)  # the state of its ring:
+TURN_TIMES = const(9)  # when the queued turns are due
+TURN_ROOM = const(8)  # so many
+RING = const(17)  # the state of its ring
 JOINT_WORDS = const(26)
 # words of a ring's state
 WRITTEN = const(0)  # entries written since the stream was started
 MATCHED = const(1)  # words that the stream has handed on since; so many matches have been
 NDTR_AT_START = const(2)  # NDTR right after the start
 LAST_TIME = const(3)  # time of the last entry written
-FAR_TIME = const(4)  # the far-away entry behind it
-MASK = const(5)  # entries of the ring less 1; they are a power of two, so that an index is a mask away
+FAR_TIME = const(4)  # of the entry behind it, half a round of the counter away
+MASK = const(5)  # entries of the ring, a power of two, less 1
 NDTR_AT = const(6)  # word offset of its stream's NDTR in DMA1
-FED = const(7)  # the interrupt writes to the ring; it ends that when the ring has run dry
+FED = const(7)  # the interrupt writes to the ring; it stops that when the ring has run out of entries
 ROOM = const(8)  # entries that may be written now
 STATE_WORDS = const(9)
 
@@ -111,19 +110,19 @@ _PORT_A = const(0)
 _PORT_B = const(1)
 _LEAST_AHEAD_TICKS = const(84)  # 1 us: a compare value nearer than that may be missed
 _CALL_TICKS = const(336)  # 4 us
-# entries of a ring behind the matched one that stay readable, and the far-away entry
-SPARE_ENTRIES = const(8)
+SPARE_ENTRIES = const(8)  # of a ring, that are not overwritten: those matched last, and the far-away entry
 _GUARD_TICKS = const(32768)  # 390 us: entries are only added behind a rising edge that is further away,
 _FAR_AHEAD_TICKS = const(3145728)  # but not 37 ms away,
 _MOST_ENTRIES = const(512)  # and so many at most, which takes less than the 390 us
-# from the mode 7 down
-_TO_TOGGLE = const(4)  # to 3
-_TO_FORCED_LOW = const(3)  # to 4
+# modes of an output (RM0090 18.4.7), by what is subtracted from all three bits set
+_MODE_BITS = const(7)
+_TO_TOGGLE = const(4)  # 3: toggle on match
+_TO_FORCED_LOW = const(3)  # 4: forced inactive
 
 
 @micropython.viper
 def counter_kiticks(timer: ptr32) -> int:
-    """The counter in units of 1024 ticks, 22 bits."""
+    """The counter in Ki ticks, 22 bits."""
     return (timer[CNT] >> 10) & 0x3FFFFF
 
 
@@ -142,7 +141,7 @@ def counters_agree(timer2: ptr32, timer5: ptr32) -> int:
 
 @micropython.viper
 def word_kiticks(words: ptr32, at: int) -> int:
-    """A counter value kept in an array, in units of 1024 ticks, 22 bits."""
+    """A counter value that stands in an array, in Ki ticks, 22 bits."""
     return (words[at] >> 10) & 0x3FFFFF
 
 
@@ -160,7 +159,7 @@ def read_counter(timer: ptr32) -> int:
 
 @micropython.viper
 def kiticks_until(timer: ptr32, words: ptr32, at: int) -> int:
-    """Units of 1024 ticks from now until the time ``words[at]``; negative when it has passed."""
+    """Ki ticks from now until the time ``words[at]``; negative when it has passed."""
     gap = ((words[at] - timer[CNT]) >> 10) & 0x3FFFFF
     if gap >= 0x200000:
         gap -= 0x400000
@@ -180,10 +179,9 @@ def matches(state: ptr32, dma: ptr32) -> int:
 
 @micropython.viper
 def rings_to_refill(block: ptr32, dma: ptr32, timer: ptr32) -> int:
-    """Look after all rings; a bit for each joint to whose ring entries are to be added now, ROOM at most.
+    """Bit a joint: a quarter of its ring is free, so entries are to be added now, ROOM at most. -1: no ring is fed.
 
-    That is where a quarter is free. -1: there is nothing to look after. 130 instructions and 76 a joint, 123 where
-    entries are to be added.
+    130 instructions and 76 a joint, 123 where entries are to be added.
     """
     found = 0
     fed = 0
@@ -217,20 +215,20 @@ def rings_to_refill(block: ptr32, dma: ptr32, timer: ptr32) -> int:
 
 @micropython.viper
 def note_written(state: ptr32, ring: ptr32, timer: ptr32, queue: ptr32) -> int:
-    """Take in what was written up to the queue's HEAD, and write the far-away entry behind it; 1: it came too late.
+    """Count what was written up to the queue's HEAD, and write the far-away entry behind it; 1: it came too late.
 
-    Entry 0 goes into the compare register by hand, so the stream begins with entry 1 and runs over the
-    words behind it: word 0 is repeated behind the end.
+    The program itself puts entry 0 into the compare register. So the stream begins with entry 1 and goes on to one
+    word behind the ring: entry 0 is repeated there.
     """
     late = 0
-    made = queue[_HEAD]
-    if made != state[WRITTEN]:
+    written = queue[_HEAD]
+    if written != state[WRITTEN]:
         late = ((state[LAST_TIME] - queue[_PULSE] - timer[CNT]) >> 31) & 1
-        state[WRITTEN] = made
-        state[LAST_TIME] = ring[(made - 1) & state[MASK]]
+        state[WRITTEN] = written
+        state[LAST_TIME] = ring[(written - 1) & state[MASK]]
         half = 1
         state[FAR_TIME] = (half << 31) + state[LAST_TIME]
-        ring[made & state[MASK]] = state[FAR_TIME]
+        ring[written & state[MASK]] = state[FAR_TIME]
         ring[state[MASK] + 1] = ring[_FIRST_ENTRY]
     return late
 
@@ -255,7 +253,7 @@ def arm_channel(block: ptr32, timer: ptr32, ring: ptr32, at: int) -> int:
     bit = 1 << (block[CCR_AT] - CCR1 + 1)
     timer[SR] = (1 << 16) - 1 - bit
     mode = block[CCMR_AT]
-    timer[mode] = (timer[mode] | (7 << block[MODE_SHIFT])) - (_TO_TOGGLE << block[MODE_SHIFT])
+    timer[mode] = (timer[mode] | (_MODE_BITS << block[MODE_SHIFT])) - (_TO_TOGGLE << block[MODE_SHIFT])
     timer[DIER] = timer[DIER] | (bit << 8)
     return ((first - timer[CNT] - _LEAST_AHEAD_TICKS) >> 31) & 1
 
@@ -265,13 +263,13 @@ def release_channel(block: ptr32, timer: ptr32, at: int) -> object:
     """Hold the output low and take no more words from DMA. Call it with interrupts off."""
     block = ptr32(int(block) + 4 * at)
     mode = block[CCMR_AT]
-    timer[mode] = (timer[mode] | (7 << block[MODE_SHIFT])) - (_TO_FORCED_LOW << block[MODE_SHIFT])
+    timer[mode] = (timer[mode] | (_MODE_BITS << block[MODE_SHIFT])) - (_TO_FORCED_LOW << block[MODE_SHIFT])
     timer[DIER] = timer[DIER] & (0xFFFF - (1 << (block[CCR_AT] - CCR1 + 9)))
 
 
 @micropython.viper
 def push_away(timer: ptr32, compare: int, state: ptr32) -> object:
-    """Move an idle compare value as far away as the counter allows."""
+    """Move the compare value of an empty ring half a round of the counter away."""
     half = 1
     far = timer[CNT] + (half << 31)
     timer[compare] = far
@@ -280,7 +278,7 @@ def push_away(timer: ptr32, compare: int, state: ptr32) -> object:
 
 @micropython.viper
 def set_last_to_now(timer: ptr32, state: ptr32) -> object:
-    """Count the last entry as being now."""
+    """Take the time of the last entry for now."""
     state[LAST_TIME] = timer[CNT]
 
 
@@ -288,17 +286,17 @@ def set_last_to_now(timer: ptr32, state: ptr32) -> object:
 def add_turn(block: ptr32, state: ptr32, at: int, delay: int) -> int:
     """Queue a turn of DIR, ``delay`` ticks behind the last entry; 0 when the queue is full."""
     block = ptr32(int(block) + 4 * at)
-    given = block[TURNS_IN]
-    if ((given - block[TURNS_OUT]) & 0xFF) >= TURN_ROOM:
+    queued = block[TURNS_IN]
+    if ((queued - block[TURNS_OUT]) & 0xFF) >= TURN_ROOM:
         return 0
-    block[TURN_TIMES + (given & (TURN_ROOM - 1))] = state[LAST_TIME] + delay
-    block[TURNS_IN] = (given + 1) & 0xFF
+    block[TURN_TIMES + (queued & (TURN_ROOM - 1))] = state[LAST_TIME] + delay
+    block[TURNS_IN] = (queued + 1) & 0xFF
     return 1
 
 
 @micropython.viper
 def interrupt_soon(timer: ptr32) -> object:
-    """Have the compare interrupt come in 4 us, to look at what was queued."""
+    """Let the compare interrupt come in 4 us, to look at what was queued."""
     while True:
         timer[CCR4] = timer[CNT] + _CALL_TICKS
         if ((timer[CCR4] - timer[CNT]) >> 31) & 1 == 0:
@@ -396,18 +394,17 @@ def take_sample(raw: ptr32, block: ptr32, dma: ptr32, encoders: object) -> objec
 def freeze(block: ptr32, timer2: ptr32, timer5: ptr32) -> int:
     """Stop all STEP outputs now; ``finish_pulses`` has to follow; 0 where that is done. 125 + 27 a joint.
 
-    First no more words come from DMA, then every compare value goes far away: from there on the pins stand
-    still. What DMA had been asked for before is served within a few bus cycles, long before its compare value
-    is overwritten here.
+    First no more words come from DMA, then every compare value goes half a round of the counter away: from there on
+    the pins stand still. A request that DMA had before is served within a few bus cycles, long before the compare
+    value is overwritten here.
     """
     if block[FROZEN]:
         return 0
     block[FROZEN] = 1
     timer2[DIER] = 0
     timer5[DIER] = 0
-    block[FROZEN_AT] = timer2[CNT]
     far = 1
-    far = (far << 31) + block[FROZEN_AT]
+    far = (far << 31) + timer2[CNT]
     joints = block[JOINTS]
     block = ptr32(int(block) + 4 * BLOCK_HEAD)
     while joints:
@@ -443,7 +440,9 @@ def finish_pulses(block: ptr32, timer2: ptr32, timer5: ptr32, ports: object) -> 
             timer[block[CCR_AT]] = timer[CNT] + head[PULSE_TICKS]
         else:
             mode = block[CCMR_AT]
-            timer[mode] = (timer[mode] | (7 << block[MODE_SHIFT])) - (_TO_FORCED_LOW << block[MODE_SHIFT])
+            timer[mode] = (timer[mode] | (_MODE_BITS << block[MODE_SHIFT])) - (
+                _TO_FORCED_LOW << block[MODE_SHIFT]
+            )
     head[STEP_HIGH] = high
 
 

@@ -1,6 +1,6 @@
-"""The compare interrupt of TIM2 channel 4: samples on the motion's clock, and turns of the DIR pins.
+"""The compare interrupt of TIM2 channel 4: samples at exact times of the motion, and turns of the DIR pins.
 
-The interrupt stores raw readings; ``next_raw`` hands them to the main loop in their order.
+The interrupt stores raw samples; ``next_raw`` gives them to the main loop in their order.
 """
 
 from array import array
@@ -15,12 +15,13 @@ from pyb import Timer
 from armtempo_board.hardware import isr
 
 _LOW32 = 0xFFFFFFFF
+_COMPARE_4 = const(1 << 4)  # CC4IE in DIER
 _QUIET_KITICKS = const(80)  # 1 ms
-_DEAD_KITICKS = const(-40)  # 0.5 ms ago
+_OVERDUE_KITICKS = const(-40)  # 0.5 ms ago
 
 
 class Sampler:
-    """Owns the memory shared with the interrupts. ``counters``: addresses of the encoder timers in use."""
+    """Owns the memory that the interrupts share. ``counters``: addresses of the encoder timers in use."""
 
     def __init__(self, joints: int, counters: "tuple[int, ...]") -> None:
         words = isr.BLOCK_HEAD + MAX_JOINTS * isr.JOINT_WORDS
@@ -37,18 +38,18 @@ class Sampler:
         self._hook = self._interrupt  # bound once: making a bound method allocates
 
     def connect(self) -> None:
-        """Hook the interrupt. Starts TIM2, so set the timers up after it."""
+        """Set the interrupt up. It starts TIM2, so set the timers up after it."""
         timer = Timer(2, prescaler=0, period=0x3FFFFFFF)
         timer.channel(4, Timer.OC_TIMING, callback=self._hook)  # type: ignore[arg-type]
 
     @micropython.viper
     def _interrupt(self, timer: object) -> object:
-        # 9 us before the first pin turns (see docs/hardware.md)
+        # the first pin turns 9 us after the match (see docs/hardware.md)
         while int(isr.serve_compare(self.block, self._timer2, self._directions)):
             isr.take_sample(self.raw, self.block, self._dma, self._counters)
 
     def joint_at(self, joint: int) -> int:
-        """Place of a joint's words in the block."""
+        """Index of a joint's first word in the block."""
         return isr.BLOCK_HEAD + joint * isr.JOINT_WORDS
 
     def plan(self, duration_ticks: int) -> None:
@@ -66,10 +67,10 @@ class Sampler:
         block[isr.SAMPLES_DONE] = 0
         mem32[self._timer2 + 4 * isr.CCR4] = 0
         mem32[self._timer2 + 4 * isr.SR] = 0
-        mem32[self._timer2 + 4 * isr.DIER] = 1 << 4
+        mem32[self._timer2 + 4 * isr.DIER] = _COMPARE_4
 
     def end_at(self, ticks: int) -> None:
-        """The motion ends at another time than planned. Call it while no sample is due."""
+        """The motion ends at another time than planned. Call it only while ``quiet``."""
         block = self.block
         begun = self._regular - block[isr.SAMPLES_LEFT]
         self._regular = max(-(-ticks // SAMPLE_TICKS), begun)
@@ -80,7 +81,7 @@ class Sampler:
         isr.interrupt_soon(self._timer2)
 
     def waits(self) -> bool:
-        """Whether raw samples are to be converted."""
+        """Whether raw samples wait to be converted."""
         return self.block[isr.RAW_IN] != self.block[isr.RAW_OUT]
 
     def quiet(self) -> bool:
@@ -94,16 +95,19 @@ class Sampler:
         )
 
     def overdue(self, joint: int) -> bool:
-        """Whether a sample or a turn of the joint was due long ago: the interrupt comes no more."""
+        """Whether a sample or a turn of the joint was due 0.5 ms ago: the interrupt comes no more."""
         block = self.block
         at = self.joint_at(joint)
         out = block[at + isr.TURNS_OUT]
         turn = at + isr.TURN_TIMES + (out & (isr.TURN_ROOM - 1))
-        if out != block[at + isr.TURNS_IN] and isr.kiticks_until(self._timer2, block, turn) < _DEAD_KITICKS:
+        if (
+            out != block[at + isr.TURNS_IN]
+            and isr.kiticks_until(self._timer2, block, turn) < _OVERDUE_KITICKS
+        ):
             return True
         return (
             block[isr.SAMPLES_DONE] == 0
-            and isr.kiticks_until(self._timer2, block, isr.NEXT_SAMPLE) < _DEAD_KITICKS
+            and isr.kiticks_until(self._timer2, block, isr.NEXT_SAMPLE) < _OVERDUE_KITICKS
         )
 
     def done(self) -> bool:
@@ -111,7 +115,7 @@ class Sampler:
         return self.block[isr.SAMPLES_DONE] != 0 and not self.waits()
 
     def next_raw(self) -> int:
-        """Place of the oldest raw sample in ``raw``, or -1; ``drop`` it when it has been converted."""
+        """Index of the oldest raw sample in ``raw``, or -1; ``drop`` it when it has been converted."""
         read = self.block[isr.RAW_OUT]
         if read == self.block[isr.RAW_IN]:
             return -1

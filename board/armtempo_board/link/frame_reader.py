@@ -67,7 +67,7 @@ class FrameReader:
         return max(0, length + OVERHEAD - self._filled)
 
     def _announced(self) -> int:
-        """Payload bytes that the frame's head tells of."""
+        """Payload bytes by the frame's head."""
         return self.data[LENGTH_AT] | self.data[LENGTH_AT + 1] << 8
 
     def _accept(self) -> bool:

@@ -34,7 +34,7 @@ class SerialLink:
         self.reply = bytearray(MAX_PAYLOAD + OVERHEAD)
         self.out = bytearray(_OUT_SIZE)
         self.heard_ms: "Any" = 0  # when the last good frame came
-        self.escape = False  # Ctrl-C outside of any frame: somebody asks for the REPL
+        self.escape = False  # Ctrl-C outside of any frame asks for the REPL
         self._begin = 0
         self._end = 0
         self._reply_size = 0  # of the last reply; 0: none yet
@@ -138,7 +138,7 @@ class SerialLink:
         )
 
     def _watch_escape(self, byte: int, now_ms: "Any") -> None:
-        """Tell a Ctrl-C (of mpremote, or typed twice) from noise: nothing but CR and Ctrl-C came, after quiet.
+        """Find a Ctrl-C (of mpremote, or typed twice) that is no noise: after quiet only CR and Ctrl-C came.
 
         Three in a row count at once, also right behind a frame. mpremote sends Ctrl-A after them, once, and the
         prompt is to get it.

@@ -3,8 +3,8 @@
 The subintervals are those of a binary tree over a time segment; a node's number is 2**level + index. An array of pieces
 has six places of 13 words: the piece that is looked at, four right halves by their level modulo 4, and the root. A
 right half comes with the left one and is kept, as it is the next to be looked at or halved. The last word of a place
-tells the node. A right half of an earlier segment is never taken for one of this: before it is looked for, the piece
-that both come from has been halved in this segment, which has put the new one into its place.
+holds the node's number. A right half that was kept in an earlier segment is never taken for one of this segment: before
+it is looked for, its parent has been halved in this segment, which has overwritten the old one.
 
 A piece is measured in block floating point: differences of neighbouring points as single words, with a scale of their
 own. Signed values in arrays are stored with a bias, see bezier.py.
@@ -47,7 +47,7 @@ MONOTONE = const(1)  # steps in it, all in one direction
 AT_START = const(2)  # steps, all of them at its start
 END = const(3)
 
-# what a measurement tells. Steady: the differences have one sign and are within a factor of two
+# results of a measurement. Steady: the differences have one sign and are within a factor of two
 MEASURED = const(1)
 ANGLE_STEADY = const(2)
 TIME_STEADY = const(8)  # and they are positive
@@ -89,7 +89,7 @@ def search(
 
     ``piece`` and ``measures``: those of time; ``point`` and ``other_measures``: pieces and measures of angle.
     ``position`` (+ bezier.BIAS): where the steps so far lead; 0: only measure the next subinterval, and give 4 times
-    what that tells. ``min_ticks``: see ``Subintervals``.
+    the results of that. ``min_ticks``: see ``Subintervals``.
     """
     other = point
     node = measures[NODE]

@@ -72,7 +72,7 @@ class Subintervals:
         return subdivision.NOT_YET if found == subdivision.END and self.load_segment() else found
 
     def measure(self) -> int:
-        """Compute and measure the subinterval; 0: past the end, else MEASURED and what else that tells."""
+        """Compute and measure the subinterval; 0: past the end, else MEASURED and its other results."""
         found = 0
         while not found:
             found = search(self.time, self.angle, self.time_measures, self.angle_measures, 0, 0) >> 2

@@ -1,10 +1,10 @@
-"""Records in flash: trajectories, the arm record, the name of the default; never half written.
+"""Records in flash: motions, the arm record, the name of the default motion; never half written.
 
-A record is written to ``NAME.new``, read back, synced and renamed. Where a power cut leaves a ``.new``
-behind, ``recover`` takes it if the old one is gone and the new one is whole, and removes it otherwise.
+A record is written to ``NAME.new``, read back, synced and renamed. Where a power cut leaves a ``.new`` file,
+``recover`` takes it if the old file is gone and the new one is whole, and removes it otherwise.
 
-A record's name is that of its trajectory, or ``ARM_RECORD_NAME``. The module is imported when it is needed
-and forgotten before a motion (see ``App.store``): no file is touched while one runs.
+A record's name is that of its motion, or ``ARM_RECORD_NAME``. The module is imported when it is needed and forgotten
+before a motion (see ``Controller.store``): no file is read or written while one runs.
 """
 
 import os
@@ -43,7 +43,7 @@ def _file_name(name: str) -> str:
 
 
 def _motion_file(name: str) -> str:
-    """The file of a trajectory; refuses what is no name for one."""
+    """The file of a motion; refuses what is no name for one."""
     if not 0 < len(name) <= MAX_NAME:
         raise Refused(codes.BAD_NAME)
     for letter in name:
@@ -59,7 +59,7 @@ def _sync() -> None:
 
 
 def _whole(file_name: str, data: bytes) -> bool:
-    """Whether the bytes are a whole record of the kind that the name tells."""
+    """Whether the bytes are a whole record, of the kind that the file's name says."""
     if file_name.endswith(_MOTION):
         try:
             Motion(data)
@@ -101,7 +101,7 @@ class Store:
                 self._recover(name[: -len(_NEW)])
 
     def free(self) -> int:
-        """Bytes free in the flash, as far as a small integer can tell."""
+        """Bytes free in the flash; as many as a small integer can hold at most."""
         try:
             stat = os.statvfs(self._root)
         except OSError:
@@ -109,7 +109,7 @@ class Store:
         return min(stat[_F_BSIZE] * stat[_F_BAVAIL], _MOST_FREE)
 
     def names(self) -> "list[str]":
-        """Names of the stored trajectories, sorted."""
+        """Names of the stored motions, sorted."""
         return sorted([name[: -len(_MOTION)] for name in self._files() if name.endswith(_MOTION)])
 
     def begin(self, name: str, size: int) -> None:
@@ -127,7 +127,7 @@ class Store:
         self._received = 0
 
     def write(self, offset: int, data: bytes) -> int:
-        """Add a piece; one that came before is passed over. Returns the offset of the next."""
+        """Add a piece; one that has come before is ignored. Returns the offset of the next."""
         if not self._file or not offset <= self._received or offset + len(data) > self._size:
             raise Refused(codes.BAD_OFFSET, value=self._received)
         fresh = data[self._received - offset :]
@@ -182,14 +182,14 @@ class Store:
             file.close()
 
     def remove(self, name: str) -> None:
-        """Remove a trajectory."""
+        """Remove a motion."""
         file_name = _motion_file(name)
         self._size_of(file_name)
         self._guard(os.remove, self._path(file_name))
         self._guard(_sync)
 
     def rename(self, old: str, new: str) -> None:
-        """Give a trajectory another name; the default goes with it."""
+        """Give a motion another name; where it is the default it stays that."""
         old_file, new_file = _motion_file(old), _motion_file(new)
         self._size_of(old_file)
         if new.lower() in [name.lower() for name in self.names() if name != old] or new == old:
@@ -203,7 +203,7 @@ class Store:
             self._write_default(new)
 
     def default(self) -> str:
-        """Name of the default trajectory, "" for none."""
+        """Name of the default motion, "" for none."""
         try:
             lines = self._read(_DEFAULT).decode().split("\n")
         except (Refused, UnicodeError):
@@ -215,7 +215,7 @@ class Store:
         return ""
 
     def set_default(self, name: str) -> None:
-        """Make a stored trajectory the default; "" for none."""
+        """Make a stored motion the default; "" for none."""
         if name:
             self._size_of(_motion_file(name))
         self._write_default(name)
@@ -232,7 +232,7 @@ class Store:
         self._replace(_DEFAULT)
 
     def _other_case(self, file_name: str) -> None:
-        """FAT does not tell upper from lower case: two names must differ in more than that."""
+        """FAT ignores the case of letters: two names must differ in more than that."""
         for name in self._files():
             if name != file_name and name.lower() == file_name.lower():
                 raise Refused(codes.EXISTS)
