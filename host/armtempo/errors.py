@@ -15,6 +15,9 @@ Every message says what is wrong, where, and what to do.
 
 from __future__ import annotations
 
+INTERRUPTED = 130
+"""Exit code of the command after Ctrl-C."""
+
 
 class ArmtempoError(Exception):
     """Base of all errors that are shown to the user as one message, without a traceback."""

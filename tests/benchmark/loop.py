@@ -24,7 +24,7 @@ from zlib import crc32
 
 from armtempo.deploy import firmware as deployed
 from armtempo.deploy import program
-from armtempo.model import arm as arms
+from armtempo.model.arm import Arm
 from armtempo.records import encode
 from armtempo_shared import armrecord, limits, wire
 from armtempo_shared.limits import TICK_HZ
@@ -107,7 +107,7 @@ def cruise(rate: int, joints: int, ramp_s: float = RAMP_S, whole_s: float = WHOL
 
 def paper() -> Case:
     """The paper's motion on the shipped arm."""
-    head, rows, _ = armrecord.unpack(encode.arm_record(arms.load_arm(arms.default_path())))
+    head, rows, _ = armrecord.unpack(encode.arm_record(Arm.paper()))
     flags = head["flags"] & ~armrecord.FLAG_STOP_ON_LINK_LOSS | armrecord.FLAG_ESTOP_ACTIVE_HIGH
     start = [round(rate * via) for rate, via in zip(motions.STEPS_PER_DEG, motions.VIA_DEG[0], strict=True)]
     return Case("paper", {**head, "flags": flags}, rows, motions.feeding(), start)

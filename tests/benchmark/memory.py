@@ -17,9 +17,9 @@ import numpy as np
 from armtempo.deploy import program
 from armtempo.deploy.package import STM32F4
 from armtempo.model import arm
+from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
 from armtempo.records import encode
-from armtempo.robot import operate
 from armtempo_shared import wire
 
 from tests import interpreters
@@ -40,7 +40,7 @@ def measure() -> dict[str, int]:
         for path, data in library.items():
             (folder / path).parent.mkdir(parents=True, exist_ok=True)
             (folder / path).write_bytes(data)
-        write_session(folder, arm.load_arm(arm.default_path()))
+        write_session(folder, Arm.paper())
         machine_code = sum(map(machine_code_bytes, library.values()))
         lines = _run(folder, HEAP - machine_code).splitlines()
         assert accepted((folder / "answers").read_bytes()) == len(SESSION)
@@ -51,7 +51,7 @@ def measure() -> dict[str, int]:
 
 def write_session(folder: Path, of_arm: arm.Arm) -> None:
     """Store an arm and a motion, and write the frames of a host that starts it."""
-    home_deg = operate.home_deg(of_arm)
+    home_deg = of_arm.home_deg
     trajectory = point_to_point.straight(
         "go", home_deg, home_deg + np.resize([2.0, 1.0, -2.0], home_deg.shape), of_arm
     )
@@ -59,7 +59,7 @@ def write_session(folder: Path, of_arm: arm.Arm) -> None:
     (folder / "arm.ata").write_bytes(encode.arm_record(of_arm))
     (folder / "go.atm").write_bytes(motion)
     pairs = zip(home_deg, of_arm.driven, strict=True)
-    steps = [round(float(angle) * encode.steps_per_deg(joint)) for angle, joint in pairs]
+    steps = [round(float(angle) * joint.steps_per_deg) for angle, joint in pairs]
     values = {
         "hello": ((wire.PROTOCOL_VERSION, 1), b""),
         "home": (((1 << len(steps)) - 1,), struct.pack(f"<{len(steps)}i", *steps)),

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import random
 
-from armtempo.link import Board
+from armtempo.link import Client
+from armtempo.link.board_messages import Sample
 from armtempo.link.follow import Follower, RunEnd
-from armtempo.link.messages import Sample
 from armtempo_shared import armrecord, motion, wire
 
 from tests.board.scripts import stand_in
@@ -21,7 +21,7 @@ def random_motion(numbers: random.Random, segments: int = 6, joints: int = 3) ->
     return motion.pack(5, points, points, segments, 1, 0, armrecord.unpack(ARM)[2])
 
 
-def ready(pipe: Pipe) -> tuple[Board, bytes]:
+def ready(pipe: Pipe) -> tuple[Client, bytes]:
     """A board with arm, motion ``feed`` and known positions."""
     board = connect(pipe)
     board.upload(wire.ARM_RECORD_NAME, ARM)
@@ -34,12 +34,12 @@ def ready(pipe: Pipe) -> tuple[Board, bytes]:
 def started(pipe: Pipe) -> Follower:
     """A run of ``feed`` that has just begun on a board made ready for it."""
     board, data = ready(pipe)
-    run, _ = board.start("feed", wire.record_crc(data))
+    run = board.start("feed", wire.record_crc(data)).run
     return Follower(board, run)
 
 
 def follow(follower: Follower) -> tuple[list[Sample], RunEnd]:
     """All samples of the run, and how it ended."""
     samples = list(follower.samples())
-    assert follower.end is not None
+    assert follower.ended
     return samples, follower.end

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 from armtempo.cli import main
 from armtempo.errors import ArmtempoError, InputError
-from armtempo.model import arm as arms
-from armtempo.model import job as jobs
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
 from armtempo.research.bench import cases, result_plot, result_store, result_table, worker_pool
 from click.testing import CliRunner
 
@@ -27,8 +27,8 @@ SMALL = ["--populations", "4,6", "--seeds", "2", "--iterations", str(ITERATIONS)
 
 @pytest.fixture(scope="module")
 def problem() -> cases.Problem:
-    arm = arms.load_arm(arms.default_path())
-    return cases.problem_of(arm, jobs.load_job(jobs.default_path(), arm), 1, "stretched", ITERATIONS)
+    arm = Arm.paper()
+    return cases.problem_of(arm, Job.paper(arm), 1, "stretched", ITERATIONS)
 
 
 @pytest.fixture(scope="module")
@@ -57,8 +57,8 @@ def test_problem_is_the_planners_fitness(problem: cases.Problem) -> None:
 
 
 def test_problem_refuses_joints_that_cannot_be_timed() -> None:
-    arm = arms.load_arm(arms.default_path())
-    job = jobs.load_job(jobs.default_path(), arm)
+    arm = Arm.paper()
+    job = Job.paper(arm)
     with pytest.raises(InputError, match="joints 1 to 3"):
         cases.problem_of(arm, job, 4, "stretched", 1)
 

@@ -8,11 +8,12 @@ from pathlib import Path
 
 import pytest
 from armtempo.errors import LinkError
-from armtempo.link import Board
+from armtempo.link import Client
+from armtempo.link.board_messages import Sample
 from armtempo.link.follow import Follower, RunEnd
-from armtempo.link.messages import Sample
 from armtempo.link.session import NoAnswer, OtherBoard
-from armtempo.robot import operate
+from armtempo.records.encoded_motion import MotionKey
+from armtempo.robot import stored_motion
 from armtempo.robot.stop_request import StopRequest
 from armtempo_shared import wire
 
@@ -20,14 +21,14 @@ from tests.host.linked import random_motion, ready
 from tests.inprocess import Pipe, connect
 
 
-def prepared(pipe: Pipe) -> tuple[Board, operate.Stored]:
+def prepared(pipe: Pipe) -> tuple[Client, MotionKey]:
     """A board with known positions and a motion."""
     board, data = ready(pipe)
-    return board, operate.Stored("feed", wire.record_crc(data))
+    return board, MotionKey("feed", wire.record_crc(data))
 
 
 def replay(
-    board: Board, stored: operate.Stored, at_20: Callable[[], None], stop: StopRequest | None = None
+    board: Client, stored: MotionKey, at_20: Callable[[], None], stop: StopRequest | None = None
 ) -> tuple[RunEnd, list[int]]:
     """Run it; ``at_20`` is called with the sample number 20."""
     indices: list[int] = []
@@ -37,7 +38,7 @@ def replay(
         if sample.index == 20:
             at_20()
 
-    return operate.replay(board, stored, stop or StopRequest(), take), indices
+    return stored_motion.replay(board, stored, stop or StopRequest(), take), indices
 
 
 @pytest.mark.parametrize("trouble", ["unplug_for", "silence_for"])
@@ -119,7 +120,7 @@ def test_cable_out_during_a_run_costs_no_sample(tmp_path: Path) -> None:
     board, data = ready(pipe)
     told: list[str] = []
     board.session.tell = told.append
-    run, _ = board.start("feed", wire.record_crc(data))
+    run = board.start("feed", wire.record_crc(data)).run
     indices = []
     follower = Follower(board, run)
     for sample in follower.samples():

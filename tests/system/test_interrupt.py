@@ -36,7 +36,7 @@ def test_interrupted_run(tmp_path: Path, number: signal.Signals) -> None:
     assert repetition["state"] == run_folder.INTERRUPTED
     assert len(run.repetitions[0].index) == repetition["samples"] >= 3
     assert repetition["duration_s"] < trajectory_file.load(file).trajectory.duration_s - 0.1
-    assert tuple(repetition["commanded_steps"]) == status.stand.commanded_steps
+    assert tuple(repetition["commanded_steps"]) == status.positions.commanded_steps
 
 
 def test_killed_host_leaves_a_readable_folder_and_a_board_to_talk_to(tmp_path: Path) -> None:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from armtempo import simulator
 from armtempo.link import open_board
-from armtempo.model import arm as arms
-from armtempo.robot import operate
+from armtempo.model.arm import Arm
+from armtempo.robot import arm_state
 from armtempo.runs import reader
 from armtempo.simulator import Fault
 
@@ -23,11 +23,11 @@ ENDS_WITHIN_S = 60.0
 @contextmanager
 def board_at_home(*faults: Fault) -> Iterator[simulator.VirtualBoard]:
     """A virtual board in real time whose arm stands where the shipped motion begins."""
-    arm = arms.load_arm(arms.default_path())
+    arm = Arm.paper()
     with simulator.launch(arm=arm, virtual_time=False, faults=faults) as process:
         with open_board(process.port) as board:
-            operate.configure(board, arm, replace=True)
-            operate.home(board, arm)
+            arm_state.configure(board, arm, replace=True)
+            arm_state.home(board, arm)
         yield process
 
 

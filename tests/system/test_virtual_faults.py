@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from armtempo.link import open_board
+from armtempo.link.board_messages import Status
 from armtempo.link.follow import RunEnd
-from armtempo.link.messages import Status
 from armtempo.model.arm import Arm, JointModel
 from armtempo.planning import point_to_point
 from armtempo.records import encode
-from armtempo.robot import operate
+from armtempo.robot import arm_state, stored_motion
 from armtempo.robot.stop_request import StopRequest
 from armtempo.simulator import Fault, edgelog, launch
 from armtempo_shared.wire import ERROR_CODES
@@ -29,27 +29,27 @@ def run(
     *faults: Fault, arm: Arm = boards.ARM, model: Arm | None = None, log: Path | None = None
 ) -> tuple[RunEnd, Status]:
     """A short motion from home, and how the board stands after it."""
-    home_deg = operate.home_deg(arm)
+    home_deg = arm.home_deg
     data = encode.motion_record(point_to_point.straight("move", home_deg, TARGET_DEG, arm), arm)
     with launch(faults=faults, arm=model, edge_log=log) as process, open_board(process.port) as board:
-        operate.configure(board, arm, replace=True)
-        operate.home(board, arm)
-        stored = operate.store(board, "move", data)
+        arm_state.configure(board, arm, replace=True)
+        arm_state.home(board, arm)
+        stored = stored_motion.store(board, "move", data)
         with StopRequest() as stop:
-            end = operate.replay(board, stored, stop)
+            end = stored_motion.replay(board, stored, stop)
         return end, board.status()
 
 
 def code(end: RunEnd) -> str:
     """Name of the fault that ended a run."""
-    return operate.fault_name(end.fault)
+    return stored_motion.fault_name(end.fault)
 
 
 def test_nothing() -> None:
     end, status = run()
-    steps = np.array([encode.steps_per_deg(joint) for joint in boards.ARM.driven])
+    steps = np.array([joint.steps_per_deg for joint in boards.ARM.driven])
     assert not end.fault
-    assert np.all(np.abs(np.array(status.stand.commanded_steps) - TARGET_DEG * steps) <= 0.5)
+    assert np.all(np.abs(np.array(status.positions.commanded_steps) - TARGET_DEG * steps) <= 0.5)
 
 
 def test_short_stall_does_no_harm() -> None:
@@ -90,13 +90,13 @@ def test_slipped_coupling_is_a_following_error() -> None:
 
 def test_hang_makes_the_watchdog_bite() -> None:
     with launch(faults=[Fault("hang", at_s=0.3)]) as process, open_board(process.port) as board:
-        operate.configure(board, boards.ARM, replace=True)
-        operate.home(board, boards.ARM)
-        home_deg = operate.home_deg(boards.ARM)
+        arm_state.configure(board, boards.ARM, replace=True)
+        arm_state.home(board, boards.ARM)
+        home_deg = boards.ARM.home_deg
         data = encode.motion_record(
             point_to_point.straight("move", home_deg, TARGET_DEG, boards.ARM), boards.ARM
         )
-        stored = operate.store(board, "move", data)
+        stored = stored_motion.store(board, "move", data)
         board.start(stored.name, stored.crc)
         before = board.info
         assert before is not None
@@ -127,4 +127,4 @@ def test_motor_driven_beyond_its_torque_loses_steps() -> None:
 def test_without_a_model_the_motors_are_ideal() -> None:
     joints = tuple(replace(joint, model=JointModel()) for joint in boards.ARM.joints)
     ends = [run(model=model)[0] for model in (None, replace(boards.ARM, joints=joints))]
-    assert ends[0].stand == ends[1].stand
+    assert ends[0].positions == ends[1].positions

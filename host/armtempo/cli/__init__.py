@@ -13,9 +13,8 @@ from typing import Any
 import click
 
 from armtempo import __version__
-from armtempo.errors import ArmtempoError
-from armtempo.robot.stop_request import raised_by_signals
-from armtempo.start import INTERRUPTED
+from armtempo.cli.interrupts import raised_by_signals
+from armtempo.errors import INTERRUPTED, ArmtempoError
 
 COMMANDS = (
     "demo",

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from armtempo.cli import options
-from armtempo.cli.progress import Progress
-from armtempo.errors import MissingPackageError
-from armtempo.start import INTERRUPTED
+from armtempo.cli.progress import ProgressBar
+from armtempo.errors import INTERRUPTED, MissingPackageError
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -82,13 +81,12 @@ def command(
     ctx: click.Context, /, out: Path, workers: int | None, scheduler: str | None, plot: bool, **chosen: Any
 ) -> None:
     """Compare the search algorithms as the paper does in Table 4 and Fig. 6."""
-    from armtempo.model import job as jobs
     from armtempo.research.bench import cases, result_table, worker_pool
     from armtempo.research.bench.result_store import Store
 
     arm_path, job_path = chosen["arm_path"], chosen["job_path"]
     arm = options.load_arm(arm_path)
-    job = jobs.load_job(job_path or jobs.default_path(), arm)
+    job = options.load_job(job_path, arm)
     problem = cases.problem_of(arm, job, chosen["joint"], chosen["fitness"], chosen["iterations"])
     wanted = cases.cases(chosen["algorithms"], chosen["populations"], range(1, chosen["seeds"] + 1))
     store = Store(out, problem)
@@ -118,7 +116,7 @@ def _run(
     todo = [case for case in wanted if case not in store.runs]
     if not todo:
         return
-    with Progress("searching") as progress, place as executor:
+    with ProgressBar("searching") as progress, place as executor:
         for number, run in enumerate(cases.execute(problem, todo, executor), 1):
             store.add(run)
             progress(number, len(todo))

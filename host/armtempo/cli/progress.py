@@ -16,7 +16,7 @@ _BAR_COLUMNS = 24
 """Frame, percentage and remaining time: the note leaves room for them, so that no line wraps."""
 
 
-class Progress:
+class ProgressBar:
     """Call it with (done, whole); a bar appears once a second has passed and work is left."""
 
     def __init__(self, label: str) -> None:

@@ -17,10 +17,10 @@ from armtempo.deploy.changes import Tell, check_suitable, choose, difference, is
 from armtempo.deploy.remote import RECOVERY, Remote, Survey, each, rename
 from armtempo.errors import InputError, LinkError
 from armtempo.link import open_board
-from armtempo.link.board import Progress
 from armtempo.link.diagnose import Prompt
 from armtempo.link.ports import is_sim
 from armtempo.link.transport import NotOpened
+from armtempo.progress import Progress
 
 KEPT_ASIDE = ".before-armtempo"
 """Added to the name of a boot.py or main.py that was there before."""

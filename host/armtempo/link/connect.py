@@ -9,7 +9,7 @@ from pathlib import Path
 
 from armtempo.errors import BoardError, LinkError
 from armtempo.link import diagnose, ports, traffic
-from armtempo.link.board import Board
+from armtempo.link.client import Client
 from armtempo.link.program_version import own_crc
 from armtempo.link.session import NoAnswer, Session
 from armtempo.link.transport import SerialTransport, Transport
@@ -26,7 +26,7 @@ def open_board(
     sink: traffic.Sink | None = None,
     arm: Arm | None = None,
     any_program: bool = False,
-) -> Iterator[Board]:
+) -> Iterator[Client]:
     """The board on ``port``, greeted; a sim port starts a virtual one that lives as long as the context.
 
     ``log_traffic``: file for the traffic log; ``sink`` takes the traffic as well; ``arm``: what a virtual
@@ -54,7 +54,7 @@ def open_board(
         yield board
 
 
-def _greeted(stack: ExitStack, transport: Transport) -> Board:
+def _greeted(stack: ExitStack, transport: Transport) -> Client:
     """The board behind a transport; the one that is in use at the end is closed with the stack."""
     first = stack.enter_context(closing(transport))
     board = greet(first)
@@ -62,8 +62,7 @@ def _greeted(stack: ExitStack, transport: Transport) -> Board:
     return board
 
 
-def _check_program(board: Board) -> None:
-    assert board.info is not None  # greeted
+def _check_program(board: Client) -> None:
     if board.info.program_crc != own_crc():
         raise LinkError(
             f"the board on {board.session.transport.name} runs another version of the board program than the "
@@ -73,9 +72,9 @@ def _check_program(board: Board) -> None:
 
 def greet(
     transport: Transport, session_number: int | None = None, clock: Callable[[], float] = time.monotonic
-) -> Board:
+) -> Client:
     """A board that has answered ``hello``; LinkError, saying what is there instead, where none has."""
-    board = Board(Session(transport, clock), session_number)
+    board = Client(Session(transport, clock), session_number)
     for _ in range(_NOISY_TRIES):
         try:
             board.hello()

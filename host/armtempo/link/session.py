@@ -15,7 +15,7 @@ from typing import Any
 from armtempo_shared import wire
 
 from armtempo.errors import ArmtempoError, LinkError
-from armtempo.link import messages
+from armtempo.link import board_messages
 from armtempo.link.refusal import refusal
 from armtempo.link.transport import Transport
 
@@ -65,11 +65,11 @@ class Session:
         self.reopen: Callable[[], Transport] | None = None
         self.greet: Callable[[], None] = lambda: None
         """Raises OtherBoard where another one answers, or the same one started anew."""
-        self.tell: Callable[[str], None] = lambda text: None
+        self.tell: Callable[[str], object] = lambda text: None
         """Gets what a user should know while it happens."""
         self.hurried: Callable[[], bool] = lambda: False
         """Whether somebody wants an end: then a port that broke is waited for only HURRY_S."""
-        self.events: deque[messages.Event] = deque()
+        self.events: deque[board_messages.Event] = deque()
         self.recent = bytearray()
         self.repeats = 0
         self.sleep = time.sleep
@@ -113,7 +113,7 @@ class Session:
                 raise NoAnswer(self._no_answer(name, now_s - begin_s))
             self.repeats += 1
 
-    def poll(self, timeout_s: float) -> messages.Event | None:
+    def poll(self, timeout_s: float) -> board_messages.Event | None:
         """The oldest event; waits up to ``timeout_s`` for one."""
         deadline_s = self.clock() + timeout_s
         while not self.events:
@@ -136,7 +136,7 @@ class Session:
         self._sequence = (self._sequence + (2 if self._sequence == _CTRL_C - 1 else 1)) % 256
         return self._sequence
 
-    def _reply(self, deadline_s: float, sequence: int, number: int) -> messages.Frame | None:
+    def _reply(self, deadline_s: float, sequence: int, number: int) -> board_messages.Frame | None:
         while (left_s := deadline_s - self.clock()) > 0:
             frame = self._frame(left_s)
             if frame is None:
@@ -148,7 +148,7 @@ class Session:
                 self._keep_event(frame)
         return None
 
-    def _frame(self, timeout_s: float) -> messages.Frame | None:
+    def _frame(self, timeout_s: float) -> board_messages.Frame | None:
         frame = self._next_frame()
         if frame is not None:
             return frame
@@ -217,13 +217,13 @@ class Session:
         finally:
             self.reopen = reopen
 
-    def _next_frame(self) -> messages.Frame | None:
-        frame: messages.Frame | None = self._parser.next()
+    def _next_frame(self) -> board_messages.Frame | None:
+        frame: board_messages.Frame | None = self._parser.next()
         return frame
 
-    def _keep_event(self, frame: messages.Frame) -> None:
+    def _keep_event(self, frame: board_messages.Frame) -> None:
         try:
-            self.events.append(messages.event(frame[1], frame[2]))
+            self.events.append(board_messages.event(frame[1], frame[2]))
         except wire.WireError:
             return  # a reply to an older command, or a message of a newer protocol
 

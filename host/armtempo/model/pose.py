@@ -6,11 +6,10 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from armtempo.arrays import Array
 from armtempo.errors import InputError
-
-Array = NDArray[np.float64]
 
 LARGEST = 1e9
 """Lengths in mm and angles in degrees beyond this are slips of the pen; with them no digit of a result is right."""

@@ -15,9 +15,11 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import ArrayLike
 
+from armtempo.arrays import Array
 from armtempo.errors import InputError
 from armtempo.optimise.parameters import Parameter, Value
-from armtempo.optimise.tracker import Array, Function, Progress, Result, Task
+from armtempo.optimise.tracker import Function, Result, Task
+from armtempo.progress import Progress
 
 __all__ = ["ALGORITHMS", "Function", "Progress", "Result", "minimise", "parameters"]
 
@@ -25,11 +27,11 @@ ALGORITHMS = {
     "acs": "armtempo.optimise.acs",
     "cs": "armtempo.optimise.cs",
     "ga": "armtempo.optimise.ga",
-    "hpso": "armtempo.optimise.hpso",
     "iaga": "armtempo.optimise.iaga",
     "pso": "armtempo.optimise.pso",
+    "hpso": "armtempo.optimise.hpso",
 }
-"""Name of an algorithm: the module that holds it."""
+"""Name of an algorithm (Table 4): the module that holds it."""
 
 
 def parameters(algorithm: str) -> Mapping[str, Parameter]:

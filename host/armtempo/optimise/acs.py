@@ -21,9 +21,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from armtempo.arrays import Array
 from armtempo.optimise.levy import BETA, levy_scale
 from armtempo.optimise.parameters import Choice, Number, Parameter
-from armtempo.optimise.tracker import Array, Result, Task, Tracker
+from armtempo.optimise.tracker import Result, Task, Tracker
 
 
 class Nests:

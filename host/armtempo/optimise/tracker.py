@@ -6,13 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from armtempo.arrays import Array
+from armtempo.progress import Progress
+
 Function = Callable[[Array], Array]
 """Values (N,) of points (N, d)."""
-Progress = Callable[[int, int], None]
-"""Called with the iterations done and their number."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from armtempo.arrays import Array
 from armtempo.errors import RunFolderError
 from armtempo.formats.atomic_file import replace_text
 from armtempo.report import html_page, plots, run_report
@@ -93,9 +94,7 @@ def _table(sheet: html_page.Page, found: dict[str, run_report.Evaluation]) -> No
     sheet.table((*header, "lag at start (ms)", "lag at end (ms)"), rows)
 
 
-def _of_joint(
-    found: dict[str, run_report.Evaluation], joint: int
-) -> dict[str, tuple[plots.Array, plots.Array, plots.Array]]:
+def _of_joint(found: dict[str, run_report.Evaluation], joint: int) -> dict[str, tuple[Array, Array, Array]]:
     """By run: times (K,), mean (3, K) and error of the angle (K,)."""
     return {
         name: (

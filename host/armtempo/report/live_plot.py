@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from armtempo.arrays import Array
 from armtempo.errors import ArmtempoError
 from armtempo.report.plots import COLOURS
-from armtempo.splines.bspline import Array
 from armtempo.splines.trajectory import Trajectory
 
 _WITHOUT_WINDOW = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")

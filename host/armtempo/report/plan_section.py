@@ -52,7 +52,6 @@ def origin(sheet: html_page.Page, plan: Plan, others: Sequence[tuple[str, object
 
 def _extremes_row(plan: Plan, joint: int) -> list[str]:
     limits = plan.arm.driven[joint].limits
-    assert limits is not None  # driven
     floors = [search.floor_s for search in plan.searches if joint in search.joints]
     peaks = zip(plan.extremes[joint].values, limits.values, strict=True)
     return [

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from armtempo.arrays import Array
 from armtempo.errors import MissingPackageError
 from armtempo.model.arm import Limits
 from armtempo.runs.analysis import Curves
@@ -25,8 +25,6 @@ from armtempo.splines.trajectory import Trajectory
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 
 COLOURS = ("#1f77b4", "#d95f02", "#1b9e77", "#b0479a", "#8c6d1f", "#6b6ecf")
 LIMIT_COLOUR = "#c0392b"

@@ -9,7 +9,7 @@ from typing import Any
 from armtempo_shared import armrecord
 
 from armtempo.errors import InputError
-from armtempo.model.arm import Arm, Joint
+from armtempo.model.arm import Arm, DrivenJoint
 from armtempo.records import encode
 
 
@@ -29,9 +29,8 @@ def describe(arm: Arm, start_deg: Sequence[float] | None = None) -> dict[str, An
     }
 
 
-def _joint(joint: Joint) -> dict[str, Any]:
+def _joint(joint: DrivenJoint) -> dict[str, Any]:
     model, motor = joint.model, joint.motor
-    assert motor is not None  # driven
     if model.holding_torque_nm and not (model.inertia_kg_m2 or model.rotor_inertia_kg_m2):
         raise InputError(
             f"{joint.name}: model.holding_torque_nm without an inertia; "

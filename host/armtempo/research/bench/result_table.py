@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from armtempo.arrays import Array
 from armtempo.research.bench.cases import Run
-from armtempo.splines.bspline import Array
 
 PAPER = {
     "ga": {10: (10.491, 31.2), 50: (8.498, 164.8), 100: (6.766, 318.5), 500: (6.161, 1652.8)},

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from armtempo.kinematics.geometry import Array, Geometry
+from armtempo.arrays import Array
+from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.inverse import inverse
 from armtempo.model.arm import Arm
 from armtempo.research.paper import printed

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.progress import Progress
 from armtempo.research.bench import cases, worker_pool
 from armtempo.research.bench.result_store import Store
 from armtempo.research.bench.result_table import PAPER, Row, rows
@@ -23,8 +24,6 @@ _BECAUSE = {
     BETTER: "the paper does not say how its operators are tuned; ours are in docs/optimisers.md",
     DIFFERS: "printed is one run of a random search, here is the median over seeds",
 }
-
-Progress = Callable[[int, int], None]
 
 
 def run(arm: Arm, job: Job, folder: Path, quick: bool, progress: Progress) -> list[Row]:

@@ -1,16 +1,18 @@
-"""The board as an object: one method a command of the message table."""
+"""The protocol's commands as methods: one method for each command of the message table."""
 
 from __future__ import annotations
 
 import secrets
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 from armtempo_shared import limits, wire
 from armtempo_shared.messages import MAX_PAYLOAD
 
-from armtempo.errors import BoardError
-from armtempo.link import messages
+from armtempo.errors import BoardError, LinkError
+from armtempo.link import board_messages
 from armtempo.link.session import PATIENCE_S, NoAnswer, OtherBoard, Session
+from armtempo.progress import Progress
 
 SLOW_S = 30.0
 """Silence allowed where the board erases flash or checks a whole motion before it answers."""
@@ -24,14 +26,29 @@ _CTRL_C = 3
 _GREETINGS = 8
 """So many of a session's first frames may be ``hello``."""
 
-Progress = Callable[[float, float], None]
-"""Called with what is done and the whole."""
+
+@dataclass(frozen=True)
+class Started:
+    """The board's answer to ``start``."""
+
+    run: int
+    """Number of the run, which its samples and events carry."""
+    duration_s: float
+
+
+@dataclass(frozen=True)
+class KeptSamples:
+    """The board's answer to ``samples``: which samples it still keeps."""
+
+    first: int
+    """Index of the oldest one."""
+    count: int
 
 
 def harmless_number() -> int:
-    """A random session number (32 bits) without a Ctrl-C in its ``hello``.
+    """A random session number (32 bits) whose ``hello`` frames hold no byte 3 in number or checksum.
 
-    A board that is just starting would take it for a wish to interrupt boot.py.
+    MicroPython takes byte 3 for Ctrl-C and would interrupt boot.py on a board that is just starting.
     """
     entry = wire.COMMAND["hello"]
     while True:
@@ -42,43 +59,52 @@ def harmless_number() -> int:
             return number
 
 
-class Board:
-    """A board at the other end of a session; methods raise BoardError where it refuses, LinkError where
-    it is gone."""
+class Client:
+    """The host's end of the protocol, one method a command.
+
+    Every method raises BoardError where the board refuses, LinkError where the connection is lost.
+    """
 
     def __init__(self, session: Session, session_number: int | None = None) -> None:
         self.session = session
         self._number = harmless_number() if session_number is None else session_number
         self._piece = LARGEST_PIECE
-        self.info: messages.Hello | None = None
+        self._info: board_messages.Hello | None = None
         session.greet = self._greet_again
 
-    def hello(self) -> messages.Hello:
+    @property
+    def info(self) -> board_messages.Hello:
+        """The board's answer to ``hello``; LinkError before it."""
+        if self._info is None:
+            raise LinkError("the board has not been greeted yet")
+        return self._info
+
+    def hello(self) -> board_messages.Hello:
         """Begin a session; NoAnswer within about a second and a half where nobody speaks the protocol."""
         values, board_id = self.session.command(
             "hello", (wire.PROTOCOL_VERSION, self._number), silence_s=HELLO_S, patience_s=HELLO_S
         )
         fields = [*values, board_id]
-        fields[3] = messages.state_name(values[3])
-        self.info = messages.Hello(*fields)
-        return self.info
+        fields[3] = board_messages.state_name(values[3])
+        self._info = board_messages.Hello(*fields)
+        return self._info
 
     def _greet_again(self) -> None:
-        before = self.info
+        before = self._info
         now = self.hello()
         if before is None or (now.board_id, now.boot) == (before.board_id, before.boot):
             return
-        self.info = before
+        self._info = before
         where = self.session.transport.name
         if now.board_id != before.board_id:
             raise OtherBoard(f"another board is on {where} now ({now.board_id}, before {before.board_id})")
         raise OtherBoard(f"the board on {where} has started anew: positions are unknown, 'armtempo home'")
 
-    def status(self) -> messages.Status:
+    def status(self) -> board_messages.Status:
         """What the board is doing and where the joints stand."""
         values, tail = self.session.command("status")
-        fields = [messages.state_name(values[0]), *values[1:], messages.stand(tail)]
-        return messages.Status(*fields)
+        fields = [board_messages.state_name(values[0]), *values[1:], board_messages.positions(tail)]
+        return board_messages.Status(*fields)
 
     def upload(self, name: str, data: bytes, progress: Progress | None = None) -> None:
         """Store a record under a name; the board keeps the old one until all of the new one has arrived."""
@@ -110,9 +136,9 @@ class Board:
     def _patience_s(self) -> float:
         return PATIENCE_S if self._piece == SMALLEST_PIECE else PIECE_PATIENCE_S
 
-    def stored(self) -> list[messages.Stored]:
+    def stored(self) -> list[board_messages.StoredMotion]:
         """All stored trajectories."""
-        found: list[messages.Stored] = []
+        found: list[board_messages.StoredMotion] = []
         while True:
             try:
                 (count, size, crc, duration, joints, default), name = self.session.command(
@@ -124,11 +150,11 @@ class Board:
                 raise
             if not name:
                 return found
-            found.append(messages.Stored(name, size, crc, duration, joints, bool(default)))
+            found.append(board_messages.StoredMotion(name, size, crc, duration, joints, bool(default)))
             if len(found) >= count:
                 return found
 
-    def find(self, name: str) -> messages.Stored | None:
+    def find(self, name: str) -> board_messages.StoredMotion | None:
         """The stored trajectory of this name, or None."""
         return next((entry for entry in self.stored() if entry.name == name), None)
 
@@ -160,12 +186,12 @@ class Board:
         tail = b"".join((value or 0).to_bytes(4, "little", signed=True) for value in steps)
         self.session.command("home", (mask,), tail)
 
-    def start(self, name: str, crc: int, flags: int = 0) -> tuple[int, float]:
-        """Start a stored motion; gives the number of the run and its length in seconds."""
+    def start(self, name: str, crc: int, flags: int = 0) -> Started:
+        """Start a stored motion; ``crc`` is the record's own checksum, ``flags`` START_HOMING or 0."""
         (run, duration), _ = self.session.command(
             "start", (flags, crc), name, silence_s=SLOW_S, patience_s=SLOW_S
         )
-        return run, duration / limits.TICK_HZ
+        return Started(run, duration / limits.TICK_HZ)
 
     def stop(self, now: bool = False) -> None:
         """Brake along the path, or freeze."""
@@ -179,10 +205,10 @@ class Board:
         """End the board program; the port becomes MicroPython's REPL."""
         self.session.command("leave")
 
-    def samples(self, acknowledged: int, wanted: int = 0) -> tuple[int, int]:
+    def samples(self, acknowledged: int, wanted: int = 0) -> KeptSamples:
         """All samples before ``acknowledged`` have arrived; ask for up to ``wanted`` from there on again.
 
-        Gives the index of the oldest sample the board still has and how many it has.
+        ``wanted`` is at most what one answer asks for; the samples come as events.
         """
         (first, count), _ = self.session.command("samples", (acknowledged, wanted))
-        return first, count
+        return KeptSamples(first, count)
