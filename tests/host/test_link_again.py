@@ -7,11 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from armtempo.errors import LinkError
+from armtempo.errors import LinkError, NoAnswerError, OtherBoardError
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import Follower, RunEnd
-from armtempo.link.session import NoAnswer, OtherBoard
 from armtempo.records.encoded_motion import MotionKey
 from armtempo.robot import stored_motion
 from armtempo.robot.stop_request import StopRequest
@@ -85,7 +84,7 @@ def test_the_same_board_started_anew_is_found_out_before_any_command(tmp_path: P
     board, _ = prepared(pipe)
     pipe.unplug_for(1.0)
     pipe.swap_board(pipe.app.board_id)
-    with pytest.raises(OtherBoard, match="started anew"):
+    with pytest.raises(OtherBoardError, match="started anew"):
         board.home([1, 2, 3])
     assert "home" not in pipe.app.engine.calls
     assert board.session.reopen is not None
@@ -160,7 +159,7 @@ def test_silent_board_is_reported_in_time(tmp_path: Path) -> None:
     board = connect(pipe)
     pipe._send = lambda way, frame: None  # type: ignore[method-assign]
     begin_s = pipe.clock()
-    with pytest.raises(NoAnswer, match="did not answer 'status'"):
+    with pytest.raises(NoAnswerError, match="did not answer 'status'"):
         board.status()
     assert pipe.clock() - begin_s < 4.0
 

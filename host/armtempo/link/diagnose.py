@@ -5,7 +5,7 @@ from __future__ import annotations
 from armtempo_shared import wire
 from armtempo_shared.messages import SYNC
 
-from armtempo.errors import LinkError
+from armtempo.errors import DisturbedError, LinkError, NoProgramError
 from armtempo.link.transport import Transport
 
 LOOK_S = 0.4
@@ -17,25 +17,17 @@ _NUDGE = b"\r\x02\r"
 """Ends a line, leaves a raw REPL, asks for a prompt; without meaning to the board program."""
 
 
-class Prompt(LinkError):
-    """MicroPython's prompt answers."""
-
-
-class Garbled(LinkError):
-    """Pieces of frames arrive, but none whole: worth another try."""
-
-
 def explain(transport: Transport, heard: bytes) -> LinkError:
     """The error to raise: silence, a bare MicroPython REPL, or something else; ``heard`` so far."""
     transport.write(_NUDGE)
     heard += _listen(transport)
     where = f"the board on {transport.name}"
     if any(sign in heard for sign in _REPL_SIGNS):
-        return Prompt(
+        return NoProgramError(
             f"{where} runs MicroPython but not the armtempo program; install it with 'armtempo deploy'"
         )
     if any(sign in heard for sign in _FRAME_SIGNS):
-        return Garbled(
+        return DisturbedError(
             f"{where} is hardly to be understood: pieces of armtempo's messages arrive, too few of them "
             "whole; check cable and plugs"
         )

@@ -14,7 +14,7 @@ from typing import Any
 
 from armtempo_shared import wire
 
-from armtempo.errors import ArmtempoError, LinkError
+from armtempo.errors import ArmtempoError, LinkError, NoAnswerError, OtherBoardError
 from armtempo.link import board_messages
 from armtempo.link.refusal import refusal
 from armtempo.link.transport import Transport
@@ -42,14 +42,6 @@ Answer = tuple[tuple[Any, ...], Any]
 """Field values (int) and tail (bytes or str) of an answer."""
 
 
-class NoAnswer(LinkError):
-    """The board did not answer a command in time."""
-
-
-class OtherBoard(LinkError):
-    """The board that answers is not the one that was there before, or was started anew since."""
-
-
 class Session:
     """The host's end of the protocol; ``clock`` gives seconds and is replaced in tests.
 
@@ -64,7 +56,7 @@ class Session:
         self.clock = clock
         self.reopen: Callable[[], Transport] | None = None
         self.greet: Callable[[], None] = lambda: None
-        """Raises OtherBoard where another one answers, or the same one started anew."""
+        """Raises OtherBoardError where another one answers, or the same one started anew."""
         self.tell: Callable[[str], object] = lambda text: None
         """Gets what a user should know while it happens."""
         self.hurried: Callable[[], bool] = lambda: False
@@ -93,7 +85,7 @@ class Session:
     ) -> Answer:
         """(fields, tail) of the board's answer.
 
-        Raises BoardError where the board refuses, NoAnswer after ``silence_s`` without a byte or
+        Raises BoardError where the board refuses, NoAnswerError after ``silence_s`` without a byte or
         ``patience_s`` without an answer, LinkError where the port breaks.
         """
         number = wire.COMMAND[name][1]
@@ -110,7 +102,7 @@ class Session:
                 now_s - self._heard_s >= silence_s and not self.frames_bad
             )  # on a bad line all may be lost
             if silent or now_s - begin_s >= patience_s:
-                raise NoAnswer(self._no_answer(name, now_s - begin_s))
+                raise NoAnswerError(self._no_answer(name, now_s - begin_s))
             self.repeats += 1
 
     def poll(self, timeout_s: float) -> board_messages.Event | None:
@@ -177,7 +169,7 @@ class Session:
     def reconnect(self, reason: LinkError) -> None:
         """Close the port and open it again until the board answers, for up to RECONNECT_S.
 
-        Raises ``reason`` where that fails, OtherBoard where another board answers.
+        Raises ``reason`` where that fails, OtherBoardError where another board answers.
         """
         if self.reopen is None:
             raise reason
@@ -209,7 +201,7 @@ class Session:
             self.transport = reopen()
             self.greet()
             return True
-        except OtherBoard:
+        except OtherBoardError:
             raise
         except ArmtempoError:
             self.transport.close()

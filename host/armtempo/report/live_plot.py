@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from armtempo.arrays import Array
-from armtempo.errors import ArmtempoError
+from armtempo.errors import ArmtempoError, MissingPackageError
 from armtempo.report.plots import COLOURS
 from armtempo.splines.trajectory import Trajectory
 
@@ -18,14 +18,14 @@ _WITHOUT_WINDOW = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")
 class LivePlot:
     """One field a joint.
 
-    Raises ArmtempoError where matplotlib is missing or has no display to open a window on.
+    Raises MissingPackageError without matplotlib, ArmtempoError where there is no display to open a window on.
     """
 
     def __init__(self, trajectory: Trajectory, names: Sequence[str]) -> None:
         try:
             import matplotlib.pyplot as plt
         except ImportError:
-            raise ArmtempoError("matplotlib is not installed: pip install 'armtempo[plot]'") from None
+            raise MissingPackageError("a live plot", "matplotlib", "plot") from None
         if plt.get_backend().lower() in _WITHOUT_WINDOW:
             raise ArmtempoError("there is no display to open a window on")
         self._plt: Any = plt

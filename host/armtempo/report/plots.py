@@ -42,9 +42,7 @@ def new_figure(rows: int, columns: int, width: float, height: float) -> tuple[Fi
     try:
         from matplotlib.figure import Figure
     except ImportError:
-        raise MissingPackageError(
-            "figures need matplotlib, which is not installed; install it with: pip install 'armtempo[plot]'"
-        ) from None
+        raise MissingPackageError("a figure", "matplotlib", "plot") from None
     figure = Figure(figsize=(width, height), layout="constrained")
     return figure, figure.subplots(rows, columns, squeeze=False)
 

@@ -16,8 +16,8 @@ from armtempo.progress import Progress
 from armtempo.records import encoded_motion
 from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.robot import arm_state
-from armtempo.robot.stored_motion import SampleSink, raise_fault, replay, store
 from armtempo.robot.stop_request import StopRequest
+from armtempo.robot.stored_motion import SampleSink, raise_fault, replay, store
 
 TEMPORARY = "tmp-"
 """Names of motions that are removed after use begin so."""

@@ -15,8 +15,8 @@ from armtempo.model import trajectory_file
 from armtempo.progress import Progress
 from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.robot.goto import go_back
-from armtempo.robot.stored_motion import fault_name, raise_fault, readable, replay
 from armtempo.robot.stop_request import StopRequest
+from armtempo.robot.stored_motion import fault_name, raise_fault, readable, replay
 from armtempo.runs import run_folder
 from armtempo.runs.run_folder import COMPLETE, FAULT, INTERRUPTED, Repetition, RunFolder
 

@@ -7,12 +7,12 @@ from contextlib import suppress
 
 from armtempo_shared import wire
 
-from armtempo.errors import BoardError, LinkError
+from armtempo.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import CHECK_S, Follower, RunEnd
 from armtempo.link.refusal import refusal
-from armtempo.link.session import RECONNECT_S, NoAnswer, OtherBoard
+from armtempo.link.session import RECONNECT_S
 from armtempo.progress import Progress
 from armtempo.records.encoded_motion import MotionKey
 from armtempo.robot.stop_request import StopRequest
@@ -55,7 +55,7 @@ def replay(
         return _follow(
             client, follower, _Brake(client, stop), lambda sample: sink(sample, started.duration_s)
         )
-    except OtherBoard as error:
+    except OtherBoardError as error:
         raise LinkError(f"{error}; what came after the last sample cannot be known") from error
 
 
@@ -66,9 +66,9 @@ def _follow(client: Client, follower: Follower, brake: _Brake, take: Callable[[S
             for sample in follower.samples(brake):
                 heard_s = client.session.clock()
                 take(sample)
-        except OtherBoard:
+        except OtherBoardError:
             raise
-        except NoAnswer as error:  # silent, though its port is there: as if the cable were out
+        except NoAnswerError as error:  # silent, though its port is there: as if the cable were out
             if not client.session.hurried():  # else the stop goes on, until it is given up
                 if client.session.clock() - heard_s > RECONNECT_S:
                     raise

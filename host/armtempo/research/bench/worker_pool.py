@@ -49,10 +49,7 @@ def cluster(address: str) -> Iterator[Executor]:
     try:
         distributed: Any = import_module("distributed")
     except ImportError:
-        raise MissingPackageError(
-            "--scheduler needs distributed, which is not installed; "
-            "install it with: pip install 'armtempo[cluster]'"
-        ) from None
+        raise MissingPackageError("--scheduler", "distributed", "cluster") from None
     try:
         client = distributed.Client(address, timeout=_CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:
