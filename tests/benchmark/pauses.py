@@ -23,7 +23,7 @@ from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.planning import planner
 from armtempo.robot import arm_state
-from armtempo.simulator import launch
+from armtempo.simulator import LaunchOptions, launch
 
 SPEED_DEG_S = 0.3
 VIAS = ((0.0, -60.0, 40.0), (90.0, -100.0, 0.0), (180.0, -38.0, -52.0))
@@ -47,7 +47,7 @@ def record(plan: Plan, folder: Path, numbers: random.Random) -> list[float]:
     file = folder / "slow.json"
     trajectory_file.save(plan, file)
     pauses = []
-    with launch(arm=plan.arm, virtual_time=False) as process:
+    with launch(LaunchOptions(arm=plan.arm, virtual_time=False)) as process:
         with open_board(process.port) as board:
             arm_state.configure(board, plan.arm, replace=True)
             arm_state.home(board, plan.arm)

@@ -137,7 +137,8 @@ def own(evaluations: int) -> Iterator[tuple[str, Search]]:
             fitness: Counted, seed: int, algorithm: str = algorithm, iterations: int = iterations
         ) -> None:
             rng = np.random.default_rng(seed)
-            optimise.minimise(fitness.population, fitness.bounds, rng, NESTS, iterations, algorithm)
+            settings = optimise.Settings(algorithm, NESTS, iterations)
+            optimise.minimise(fitness.population, fitness.bounds, rng, settings)
 
         yield f"armtempo {algorithm}, {NESTS} x {iterations}", search
 

@@ -19,7 +19,7 @@ from armtempo.planning import planner
 from armtempo.records import encode
 from armtempo.robot import arm_state, stored_motion
 from armtempo.robot.stop_request import StopRequest
-from armtempo.simulator import edgelog, launch
+from armtempo.simulator import LaunchOptions, edgelog, launch
 from armtempo.splines.trajectory import Trajectory
 from armtempo_shared.limits import TICK_HZ
 
@@ -35,7 +35,9 @@ def replay(
     """(seconds that the replay took, its samples)."""
     samples: list[Sample] = []
     with (
-        launch(interpreter=interpreters.starter(interpreter), arm=model, edge_log=log) as process,
+        launch(
+            LaunchOptions(interpreter=interpreters.starter(interpreter), arm=model, edge_log=log)
+        ) as process,
         open_board(process.port) as board,
         StopRequest() as stop,
     ):

@@ -12,7 +12,7 @@ from armtempo.link.transport import SerialTransport
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
 from armtempo.records import encode
-from armtempo.simulator import launch
+from armtempo.simulator import LaunchOptions, launch
 from armtempo_shared import wire
 
 from tests import interpreters
@@ -50,7 +50,7 @@ def test_upload_is_old_or_new(tmp_path: Path) -> None:
 
 def _upload_with_a_cut(flash: Path, cut: int, data: bytes) -> tuple[bool, int]:
     """Whether the upload was acknowledged, and the checksum of what is stored once the board is up again."""
-    with launch(flash, power_cut_at=cut, interpreter=INTERPRETER) as virtual:
+    with launch(LaunchOptions(flash, power_cut_at=cut, interpreter=INTERPRETER)) as virtual:
         transport = SerialTransport(virtual.port)
         board = Client(Session(transport))
         done = True

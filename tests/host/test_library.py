@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from armtempo import errors
 from armtempo.link.board_messages import Sample
-from armtempo.simulator import launch
+from armtempo.simulator import LaunchOptions, launch
 from numpy.typing import ArrayLike
 
 START_DEG, END_DEG = (0.0, -60.0, 40.0), (20.0, -75.0, 50.0)
@@ -145,7 +145,7 @@ def test_a_second_run_of_the_same_board_starts_where_it_should(
 
 
 def test_a_real_arm_does_not_move_by_surprise(plan: armtempo.Plan, arm: armtempo.Arm, tmp_path: Path) -> None:
-    with launch(arm=arm) as process, armtempo.connect(process.port) as board:
+    with launch(LaunchOptions(arm=arm)) as process, armtempo.connect(process.port) as board:
         with pytest.raises(armtempo.InputError, match="which arm"):
             board.goto(START_DEG)
         with pytest.raises(armtempo.LinkError, match="position of joint 1"):
@@ -160,7 +160,7 @@ def test_a_real_arm_does_not_move_by_surprise(plan: armtempo.Plan, arm: armtempo
 
 
 def test_the_arm_goes_where_a_motion_begins(plan: armtempo.Plan, arm: armtempo.Arm, tmp_path: Path) -> None:
-    with launch(arm=arm) as process, armtempo.connect(process.port) as board:
+    with launch(LaunchOptions(arm=arm)) as process, armtempo.connect(process.port) as board:
         board.home(arm)
         board.goto(END_DEG)
         board.goto(plan)
@@ -236,5 +236,5 @@ def test_a_spline_goes_through_its_points_and_rests_at_the_ends(points: ArrayLik
 
 def test_minimise_finds_the_bottom_of_a_bowl() -> None:
     rng = np.random.default_rng(4)
-    found = armtempo.optimise.minimise(lambda x: ((x - 0.5) ** 2).sum(1), [(-2, 2)] * 2, rng, 10, 200)
+    found = armtempo.optimise.minimise(lambda x: ((x - 0.5) ** 2).sum(1), [(-2, 2)] * 2, rng)
     np.testing.assert_allclose(found.x, 0.5, atol=1e-3)

@@ -81,7 +81,9 @@ def replay(trajectory: Path, interpreter: str, folder: Path) -> Replay:
     log = folder / "edges.bin"
     starter = interpreters.starter(interpreter)
     with (
-        simulator.launch(edge_log=log, interpreter=starter) as process,  # without an arm: ideal motors
+        simulator.launch(
+            simulator.LaunchOptions(edge_log=log, interpreter=starter)
+        ) as process,  # without an arm: ideal motors
         connect(process.port) as board,
     ):
         board.home(plan.arm)

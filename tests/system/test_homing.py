@@ -14,7 +14,7 @@ from armtempo.model import arm_file
 from armtempo.model.arm import Arm
 from armtempo.robot import arm_state, goto, homing
 from armtempo.robot.stop_request import StopRequest
-from armtempo.simulator import launch
+from armtempo.simulator import LaunchOptions, launch
 
 PAPER = Arm.paper()
 SWITCH = """
@@ -37,7 +37,7 @@ def switched_arm(folder: Path, angle: float = -9.0) -> Arm:
 @contextmanager
 def unhomed(found: Arm, real: Arm | None = None) -> Iterator[tuple[Client, StopRequest]]:
     """A virtual board set up for an arm; ``real``: what its motors move instead."""
-    with launch(arm=real or found) as virtual, open_board(virtual.port) as board:
+    with launch(LaunchOptions(arm=real or found)) as virtual, open_board(virtual.port) as board:
         arm_state.configure(board, found, replace=True)
         with StopRequest() as stop:
             yield board, stop

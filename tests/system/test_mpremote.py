@@ -14,7 +14,7 @@ from armtempo.link import Client, open_board
 from armtempo.planning import point_to_point
 from armtempo.records import encode, encoded_motion
 from armtempo.robot import arm_state
-from armtempo.simulator import edgelog, launch
+from armtempo.simulator import LaunchOptions, edgelog, launch
 from mpremote.transport import TransportError
 from mpremote.transport_serial import SerialTransport
 
@@ -68,7 +68,7 @@ def state(port: str) -> str:
 def test_replay_from_the_prompt(flash: Path, tmp_path: Path) -> None:
     """A soft reset comes first, so the posture is taken for the start; ``resume`` does without, and knows it."""
     log = tmp_path / "edges"
-    with launch(flash, interpreter=INTERPRETER, edge_log=log) as process:
+    with launch(LaunchOptions(flash, interpreter=INTERPRETER, edge_log=log)) as process:
         with open_board(process.port) as board:
             arm_state.home(board, boards.ARM)
         said = mpremote(process.port, "resume", "exec", REPLAY)
@@ -87,7 +87,7 @@ def test_replay_from_the_prompt(flash: Path, tmp_path: Path) -> None:
 
 
 def test_files_while_the_program_runs(flash: Path) -> None:
-    with launch(flash, interpreter=INTERPRETER) as process:
+    with launch(LaunchOptions(flash, interpreter=INTERPRETER)) as process:
         assert state(process.port) == "unhomed"
         assert "go.atm" in mpremote(process.port, "ls", "armtempo")
         assert mpremote(process.port, "exec", "print(6 * 7)") == "42\n"
@@ -98,7 +98,7 @@ def test_files_while_the_program_runs(flash: Path) -> None:
 
 def test_while_it_moves_nobody_gets_in(flash: Path) -> None:
     """mpremote gives up; the motion comes to its end, where it should; then mpremote is let in."""
-    with launch(flash, interpreter=INTERPRETER, virtual_time=False) as process:
+    with launch(LaunchOptions(flash, interpreter=INTERPRETER, virtual_time=False)) as process:
         with open_board(process.port) as board:
             arm_state.home(board, boards.ARM)
             run, duration_s = _start(board)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from armtempo.model import arm_file
 from armtempo.runs import reader
-from armtempo.simulator import launch
+from armtempo.simulator import LaunchOptions, launch
 
 from tests.system import commandline
 from tests.system.boards import armtempo, small_plan
@@ -16,7 +16,7 @@ from tests.system.boards import armtempo, small_plan
 
 def test_board_on_a_port(tmp_path: Path) -> None:
     file = small_plan(tmp_path / "small.json")
-    with launch(tmp_path / "flash") as board:
+    with launch(LaunchOptions(tmp_path / "flash")) as board:
 
         def on_board(*arguments: str | Path, code: int = 0) -> str:
             return armtempo(*arguments, "--port", board.port, cwd=tmp_path, code=code)
@@ -34,7 +34,7 @@ def test_board_on_a_port(tmp_path: Path) -> None:
     found = reader.load(tmp_path / "runs" / "small-001")
     first, second = found.repetitions
     np.testing.assert_array_equal(first.commanded_steps, second.commanded_steps)
-    with launch(tmp_path / "flash") as board:
+    with launch(LaunchOptions(tmp_path / "flash")) as board:
         assert "small " in armtempo("list", "--port", board.port, cwd=tmp_path)
         assert "position unknown" in armtempo("status", "--port", board.port, cwd=tmp_path)
 

@@ -30,7 +30,7 @@ def test_samples_wait_for_a_host_that_does_not_read() -> None:
     arm = replace(shipped, joints=tuple(joints))
     motion = point_to_point.straight("slow", arm.home_deg, [180.0, -60.0, 40.0], arm)
     with (
-        simulator.launch(interpreter=FASTEST) as process,
+        simulator.launch(simulator.LaunchOptions(interpreter=FASTEST)) as process,
         open_board(process.port) as board,
     ):
         arm_state.configure(board, arm, replace=True)

@@ -21,7 +21,7 @@ from armtempo.planning import point_to_point
 from armtempo.records import encode
 from armtempo.robot import arm_state, stored_motion
 from armtempo.robot.stop_request import StopRequest
-from armtempo.simulator import launch
+from armtempo.simulator import LaunchOptions, launch
 from armtempo_shared import limits, wire
 
 from tests import interpreters
@@ -66,7 +66,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
         point_to_point.straight("go", home_deg, home_deg + AWAY_DEG, boards.ARM), boards.ARM
     )
     starter = interpreters.starter(INTERPRETERS[-1])
-    with launch(interpreter=starter) as process, open_board(process.port, made.path) as board:
+    with launch(LaunchOptions(interpreter=starter)) as process, open_board(process.port, made.path) as board:
         arm_state.configure(board, boards.ARM, replace=True)
         arm_state.home(board, boards.ARM)
         stored = stored_motion.store(board, "go", data)
@@ -133,7 +133,7 @@ def say_again(chunks: list[Chunk], port: str) -> bytes:
 
 @pytest.mark.parametrize("name", INTERPRETERS)
 def test_a_board_answers_the_host_s_bytes_in_the_same_way(recording: Recording, name: str) -> None:
-    with launch(interpreter=interpreters.starter(name)) as process:
+    with launch(LaunchOptions(interpreter=interpreters.starter(name))) as process:
         answers = say_again(recording.chunks(), process.port)
     recorded, again = (list(frames(data)) for data in (recording.data(FROM_BOARD), answers))
     pairs = zip(

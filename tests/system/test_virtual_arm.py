@@ -15,7 +15,7 @@ from armtempo.planning import planner
 from armtempo.records import encode
 from armtempo.robot import arm_state, homing, stored_motion
 from armtempo.robot.stop_request import StopRequest
-from armtempo.simulator import edgelog, launch
+from armtempo.simulator import LaunchOptions, edgelog, launch
 from armtempo_shared.limits import TICK_HZ
 
 from tests import interpreters
@@ -46,7 +46,7 @@ def swing_deg(degree: int) -> float:
     job = replace(Job.paper(arm), degree=degree, iterations=50)
     trajectory = planner.plan(arm, job).trajectory
     samples: list[Sample] = []
-    with launch(arm=arm) as process, open_board(process.port) as board, StopRequest() as stop:
+    with launch(LaunchOptions(arm=arm)) as process, open_board(process.port) as board, StopRequest() as stop:
         arm_state.configure(board, arm, replace=True)
         arm_state.home(board, arm)
         stored = stored_motion.store(board, "feed", encode.motion_record(trajectory, arm))
@@ -69,7 +69,7 @@ def test_homing_by_limit_switch(tmp_path: Path) -> None:
     start_deg = [6.0, -60.0, 40.0]
     log = tmp_path / "edges"
     with (
-        launch(arm=arm, start_deg=start_deg, edge_log=log) as process,
+        launch(LaunchOptions(arm=arm, start_deg=start_deg, edge_log=log)) as process,
         open_board(process.port) as board,
         StopRequest() as stop,
     ):

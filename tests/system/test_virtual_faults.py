@@ -16,7 +16,7 @@ from armtempo.planning import point_to_point
 from armtempo.records import encode
 from armtempo.robot import arm_state, stored_motion
 from armtempo.robot.stop_request import StopRequest
-from armtempo.simulator import Fault, edgelog, launch
+from armtempo.simulator import InjectedFault, LaunchOptions, edgelog, launch
 from armtempo_shared.wire import ERROR_CODES
 
 from tests.system import boards
@@ -26,12 +26,15 @@ GUARDED = replace(boards.ARM, safety=replace(boards.ARM.safety, estop_fitted=Tru
 
 
 def run(
-    *faults: Fault, arm: Arm = boards.ARM, model: Arm | None = None, log: Path | None = None
+    *faults: InjectedFault, arm: Arm = boards.ARM, model: Arm | None = None, log: Path | None = None
 ) -> tuple[RunEnd, Status]:
     """A short motion from home, and how the board stands after it."""
     home_deg = arm.home_deg
     data = encode.motion_record(point_to_point.straight("move", home_deg, TARGET_DEG, arm), arm)
-    with launch(faults=faults, arm=model, edge_log=log) as process, open_board(process.port) as board:
+    with (
+        launch(LaunchOptions(faults=faults, arm=model, edge_log=log)) as process,
+        open_board(process.port) as board,
+    ):
         arm_state.configure(board, arm, replace=True)
         arm_state.home(board, arm)
         stored = stored_motion.store(board, "move", data)
@@ -53,13 +56,13 @@ def test_nothing() -> None:
 
 
 def test_short_stall_does_no_harm() -> None:
-    end, _ = run(Fault("stall", at_s=0.4, ms=10))
+    end, _ = run(InjectedFault("stall", at_s=0.4, ms=10))
     assert not end.fault
 
 
 @pytest.mark.parametrize("at_s", [0.3, 0.55, 0.8])
 def test_long_stall_is_an_underrun(at_s: float) -> None:
-    end, status = run(Fault("stall", at_s=at_s, ms=1500))
+    end, status = run(InjectedFault("stall", at_s=at_s, ms=1500))
     assert code(end) == "underrun"
     assert status.known == 7
 
@@ -67,7 +70,7 @@ def test_long_stall_is_an_underrun(at_s: float) -> None:
 @pytest.mark.parametrize("at_s", [0.0, 0.41, 0.77])
 def test_estop_freezes_within_20_us(at_s: float, tmp_path: Path) -> None:
     log = tmp_path / "edges"
-    end, _ = run(Fault("input", at_s=at_s, name="E15", level=0), arm=GUARDED, log=log)
+    end, _ = run(InjectedFault("input", at_s=at_s, name="E15", level=0), arm=GUARDED, log=log)
     assert code(end) == "estop"
     pins = edgelog.read(log)[-1].motion()
     (tripped,) = pins["E15"][0]
@@ -79,17 +82,20 @@ def test_estop_freezes_within_20_us(at_s: float, tmp_path: Path) -> None:
 
 
 def test_blocked_joint_is_a_following_error() -> None:
-    end, _ = run(Fault("block", at_s=0.3, joint=1))
+    end, _ = run(InjectedFault("block", at_s=0.3, joint=1))
     assert (code(end), end.fault_joint) == ("following", 1)
 
 
 def test_slipped_coupling_is_a_following_error() -> None:
-    end, _ = run(Fault("slip", at_s=0.5, joint=2, counts=-60))
+    end, _ = run(InjectedFault("slip", at_s=0.5, joint=2, counts=-60))
     assert (code(end), end.fault_joint) == ("following", 2)
 
 
 def test_hang_makes_the_watchdog_bite() -> None:
-    with launch(faults=[Fault("hang", at_s=0.3)]) as process, open_board(process.port) as board:
+    with (
+        launch(LaunchOptions(faults=[InjectedFault("hang", at_s=0.3)])) as process,
+        open_board(process.port) as board,
+    ):
         arm_state.configure(board, boards.ARM, replace=True)
         arm_state.home(board, boards.ARM)
         home_deg = boards.ARM.home_deg
@@ -112,7 +118,7 @@ def test_hang_makes_the_watchdog_bite() -> None:
 
 
 def test_crash_is_an_internal_fault() -> None:
-    end, _ = run(Fault("crash", at_s=0.5))
+    end, _ = run(InjectedFault("crash", at_s=0.5))
     assert code(end) == "internal"
     assert "injected crash" in end.notices[0]
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from armtempo.research.bench.cases import Case, Problem
-    from armtempo.research.bench.result_store import Store
+    from armtempo.research.bench.result_store import ResultStore
     from armtempo.research.bench.result_table import Row
 
 
@@ -82,19 +82,19 @@ def command(
 ) -> None:
     """Compare the search algorithms as the paper does in Table 4 and Fig. 6."""
     from armtempo.research.bench import cases, result_table, worker_pool
-    from armtempo.research.bench.result_store import Store
+    from armtempo.research.bench.result_store import ResultStore
 
     arm_path, job_path = chosen["arm_path"], chosen["job_path"]
     arm = options.load_arm(arm_path)
     job = options.load_job(job_path, arm)
     problem = cases.problem_of(arm, job, chosen["joint"], chosen["fitness"], chosen["iterations"])
     wanted = cases.cases(chosen["algorithms"], chosen["populations"], range(1, chosen["seeds"] + 1))
-    store = Store(out, problem)
+    store = ResultStore(out, problem)
     place = worker_pool.cluster(scheduler) if scheduler else worker_pool.local(workers)
     try:
         _run(problem, wanted, store, place)
     except KeyboardInterrupt:
-        kept = Store(out, problem).runs
+        kept = ResultStore(out, problem).runs
         done = sum(case in kept for case in wanted)
         click.echo(
             f"armtempo: interrupted; {done} of {len(wanted)} runs are kept in {store.path}, "
@@ -108,7 +108,7 @@ def command(
 
 
 def _run(
-    problem: Problem, wanted: Sequence[Case], store: Store, place: AbstractContextManager[Executor]
+    problem: Problem, wanted: Sequence[Case], store: ResultStore, place: AbstractContextManager[Executor]
 ) -> None:
     """The runs that are still missing."""
     from armtempo.research.bench import cases

@@ -91,7 +91,7 @@ def _virtual_port(port: str, arm: Arm | None) -> Iterator[str]:
     """A virtual board's port; where its program fails, the errors meanwhile end with its last words."""
     from armtempo import simulator
 
-    with simulator.launch(ports.sim_flash(port), arm=arm) as board:
+    with simulator.launch(simulator.LaunchOptions(ports.sim_flash(port), arm=arm)) as board:
         try:
             yield board.port
         except LinkError as error:

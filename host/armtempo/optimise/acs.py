@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from armtempo.arrays import Array
 from armtempo.optimise.levy import BETA, levy_scale
-from armtempo.optimise.parameters import Choice, Number, Parameter
+from armtempo.optimise.parameters import Number, OneOf, Parameter
 from armtempo.optimise.tracker import Result, Task, Tracker
 
 
@@ -97,7 +97,7 @@ PARAMETERS: dict[str, Parameter] = {
     "b": Number(0.5, -5.0, 5.0),
     "pa": Number(0.25, 0.001, 1.0),
     "beta": BETA,
-    "variant": Choice("differences", tuple(VARIANTS)),
+    "variant": OneOf("differences", tuple(VARIANTS)),
 }
 
 

@@ -31,7 +31,7 @@ class Number:
 
 
 @dataclass(frozen=True)
-class Choice:
+class OneOf:
     """One of several words."""
 
     default: str
@@ -47,4 +47,4 @@ class Choice:
         return value in self.words
 
 
-Parameter = Number | Choice
+Parameter = Number | OneOf

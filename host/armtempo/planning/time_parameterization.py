@@ -75,11 +75,8 @@ def _search(fitness: Fitness, job: Job, rng: np.random.Generator, progress: Prog
         function,
         [job.bounds_s] * fitness.intervals,
         rng,
-        job.population,
-        job.iterations,
-        job.optimiser,
+        optimise.Settings(job.optimiser, job.population, job.iterations, parameters),
         progress,
-        **parameters,
     )
 
 

@@ -33,6 +33,9 @@ Where = Plan | EncodedMotion | ArrayLike
 """A posture: angles of the driven joints in degrees, (J,), or a motion for where it begins."""
 
 
+LOG = logging.getLogger("armtempo")
+
+
 def connect(
     port: str = "sim",
     arm: Arm | None = None,
@@ -40,16 +43,16 @@ def connect(
     log_traffic: Path | None = None,
     sink: Sink | None = None,
     any_program: bool = False,
-    tell: Callable[[str], object] = logging.getLogger("armtempo").warning,
+    tell: Callable[[str], object] = LOG.warning,
 ) -> Board:
     """The board on ``port``, which has answered; use it as a context, or ``close`` it.
 
     ``port``: a serial device or URL; ``"sim"`` starts a virtual board that lives until it is closed,
     ``"sim:FOLDER"`` one that keeps its flash in FOLDER. ``arm``: what a virtual board's motors move; None:
     ideal motors. ``log_traffic``: file that gets every byte both ways; ``sink`` takes the same. ``any_program``:
-    also talk to a board whose program is not the one installed here. ``tell`` hears what goes on with the
-    connection while other calls wait. Raises InputError where there is no such port, LinkError where it is in
-    use, silent or runs something else.
+    also talk to a board whose program is not the one installed here. ``tell`` hears what happens to the
+    connection while other calls wait; by default the logger "armtempo" does. Raises InputError where there is
+    no such port, LinkError where it is in use, silent or runs something else.
     """
     stack = ExitStack()
     client = stack.enter_context(link.open_board(port, log_traffic, sink, arm, any_program))

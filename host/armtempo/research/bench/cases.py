@@ -49,7 +49,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Run:
+class Trial:
     """What came of a case."""
 
     case: Case
@@ -97,20 +97,21 @@ def cases(algorithms: Iterable[str], populations: Iterable[int], seeds: Iterable
     return sorted(chosen, key=lambda case: (-case.population, case.seed, case.algorithm))
 
 
-def solve(problem: Problem, case: Case) -> Run:
+def solve(problem: Problem, case: Case) -> Trial:
     """Runs one case. The same case gives the same run, but for its seconds, wherever it runs."""
     function = problem.function()
     bounds = [problem.bounds_s] * (len(problem.via_deg) - 1)
     rng = np.random.default_rng(case.seed)
     start = time.thread_time()
-    found = optimise.minimise(function, bounds, rng, case.population, problem.iterations, case.algorithm)
+    settings = optimise.Settings(case.algorithm, case.population, problem.iterations)
+    found = optimise.minimise(function, bounds, rng, settings)
     seconds = time.thread_time() - start
     better = [0, *(np.flatnonzero(np.diff(found.history) < 0) + 1)]
     improvements = tuple((int(at), float(found.history[at])) for at in better)
-    return Run(case, tuple(float(x) for x in found.x), found.evaluations, seconds, improvements)
+    return Trial(case, tuple(float(x) for x in found.x), found.evaluations, seconds, improvements)
 
 
-def execute(problem: Problem, todo: Iterable[Case], executor: Executor) -> Iterator[Run]:
+def execute(problem: Problem, todo: Iterable[Case], executor: Executor) -> Iterator[Trial]:
     """Runs the cases on the executor's workers, and yields each run as it comes."""
     futures = [executor.submit(solve, problem, case) for case in todo]
     for future in as_completed(futures):

@@ -9,7 +9,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.progress import Progress
 from armtempo.research.bench import cases, worker_pool
-from armtempo.research.bench.result_store import Store
+from armtempo.research.bench.result_store import ResultStore
 from armtempo.research.bench.result_table import PAPER, Row, rows
 from armtempo.research.paper.claims import BETTER, DIFFERS, SAME, Claim
 
@@ -31,7 +31,7 @@ def run(arm: Arm, job: Job, folder: Path, quick: bool, progress: Progress) -> li
     problem = cases.problem_of(arm, job, 1, FITNESS, ITERATIONS)
     seeds = range(1, 4 if quick else 11)
     wanted = cases.cases(PAPER, QUICK_POPULATIONS if quick else POPULATIONS, seeds)
-    store = Store(folder, problem)
+    store = ResultStore(folder, problem)
     todo = [case for case in wanted if case not in store.runs]
     if todo:
         with worker_pool.local() as executor:

@@ -19,7 +19,7 @@ _LAG_US = 20_000  # a delay beyond this is not made up for
 
 
 class Pace:
-    """Ties the board's time to the world's."""
+    """Ties the board's virtual time to real time."""
 
     def __init__(self, board, serial, speed):
         self._board = board

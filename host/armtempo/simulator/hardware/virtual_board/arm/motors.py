@@ -7,7 +7,7 @@ from virtual_board.chip import gpio
 from virtual_board.firmware.external_interrupts import set_level
 
 
-class Motor:
+class IdealMotor:
     """One joint's motor and encoder.
 
     ``step``, ``direction``: its lines; ``encoder``: the timer that counts it, or None; ``joint``:
@@ -78,7 +78,7 @@ class Enable:
         return self._line.level == self._active and self._line.mode() == gpio.OUTPUT
 
 
-class Arm:
+class ArmOnPins:
     """All motors, as the arm record in the flash has them.
 
     ``record()`` gives (head, joints) or None; ``angles``: where the joints stand, else where ``joints`` says.
@@ -95,7 +95,7 @@ class Arm:
         self.motors = []
         self.watches_host = False
         board.follow = self.follow
-        board.worlds.append(self)
+        board.observers.append(self)
         self.connect()
 
     def connect(self):
@@ -130,7 +130,7 @@ class Arm:
             from virtual_board.arm.stepper import Stepper
 
             return Stepper(step, direction, enable, encoder, joint, 100 * self._seed + number)
-        return Motor(step, direction, enable, encoder, joint)
+        return IdealMotor(step, direction, enable, encoder, joint)
 
     def follow(self):
         """Time has passed."""

@@ -15,7 +15,7 @@ swings fast; each step sees the mean of what was commanded in it, so a pulse cou
 
 from math import asin, ceil, cos, pi, sin, sqrt
 
-from virtual_board.arm.motors import Motor
+from virtual_board.arm.motors import IdealMotor
 from virtual_board.arm.noise import Noise
 
 _DT_TICKS = 84_000
@@ -25,7 +25,7 @@ _REST_STEPS = 0.002
 _SCATTER_LENGTH_DEG = 2.0  # of motion, in which a new repetition's scatter comes up
 
 
-class Stepper(Motor):
+class Stepper(IdealMotor):
     """``joint``: also what the arm file says of the joint's drive, and its ``model``."""
 
     def __init__(self, step, direction, enable, encoder, joint, seed):

@@ -23,7 +23,7 @@ NO_FILE_SYSTEM, UNREADABLE = "no file system", "unreadable"
 """Kinds of damage: the firmware finds no file system; it mounts one in which nothing can be read or written."""
 
 
-class Flash:
+class FlashFolder:
     """The folder ``root`` of ``size`` blocks; ``stall(ms)`` lets time pass while the flash is busy.
 
     ``programs``: folders of the host that hold a program which is not deployed to the flash; read only.

@@ -63,7 +63,7 @@ class Line:
             sink.edges(self, before, count, times, origin)
 
 
-class Port:
+class GpioPort:
     """One GPIO port."""
 
     def __init__(self, index):
@@ -107,7 +107,7 @@ class Pins:
     """All ports, and which timer channel leads to which pin."""
 
     def __init__(self):
-        self.ports = [Port(index) for index in range(len(PORTS))]
+        self.ports = [GpioPort(index) for index in range(len(PORTS))]
 
     def line(self, name):
         """The line of a pin by its name, with or without the leading P: ``PA15``."""

@@ -12,7 +12,7 @@ PREFIX = "armtempo-virtual-"
 _LOCK = "lock"
 
 
-class Folder:
+class TemporaryFolder:
     """A new folder; ``lock`` is a file descriptor that keeps it, also in a process that inherits it.
 
     Making one removes those whose owners were killed.
