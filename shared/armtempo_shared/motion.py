@@ -46,16 +46,16 @@ def pack(
     degree: int,
     angles: "list[list[int]]",
     times: "list[list[int]]",
-    segments: int,
     refine: int,
     brake_ticks: int,
     arm_crc: int,
 ) -> bytes:
-    """A motion record.
+    """A motion record of n path segments with ``refine`` R time segments each.
 
     ``angles``: per joint its n + k control points (int, steps * 2**28); ``times``: per joint, or one for
     all, its n * R + k control points (int, ticks * 2**16).
     """
+    segments = len(angles[0]) - degree
     shared = len(times) == 1 and len(angles) > 1
     flags = SHARED_AXIS if shared else 0
     head = struct.pack(_HEAD, MAGIC, degree, len(angles), flags, 0, segments, refine, brake_ticks, arm_crc)

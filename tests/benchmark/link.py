@@ -41,7 +41,7 @@ def motion_record(numbers: random.Random, arm: bytes = ARM, segments: int = 6) -
     """A record of the shipped job's size: three joints, six segments, quintic."""
     _, joints, crc = armrecord.unpack(arm)
     points = [[numbers.randrange(2**40) for _ in range(segments + 5)] for _ in joints]
-    return motion.pack(5, points, points, segments, 1, 0, crc)
+    return motion.pack(5, points, points, 1, 0, crc)
 
 
 def ready(pipe: Pipe, arm: bytes = ARM) -> tuple[Client, int]:

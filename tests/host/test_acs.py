@@ -57,6 +57,6 @@ def test_finds_a_narrow_valley(variant: str) -> None:
     ],
 )
 def test_refuses_other_parameters(parameters: dict[str, object], message: str) -> None:
+    settings = optimise.Settings("acs", 10, 5, parameters)
     with pytest.raises(InputError, match=message):
-        settings = optimise.Settings("acs", 10, 5, parameters)
         optimise.minimise(lambda x: x.sum(1), [(0, 1)], np.random.default_rng(1), settings)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from armtempo_shared import armrecord, limits, motion
+from armtempo_shared.wire import record_crc
 from numpy.typing import NDArray
 
 from armtempo.errors import InputError
@@ -44,10 +45,9 @@ def motion_record(trajectory: Trajectory, arm: Arm, brake_s: float = 0.0) -> byt
     times = [_fixed(spline.time_points_s * limits.TICK_HZ, limits.TICK_FRACTION_BITS) for spline in axes]
     checks.check_held(trajectory, arm)
     first = trajectory.joints[0]
-    segments = len(first.angle_points_deg) - first.degree
     brake_ticks = round(brake_s * limits.TICK_HZ)
-    crc = armrecord.unpack(arm_record(arm))[2]
-    return motion.pack(first.degree, angles, times, segments, first.refine, brake_ticks, crc)
+    crc = record_crc(arm_record(arm))
+    return motion.pack(first.degree, angles, times, first.refine, brake_ticks, crc)
 
 
 def _fixed(points: NDArray[np.float64], bits: int) -> list[int]:
