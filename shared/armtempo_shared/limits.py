@@ -29,5 +29,9 @@ Seen to run on the emulated chip at 3 cycles an instruction, with one, two and t
 MAX_STEP_RATE_SUM = 240_000
 """Highest sum of the step rates of all joints, steps/s. The same."""
 
+LONGEST_TICKS = 1 << 38
+"""Times in a motion stay below this, a little under an hour: in units of 1024 ticks they are small integers
+of 32-bit MicroPython."""
+
 MAX_MOTION_BYTES = 16384
 """Largest motion record that the board takes: it must fit into its memory whole."""

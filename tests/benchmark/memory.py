@@ -51,7 +51,7 @@ def measure() -> dict[str, int]:
 
 def write_session(folder: Path, of_arm: arm.Arm) -> None:
     """Store an arm and a motion, and write the frames of a host that starts it."""
-    home_deg = of_arm.home_deg
+    home_deg = np.array(of_arm.home_deg)
     trajectory = point_to_point.straight(
         "go", home_deg, home_deg + np.resize([2.0, 1.0, -2.0], home_deg.shape), of_arm
     )

@@ -23,7 +23,7 @@ INTERPRETER = interpreters.starter(interpreters.AVAILABLE[min(1, len(interpreter
 
 def test_upload_is_old_or_new(tmp_path: Path) -> None:
     paper_arm = Arm.paper()
-    home_deg = paper_arm.home_deg
+    home_deg = np.array(paper_arm.home_deg)
     old, new = (
         encode.motion_record(
             point_to_point.straight("go", home_deg, home_deg + np.array(move), paper_arm), paper_arm

@@ -19,7 +19,7 @@ SCRIPT = Path(__file__).parent / "scripts" / "replay.py"
 def test_replay_from_the_repl(name: str, tmp_path: Path) -> None:
     """The first call takes the posture for the start and moves; the second finds the arm elsewhere."""
     paper_arm = Arm.paper()
-    home_deg = paper_arm.home_deg
+    home_deg = np.array(paper_arm.home_deg)
     trajectory = point_to_point.straight("go", home_deg, home_deg + np.array([2.0, 1.0, -2.0]), paper_arm)
     (tmp_path / "armtempo").mkdir()
     (tmp_path / "armtempo" / "arm.ata").write_bytes(encode.arm_record(paper_arm))

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from armtempo.errors import LinkError
 from armtempo.link import Client, open_board
+from armtempo.link.client import Started
 from armtempo.planning import point_to_point
 from armtempo.records import encode, encoded_motion
 from armtempo.robot import arm_state
@@ -22,7 +23,7 @@ from tests import interpreters
 from tests.system import boards, commandline
 
 INTERPRETER = interpreters.starter("micropython" if "micropython" in interpreters.AVAILABLE else "cpython")
-HOME_DEG = boards.ARM.home_deg
+HOME_DEG = np.array(boards.ARM.home_deg)
 AWAY_DEG = HOME_DEG + np.array([40.0, -10.0, 15.0])
 REPLAY = "import armtempo_board; armtempo_board.replay('go')"
 
@@ -101,28 +102,28 @@ def test_while_it_moves_nobody_gets_in(flash: Path) -> None:
     with launch(LaunchOptions(flash, interpreter=INTERPRETER, virtual_time=False)) as process:
         with open_board(process.port) as board:
             arm_state.home(board, boards.ARM)
-            run, duration_s = _start(board)
+            started = _start(board)
             begun_s = time.monotonic()
         port = SerialTransport(
             process.port, timeout=0.05
         )  # a pseudo terminal: without one its read waits for ever
         with pytest.raises(TransportError, match="could not enter raw repl"):
-            port.enter_raw_repl(timeout_overall=duration_s / 2)
+            port.enter_raw_repl(timeout_overall=started.duration_s / 2)
         port.close()
         with open_board(process.port) as board:
-            still_moving = time.monotonic() - begun_s < duration_s - 0.2
+            still_moving = time.monotonic() - begun_s < started.duration_s - 0.2
             assert board.status().moving or not still_moving
             commandline.wait_for(lambda: not board.status().moving, "the end of the motion")
             status = board.status()
         assert (status.state, status.run, list(status.positions.commanded_steps)) == (
             "idle",
-            run,
+            started.run,
             steps(AWAY_DEG),
         )
         assert mpremote(process.port, "resume", "exec", "print('in')") == "in\n"
 
 
-def _start(board: Client) -> tuple[int, float]:
+def _start(board: Client) -> Started:
     stored = board.find("go")
     assert stored is not None
     return board.start("go", stored.crc)

@@ -61,7 +61,7 @@ class Recording:
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     """Greeting, arm, home, upload, a refusal, a run, status, the store's commands; as ``--log-traffic`` writes it."""
     made = Recording(tmp_path_factory.mktemp("traffic") / "traffic.log")
-    home_deg = boards.ARM.home_deg
+    home_deg = np.array(boards.ARM.home_deg)
     data = encode.motion_record(
         point_to_point.straight("go", home_deg, home_deg + AWAY_DEG, boards.ARM), boards.ARM
     )

@@ -29,7 +29,7 @@ def run(
     *faults: InjectedFault, arm: Arm = boards.ARM, model: Arm | None = None, log: Path | None = None
 ) -> tuple[RunEnd, Status]:
     """A short motion from home, and how the board stands after it."""
-    home_deg = arm.home_deg
+    home_deg = np.array(arm.home_deg)
     data = encode.motion_record(point_to_point.straight("move", home_deg, TARGET_DEG, arm), arm)
     with (
         launch(LaunchOptions(faults=faults, arm=model, edge_log=log)) as process,
@@ -98,7 +98,7 @@ def test_hang_makes_the_watchdog_bite() -> None:
     ):
         arm_state.configure(board, boards.ARM, replace=True)
         arm_state.home(board, boards.ARM)
-        home_deg = boards.ARM.home_deg
+        home_deg = np.array(boards.ARM.home_deg)
         data = encode.motion_record(
             point_to_point.straight("move", home_deg, TARGET_DEG, boards.ARM), boards.ARM
         )

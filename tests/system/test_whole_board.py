@@ -22,7 +22,7 @@ SCRIPTS = Path(__file__).parent / "scripts"
 PROGRAM = f"{interpreters.ROOT / 'board'}:{interpreters.ROOT / 'shared'}"
 HEAP = {"cpython": "", "micropython": "16M", "micropython-arm": "6M"}
 ARM = Arm.paper()
-HOME_DEG = ARM.home_deg
+HOME_DEG = np.array(ARM.home_deg)
 HOME_STEPS = [round(angle * joint.steps_per_deg) for angle, joint in zip(HOME_DEG, ARM.driven, strict=True)]
 AWAY_DEG = ([3.0, 2.0, -2.0], [-1.0, 1.0, 2.0])
 FEWER = {"micropython": 3, "cpython": 10, "micropython-arm": 12}

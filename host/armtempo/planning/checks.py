@@ -6,7 +6,14 @@ import math
 
 import numpy as np
 from armtempo_shared import motion
-from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS, MAX_STEP_RATE, MAX_STEP_RATE_SUM, TICK_HZ
+from armtempo_shared.limits import (
+    LONGEST_TICKS,
+    MAX_MOTION_BYTES,
+    MAX_SEGMENTS,
+    MAX_STEP_RATE,
+    MAX_STEP_RATE_SUM,
+    TICK_HZ,
+)
 
 from armtempo import optimise
 from armtempo.errors import InputError, PlanError
@@ -20,10 +27,10 @@ from armtempo.splines.trajectory import JointSpline, Trajectory
 TOLERANCE = 1e-9
 """What rounding may leave: largest excess over a limit, relative, and over a range, in degrees."""
 
-LONGEST_TICKS, LONGEST_SPAN_TICKS = 1 << 38, 1 << 36
+LONGEST_SPAN_TICKS = 1 << 36
 MOST_STEPS, MOST_SPAN_STEPS = 1 << 27, 1 << 24
-"""What the board's evaluator can hold: largest control point, and span of the degree + 1 of one segment
-(the same bounds stand in ``armtempo_board/check.py``; a test compares them)."""
+"""What the board's evaluator can hold besides LONGEST_TICKS: the span of the degree + 1 time control points of a
+segment, the largest angle control point, and the span of those of a segment. A test holds them against the board."""
 
 FITNESS = ("stretched", "penalised")
 """Values of the job's parameter ``fitness``: ``stretched`` scales each candidate until it just keeps its
