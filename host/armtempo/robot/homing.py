@@ -41,11 +41,6 @@ class _Switch:
     """The other end."""
 
 
-def homes_by_switch(joint: DrivenJoint) -> bool:
-    """Whether a joint has a switch whose angle is known."""
-    return _switch(joint) is not None
-
-
 def home_to_switches(client: Client, arm: Arm, stop: StopRequest) -> None:
     """Home every joint that has a switch of known angle; the others stay as they are.
 

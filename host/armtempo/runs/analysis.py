@@ -47,7 +47,6 @@ class Deviation:
 
     rms: float
     largest: float
-    final: float
 
 
 @dataclass(frozen=True)
@@ -155,8 +154,8 @@ def _peak(values: Array) -> float:
 def _deviation(error: Array) -> Deviation:
     known = error[~np.isnan(error)]
     if not len(known):
-        return Deviation(np.nan, np.nan, np.nan)
-    return Deviation(float(np.sqrt(np.mean(known**2))), float(np.abs(known).max()), float(known[-1]))
+        return Deviation(np.nan, np.nan)
+    return Deviation(float(np.sqrt(np.mean(known**2))), float(np.abs(known).max()))
 
 
 def _indices(repetition: RepetitionData) -> NDArray[np.int64]:
