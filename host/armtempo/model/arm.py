@@ -73,7 +73,7 @@ class LimitSwitches:
 
 @dataclass(frozen=True)
 class JointModel:
-    """What the virtual arm needs to know of one joint beyond its drive."""
+    """What the virtual arm simulates of one joint beyond its drive."""
 
     holding_torque_nm: float = 0.0
     """Of the motor, at its shaft; 0: an ideal motor, which never lags."""
@@ -89,7 +89,7 @@ class JointModel:
     backlash_deg: float = 0.0
     """Of the joint against its motor."""
     encoder_phase_counts: float = 0.0
-    """How far the encoder stands beyond its last count at power-up, 0 to 1."""
+    """Fraction of a count by which the encoder is beyond its last edge at power-up, 0 to 1."""
     scatter_deg: float = 0.0
     """Standard deviation between repetitions."""
 
@@ -149,7 +149,7 @@ class DrivenJoint:
 
 @dataclass(frozen=True)
 class Driver:
-    """What the stepper drivers ask of the signals."""
+    """Timing and polarity of the signals that the stepper drivers need."""
 
     pulse_us: float = 2.0
     low_us: float = 2.0
@@ -160,7 +160,7 @@ class Driver:
 
 @dataclass(frozen=True)
 class Safety:
-    """What the board does when something goes wrong."""
+    """E-stop input, and what the board does when it trips or the host disappears."""
 
     estop_fitted: bool = False
     estop_active: str = "low"
@@ -172,7 +172,7 @@ class Safety:
 
 @dataclass(frozen=True)
 class Arm:
-    """A whole arm; ``source`` names the file it was read from."""
+    """An arm; ``source`` is the file that it was read from."""
 
     name: str
     joints: tuple[Joint, ...]

@@ -9,7 +9,7 @@ from pathlib import Path
 from armtempo.model.arm import Arm
 
 REFINE, POPULATION, ITERATIONS = (1, 64), (4, 100_000), (1, 1_000_000)
-"""Least and most of these settings."""
+"""Least and largest values of these settings."""
 
 Rows = tuple[tuple[float, ...], ...]
 

@@ -21,7 +21,7 @@ VERSION = 1
 
 
 def save(plan: Plan, path: Path | str) -> None:
-    """Writes the plan whole or not at all.
+    """Write the plan, whole or not at all.
 
     Raises InputError where the file cannot be written.
     """
@@ -69,7 +69,7 @@ def _refuse(name: str) -> None:
 
 
 def _check(plan: Plan, path: Path | str) -> None:
-    """What the types cannot say: shapes, time that runs forward, one joint for each drive."""
+    """Check what types cannot express: shapes, increasing times, one spline for each driven joint."""
     for joint in plan.arm.joints:
         _check_drive(joint, f"{path}: arm: {joint.name}")
     joints, driven = plan.trajectory.joints, plan.arm.driven

@@ -29,7 +29,7 @@ def search(
     """Minimises by N evaluations an iteration.
 
     ``k1`` and ``k3`` scale the chance of crossover above and below the mean fitness, ``k2`` and ``k4``
-    that of mutation; ``least_mutation`` is added to the latter for everybody (section IV of the source).
+    that of mutation; ``least_mutation`` is added to the latter for every individual (section IV of the source).
     """
     rng, tracker = task.rng, Tracker(task)
     genes = random_bits(rng, task.population, len(task.bounds), bits)

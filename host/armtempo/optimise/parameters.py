@@ -1,4 +1,4 @@
-"""What a search may be told by name: numbers within a range, and choices between words."""
+"""Parameters of a search by name: numbers within a range, and choices between words."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every search is given and keeps: its task, a counted function, the best point so far, its history."""
+"""What all searches share: the task, counted evaluations, the best point so far, the history."""
 
 from __future__ import annotations
 
@@ -79,5 +79,5 @@ class Tracker:
             self._task.progress(len(self._history) - 1, self._task.iterations)
 
     def result(self) -> Result:
-        """The best point found, with the history as far as it went."""
+        """The best point found, with the history so far."""
         return Result(self._x, self.value, self.evaluations, np.array(self._history))

@@ -18,7 +18,7 @@ _TICKS_PER_US = limits.TICK_HZ / 1e6
 
 
 def arm_record(arm: Arm) -> bytes:
-    """What the board must know of the arm (layout: ``armtempo_shared.armrecord``).
+    """The arm record (layout: ``armtempo_shared.armrecord``).
 
     Raises InputError where a figure does not fit the board.
     """
@@ -26,7 +26,7 @@ def arm_record(arm: Arm) -> bytes:
 
 
 def motion_record(trajectory: Trajectory, arm: Arm, brake_s: float = 0.0) -> bytes:
-    """What the board replays (layout: ``armtempo_shared.motion``), tied to the arm by its crc.
+    """The motion record (layout: ``armtempo_shared.motion``), tied to the arm by the checksum of its record.
 
     ``brake_s``: time in which the motion may brake to rest anywhere (0: not at all).
     Raises InputError where trajectory and arm do not fit each other or the record's number range, PlanError

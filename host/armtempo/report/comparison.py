@@ -30,7 +30,7 @@ def write(folders: Sequence[Path], path: Path) -> Path:
 
 
 def render(found: dict[str, run_report.Evaluation], complaints: Sequence[str]) -> str:
-    """The page, for evaluations by the name they go under."""
+    """The page, for evaluations by name."""
     sheet = html_page.Page("Runs compared", ", ".join(found))
     if len({replace(evaluation.plan.arm, source="") for evaluation in found.values()}) > 1:
         arms = ", ".join(f"{name} of {evaluation.plan.arm.name}" for name, evaluation in found.items())

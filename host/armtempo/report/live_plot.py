@@ -16,7 +16,7 @@ _WITHOUT_WINDOW = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")
 
 
 class LivePlot:
-    """One field a joint.
+    """A window with one plot for each joint.
 
     Raises MissingPackageError without matplotlib, ArmtempoError where there is no display to open a window on.
     """
@@ -43,7 +43,7 @@ class LivePlot:
         self._figure.show()
 
     def add(self, time_s: float, angles_deg: Array) -> None:
-        """Draw one more sample, angles (J,); a time that goes back begins a new repetition."""
+        """Draw one more sample, angles (J,); a time before the last one begins a new repetition."""
         if self._times and time_s < self._times[-1]:
             self._times, self._angles = [], []
         self._times.append(time_s)

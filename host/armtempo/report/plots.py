@@ -1,7 +1,7 @@
 """Figures of plans and runs, drawn with matplotlib (the optional extra ``plot``).
 
 Every function returns a matplotlib Figure; ``save`` writes it as PNG or SVG, ``inline_svg`` gives it as
-text for a page. Colours are legible on white and on black; on a page, axes and text take its own colour.
+text for a page. Colours are legible on white and on black; on a page, axes and text take the colour of the page's text.
 """
 
 from __future__ import annotations
@@ -157,7 +157,7 @@ def inline_svg(figure: Figure, name: str, description: str) -> str:
 
 
 def _lay_out(figure: Figure) -> None:
-    """Place everything once and for all: with a layout engine left, each file would be drawn twice."""
+    """Fix the layout: with a layout engine left, each file would be drawn twice."""
     if figure.get_layout_engine() is not None:
         figure.draw_without_rendering()
         figure.set_layout_engine(None)
@@ -175,7 +175,7 @@ def _svg(figure: Figure) -> str:
 
 
 def _rounded(path: re.Match[str]) -> str:
-    """Coordinates to a hundredth of a point: half the size, nothing to be seen."""
+    """Coordinates to a hundredth of a point: half the size, no visible difference."""
     return re.sub(r"(\.\d\d)\d+", r"\1", path.group())
 
 

@@ -70,7 +70,7 @@ def _polished(search: Search) -> str:
 
 
 def _separation(plan: Plan) -> list[str]:
-    """What the motion loses to shared timing, which keeps the tool on the path."""
+    """How far per-joint timing lets the joints pass the via points apart, and the tool leave the path."""
     spread = ", ".join(f"{value:.2f}" for value in path_deviation.via_spread_s(plan.trajectory))
     stray = path_deviation.tool_stray_mm(plan.arm, plan.trajectory)
     return [

@@ -155,6 +155,6 @@ def readable(notices: tuple[str, ...]) -> tuple[str, ...]:
     """Texts of the board with the names of the source, where the board has the compiled program."""
     if not notices:
         return ()
-    from armtempo.deploy.program import in_full  # reads the whole program: only where it is needed
+    from armtempo.deploy.program_files import in_full  # reads the whole program: only where it is needed
 
     return tuple(map(in_full, notices))

@@ -20,7 +20,7 @@ SAMPLE_S = SAMPLE_TICKS / TICK_HZ
 """Time between two samples, by the board's motion clock."""
 ORDERS = ("angle", "speed", "acceleration")
 EDGE_S = 1.0
-"""Length of the stretch at start and end over which the lag is taken."""
+"""Length of the intervals at start and end over which the lag is estimated."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Curves:
     ``times_s`` (K,); ``each`` (R, 3, K, J) for every repetition, NaN where samples are missing; ``mean``,
     ``sem`` (standard error of the mean; NaN with one repetition), ``theory``, and ``shown``, what the same
     differentiation shows of theory's angles, each (3, K, J). Deviations are taken from ``shown``, so that
-    they speak of the arm and not of the differentiation.
+    they show the arm's errors and not those of the differentiation.
     """
 
     times_s: Array
@@ -146,7 +146,7 @@ def lags_s(found: Curves, trajectory: Trajectory) -> Array:
 
 
 def _peak(values: Array) -> float:
-    """Largest magnitude of what was measured; NaN where nothing was."""
+    """Largest magnitude of the measured values; NaN where there are none."""
     known = np.abs(values[~np.isnan(values)])
     return float(known.max()) if known.size else np.nan
 
@@ -178,9 +178,9 @@ def _on_grid(repetition: RepetitionData, count: int) -> Array:
 
 
 def _differentiated(angles: Array, ended: bool) -> Array:
-    """(3, K, J): angle, speed, acceleration; every stretch without a gap by itself.
+    """(3, K, J): angle, speed, acceleration; each interval without a gap by itself.
 
-    The arm rests before a motion and after one that ``ended``, so there the rest goes into the window.
+    The arm rests before a motion and after one that ``ended``, so there the window is filled with the angle at rest.
     """
     result = np.full((3, *angles.shape), np.nan)
     result[0] = angles

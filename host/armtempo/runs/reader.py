@@ -17,7 +17,7 @@ from armtempo.link.follow import Gap
 from armtempo.runs.run_folder import FORMAT, META, TRAJECTORY, VERSION, JointScale, Repetition
 
 _LARGEST = 2.0**53
-"""Beyond it a column of whole numbers is not exact."""
+"""Integers beyond this are not exact as doubles."""
 _LONGEST_S = 86_400.0
 """A day; no motion lasts that long on the board."""
 
@@ -117,7 +117,7 @@ def _samples(path: Path, state: str, joints: tuple[JointScale, ...]) -> Repetiti
 def _parsed(
     path: Path, state: str, joints: tuple[JointScale, ...], rows: list[dict[str, str]]
 ) -> RepetitionData:
-    """The samples in the rows of a file; ValueError where a value is missing, no number, or beyond reason."""
+    """The samples in the rows of a file; ValueError where a value is missing, no number, or impossible."""
     table = {name: [row[name] or "" for row in rows] for name in (rows[0] if rows else ())}
 
     def column(name: str, largest: float) -> Array:
@@ -148,7 +148,7 @@ def _parsed(
 
 
 def _rows(path: Path) -> list[dict[str, str]]:
-    """The whole lines of a sample file; what an interrupt left of the last one is dropped."""
+    """The whole lines of a sample file; an incomplete last line is dropped."""
     text = path.read_text(encoding="utf-8")
     whole = text[: text.rfind("\n") + 1]
     return list(csv.DictReader(whole.splitlines()))

@@ -1,4 +1,4 @@
-"""The run folder: what a run was and what came back, readable at any moment of it.
+"""The run folder: what was run and what was measured, readable at any moment of the run.
 
 ::
 
@@ -42,7 +42,7 @@ RUNNING, COMPLETE, INTERRUPTED, FAULT, BROKEN = "running", "complete", "interrup
 
 @dataclass(frozen=True)
 class JointScale:
-    """How one joint's steps and counts become degrees; counts 0: it has no encoder."""
+    """Scales of one joint's steps and counts; ``counts_per_deg`` 0: it has no encoder."""
 
     name: str
     steps_per_deg: float
@@ -117,12 +117,12 @@ class RunFolder:
     name: str
     joints: tuple[JointScale, ...]
     origin: dict[str, Any] = field(default_factory=dict)
-    """What else is known of the run: port, board, arm, stored name."""
+    """Further entries of run.json: port, board, arm, checksum of the motion."""
     started: str = field(default_factory=lambda: _now())
     repetitions: list[Repetition] = field(default_factory=list)
 
     def write(self) -> None:
-        """Replace run.json by what is known now."""
+        """Write run.json anew with what is known now."""
         meta = {
             "format": FORMAT,
             "version": VERSION,

@@ -1,4 +1,4 @@
-"""What the virtual board's process is told of the arm on its pins."""
+"""The description of the arm for the virtual board's process."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from armtempo.records import encode
 
 
 def describe(arm: Arm, start_deg: Sequence[float] | None = None) -> dict[str, Any]:
-    """The arm record's fields and, per joint, where it stands at power-up and how it is built.
+    """The arm record's fields and, per joint, where it is at power-up and its drive's model.
 
     ``start_deg`` (J,): None means the home posture. Raises InputError where a model makes no sense.
     """

@@ -80,12 +80,12 @@ class VirtualBoard:
             time.sleep(0.005)
 
     def stop(self) -> None:
-        """Pull the plug. The edge log is complete then. Nothing happens the second time."""
+        """End the board as by pulling its plug; the edge log is complete then. A second call does nothing."""
         if self._slave < 0:
             return
         os.close(self._slave)
         self._slave = -1
-        # it ends by itself when the port's last user has gone
+        # it ends by itself when nobody has its port open any more
         for end in (self._process.poll, self._process.terminate, self._process.kill):
             end()
             try:

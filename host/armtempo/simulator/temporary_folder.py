@@ -1,4 +1,4 @@
-"""A virtual board's temporary folder: its own while its launcher or its process lives, swept up after that."""
+"""A virtual board's temporary folder: kept while its launcher or its process lives, else removed by a later one."""
 
 from __future__ import annotations
 

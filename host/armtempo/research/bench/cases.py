@@ -21,7 +21,7 @@ from armtempo.splines import bspline
 
 @dataclass(frozen=True)
 class Problem:
-    """What every search gets: the intervals of one joint's path, judged by ``armtempo.fitness``."""
+    """What every search gets: the intervals of one joint's path, judged by ``planning.fitness``."""
 
     joint: str
     via_deg: tuple[float, ...]
@@ -50,7 +50,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Trial:
-    """What came of a case."""
+    """The outcome of a case."""
 
     case: Case
     intervals_s: tuple[float, ...]
@@ -75,7 +75,7 @@ class Trial:
 def problem_of(arm: Arm, job: Job, joint: int, fitness: str, iterations: int) -> Problem:
     """The search for the intervals of driven joint ``joint``, counted from 1, of a job.
 
-    Raises InputError where there is no such joint, or it has no limits or stands still in this job.
+    Raises InputError where there is no such joint, or it does not move in this job.
     """
     if not 1 <= joint <= len(arm.driven):
         raise InputError(f"joint {joint}: arm {arm.name!r} has the driven joints 1 to {len(arm.driven)}")
@@ -98,7 +98,7 @@ def cases(algorithms: Iterable[str], populations: Iterable[int], seeds: Iterable
 
 
 def solve(problem: Problem, case: Case) -> Trial:
-    """Runs one case. The same case gives the same run, but for its seconds, wherever it runs."""
+    """Run one case. The same case gives the same trial on every worker, except for its seconds."""
     function = problem.function()
     bounds = [problem.bounds_s] * (len(problem.via_deg) - 1)
     rng = np.random.default_rng(case.seed)

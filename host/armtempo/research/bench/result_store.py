@@ -24,7 +24,7 @@ class ResultStore:
     """The runs kept in a folder; ``runs`` holds what is there, by case."""
 
     def __init__(self, folder: Path, problem: Problem) -> None:
-        """Opens or starts the file. Raises InputError where it holds runs of another problem."""
+        """Open or create the file. Raises InputError where it holds runs of another problem."""
         self.path = folder / FILE
         self.runs: dict[Case, Trial] = {}
         head = _plain({"armtempo": armtempo.__version__, **asdict(problem)})
@@ -86,6 +86,6 @@ def _run(content: dict[str, Any]) -> Trial:
 
 
 def _plain(content: dict[str, Any]) -> dict[str, Any]:
-    """``content`` as it comes back from a file."""
+    """``content`` after a round trip through JSON."""
     plain: dict[str, Any] = json.loads(json.dumps(content))
     return plain

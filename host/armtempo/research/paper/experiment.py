@@ -1,4 +1,4 @@
-"""Section 4: the motions replayed ten times on the virtual arm, and what Figs. 11 and 12 say of them."""
+"""Section 4: the motions replayed ten times on the virtual arm, and compared with Figs. 11 and 12."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def _unoptimised(made: motions.Plans) -> Plan:
 
 
 def _replayed(plan: Plan, folder: Path, times: int, stop: StopRequest, tell: Callable[[float], None]) -> Path:
-    """The run folder of one motion; ``tell`` hears the share of the work that is done."""
+    """The run folder of one motion; ``tell`` is called with the fraction of the work that is done."""
     with connect(SIM, plan.arm) as board:
         return board.run(plan, times, folder, lambda done, whole: tell(done / whole), stop=stop).path
 
@@ -163,7 +163,7 @@ def _rougher_ends(quintic: run_report.Evaluation, cubic: run_report.Evaluation) 
 def _end_error(found: run_report.Evaluation, order: int) -> float:
     """RMS deviation of joint 1's mean curve from theory near start and end.
 
-    From theory as the same differentiation shows it: what the motor and the arm add, nothing else.
+    From theory as the same differentiation shows it: so only what the motor and the arm add.
     """
     end = found.plan.trajectory.joints[0].duration_s
     times = found.curves.times_s

@@ -40,7 +40,7 @@ def _claim(ours: Array, row: int) -> Claim:
 
 
 def _nearest(ours: Array, wanted: Array) -> tuple[Array, float]:
-    """Our solution nearest to a printed one, turned by whole turns towards it, and how far it is off.
+    """Our solution nearest to a printed one, shifted by whole turns towards it, and the largest difference.
 
     At theta5 = 0 only theta4 + theta6 is defined, so there the sum is compared.
     """

@@ -22,7 +22,7 @@ class IdealMotor:
         self._encoder = encoder
         self._num = -joint["counts_num"] if joint["encoder_inverted"] else joint["counts_num"]
         self._den = joint["counts_den"]
-        self.moved = False  # there is something to follow
+        self.moved = False  # the encoder has to be updated
         self._counts = self._at(0)
         self.position = 0  # steps taken since power-up
         self.blocked = False
@@ -51,14 +51,14 @@ class IdealMotor:
         self.moved = True
 
     def angle_deg(self):
-        """Where the joint stands."""
+        """The joint's angle."""
         return self._start_deg + self.position / self._steps_per_deg
 
     def begin(self, now):
         """A motion begins."""
 
     def follow(self, now):
-        """Turn the encoder to where the motor stands."""
+        """Turn the encoder to the motor's position."""
         self.moved = False
         counts = self._at(self.position)
         if self._encoder and counts != self._counts:
@@ -81,7 +81,7 @@ class Enable:
 class ArmOnPins:
     """All motors, as the arm record in the flash has them.
 
-    ``record()`` gives (head, joints) or None; ``angles``: where the joints stand, else where ``joints`` says.
+    ``record()`` gives (head, joints) or None; ``angles``: the joints' angles, else those in ``joints``.
     """
 
     def __init__(self, board, pins, record, seed, angles):

@@ -1,4 +1,4 @@
-"""Limit switches: tripped by the angle at which a joint stands."""
+"""Limit switches, tripped by the angle of a joint."""
 
 from armtempo_shared import armrecord
 
@@ -17,7 +17,7 @@ class LimitSwitch:
         self._tripped = None
 
     def look(self):
-        """Bring the input to where the joint stands."""
+        """Set the input by the joint's angle."""
         tripped = self._side * self._motor.angle_deg() >= self._trip
         if tripped != self._tripped:
             self._tripped = tripped

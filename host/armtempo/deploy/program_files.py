@@ -1,4 +1,4 @@
-"""What must stand on a board: the files of the program, as sources or compiled by mpy-cross."""
+"""The files of the board program, as sources or compiled by mpy-cross."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def start_files() -> dict[str, bytes]:
 
 
 def stamp() -> bytes:
-    """What tells the board which program it has."""
+    """The stamp file: by it the board knows the hash of its program."""
     return f"{own_crc():08x}\n".encode()
 
 
@@ -127,7 +127,7 @@ def _handlers() -> set[str]:
 
 
 def _hardware_names() -> set[str]:
-    """What methods of the hardware are called; the simulated hardware has them all."""
+    """Names of the methods of pyb, machine and the like; the simulated hardware has them all."""
     files = (Path(simulator.__file__).parent / "hardware").rglob("*.py")
     nodes = [node for file in files for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))]
     return {node.name for node in nodes if isinstance(node, ast.FunctionDef)}
