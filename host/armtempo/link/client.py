@@ -11,20 +11,20 @@ from armtempo_shared.messages import MAX_PAYLOAD
 
 from armtempo.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
 from armtempo.link import board_messages
-from armtempo.link.session import PATIENCE_S, Session
+from armtempo.link.session import ANSWER_TIMEOUT_S, Session
 from armtempo.progress import Progress
 
-SLOW_S = 30.0
-"""Silence allowed where the board erases flash or checks a whole motion before it answers."""
-HELLO_S = 1.2
-"""Silence allowed at the first word; with the look at what else is there, under 2 s."""
+FLASH_TIMEOUT_S = 30.0
+"""Time-out of commands for which the board erases flash or checks a whole motion before it answers."""
+HELLO_TIMEOUT_S = 1.2
+"""Time-out of ``hello``; with the diagnosis of what else is on the port, under 2 s."""
 SMALLEST_PIECE = 16
 LARGEST_PIECE = MAX_PAYLOAD - 4
-PIECE_PATIENCE_S = 0.5
+PIECE_TIMEOUT_S = 0.5
 
 _CTRL_C = 3
 _GREETINGS = 8
-"""So many of a session's first frames may be ``hello``."""
+"""Number of a session's first frames that may be ``hello``."""
 
 
 @dataclass(frozen=True)
@@ -80,9 +80,12 @@ class Client:
         return self._info
 
     def hello(self) -> board_messages.Hello:
-        """Begin a session; NoAnswerError within about a second and a half where nobody speaks the protocol."""
+        """Begin a session; NoAnswerError after HELLO_TIMEOUT_S where no armtempo board answers."""
         values, board_id = self.session.command(
-            "hello", (wire.PROTOCOL_VERSION, self._number), silence_s=HELLO_S, patience_s=HELLO_S
+            "hello",
+            (wire.PROTOCOL_VERSION, self._number),
+            silence_timeout_s=HELLO_TIMEOUT_S,
+            answer_timeout_s=HELLO_TIMEOUT_S,
         )
         fields = [*values, board_id]
         fields[3] = board_messages.state_name(values[3])
@@ -105,7 +108,7 @@ class Client:
         )
 
     def status(self) -> board_messages.Status:
-        """What the board is doing and where the joints stand."""
+        """What the board is doing, and the positions of the joints."""
         values, tail = self.session.command("status")
         fields = [board_messages.state_name(values[0]), *values[1:], board_messages.positions(tail)]
         return board_messages.Status(*fields)
@@ -113,20 +116,25 @@ class Client:
     def upload(self, name: str, data: bytes, progress: Progress | None = None) -> None:
         """Store a record under a name; the board keeps the old one until all of the new one has arrived."""
         crc = wire.record_crc(data)
-        self.session.command("put_begin", (len(data), crc), name, silence_s=SLOW_S)
+        self.session.command("put_begin", (len(data), crc), name, silence_timeout_s=FLASH_TIMEOUT_S)
         offset = 0
         while offset < len(data):
             offset = self._put_piece(data, offset)
             if progress is not None:
                 progress(offset, len(data))
-        self.session.command("put_commit", (crc,), silence_s=SLOW_S, patience_s=SLOW_S)
+        self.session.command(
+            "put_commit", (crc,), silence_timeout_s=FLASH_TIMEOUT_S, answer_timeout_s=FLASH_TIMEOUT_S
+        )
 
     def _put_piece(self, data: bytes, offset: int) -> int:
-        """Send the next piece; pieces become smaller while the link loses them, and larger again."""
+        """Send the next piece; pieces are halved while the link loses them, and doubled again."""
         repeats = self.session.repeats
         try:
             values, _ = self.session.command(
-                "put_data", (offset,), data[offset : offset + self._piece], patience_s=self._patience_s()
+                "put_data",
+                (offset,),
+                data[offset : offset + self._piece],
+                answer_timeout_s=self._piece_timeout_s(),
             )
         except NoAnswerError:
             if self._piece == SMALLEST_PIECE:
@@ -137,11 +145,11 @@ class Client:
             self._piece = min(LARGEST_PIECE, 2 * self._piece)
         return int(values[0])
 
-    def _patience_s(self) -> float:
-        return PATIENCE_S if self._piece == SMALLEST_PIECE else PIECE_PATIENCE_S
+    def _piece_timeout_s(self) -> float:
+        return ANSWER_TIMEOUT_S if self._piece == SMALLEST_PIECE else PIECE_TIMEOUT_S
 
     def stored(self) -> list[board_messages.StoredMotion]:
-        """All stored trajectories."""
+        """All stored motions."""
         found: list[board_messages.StoredMotion] = []
         while True:
             try:
@@ -159,7 +167,7 @@ class Client:
                 return found
 
     def find(self, name: str) -> board_messages.StoredMotion | None:
-        """The stored trajectory of this name, or None."""
+        """The stored motion of this name, or None."""
         return next((entry for entry in self.stored() if entry.name == name), None)
 
     def fetch(self, name: str) -> bytes:
@@ -173,19 +181,19 @@ class Client:
                 return data
 
     def remove(self, name: str) -> None:
-        """Remove a stored trajectory."""
-        self.session.command("remove", (), name, silence_s=SLOW_S)
+        """Remove a stored motion."""
+        self.session.command("remove", (), name, silence_timeout_s=FLASH_TIMEOUT_S)
 
     def rename(self, old: str, new: str) -> None:
-        """Give a stored trajectory another name."""
-        self.session.command("rename", (len(old.encode()),), old + new, silence_s=SLOW_S)
+        """Rename a stored motion."""
+        self.session.command("rename", (len(old.encode()),), old + new, silence_timeout_s=FLASH_TIMEOUT_S)
 
     def set_default(self, name: str) -> None:
-        """What the board's button starts; "" for nothing."""
-        self.session.command("set_default", (), name, silence_s=SLOW_S)
+        """Choose what the board's button starts; "" for nothing."""
+        self.session.command("set_default", (), name, silence_timeout_s=FLASH_TIMEOUT_S)
 
     def home(self, steps: Sequence[int | None]) -> None:
-        """Declare where the joints stand, in steps; None leaves a joint as it is."""
+        """Declare the positions of the joints, in steps; None leaves a joint as it is."""
         mask = sum(1 << joint for joint, value in enumerate(steps) if value is not None)
         tail = b"".join((value or 0).to_bytes(4, "little", signed=True) for value in steps)
         self.session.command("home", (mask,), tail)
@@ -193,7 +201,7 @@ class Client:
     def start(self, name: str, crc: int, flags: int = 0) -> Started:
         """Start a stored motion; ``crc`` is the record's own checksum, ``flags`` START_HOMING or 0."""
         (run, duration), _ = self.session.command(
-            "start", (flags, crc), name, silence_s=SLOW_S, patience_s=SLOW_S
+            "start", (flags, crc), name, silence_timeout_s=FLASH_TIMEOUT_S, answer_timeout_s=FLASH_TIMEOUT_S
         )
         return Started(run, duration / limits.TICK_HZ)
 

@@ -16,7 +16,7 @@ from armtempo.link.transport import SerialTransport, Transport
 from armtempo.model.arm import Arm
 
 _NOISY_TRIES = 10
-"""Where something arrives that may be pieces of frames, ``hello`` is tried so often."""
+"""Attempts at ``hello`` where pieces of frames arrive."""
 
 
 @contextmanager
@@ -55,7 +55,7 @@ def open_board(
 
 
 def _greeted(stack: ExitStack, transport: Transport) -> Client:
-    """The board behind a transport; the one that is in use at the end is closed with the stack."""
+    """The board behind a transport; the transport in use at the end is closed with the stack."""
     first = stack.enter_context(closing(transport))
     board = greet(first)
     stack.callback(lambda: board.session.transport.close())
@@ -73,7 +73,7 @@ def _check_program(board: Client) -> None:
 def greet(
     transport: Transport, session_number: int | None = None, clock: Callable[[], float] = time.monotonic
 ) -> Client:
-    """A board that has answered ``hello``; LinkError, saying what is there instead, where none has."""
+    """A board that has answered ``hello``; LinkError with a diagnosis where none has."""
     board = Client(Session(transport, clock), session_number)
     for _ in range(_NOISY_TRIES):
         try:
@@ -88,7 +88,7 @@ def greet(
 
 @contextmanager
 def _virtual_port(port: str, arm: Arm | None) -> Iterator[str]:
-    """A virtual board's port; where its program fails, the errors meanwhile end with its last words."""
+    """A virtual board's port; where its program fails, link errors end with the last line of its log."""
     from armtempo import simulator
 
     with simulator.launch(simulator.LaunchOptions(ports.sim_flash(port), arm=arm)) as board:

@@ -1,4 +1,4 @@
-"""What sits on a port where nobody answers ``hello``."""
+"""Diagnosis of a port on which no armtempo board answers ``hello``."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from armtempo.link.transport import Transport
 
 LOOK_S = 0.4
 _REPL_SIGNS = (b">>>", b"raw REPL")
-"""The firmware's name is none: the program's own answer to ``hello`` carries it."""
+"""Bytes by which a REPL is known; not the firmware's name, which the program's answer to ``hello`` has too."""
 _FRAME_SIGNS = (bytes((SYNC,)), bytes((wire.EVENT["ok"][1], wire.COMMAND["hello"][1])))
 """A frame's first byte, or what an answer to ``hello`` begins with."""
 _NUDGE = b"\r\x02\r"
-"""Ends a line, leaves a raw REPL, asks for a prompt; without meaning to the board program."""
+"""Ends a line, leaves a raw REPL, asks for a prompt; the board program ignores it."""
 
 
 def explain(transport: Transport, heard: bytes) -> LinkError:
-    """The error to raise: silence, a bare MicroPython REPL, or something else; ``heard`` so far."""
+    """The error to raise, by what the port sends: nothing, a REPL, pieces of frames, or else; ``heard`` so far."""
     transport.write(_NUDGE)
     heard += _listen(transport)
     where = f"the board on {transport.name}"
@@ -28,7 +28,7 @@ def explain(transport: Transport, heard: bytes) -> LinkError:
         )
     if any(sign in heard for sign in _FRAME_SIGNS):
         return DisturbedError(
-            f"{where} is hardly to be understood: pieces of armtempo's messages arrive, too few of them "
+            f"{where} is mostly unreadable: pieces of armtempo's messages arrive, too few of them "
             "whole; check cable and plugs"
         )
     if heard:

@@ -1,4 +1,4 @@
-"""Following one run: its samples in order, each once, the missing ones asked for again, to its end."""
+"""Receiving the samples of a run: in order, each once, missing ones requested again, to its end."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from armtempo.link.board_messages import Done, Event, Fault, Notice, Positions, 
 from armtempo.link.client import Client
 
 ACKNOWLEDGE_S = 0.25
-"""Acknowledging this often also tells the board that the host is still there."""
+"""Interval of acknowledgements; they also show the board that the host is alive."""
 CHECK_S = 0.5
-"""Nothing heard for so long: ask what the board is doing."""
+"""After this time without an event the board is asked for its status."""
 GAP_S = 0.05
-"""So long may a missing sample be on its way before it is asked for."""
+"""A missing sample is requested again after this time."""
 RESEND = 16
-"""So many samples are asked for at once."""
-FUTILE = 40
-"""What has not moved on after so many questions (motion clock, resent samples) never will."""
+"""Number of samples requested at once."""
+MOST_REPEATS = 40
+"""Number of requests without progress (of motion clock or resent samples) after which none is expected."""
 
 
 class Gap(NamedTuple):
@@ -62,19 +62,22 @@ class Follower:
         self._client = client
         self._run = run
         self._held: dict[int, Sample] = {}
-        self._next = 0  # index of the sample that comes next
+        self._next = 0  # index of the next sample
         self._oldest = 0  # the board keeps none before this one
-        self._total = 0  # samples taken so far, as far as the board has told
+        self._total = 0  # samples that the board has taken, by its last answer
         self._received = 0
         self._lost: list[Gap] = []
         self._last: Done | Fault | None = None
         self._notices: list[str] = []
         self._asked_s = client.session.clock()
-        self._progress = (-1, 0)  # what should move on (motion clock, sample number); how often it did not
+        self._progress = (
+            -1,
+            0,
+        )  # last value of what should increase (motion clock, sample index), and how often it has not
 
     @property
     def ended(self) -> bool:
-        """Whether the run has ended and all that can be had has arrived."""
+        """Whether the run has ended and every sample has arrived or is lost."""
         return self._end is not None
 
     @property
@@ -85,7 +88,7 @@ class Follower:
         return self._end
 
     def samples(self, between: Callable[[], None] = lambda: None) -> Iterator[Sample]:
-        """The samples in order until the run has ended and all that can be had has arrived.
+        """The samples in order, until the run has ended and each has arrived or is lost.
 
         ``between`` is called between two messages; it may tell the board to stop. Raises LinkError where
         the connection breaks; a later call goes on from there.
@@ -130,7 +133,7 @@ class Follower:
             self._lost.append(Gap(self._next, 1))
 
     def _keep_up(self) -> None:
-        """Acknowledge now and then; soon, and with a request, where a sample is missing."""
+        """Acknowledge at intervals; sooner, and with a request, where a sample is missing."""
         waited_s = self._client.session.clock() - self._asked_s
         if waited_s >= (GAP_S if self._held else ACKNOWLEDGE_S):
             self._request(min(self._held) - self._next if self._held else 0)
@@ -139,13 +142,13 @@ class Follower:
         kept = self._client.samples(self._next, min(missing, RESEND))
         self._asked_s = self._client.session.clock()
         events = self._client.session.events
-        while events:  # they came before the answer, and may be what the board has let go since
+        while events:  # they came before the answer; the board may have dropped them since
             self._take(events.popleft())
         self._oldest = max(self._oldest, kept.first)
         self._total = kept.first + kept.count
 
     def _collect_rest(self) -> Iterator[Sample]:
-        """What is still missing after the end: asked for until all that the board took is here or lost."""
+        """After the end: request missing samples until each has arrived or is lost."""
         self._request(0)
         while True:
             while (event := self._client.session.poll(0.0)) is not None:
@@ -173,10 +176,10 @@ class Follower:
             raise LinkError("the board says that it moves, but its motion clock stands still; reset it")
 
     def _stuck(self, value: int) -> bool:
-        """Whether ``value``, which should move on, has been the same FUTILE times."""
+        """Whether ``value``, which should increase, has been the same MOST_REPEATS times."""
         before, times = self._progress
         self._progress = (value, times + 1 if value == before else 0)
-        return self._progress[1] >= FUTILE
+        return self._progress[1] >= MOST_REPEATS
 
     def _run_end(self, last: Done | Fault) -> RunEnd:
         fault, joint = (last.code, last.joint) if isinstance(last, Fault) else (0, 255)

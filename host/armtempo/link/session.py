@@ -20,22 +20,22 @@ from armtempo.link.refusal import refusal
 from armtempo.link.transport import Transport
 
 _CTRL_C = 3
-REPEAT_S = 0.2
-"""A command without an answer is sent again after this time."""
-SILENCE_S = 3.0
-"""No byte for so long: the board is not there any more."""
-PATIENCE_S = 20.0
-"""Bytes but no answer for so long: the link is too disturbed."""
-QUIET_S = 0.05
-"""Half a frame, then nothing for so long: its rest is not coming."""
+REPEAT_INTERVAL_S = 0.2
+"""A command is sent again after this time without an answer."""
+SILENCE_TIMEOUT_S = 3.0
+"""After this time without a byte the board counts as gone."""
+ANSWER_TIMEOUT_S = 20.0
+"""After this time with bytes but without an answer the link counts as too disturbed."""
+FRAME_TIMEOUT_S = 0.05
+"""An incomplete frame is dropped after this time without a byte."""
 RECONNECT_S = 60.0
-"""A port that broke is waited for so long."""
-HURRY_S = 5.0
-"""The same where somebody wants an end: long enough to tell the board once the plug is in again."""
-RETRY_S = 0.2
-"""Between two attempts to open it."""
-RECENT = 512
-"""So many of the latest bytes are kept, to tell what sits on a port that does not answer."""
+"""How long a port that broke is tried again."""
+STOPPING_RECONNECT_S = 5.0
+"""The same after a stop request: long enough to tell the board once the plug is in again."""
+REOPEN_INTERVAL_S = 0.2
+"""Time between two attempts to open it."""
+RECENT_BYTES = 512
+"""Number of received bytes that are kept, to diagnose a port that does not answer."""
 
 
 Answer = tuple[tuple[Any, ...], Any]
@@ -45,10 +45,10 @@ Answer = tuple[tuple[Any, ...], Any]
 class Session:
     """The host's end of the protocol; ``clock`` gives seconds and is replaced in tests.
 
-    Where the port breaks, ``reopen`` (if set) is tried until it gives a new transport behind which ``greet``
-    finds the same board, and all goes on: the command under way is sent again, and what was lost meanwhile is
-    asked for again by those who need it. The greeting makes the board forget its last answer; where just that
-    was lost, the board may refuse what it has done already.
+    Where the port breaks, ``reopen`` (if set) is called until it gives a new transport on which ``greet`` finds
+    the same board. Then the command under way is sent again; who follows a run asks for the samples that were
+    lost. The greeting makes the board forget its last answer. If just that answer was lost, the board executes
+    the command twice and may refuse it the second time.
     """
 
     def __init__(self, transport: Transport, clock: Callable[[], float] = time.monotonic) -> None:
@@ -58,9 +58,9 @@ class Session:
         self.greet: Callable[[], None] = lambda: None
         """Raises OtherBoardError where another one answers, or the same one started anew."""
         self.tell: Callable[[str], object] = lambda text: None
-        """Gets what a user should know while it happens."""
-        self.hurried: Callable[[], bool] = lambda: False
-        """Whether somebody wants an end: then a port that broke is waited for only HURRY_S."""
+        """Called with messages for the user while other calls wait."""
+        self.stopping: Callable[[], bool] = lambda: False
+        """Whether a stop was asked for: then a broken port is tried again for STOPPING_RECONNECT_S only."""
         self.events: deque[board_messages.Event] = deque()
         self.recent = bytearray()
         self.repeats = 0
@@ -71,7 +71,7 @@ class Session:
 
     @property
     def frames_bad(self) -> int:
-        """Stretches of received bytes that were no frame."""
+        """Number of byte sequences received that were no frame."""
         return int(self._parser.bad)
 
     def command(
@@ -80,13 +80,13 @@ class Session:
         values: Sequence[int] = (),
         tail: bytes | str = b"",
         *,
-        silence_s: float = SILENCE_S,
-        patience_s: float = PATIENCE_S,
+        silence_timeout_s: float = SILENCE_TIMEOUT_S,
+        answer_timeout_s: float = ANSWER_TIMEOUT_S,
     ) -> Answer:
         """(fields, tail) of the board's answer.
 
-        Raises BoardError where the board refuses, NoAnswerError after ``silence_s`` without a byte or
-        ``patience_s`` without an answer, LinkError where the port breaks.
+        Raises BoardError where the board refuses, NoAnswerError after ``silence_timeout_s`` without a byte or
+        ``answer_timeout_s`` without an answer, LinkError where the port breaks.
         """
         number = wire.COMMAND[name][1]
         sequence = self._next_sequence()
@@ -94,14 +94,14 @@ class Session:
         begin_s = self._heard_s = self.clock()
         while True:
             self._write(data)
-            reply = self._reply(self.clock() + REPEAT_S, sequence, number)
+            reply = self._reply(self.clock() + REPEAT_INTERVAL_S, sequence, number)
             if reply is not None:
                 return _answer(name, *reply)
             now_s = self.clock()
             silent = (
-                now_s - self._heard_s >= silence_s and not self.frames_bad
-            )  # on a bad line all may be lost
-            if silent or now_s - begin_s >= patience_s:
+                now_s - self._heard_s >= silence_timeout_s and not self.frames_bad
+            )  # on a disturbed line all may be lost
+            if silent or now_s - begin_s >= answer_timeout_s:
                 raise NoAnswerError(self._no_answer(name, now_s - begin_s))
             self.repeats += 1
 
@@ -144,12 +144,12 @@ class Session:
         frame = self._next_frame()
         if frame is not None:
             return frame
-        data = self._read(min(timeout_s, QUIET_S))
+        data = self._read(min(timeout_s, FRAME_TIMEOUT_S))
         if data:
             self._heard_s = self.clock()
-            self.recent = (self.recent + data)[-RECENT:]
+            self.recent = (self.recent + data)[-RECENT_BYTES:]
             self._parser.feed(data)
-        elif self._parser.pending() and self.clock() - self._heard_s >= QUIET_S:
+        elif self._parser.pending() and self.clock() - self._heard_s >= FRAME_TIMEOUT_S:
             self._parser.drop()
         return self._next_frame()
 
@@ -177,16 +177,16 @@ class Session:
         self.transport.close()
         limit_s = self.clock() + RECONNECT_S
         while not self._found_again(self.reopen):
-            if self.hurried():
-                limit_s = min(limit_s, self.clock() + HURRY_S)
+            if self.stopping():
+                limit_s = min(limit_s, self.clock() + STOPPING_RECONNECT_S)
             if self.clock() >= limit_s:
                 raise self._gone(reason)
-            self.sleep(RETRY_S)
+            self.sleep(REOPEN_INTERVAL_S)
         self._heard_s = self.clock()
         self.tell(f"connected to {self.transport.name} again")
 
     def _gone(self, reason: LinkError) -> LinkError:
-        if not self.hurried():
+        if not self.stopping():
             return reason
         return LinkError(
             f"{reason}; it could not be told to stop: what was moving may move on, see 'armtempo status' once it is "
@@ -196,7 +196,7 @@ class Session:
     def _found_again(self, reopen: Callable[[], Transport]) -> bool:
         """Open the port and greet the board; False where that fails."""
         self._parser = wire.Parser()
-        self.reopen = None  # what breaks meanwhile is tried again by the caller
+        self.reopen = None  # the caller repeats what fails meanwhile
         try:
             self.transport = reopen()
             self.greet()

@@ -11,7 +11,7 @@ import serial
 from armtempo.errors import InputError, LinkError, PortError
 
 BAUD_RATE = 115_200
-"""Without meaning over USB; a plain UART between host and board would use it."""
+"""Has no effect over USB; a UART between host and board would use it."""
 _ADVICE = "'armtempo ports' lists what is there"
 
 

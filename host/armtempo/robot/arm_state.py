@@ -1,4 +1,4 @@
-"""What the board knows of the arm: its record, and where the joints are."""
+"""The arm as the board knows it: its record, and the positions of the joints."""
 
 from __future__ import annotations
 

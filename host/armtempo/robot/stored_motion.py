@@ -47,7 +47,7 @@ def replay(
     Whatever fails here stops the board. Raises BoardError where the board refuses to start, LinkError where it
     cannot be reached any more, Stopped where the stop was asked for before the start.
     """
-    client.session.hurried = lambda: stop.wanted
+    client.session.stopping = lambda: stop.wanted
     stop.check()
     started = client.start(motion.name, motion.crc, flags)
     follower = Follower(client, started.run)
@@ -69,7 +69,7 @@ def _follow(client: Client, follower: Follower, brake: _Brake, take: Callable[[S
         except OtherBoardError:
             raise
         except NoAnswerError as error:  # silent, though its port is there: as if the cable were out
-            if not client.session.hurried():  # else the stop goes on, until it is given up
+            if not client.session.stopping():  # else the stop goes on, until it is given up
                 if client.session.clock() - heard_s > RECONNECT_S:
                     raise
                 client.session.reconnect(error)
