@@ -1,4 +1,4 @@
-"""What a job and an arm must be before planning, and a plan after it."""
+"""Checks of job and arm before planning, and of the plan after it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from armtempo.splines.extremes import Extremes
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
 TOLERANCE = 1e-9
-"""What rounding may leave: largest excess over a limit, relative, and over a range, in degrees."""
+"""Allowance for rounding: largest excess over a limit, relative, and over a range, in degrees."""
 
 LONGEST_SPAN_TICKS = 1 << 36
 MOST_STEPS, MOST_SPAN_STEPS = 1 << 27, 1 << 24
@@ -140,7 +140,7 @@ def check_reached(arm: Arm, reached: tuple[Extremes, ...]) -> None:
 
 
 def check_held(trajectory: Trajectory, arm: Arm) -> None:
-    """Raises PlanError where a control point is beyond what the board's evaluator can hold."""
+    """Raises PlanError where a control point exceeds the integers of the board's evaluator."""
     for joint_spline, joint in zip(trajectory.joints, arm.driven, strict=True):
         where = f"trajectory {trajectory.name!r}, {joint.name}"
         _check_times(where, joint_spline)

@@ -1,4 +1,4 @@
-"""Moves that need no search: straight from posture to posture, and a motion backwards."""
+"""Motions without a search: from posture to posture, and a motion backwards."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def straight(name: str, start_deg: ArrayLike, end_deg: ArrayLike, arm: Arm) -> T
 
 
 def backwards(trajectory: Trajectory, name: str) -> Trajectory:
-    """The same motion from its end to its start; each joint begins at once."""
+    """The same motion from its end to its start; every joint starts at time 0."""
     return Trajectory(name, tuple(_backwards(joint) for joint in trajectory.joints), trajectory.shared)
 
 
