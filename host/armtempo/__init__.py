@@ -44,15 +44,18 @@ __all__ = [
     "__version__",
     "compare",
     "connect",
+    "deploy",
+    "find_ports",
     "forward",
     "inverse",
     "optimise",
     "plan",
+    "simulator",
     "summary",
 ]
 
 if TYPE_CHECKING:
-    from armtempo import optimise
+    from armtempo import deploy, optimise, simulator
     from armtempo.errors import (
         ArmtempoError,
         BoardError,
@@ -63,6 +66,7 @@ if TYPE_CHECKING:
         RunFolderError,
     )
     from armtempo.kinematics.of_arm import forward, inverse
+    from armtempo.link.ports import find_ports
     from armtempo.model.arm import Arm
     from armtempo.model.job import Job, Pose
     from armtempo.model.plan import Plan
@@ -85,6 +89,7 @@ _HOMES = {
         "RunFolderError",
     ),
     "armtempo.kinematics.of_arm": ("forward", "inverse"),
+    "armtempo.link.ports": ("find_ports",),
     "armtempo.model.arm": ("Arm",),
     "armtempo.model.job": ("Job", "Pose"),
     "armtempo.model.plan": ("Plan",),
@@ -96,13 +101,15 @@ _HOMES = {
     "armtempo.splines.spline": ("Spline",),
     "armtempo.splines.trajectory": ("Trajectory",),
 }
+_MODULES = ("deploy", "optimise", "simulator")
+"""Packages that are public as a whole; their own ``__all__`` says what of them."""
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 
 def __getattr__(name: str) -> Any:
     """A public name, imported when it is first used (PEP 562)."""
-    if name == "optimise":
-        return import_module("armtempo.optimise")
+    if name in _MODULES:
+        return import_module(f"{__name__}.{name}")
     if name not in _HOME_OF:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = globals()[name] = getattr(import_module(_HOME_OF[name]), name)

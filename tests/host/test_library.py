@@ -115,6 +115,16 @@ def test_a_plan_goes_through_its_via_points_and_its_file(plan: armtempo.Plan, tm
     assert again.job == plan.job
 
 
+def test_a_plan_goes_to_other_programs_and_comes_back_as_a_job(
+    plan: armtempo.Plan, arm: armtempo.Arm, tmp_path: Path
+) -> None:
+    (tmp_path / "small.csv").write_text(plan.to_csv(1.0))
+    job = armtempo.Job.from_csv(tmp_path / "small.csv", arm)
+    assert job.name == "small"
+    np.testing.assert_allclose(np.array(job.via)[[0, -1]], [START_DEG, END_DEG], atol=1e-6)
+    assert plan.to_ros(10.0, "base").startswith("header:")
+
+
 def test_a_run_on_the_virtual_board(plan: armtempo.Plan, arm: armtempo.Arm, tmp_path: Path) -> None:
     told: list[tuple[float, float]] = []
     with armtempo.connect("sim", arm) as board:

@@ -6,6 +6,7 @@ MicroPython's REPL, never half a program, and the next deployment completes it.
 
 from __future__ import annotations
 
+import logging
 import tempfile
 import time
 from collections.abc import Mapping
@@ -29,7 +30,14 @@ _SETTLE_S = 6.0
 """A prompt seen earlier than this after a reset may still be the one from before it."""
 
 
-def deploy(port: str, mpy: bool, tell: Tell, progress: Progress) -> None:
+LOG = logging.getLogger("armtempo")
+
+
+def _ignore(done: float, whole: float) -> None:
+    """Where nobody asks for progress."""
+
+
+def deploy(port: str, mpy: bool = False, tell: Tell = LOG.info, progress: Progress = _ignore) -> None:
     """Put the program on the board at ``port``, only what differs, and start it.
 
     ``mpy``: compiled; also done where the sources do not fit. Raises LinkError where the board is moving,
@@ -56,7 +64,7 @@ def deploy(port: str, mpy: bool, tell: Tell, progress: Progress) -> None:
     _confirm(port)
 
 
-def undeploy(port: str, tell: Tell) -> None:
+def undeploy(port: str, tell: Tell = LOG.info) -> None:
     """Take the program off the board; stored motions stay, and what ``deploy`` kept aside comes back."""
     end_program(port, tell)
     remote = Remote(port)

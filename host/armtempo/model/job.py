@@ -67,6 +67,17 @@ class Job:
         return job_file.load(path, arm)
 
     @classmethod
+    def from_csv(cls, path: Path | str, arm: Arm, radians: bool = False) -> Job:
+        """A job through the via points of a CSV file: a line for each point, a column for each driven joint.
+
+        It has the file's name. Raises InputError with line and value for what is no angle.
+        """
+        from armtempo.model import exchange
+
+        file = Path(path)
+        return cls(file.stem, via_deg=exchange.via_from_csv(file, arm, radians).tolist())
+
+    @classmethod
     def paper(cls, arm: Arm | None = None) -> Job:
         """The job that ships with armtempo: the paper's feeding motion, for its arm or ``arm``."""
         from armtempo.model import job_file

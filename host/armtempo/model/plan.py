@@ -69,6 +69,18 @@ class Plan:
 
         trajectory_file.save(self, path)
 
+    def to_csv(self, rate_hz: float = 100.0) -> str:
+        """Angle, speed, acceleration and jerk of each driven joint as CSV, ``rate_hz`` lines a second."""
+        from armtempo.model import exchange
+
+        return exchange.to_csv(self, rate_hz)
+
+    def to_ros(self, rate_hz: float = 100.0, frame_id: str = "") -> str:
+        """A trajectory_msgs/JointTrajectory message in YAML, radians, with ``rate_hz`` points a second."""
+        from armtempo.model import exchange
+
+        return exchange.to_ros(self, rate_hz, frame_id)
+
     @classmethod
     def load(cls, path: Path | str) -> Plan:
         """The plan of a trajectory file; InputError where the file is none, is damaged or does not fit."""
