@@ -15,6 +15,7 @@ both the same bytes.
 
 import struct
 from binascii import crc32
+from collections import namedtuple
 
 try:
     from typing import Any
@@ -47,6 +48,10 @@ def _index(kinds: str) -> "tuple[dict[str, Any], dict[int, Any]]":
 COMMAND, COMMAND_BY_ID = _index("C")
 ANSWER, ANSWER_BY_ID = _index("A")
 EVENT, EVENT_BY_ID = _index("ER")
+
+
+Frame = namedtuple("Frame", ("sequence", "number", "payload"))
+"""A received frame: sequence number, message id, payload."""
 
 
 class WireError(ValueError):
@@ -119,8 +124,8 @@ class Parser:
             self._skipping = True
             self._buffer = self._buffer[count:]
 
-    def next(self) -> "tuple[int, int, bytes] | None":
-        """(sequence, id, payload) of the next whole frame, or None."""
+    def next(self) -> "Frame | None":
+        """The next whole frame, or None."""
         while True:
             start = self._buffer.find(bytes((SYNC,)))
             self._skip(len(self._buffer) if start < 0 else start)
@@ -139,4 +144,4 @@ class Parser:
             payload = bytes(self._buffer[1 + _HEAD : end])
             self._buffer = self._buffer[end + 4 :]
             self._skipping = False
-            return sequence, number, payload
+            return Frame(sequence, number, payload)

@@ -139,3 +139,15 @@ def test_no_class_name_stands_for_two_things() -> None:
         if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
     )
     assert {name for name, count in places.items() if count > 1} <= SAME_BY_DESIGN
+
+
+def test_types_of_the_whole_package_have_one_home() -> None:
+    homes = [
+        (target.id, str(path.relative_to(HOST)))
+        for path in modules()
+        for node in ast.parse(path.read_text(encoding="utf-8")).body
+        if isinstance(node, ast.Assign)
+        for target in node.targets
+        if isinstance(target, ast.Name) and target.id in ("Array", "Progress")
+    ]
+    assert sorted(homes) == [("Array", "arrays.py"), ("Progress", "progress.py")]

@@ -9,9 +9,6 @@ from typing import Any
 from armtempo_shared import wire
 from armtempo_shared.limits import TICK_HZ
 
-Frame = tuple[int, int, bytes]
-"""Sequence number, message id, payload."""
-
 
 @dataclass(frozen=True)
 class Hello:

@@ -96,7 +96,7 @@ class Session:
             self._write(data)
             reply = self._reply(self.clock() + REPEAT_INTERVAL_S, sequence, number)
             if reply is not None:
-                return _answer(name, *reply)
+                return _answer(name, reply)
             now_s = self.clock()
             silent = (
                 now_s - self._heard_s >= silence_timeout_s and not self.frames_bad
@@ -128,19 +128,19 @@ class Session:
         self._sequence = (self._sequence + (2 if self._sequence == _CTRL_C - 1 else 1)) % 256
         return self._sequence
 
-    def _reply(self, deadline_s: float, sequence: int, number: int) -> board_messages.Frame | None:
+    def _reply(self, deadline_s: float, sequence: int, number: int) -> wire.Frame | None:
         while (left_s := deadline_s - self.clock()) > 0:
             frame = self._frame(left_s)
             if frame is None:
                 continue
-            if frame[1] in _REPLY_IDS:
-                if frame[0] == sequence and frame[2][:1] == bytes((number,)):
+            if frame.number in _REPLY_IDS:
+                if frame.sequence == sequence and frame.payload[:1] == bytes((number,)):
                     return frame
             else:
                 self._keep_event(frame)
         return None
 
-    def _frame(self, timeout_s: float) -> board_messages.Frame | None:
+    def _frame(self, timeout_s: float) -> wire.Frame | None:
         frame = self._next_frame()
         if frame is not None:
             return frame
@@ -209,13 +209,13 @@ class Session:
         finally:
             self.reopen = reopen
 
-    def _next_frame(self) -> board_messages.Frame | None:
-        frame: board_messages.Frame | None = self._parser.next()
+    def _next_frame(self) -> wire.Frame | None:
+        frame: wire.Frame | None = self._parser.next()
         return frame
 
-    def _keep_event(self, frame: board_messages.Frame) -> None:
+    def _keep_event(self, frame: wire.Frame) -> None:
         try:
-            self.events.append(board_messages.event(frame[1], frame[2]))
+            self.events.append(board_messages.event(frame.number, frame.payload))
         except wire.WireError:
             return  # a reply to an older command, or a message of a newer protocol
 
@@ -223,10 +223,10 @@ class Session:
 _REPLY_IDS = tuple(wire.EVENT[name][1] for name in ("ok", "error"))
 
 
-def _answer(name: str, sequence: int, number: int, payload: bytes) -> Answer:
+def _answer(name: str, reply: wire.Frame) -> Answer:
     try:
-        values, tail = wire.decode(wire.EVENT_BY_ID[number], payload)
-        if wire.EVENT_BY_ID[number][0] == "error":
+        values, tail = wire.decode(wire.EVENT_BY_ID[reply.number], reply.payload)
+        if wire.EVENT_BY_ID[reply.number][0] == "error":
             raise refusal(f"the board refused '{name}'", *values[1:])
         answer: Answer = wire.decode(wire.ANSWER[name], tail)
     except wire.WireError as error:
