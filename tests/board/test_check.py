@@ -32,7 +32,6 @@ def straight(times_s: list[float], angles: list[float]) -> bytes:
         3,
         [[round(angle * 2**limits.STEP_FRACTION_BITS) for angle in angles]],
         [[round(time * limits.TICK_HZ * 2**limits.TICK_FRACTION_BITS) for time in times_s]],
-        len(angles) - 3,
         1,
         0,
         0,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 from operator import mul
@@ -10,22 +10,20 @@ from operator import mul
 import numpy as np
 
 from armtempo import optimise
+from armtempo.arrays import Array
 from armtempo.model.arm import Limits
 from armtempo.model.job import Job
 from armtempo.planning import checks, local_search
 from armtempo.planning.constraints import Path
 from armtempo.planning.fitness import Fitness
+from armtempo.progress import Progress
 from armtempo.splines import time_axis
-from armtempo.splines.bspline import Array
 
 MIN_DURATION_S = 0.01
 """No motion is planned shorter: a tenth of the time between two samples."""
 
 _REFINED_GAP = 5e-5
 """How near to its local optimum a refined axis must come; more would take most of the time for nothing."""
-
-Progress = Callable[[float, float], None]
-"""Called with the work done and the whole of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,11 +75,8 @@ def _search(fitness: Fitness, job: Job, rng: np.random.Generator, progress: Prog
         function,
         [job.bounds_s] * fitness.intervals,
         rng,
-        job.population,
-        job.iterations,
-        job.optimiser,
+        optimise.Settings(job.optimiser, job.population, job.iterations, parameters),
         progress,
-        **parameters,
     )
 
 
