@@ -13,7 +13,7 @@ from tests.benchmark.emulated import Machine
 BOARD = interpreters.ROOT / "board" / "armtempo_board"
 
 SERVE = {1: (209, 382), 3: (257, 478), 6: (329, 622)}
-FREEZE = {1: 150, 3: 202, 6: 289}
+FREEZE = {1: 148, 3: 200, 6: 287}
 TAKE = {1: 198, 3: 278, 6: 398}
 REFILL = {1: (208, 255), 3: (360, 501), 6: (588, 870)}
 EMIT = {2: 485, 32: 878, 512: 9128}

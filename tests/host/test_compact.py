@@ -246,6 +246,7 @@ def test_the_board_program_is_mostly_one_module() -> None:
     made = program_files.compact_program()
     for text in made.sources.values():
         ast.parse(text)
+        assert "def const(" not in text, "the compiler takes calls of const for declarations"
     core = made.sources["armtempo_board.core"]
     assert "armtempo_board.program" in made.sources
     assert "armtempo_board.store" in made.sources

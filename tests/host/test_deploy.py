@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +12,8 @@ import pytest
 from armtempo.deploy import changes, firmware, package, program_files
 from armtempo.deploy.remote import Survey
 from armtempo.errors import InputError, LinkError, MissingPackageError
-from armtempo.link.program_version import own_crc
+from armtempo.link.program_version import PACKAGES, own_crc, package_folder
+from armtempo_shared.program_hash import sources_crc
 
 CORTEX_M4 = 6 | 3 << 8 | 7 << 10
 BOARD = Survey("STM32F4DISC with STM32F407", (1, 29, 0), CORTEX_M4, 95_000, 189, 512, False, None, {})
@@ -25,6 +27,29 @@ def test_modules_are_what_the_board_imports() -> None:
     assert {"armtempo_board/app/app.py", "armtempo_board/__init__.py", "armtempo_shared/motion.py"} <= names
     assert not {"armtempo_board/main.py", "armtempo_shared/wire.py", "armtempo_shared/meanings.py"} & names
     assert program_files.stamp() == f"{own_crc():08x}\n".encode()
+
+
+def test_the_hash_covers_names_and_contents_in_all_packages(tmp_path: Path) -> None:
+    folders = [tmp_path / name for name in PACKAGES]
+    for folder in folders:
+        shutil.copytree(package_folder(folder.name), folder)
+    found = {own_crc()}
+
+    def crc() -> int:
+        return sources_crc(*map(str, folders))
+
+    assert crc() in found
+    nested = folders[0] / "stepgen" / "newton.py"
+    for change in (
+        lambda: nested.write_text(nested.read_text() + "# more\n"),
+        lambda: nested.rename(nested.with_name("other.py")),
+        lambda: nested.with_name("other.py").rename(folders[0] / "motion" / "other.py"),
+    ):
+        change()
+        assert crc() not in found
+        found.add(crc())
+    (folders[0] / "stepgen" / "notes.txt").write_text("not a source")
+    assert crc() in found
 
 
 def test_compiled_files_fit_the_smallest_board() -> None:

@@ -266,7 +266,7 @@ def search(
                         if high:
                             found = AT_START
         else:
-            found = ((time_steady + 1) << 4) + ((steady & 1) << 3) + 4
+            found = ((time_steady + 1) << 4) + ((steady & 1) << 3) + 4 * MEASURED
         if found:
             break
     measures[MOVE] = move
