@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from armtempo_board.app.controller import Controller
 
-    class Commands(Protocol):
+    class Caller(Protocol):
         """What is asked of the caller, see ``commands.Commands``."""
 
         controller: Controller
@@ -38,26 +38,26 @@ if TYPE_CHECKING:
         def reply_tail(self, size: int, tail: bytes) -> int: ...
 
 
-def put_begin(commands: "Commands", row: tuple, length: int) -> None:
+def put_begin(commands: "Caller", row: tuple, length: int) -> None:
     """Begin an upload."""
     size, _ = commands.fields(row)
     commands.controller.store().begin(commands.text(row, length), size)
 
 
-def put_data(commands: "Commands", row: tuple, length: int) -> int:
+def put_data(commands: "Caller", row: tuple, length: int) -> int:
     """Add a piece to it."""
     (offset,) = commands.fields(row)
     return commands.reply(row, commands.controller.store().write(offset, commands.tail(row, length)))
 
 
-def put_commit(commands: "Commands", row: tuple, length: int) -> None:
+def put_commit(commands: "Caller", row: tuple, length: int) -> None:
     """Check it and put it in place; an arm record is taken at once."""
     (crc,) = commands.fields(row)
     if commands.controller.store().commit(crc) == ARM_RECORD_NAME:
         commands.controller.configure()
 
 
-def list(commands: "Commands", row: tuple, length: int) -> int:
+def list(commands: "Caller", row: tuple, length: int) -> int:
     """One of the stored motions, and how many there are."""
     (index,) = commands.fields(row)
     store = commands.controller.store()
@@ -80,19 +80,19 @@ def list(commands: "Commands", row: tuple, length: int) -> int:
     return commands.reply_tail(size, name.encode())
 
 
-def remove(commands: "Commands", row: tuple, length: int) -> None:
+def remove(commands: "Caller", row: tuple, length: int) -> None:
     """Remove a motion."""
     commands.controller.store().remove(commands.text(row, length))
 
 
-def rename(commands: "Commands", row: tuple, length: int) -> None:
+def rename(commands: "Caller", row: tuple, length: int) -> None:
     """Give a motion another name."""
     (old_length,) = commands.fields(row)
     names = commands.text(row, length)
     commands.controller.store().rename(names[:old_length], names[old_length:])
 
 
-def get(commands: "Commands", row: tuple, length: int) -> int:
+def get(commands: "Caller", row: tuple, length: int) -> int:
     """A piece of a record."""
     offset, wanted = commands.fields(row)
     fixed = commands.reply(row, 0)
@@ -102,6 +102,6 @@ def get(commands: "Commands", row: tuple, length: int) -> int:
     return commands.reply_tail(fixed, data)
 
 
-def set_default(commands: "Commands", row: tuple, length: int) -> None:
+def set_default(commands: "Caller", row: tuple, length: int) -> None:
     """Make a motion the one that the button starts."""
     commands.controller.store().set_default(commands.text(row, length))

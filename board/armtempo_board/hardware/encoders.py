@@ -6,7 +6,7 @@ from pyb import Pin
 from armtempo_board.hardware import isr
 
 
-class Encoder:
+class EncoderInput:
     """One encoder input. ``inverted``: it counts down when the joint's angle grows.
 
     Read it at least every 32 768 counts: at a million counts a second every 32 ms.

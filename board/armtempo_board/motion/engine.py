@@ -30,7 +30,7 @@ from armtempo_board import heap
 from armtempo_board.buffers import COMMANDED, TICKS_HIGH, TICKS_LOW
 from armtempo_board.errors import Refused
 from armtempo_board.hardware import isr
-from armtempo_board.hardware.encoders import Encoder, NoEncoder
+from armtempo_board.hardware.encoders import EncoderInput, NoEncoder
 from armtempo_board.hardware.inputs import Inputs
 from armtempo_board.hardware.sampler import Sampler
 from armtempo_board.motion.following_error import FollowingError
@@ -65,7 +65,7 @@ class Engine:
         from armtempo_board.hardware import registers
 
         rows = [row for row in joints if row["encoder"] != armrecord.NONE]
-        fitted = [Encoder(row["encoder"], row["encoder_inverted"]) for row in rows]
+        fitted = [EncoderInput(row["encoder"], row["encoder_inverted"]) for row in rows]
         self._sampler = Sampler(len(joints), tuple([encoder.address for encoder in fitted]))
         self._block = self._sampler.block
         self._sampler.connect()

@@ -9,7 +9,7 @@ from micropython import const
 
 from armtempo_board.buffers import COMMANDED, TICKS_HIGH, TICKS_LOW
 from armtempo_board.hardware import isr
-from armtempo_board.hardware.encoders import Encoder, NoEncoder
+from armtempo_board.hardware.encoders import EncoderInput, NoEncoder
 from armtempo_board.hardware.sampler import Sampler
 from armtempo_board.motion.joint_drive import JointDrive
 
@@ -24,7 +24,7 @@ class Readings:
         self,
         sampler: Sampler,
         joints: "list[JointDrive]",
-        encoders: "list[Encoder | NoEncoder]",
+        encoders: "list[EncoderInput | NoEncoder]",
         slots: "list[int]",
     ) -> None:
         self._sampler = sampler

@@ -4,8 +4,8 @@ import micropython
 from micropython import const
 
 from armtempo_board.stepgen.braking import scale_slope, to_real_time
+from armtempo_board.stepgen.cubics import cubics_fit, put_cubics
 from armtempo_board.stepgen.newton import solve
-from armtempo_board.stepgen.step_queue import cubics_fit, put_cubics
 
 _MOST_STEPS = const(1024)  # of a cubic
 _SINGLY = const(8)  # steps solved one by one before a cubic is tried again; an item of the queue holds 8

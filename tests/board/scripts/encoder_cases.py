@@ -3,7 +3,7 @@
 import random
 
 from armtempo_board.hardware import isr
-from armtempo_board.hardware.encoders import Encoder
+from armtempo_board.hardware.encoders import EncoderInput
 from armtempo_board.motion.following_error import FollowingError
 from engine_rig import TICK_HZ, Motion, Rig, Steps, arm, cases, row
 from virtual_board import standalone
@@ -17,7 +17,7 @@ def both_ways_round():
     for channel, timer in ((0, 1), (1, 3), (2, 8), (3, 4)):
         for inverted in (0, 1):
             board = standalone.start()
-            encoder = Encoder(channel, inverted)
+            encoder = EncoderInput(channel, inverted)
             total = 0
             for n in range(300):
                 jump = random.choice((1, -1, 32767, -32767, random.randrange(-32767, 32768)))
@@ -32,7 +32,7 @@ def both_ways_round():
 def declared():
     """The count goes on from what was declared, also across the counter's zero."""
     board = standalone.start()
-    encoder = Encoder(0, 0)
+    encoder = EncoderInput(0, 0)
     board.timers[1].turn(-5)
     encoder.declare(-1000)
     assert encoder.counts == -1000
@@ -91,7 +91,7 @@ def moved_by_hand():
 def unread_counter():
     """The counter of an encoder timer reads back as 16 bits."""
     board = standalone.start()
-    encoder = Encoder(1, 0)
+    encoder = EncoderInput(1, 0)
     board.timers[3].turn(-1)
     assert isr.read_counter(encoder.address) == 0xFFFF
 
