@@ -6,9 +6,10 @@ from armtempo.kinematics.branches import BRANCHES, Branch, branch_of
 from armtempo.kinematics.choice import Candidate, Choice, choose
 from armtempo.kinematics.forward import forward, postures
 from armtempo.kinematics.geometry import Geometry
-from armtempo.kinematics.inverse import Solutions, inverse
+from armtempo.kinematics.inverse import inverse, inverse_of_pose
 from armtempo.kinematics.ranges import Ranges
 from armtempo.kinematics.shape import refusals
+from armtempo.kinematics.solutions import PoseSolutions, Solutions
 
 __all__ = [
     "BRANCHES",
@@ -16,12 +17,14 @@ __all__ = [
     "Candidate",
     "Choice",
     "Geometry",
+    "PoseSolutions",
     "Ranges",
     "Solutions",
     "branch_of",
     "choose",
     "forward",
     "inverse",
+    "inverse_of_pose",
     "postures",
     "refusals",
 ]

@@ -11,9 +11,9 @@ import numpy as np
 from armtempo.kinematics import numerical
 from armtempo.kinematics.choice import Candidate, Choice, choose
 from armtempo.kinematics.geometry import Array, Geometry
-from armtempo.kinematics.inverse import ELBOW_STRETCHED, ON_AXIS_1, WRIST_STRAIGHT
 from armtempo.kinematics.numerical import NumericalSolution
 from armtempo.kinematics.ranges import Ranges
+from armtempo.kinematics.solutions import ELBOW_STRETCHED, ON_AXIS_1, WRIST_STRAIGHT
 
 SINGULAR = {
     ON_AXIS_1: "wrist centre on axis 1: joint 1 kept as before",

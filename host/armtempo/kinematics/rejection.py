@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from armtempo.kinematics.geometry import Array
-from armtempo.kinematics.inverse import DUPLICATE, ELBOW_STRETCHED, IN_OFFSET, TOO_FAR, TOO_NEAR
 from armtempo.kinematics.ranges import Ranges
 from armtempo.kinematics.regions import radii
 from armtempo.kinematics.shape import Shape
+from armtempo.kinematics.solutions import DUPLICATE, ELBOW_STRETCHED, IN_OFFSET, TOO_FAR, TOO_NEAR
 
 
 @dataclass(frozen=True)
