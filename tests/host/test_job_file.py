@@ -46,7 +46,7 @@ def test_poses_and_angles_may_be_mixed(tmp_path: Path) -> None:
     job = load_job(written(tmp_path, text), ARM)
     assert job.via[0] == (0, -60, 40)
     assert isinstance(job.via[1], Pose)
-    assert job.via[1].matrix[0] == (0, 0, -1, -536.404)
+    assert job.via[1].target.matrix[0] == (0, 0, -1, -536.404)
 
 
 @pytest.mark.parametrize(
@@ -57,13 +57,56 @@ def test_poses_may_be_positions_that_are_turned(turned: str, tmp_path: Path) -> 
     via = load_job(written(tmp_path, text), ARM).via[1]
     assert isinstance(via, Pose)
     wanted = ((0, 0, -1, -536.404), (0, 1, 0, 0), (1, 0, 0, 434.698), (0, 0, 0, 1))
-    np.testing.assert_allclose(via.matrix, wanted, atol=1e-12)
+    np.testing.assert_allclose(via.target.matrix, wanted, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("keys", "fixed"),
+    [
+        ("", ()),
+        ("pitch_deg = -90", ("pitch",)),
+        ("yaw_deg = 20", ("yaw",)),
+        ("roll_deg = 20", ("roll",)),
+        ("roll_deg = 0\npitch_deg = -90", ("roll", "pitch")),
+        ("pitch_deg = 5\nyaw_deg = -90", ("pitch", "yaw")),
+        ("roll_deg = 1\npitch_deg = 5\nyaw_deg = -90", ("roll", "pitch", "yaw")),
+        ("approach = [0, 0, -2]", ("approach",)),
+    ],
+)
+def test_a_position_may_ask_for_a_part_of_the_orientation(
+    keys: str, fixed: tuple[str, ...], tmp_path: Path
+) -> None:
+    text = f"[[via]]\nangles_deg = [0, -60, 40]\n[[via]]\nposition_mm = [300, 0, 60]\n{keys}\n"
+    via = load_job(written(tmp_path, text), ARM).via[1]
+    assert isinstance(via, Pose)
+    assert via.target.fixed == fixed
+    assert (via.target.tolerance_mm, via.target.tolerance_deg) == (0.1, 0.1)
+    assert [row[3] for row in via.target.matrix] == [300, 0, 60, 1]
+    wider = load_job(written(tmp_path, text + "tolerance_mm = 2\ntolerance_deg = 3.5\n"), ARM).via[1]
+    assert isinstance(wider, Pose)
+    assert (wider.target.tolerance_mm, wider.target.tolerance_deg) == (2.0, 3.5)
 
 
 @pytest.mark.parametrize(
     ("via", "said"),
     [
-        ("position_mm = [1, 2, 3]", "via[1]: position_mm goes with one of rpy_deg and quaternion"),
+        (
+            "position_mm = [1, 2, 3]\nrpy_deg = [0, 0, 0]\npitch_deg = 3",
+            "position_mm goes alone or with one of",
+        ),
+        (
+            "position_mm = [1, 2, 3]\napproach = [0, 0, 1]\nyaw_deg = 3",
+            "position_mm goes alone or with one of",
+        ),
+        (
+            "position_mm = [1, 2, 3]\nroll_deg = 0\nyaw_deg = 3",
+            "roll and yaw without pitch leave too much open",
+        ),
+        ("position_mm = [1, 2, 3]\napproach = [0, 0, 0]", "a direction such as 0 0 -1"),
+        ("position_mm = [1, 2, 3]\npitch_deg = nan", "via[1].pitch_deg"),
+        ("position_mm = [1, 2, 3]\ntolerance_mm = 0", "via[1].tolerance_mm = 0 is not allowed"),
+        ("position_mm = [1, 2, 3]\ntolerance_deg = 200", "via[1].tolerance_deg = 200 is not allowed"),
+        ("angles_deg = [0, 0, 0]\ntolerance_deg = 2", "via[1].tolerance_deg: unknown key"),
         ("position_mm = [1, 2]\nrpy_deg = [0, 0, 0]", "via[1].position_mm = [1, 2]"),
         ("position_mm = [1, 2, 3]\nrpy_deg = [0, 0, nan]", "via[1].rpy_deg"),
         ("position_mm = [1, 2, 3]\nquaternion = [1, 1, 0, 0]", "length 1.41421"),

@@ -21,6 +21,7 @@ COMMANDS = (
     "demo",
     "plan",
     "ik",
+    "fk",
     "bench",
     "paper",
     "upload",

@@ -9,14 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple
 
 import numpy as np
 
-from armtempo.kinematics.geometry import Array
+from armtempo.kinematics.geometry import Array, T
 from armtempo.kinematics.shape import Shape
-
-T = TypeVar("T", float, Array)
 
 
 def _wrapped(angles: Array) -> Array:

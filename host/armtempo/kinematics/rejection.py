@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-
-import numpy as np
 
 from armtempo.kinematics.geometry import Array
 from armtempo.kinematics.ranges import Ranges
@@ -78,8 +77,8 @@ def duplicate(index: int, singular: int) -> Rejection:
     return Rejection("duplicate", f"equals solution {twin + 1}: {why}", twin=twin + 1)
 
 
-def out_of_range(ranges: Ranges, angles: Array) -> tuple[Rejection, ...]:
-    """Say which joints are outside their ranges and by how much; ``angles`` (6,) from ``Ranges.place``."""
+def out_of_range(ranges: Ranges, angles: Sequence[float]) -> tuple[Rejection, ...]:
+    """Say which joints are outside their ranges and by how much; ``angles`` (joints,) from ``Ranges.placed``."""
     return tuple(
         Rejection("range", _range_text(ranges, joint, angles[joint]), math.degrees(excess), joint=joint + 1)
         for joint, excess in enumerate(ranges.excess(angles))
@@ -88,7 +87,7 @@ def out_of_range(ranges: Ranges, angles: Array) -> tuple[Rejection, ...]:
 
 
 def _range_text(ranges: Ranges, joint: int, angle: float) -> str:
-    low, high, at = np.degrees((ranges.low[joint], ranges.high[joint], angle))
+    low, high, at = map(math.degrees, (*ranges.ends[joint], angle))
     side, by = ("below", low - at) if at < low else ("above", at - high)
     return f"joint {joint + 1} at {at:.4g} deg is {by:.4g} deg {side} its range {low:g} to {high:g}"
 
@@ -100,7 +99,7 @@ def reasons(
     outcome: int,
     singular: int,
     ranges: Ranges,
-    angles: Array,
+    angles: Sequence[float],
     unit: str,
 ) -> tuple[Rejection, ...]:
     """Collect everything against solution ``index``, 0 to 7; empty if nothing is."""
@@ -108,3 +107,14 @@ def reasons(
         return (unreachable(shape, wrist, index, outcome, unit),)
     found = out_of_range(ranges, angles)
     return (duplicate(index, singular), *found) if outcome == DUPLICATE else found
+
+
+def table(rejections: Iterable[Sequence[Rejection]]) -> str:
+    """The reasons against solutions 1, 2, ..., equal ones together, as lines to hang under a message."""
+    numbers: dict[str, list[str]] = {}
+    for number, reasons_of_one in enumerate(rejections, 1):
+        text = "; ".join(reason.text for reason in reasons_of_one)
+        numbers.setdefault(text, []).append(str(number))
+    rows = [("solution", "why not"), *((", ".join(which), text) for text, which in numbers.items())]
+    width = max(len(which) for which, _ in rows)
+    return "".join(f"\n  {which:<{width}}  {text}" for which, text in rows)

@@ -1,0 +1,105 @@
+"""A tool pose to reach: its position and as much of its orientation as is asked for, with tolerances."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from armtempo.errors import InputError
+from armtempo.model import pose
+from armtempo.model.pose import Array
+
+Rows = tuple[tuple[float, ...], ...]
+
+ROLL, PITCH, YAW, APPROACH = "roll", "pitch", "yaw", "approach"
+WHOLE = (ROLL, PITCH, YAW)
+CONSTRAINTS = {
+    (): 3,
+    (ROLL,): 4,
+    (PITCH,): 4,
+    (YAW,): 4,
+    (ROLL, PITCH): 5,
+    (PITCH, YAW): 5,
+    (APPROACH,): 5,
+    WHOLE: 6,
+}
+"""What may be asked of the orientation, and how many numbers that asks for, the three of the position included."""
+
+TOLERANCE_MM, TOLERANCE_DEG = 0.1, 0.1
+"""A tool this near to its pose has reached it, unless something else is asked for."""
+
+SMALLEST, LARGEST_MM, LARGEST_DEG = 1e-6, 1000.0, 180.0
+"""Tolerances that make sense."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """A tool pose, or as much of one as ``fixed`` says.
+
+    The position always counts. Roll, pitch and yaw turn about x, then y, then z of the base.
+    """
+
+    matrix: Rows
+    """4 rows of 4, lengths in mm; its rotation is one of those that are asked for."""
+    fixed: tuple[str, ...] = WHOLE
+    """A key of CONSTRAINTS: what counts of the orientation; "approach": the direction of the tool's z axis."""
+    tolerance_mm: float = TOLERANCE_MM
+    tolerance_deg: float = TOLERANCE_DEG
+
+    def __post_init__(self) -> None:
+        """InputError for what makes no target."""
+        if self.fixed not in CONSTRAINTS:
+            allowed = ", ".join("+".join(fixed) or "nothing" for fixed in CONSTRAINTS)
+            raise InputError(f"a pose may fix {allowed} of its orientation, not {'+'.join(self.fixed)}")
+        if not (
+            SMALLEST <= self.tolerance_mm <= LARGEST_MM and SMALLEST <= self.tolerance_deg <= LARGEST_DEG
+        ):
+            raise InputError(
+                f"tolerances of {self.tolerance_mm:g} mm and {self.tolerance_deg:g} deg are not allowed; give "
+                f"{SMALLEST:g} to {LARGEST_MM:g} mm and {SMALLEST:g} to {LARGEST_DEG:g} deg"
+            )
+
+    @property
+    def constraints(self) -> int:
+        """How many numbers the target asks for, 3 to 6."""
+        return CONSTRAINTS[self.fixed]
+
+    @property
+    def words(self) -> str:
+        """What is asked for."""
+        if self.fixed == WHOLE:
+            return "whole pose"
+        return " and ".join(("position", *self.fixed)) if self.fixed else "position only"
+
+
+def of_matrix(matrix: Array, fixed: tuple[str, ...] = WHOLE) -> Target:
+    """The target of a checked pose, (4, 4)."""
+    return Target(tuple(map(tuple, matrix.tolist())), fixed)
+
+
+def of_angles(position: Sequence[float], angles_deg: Mapping[str, float], what: str = "the pose") -> Target:
+    """A position with any of "roll", "pitch" and "yaw"; those left out are free. InputError names ``what``."""
+    fixed = tuple(name for name in WHOLE if name in angles_deg)
+    if fixed not in CONSTRAINTS:
+        raise InputError(
+            f"{what}: roll and yaw without pitch leave too much open; give pitch too, or leave one out"
+        )
+    rpy = [angles_deg.get(name, 0.0) for name in WHOLE]
+    return of_matrix(pose.from_rpy(position, rpy, what), fixed)
+
+
+def of_approach(position: Sequence[float], direction: Sequence[float], what: str = "the pose") -> Target:
+    """A position with the direction, of any length, in which the tool's z axis points."""
+    length = math.hypot(*direction)
+    if not 1e-9 <= length <= pose.LARGEST:
+        raise InputError(
+            f"{what}: the approach is a direction such as 0 0 -1 (straight down), not of length {length:g}"
+        )
+    z = np.array(direction) / length
+    x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
+    x /= np.linalg.norm(x)
+    matrix = np.column_stack((x, np.cross(z, x), z, position))
+    return of_matrix(pose.checked(matrix, what), (APPROACH,))
