@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 from armtempo.kinematics.solver import PoseSolver
-from armtempo.model import target
 from armtempo.model.arm import Arm, Joint, default_path, load_arm
 from armtempo.model.pose import to_rpy_deg
-from armtempo.model.target import APPROACH, WHOLE, Target
+from armtempo.model.tool_pose import APPROACH, WHOLE, Pose
 
 PAPER_ARM = load_arm(default_path())
 """Six rows, three motors."""
@@ -88,15 +87,15 @@ def drawn_posture(solver: PoseSolver, rng: np.random.Generator) -> np.ndarray:
     return np.where(driven, inside, solver.home_rad)
 
 
-def asked(pose: np.ndarray, fixed: tuple[str, ...], tolerance_mm: float = 0.1) -> Target:
+def asked(pose: np.ndarray, fixed: tuple[str, ...], tolerance_mm: float = 0.1) -> Pose:
     """A target that asks of a pose (4, 4) only what ``fixed`` says."""
     if fixed == (APPROACH,):
-        found = target.of_approach(pose[:3, 3], pose[:3, 2])
+        found = Pose.of_approach(pose[:3, 3], pose[:3, 2])
     elif fixed == WHOLE:
-        found = target.of_matrix(pose)
+        found = Pose.of_matrix(pose)
     else:
         angles = dict(zip(WHOLE, to_rpy_deg(pose), strict=True))
-        found = target.of_angles(pose[:3, 3], {name: angles[name] for name in fixed})
+        found = Pose.of_angles(pose[:3, 3], {name: angles[name] for name in fixed})
     return replace(found, tolerance_mm=tolerance_mm)
 
 

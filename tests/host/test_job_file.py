@@ -46,7 +46,7 @@ def test_poses_and_angles_may_be_mixed(tmp_path: Path) -> None:
     job = load_job(written(tmp_path, text), ARM)
     assert job.via[0] == (0, -60, 40)
     assert isinstance(job.via[1], Pose)
-    assert job.via[1].target.matrix[0] == (0, 0, -1, -536.404)
+    assert job.via[1].matrix[0] == (0, 0, -1, -536.404)
 
 
 @pytest.mark.parametrize(
@@ -57,7 +57,7 @@ def test_poses_may_be_positions_that_are_turned(turned: str, tmp_path: Path) -> 
     via = load_job(written(tmp_path, text), ARM).via[1]
     assert isinstance(via, Pose)
     wanted = ((0, 0, -1, -536.404), (0, 1, 0, 0), (1, 0, 0, 434.698), (0, 0, 0, 1))
-    np.testing.assert_allclose(via.target.matrix, wanted, atol=1e-12)
+    np.testing.assert_allclose(via.matrix, wanted, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -79,12 +79,12 @@ def test_a_position_may_ask_for_a_part_of_the_orientation(
     text = f"[[via]]\nangles_deg = [0, -60, 40]\n[[via]]\nposition_mm = [300, 0, 60]\n{keys}\n"
     via = load_job(written(tmp_path, text), ARM).via[1]
     assert isinstance(via, Pose)
-    assert via.target.fixed == fixed
-    assert (via.target.tolerance_mm, via.target.tolerance_deg) == (0.1, 0.1)
-    assert [row[3] for row in via.target.matrix] == [300, 0, 60, 1]
+    assert via.fixed == fixed
+    assert (via.tolerance_mm, via.tolerance_deg) == (0.1, 0.1)
+    assert [row[3] for row in via.matrix] == [300, 0, 60, 1]
     wider = load_job(written(tmp_path, text + "tolerance_mm = 2\ntolerance_deg = 3.5\n"), ARM).via[1]
     assert isinstance(wider, Pose)
-    assert (wider.target.tolerance_mm, wider.target.tolerance_deg) == (2.0, 3.5)
+    assert (wider.tolerance_mm, wider.tolerance_deg) == (2.0, 3.5)
 
 
 @pytest.mark.parametrize(

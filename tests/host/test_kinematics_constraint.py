@@ -12,8 +12,8 @@ from armtempo.kinematics.constraint import Constraint, Miss
 from armtempo.kinematics.descent import Problem, _posture, _system
 from armtempo.kinematics.forward import Frame
 from armtempo.kinematics.solver import PoseSolver
-from armtempo.model import pose, target
-from armtempo.model.target import APPROACH, CONSTRAINTS, Target
+from armtempo.model import pose
+from armtempo.model.tool_pose import APPROACH, CONSTRAINTS, Pose
 
 from tests.host.small_arms import OFFSET_WRIST, asked
 
@@ -21,7 +21,7 @@ SOLVER = PoseSolver(OFFSET_WRIST)
 EVERY = list(CONSTRAINTS)
 
 
-def miss(wanted: Target, stands: np.ndarray) -> Miss:
+def miss(wanted: Pose, stands: np.ndarray) -> Miss:
     """How far a tool with the pose ``stands`` (4, 4) is from the target."""
     x, y, z, origin = (tuple(stands[:3, column].tolist()) for column in range(4))
     return Constraint.of(wanted).miss(Frame(x, y, z, origin))
@@ -99,26 +99,26 @@ def test_at_a_solution_the_second_derivatives_are_those_of_the_cost(fixed: tuple
 
 
 def test_an_approach_of_any_length_is_a_direction() -> None:
-    found = target.of_approach((1, 2, 3), (0, 0, -5))
+    found = Pose.of_approach((1, 2, 3), (0, 0, -5))
     matrix = pose.checked(found.matrix)
     np.testing.assert_allclose(matrix[:3, 2], (0, 0, -1))
     assert found.constraints == 5
     rng = np.random.default_rng(43)
     for direction in rng.normal(size=(20, 3)):
-        matrix = pose.checked(target.of_approach((1, 2, 3), direction).matrix)
+        matrix = pose.checked(Pose.of_approach((1, 2, 3), direction).matrix)
         np.testing.assert_allclose(matrix[:3, 2], direction / np.linalg.norm(direction), atol=1e-12)
 
 
 def test_targets_that_make_no_sense_are_refused() -> None:
     rows = tuple(map(tuple, np.eye(4).tolist()))
     with pytest.raises(InputError, match=r"a pose may fix nothing, roll, .*, not roll\+yaw"):
-        Target(rows, ("roll", "yaw"))
+        Pose(rows, ("roll", "yaw"))
     with pytest.raises(
         InputError, match=r"tolerances of 0 mm and 0\.1 deg are not allowed; give 1e-06 to 1000 mm"
     ):
-        Target(rows, tolerance_mm=0.0)
+        Pose(rows, tolerance_mm=0.0)
     with pytest.raises(InputError, match="tolerances"):
-        Target(rows, tolerance_deg=math.nan)
+        Pose(rows, tolerance_deg=math.nan)
 
 
 def test_targets_say_what_they_ask_for() -> None:

@@ -12,9 +12,8 @@ from armtempo.kinematics.constraint import Constraint
 from armtempo.kinematics.forward import frames
 from armtempo.kinematics.numerical import MovingArm, NumericalSolutions, search
 from armtempo.kinematics.solver import PoseSolver
-from armtempo.model import target
 from armtempo.model.arm import Arm
-from armtempo.model.target import WHOLE
+from armtempo.model.tool_pose import WHOLE, Pose
 
 from tests.host.published_arms import NAMED
 from tests.host.small_arms import (
@@ -77,7 +76,7 @@ def test_all_solutions_of_the_closed_form_are_found(name: str) -> None:
         pose = forward(in_mm, rng.uniform(-np.pi, np.pi, 6))
         solutions = inverse(in_mm, pose)
         closed = solutions.angles_rad[0][solutions.outcome[0] == 0]
-        found = checked(search(arm, target.of_matrix(pose), np.zeros(6)))
+        found = checked(search(arm, Pose.of_matrix(pose), np.zeros(6)))
         assert len(found) == len(closed)
         for angles in closed:
             assert turned(found - angles).max(axis=1).min() < 1e-6
@@ -103,7 +102,7 @@ def test_a_tool_that_points_straight_down_is_no_special_case(pitch: float) -> No
         replace(FOUR, joints=tuple(replace(each, range_deg=(-180, 180)) for each in FOUR.joints))
     )
     position = (150.0, 120.0, 60.0)
-    found = search(solver.moving, target.of_angles(position, {"pitch": pitch}), solver.home_rad)
+    found = search(solver.moving, Pose.of_angles(position, {"pitch": pitch}), solver.home_rad)
     assert found.chosen is not None, found.reason
     tool = forward(solver.geometry, found.chosen.angles_rad)
     np.testing.assert_allclose(tool[:3, 3], position, atol=1e-6)
@@ -118,7 +117,7 @@ def test_a_pose_typed_with_a_few_digits_is_not_refused() -> None:
     position = (345.0, 120.0, 60.0)
     rounded = round(math.degrees(exact), 3)
     assert rounded == 19.179
-    wanted = target.of_angles(position, {"roll": 90.0, "pitch": 0.0, "yaw": rounded})
+    wanted = Pose.of_angles(position, {"roll": 90.0, "pitch": 0.0, "yaw": rounded})
     found = search(solver.moving, wanted, solver.home_rad)
     assert found.chosen is not None, found.reason
     assert 0.0 < found.chosen.miss.position_mm < 1e-3
@@ -128,7 +127,7 @@ def test_a_pose_typed_with_a_few_digits_is_not_refused() -> None:
 def test_tolerances_decide_and_the_reason_has_units_and_a_next_step() -> None:
     solver = PoseSolver(FOUR)
     yaw = math.degrees(math.atan2(120.0, 345.0)) + 1.0
-    wanted = target.of_angles((345.0, 120.0, 60.0), {"roll": 90.0, "pitch": 0.0, "yaw": yaw})
+    wanted = Pose.of_angles((345.0, 120.0, 60.0), {"roll": 90.0, "pitch": 0.0, "yaw": yaw})
     refused = search(solver.moving, wanted, solver.home_rad)
     assert refused.chosen is None
     assert "no posture reaches this pose within 0.1 mm and 0.1 deg" in refused.reason
@@ -143,12 +142,12 @@ def test_tolerances_decide_and_the_reason_has_units_and_a_next_step() -> None:
 
 def test_the_nearest_posture_to_a_pose_out_of_reach_is_the_stretched_arm() -> None:
     solver = PoseSolver(PLANAR_2)
-    found = search(solver.moving, target.of_angles((320.0, 240.0, 0.0), {}), solver.home_rad)
+    found = search(solver.moving, Pose.of_angles((320.0, 240.0, 0.0), {}), solver.home_rad)
     assert found.chosen is None
     assert found.nearest.miss.position_mm == pytest.approx(50.0, abs=1e-6)
     np.testing.assert_allclose(found.nearest.angles_rad, [math.atan2(240.0, 320.0), 0.0], atol=1e-4)
     assert "bring the pose nearer to the arm" in found.reason
-    within = target.of_angles((320.0, 240.0, 0.0), {})
+    within = Pose.of_angles((320.0, 240.0, 0.0), {})
     allowed = search(solver.moving, replace(within, tolerance_mm=50.5), solver.home_rad)
     assert allowed.chosen is not None
 
@@ -206,7 +205,7 @@ def test_an_axis_that_turns_nothing_leaves_a_joint_free() -> None:
 
 def test_joints_without_a_motor_stay() -> None:
     solver = PoseSolver(PAPER_ARM)
-    wanted = target.of_angles((-536.404, 0.0, 434.698), {})
+    wanted = Pose.of_angles((-536.404, 0.0, 434.698), {})
     found = search(solver.moving, wanted, solver.home_rad)
     assert len(found.solutions) == 4
     np.testing.assert_array_equal(checked(found)[:, 3:], np.zeros((4, 3)))
@@ -223,9 +222,9 @@ def test_the_same_seed_gives_the_same_answer() -> None:
 def test_an_arm_without_any_length_only_turns() -> None:
     point = Geometry((5.0,), (0.0,), (0.0,), (0.0,))
     arm = MovingArm(point, Ranges(np.full(1, -np.pi), np.full(1, np.pi)), (0,))
-    found = search(arm, target.of_matrix(forward(point, [0.5])), [0.0])
+    found = search(arm, Pose.of_matrix(forward(point, [0.5])), [0.0])
     assert found.nearest.angles_rad == pytest.approx([0.5])
-    away = search(arm, target.of_matrix(np.eye(4)), [0.0])
+    away = search(arm, Pose.of_matrix(np.eye(4)), [0.0])
     assert away.chosen is None
     assert away.nearest.miss.position_mm == 5.0
 
@@ -235,6 +234,6 @@ def test_one_joint_and_three_planar_ones_take_a_position_they_can_reach() -> Non
     pose = forward(one.geometry, [1.0])
     assert search(one.moving, asked(pose, ()), [0.0]).nearest.angles_rad == pytest.approx([1.0])
     planar = PoseSolver(PLANAR_3)
-    found = search(planar.moving, target.of_angles((100.0, 50.0, 5.0), {}), planar.home_rad)
+    found = search(planar.moving, Pose.of_angles((100.0, 50.0, 5.0), {}), planar.home_rad)
     assert found.chosen is None  # 5 mm above the plane
     assert found.nearest.miss.position_mm == pytest.approx(5.0, abs=1e-3)

@@ -9,7 +9,7 @@ import pytest
 from armtempo.errors import InputError
 from armtempo.kinematics import pose_file
 from armtempo.model import pose
-from armtempo.model.target import WHOLE
+from armtempo.model.tool_pose import WHOLE
 from scipy.spatial.transform import Rotation
 
 TURN = Rotation.from_euler("xyz", [10.0, -20.0, 130.0], degrees=True)

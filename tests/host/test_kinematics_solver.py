@@ -10,9 +10,9 @@ import pytest
 from armtempo.errors import InputError
 from armtempo.kinematics import choose, forward
 from armtempo.kinematics.solver import CLOSED_FORM, NUMERICAL, PoseSolver
-from armtempo.model import pose, target
+from armtempo.model import pose
 from armtempo.model.arm import Arm
-from armtempo.model.target import WHOLE
+from armtempo.model.tool_pose import WHOLE, Pose
 
 from tests.host.small_arms import (
     FITTING,
@@ -63,7 +63,7 @@ def test_nearest_is_the_choice_of_the_closed_form() -> None:
     for _ in range(100):
         matrix = forward(solver.geometry, drawn_posture(solver, rng))
         start = drawn_posture(solver, rng)
-        found = solver.nearest(target.of_matrix(matrix), start)
+        found = solver.nearest(Pose.of_matrix(matrix), start)
         choice = choose(solver.geometry, matrix, solver.ranges, start)
         assert choice.chosen is not None
         assert found.method == CLOSED_FORM
@@ -73,13 +73,13 @@ def test_nearest_is_the_choice_of_the_closed_form() -> None:
 def test_a_jog_out_of_reach_ends_at_the_nearest_posture_with_the_miss() -> None:
     for arm in (SIX, FOUR):
         solver = PoseSolver(arm)
-        found = solver.nearest(target.of_angles((2000.0, 0.0, 200.0), {}), solver.home_rad)
+        found = solver.nearest(Pose.of_angles((2000.0, 0.0, 200.0), {}), solver.home_rad)
         assert not found.success
         assert found.miss.position_mm > 1000.0
         assert found.reason.startswith("the arm does not reach the pose from here; the nearest posture")
         assert f"misses it by {found.miss}" in found.reason
         assert not any(solver.ranges.excess(found.angles_rad))
-    whole = PoseSolver(SIX).nearest(target.of_angles((2000.0, 0, 0), dict.fromkeys(WHOLE, 0.0)), [0.0] * 6)
+    whole = PoseSolver(SIX).nearest(Pose.of_angles((2000.0, 0, 0), dict.fromkeys(WHOLE, 0.0)), [0.0] * 6)
     assert (whole.success, whole.method) == (False, NUMERICAL)
 
 
@@ -104,9 +104,9 @@ def test_joints_without_a_motor_stay_in_a_jog() -> None:
     assert found.success
     np.testing.assert_array_equal(found.angles_rad[3:], start[3:])
     # A whole pose that the three joints reach is met too, and one that they do not is refused.
-    assert solver.nearest(target.of_matrix(moved), start).success
+    assert solver.nearest(Pose.of_matrix(moved), start).success
     turned = moved @ pose.from_rpy((0, 0, 0), (0, 0, 20))
-    assert not solver.nearest(target.of_matrix(turned), start).success
+    assert not solver.nearest(Pose.of_matrix(turned), start).success
 
 
 def test_solve_chooses_the_nearest_and_says_where_the_tool_is() -> None:
@@ -130,7 +130,7 @@ def test_a_whole_pose_a_little_out_of_reach_is_met_within_its_tolerance() -> Non
     shoulder = np.array([-100.0 * math.cos(0.2), -100.0 * math.sin(0.2), 130.0])
     out = matrix[:3, 3] - 40.0 * matrix[:3, 2] - shoulder
     matrix[:3, 3] += 0.05 * out / np.linalg.norm(out)
-    answer = solver.solve(target.of_matrix(matrix), solver.home_rad)
+    answer = solver.solve(Pose.of_matrix(matrix), solver.home_rad)
     assert answer.success, answer.reason
     assert answer.choice is not None
     assert answer.choice.chosen is None
@@ -140,7 +140,7 @@ def test_a_whole_pose_a_little_out_of_reach_is_met_within_its_tolerance() -> Non
 
 def test_a_refusal_lists_the_reasons_solution_by_solution() -> None:
     solver = PoseSolver(SIX)
-    answer = solver.solve(target.of_angles((900.0, 0.0, 300.0), dict.fromkeys(WHOLE, 0.0)), solver.home_rad)
+    answer = solver.solve(Pose.of_angles((900.0, 0.0, 300.0), dict.fromkeys(WHOLE, 0.0)), solver.home_rad)
     assert not answer.success
     first, columns, front, rear = answer.reason.splitlines()
     assert "bring the pose nearer to the arm" in first
@@ -151,7 +151,7 @@ def test_a_refusal_lists_the_reasons_solution_by_solution() -> None:
 
 def test_another_number_of_angles_is_refused() -> None:
     solver = PoseSolver(OFFSET_WRIST)
-    wanted = target.of_angles((300.0, 0.0, 200.0), {})
+    wanted = Pose.of_angles((300.0, 0.0, 200.0), {})
     for call in (solver.nearest, solver.solve):
         with pytest.raises(InputError, match="3 angles given, the arm has 6 joints"):
             call(wanted, [0.0, 0.0, 0.0])

@@ -13,7 +13,7 @@ import pytest
 from armtempo.errors import InputError
 from armtempo.model import arm as arms
 from armtempo.model import job as jobs
-from armtempo.model import target, trajectory_file
+from armtempo.model import trajectory_file
 from armtempo.model.job import Pose
 from armtempo.model.plan import Plan
 from armtempo.planning import planner
@@ -57,7 +57,7 @@ def test_is_enough_to_plan_again(path: Path) -> None:
 
 
 def test_keeps_poses(plan: Plan, tmp_path: Path) -> None:
-    pose = Pose(target.of_angles((5.0, 6.0, 7.0), {"pitch": 20.0}))
+    pose = Pose.of_angles((5.0, 6.0, 7.0), {"pitch": 20.0})
     posed = replace(plan, job=replace(plan.job, via=(plan.job.via[0], pose)))
     trajectory_file.save(posed, tmp_path / "posed.json")
     assert trajectory_file.load(tmp_path / "posed.json").job == posed.job

@@ -11,7 +11,7 @@ from armtempo.cli import main
 from armtempo.errors import InputError, PlanError
 from armtempo.kinematics import Geometry, forward
 from armtempo.model import job as jobs
-from armtempo.model import pose, target, trajectory_file
+from armtempo.model import pose, trajectory_file
 from armtempo.model.arm import Arm, default_path, load_arm
 from armtempo.model.job import Job, Pose
 from armtempo.planning import planner, via_points
@@ -34,7 +34,7 @@ ALL_DRIVEN = replace(
 def pose_of(*angles_deg: float, arm: Arm = ARM, posture_deg: tuple[float, ...] | None = None) -> Pose:
     """The pose of these joint angles; the wrist at home if only three are given."""
     angles = np.radians([*angles_deg, 0.0, 0.0, 0.0][:6])
-    return Pose(target.of_matrix(forward(Geometry.of(arm), angles)), posture_deg)
+    return replace(Pose.of_matrix(forward(Geometry.of(arm), angles)), posture_deg=posture_deg)
 
 
 def job(*via: tuple[float, ...] | Pose) -> Job:
@@ -128,7 +128,7 @@ def test_a_branch_change_between_angles_the_user_gave_is_his_own() -> None:
 
 
 def test_a_pose_out_of_reach_is_refused_with_every_reason() -> None:
-    far = Pose(target.of_angles((3000.0, 0.0, 0.0), {"roll": 0.0, "pitch": 0.0, "yaw": 0.0}))
+    far = Pose.of_angles((3000.0, 0.0, 0.0), {"roll": 0.0, "pitch": 0.0, "yaw": 0.0})
     with pytest.raises(PlanError, match="via 2: no posture reaches this pose within") as caught:
         via_points.resolve(ARM, job(JOB.via[0], far))
     first, columns, front, rear = str(caught.value).splitlines()
@@ -149,7 +149,7 @@ def test_a_pose_out_of_the_driven_ranges_is_refused_with_the_joint() -> None:
     [
         ((1.0, 2.0), "via 2: 2 angles, but 3 joints have a motor"),
         (
-            Pose(target.of_matrix(np.diag((2.0, 1.0, 1.0, 1.0)))),
+            Pose.of_matrix(np.diag((2.0, 1.0, 1.0, 1.0))),
             "not a rot",
         ),
         (pose_of(0.0, -60.0, 40.0, posture_deg=(1.0, 2.0)), "posture_deg has 2 angles, not 6"),
@@ -162,7 +162,7 @@ def test_wrong_via_points_are_named(via: tuple[float, ...] | Pose, words: str) -
 
 
 def test_plan_prints_the_notes(tmp_path: Path) -> None:
-    rows = pose_of(20.0, -75.0, 50.0, 0.0, 30.0, 0.0).target.matrix
+    rows = pose_of(20.0, -75.0, 50.0, 0.0, 30.0, 0.0).matrix
     file = tmp_path / "job.toml"
     file.write_text(
         'name = "posed"\npopulation = 4\niterations = 5\n'
@@ -178,7 +178,7 @@ def test_plan_prints_the_notes(tmp_path: Path) -> None:
 
 
 def test_a_position_alone_is_reached_by_the_joints_with_a_motor() -> None:
-    wanted = Pose(target.of_angles((300.0, 200.0, 60.0), {}))
+    wanted = Pose.of_angles((300.0, 200.0, 60.0), {})
     resolved = via_points.resolve(ARM, job(JOB.via[0], wanted))
     tool = forward(GEOMETRY, np.radians([*resolved.via_deg[1], 0.0, 0.0, 0.0]))
     np.testing.assert_allclose(tool[:3, 3], (300.0, 200.0, 60.0), atol=1e-6)
@@ -188,19 +188,19 @@ def test_a_position_alone_is_reached_by_the_joints_with_a_motor() -> None:
 def test_four_joints_take_position_and_pitch_near_to_the_via_point_before() -> None:
     angles = ((10.0, 60.0, -80.0, -50.0), (30.0, 70.0, -90.0, -60.0), (60.0, 80.0, -100.0, -40.0))
     poses = (asked(forward(Geometry.of(FOUR), np.radians(each)), ("pitch",)) for each in angles[1:])
-    resolved = via_points.resolve(FOUR, job(angles[0], *map(Pose, poses)))
+    resolved = via_points.resolve(FOUR, job(angles[0], *poses))
     np.testing.assert_allclose(resolved.via_deg, angles, atol=1e-6)
     assert resolved.notes == ()
 
 
 def test_a_pose_within_its_tolerance_is_taken_with_a_note_of_the_miss() -> None:
     off = pose.from_rpy((345.0, 120.0, 60.0), (90.0, 0.0, 19.9))
-    refused = Pose(target.of_matrix(off))
+    refused = Pose.of_matrix(off)
     with pytest.raises(
         PlanError, match=r"via 2: .* 0\.1 mm and 0\.1 deg: the nearest one that was found misses it by"
     ):
         via_points.resolve(FOUR, job((0.0, 60.0, -80.0, -50.0), refused))
-    wider = Pose(replace(target.of_matrix(off), tolerance_deg=1.0))
+    wider = replace(Pose.of_matrix(off), tolerance_deg=1.0)
     resolved = via_points.resolve(FOUR, job((0.0, 60.0, -80.0, -50.0), wider))
     (note,) = resolved.notes
     assert (note.kind, note.via) == ("miss", 2)
@@ -212,7 +212,7 @@ def test_a_tolerance_decides_whether_undriven_joints_are_missed() -> None:
     nearly = pose_of(20.0, -75.0, 50.0, 0.0, 0.05, 0.0)
     (note,) = via_points.resolve(ARM, job(JOB.via[0], nearly)).notes
     assert note.kind == "miss"
-    narrow = replace(nearly, target=replace(nearly.target, tolerance_deg=0.02))
+    narrow = replace(nearly, tolerance_deg=0.02)
     (note,) = via_points.resolve(ARM, job(JOB.via[0], narrow)).notes
     assert note.kind == "undriven"
 
@@ -226,7 +226,7 @@ def test_an_arm_outside_the_class_is_served_numerically() -> None:
     assert not isinstance(angles, Pose)
     resolved = via_points.resolve(arm, job(angles, pose_of(10.0, -70.0, 45.0, arm=arm)))
     np.testing.assert_allclose(resolved.via_deg[1], [10.0, -70.0, 45.0], atol=1e-5)
-    far = Pose(target.of_angles((3000.0, 0.0, 0.0), {"roll": 0.0, "pitch": 0.0, "yaw": 0.0}))
+    far = Pose.of_angles((3000.0, 0.0, 0.0), {"roll": 0.0, "pitch": 0.0, "yaw": 0.0})
     with pytest.raises(
         PlanError, match=r"no posture reaches this pose within .* mm and .* deg: the nearest one"
     ):

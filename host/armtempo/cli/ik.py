@@ -15,7 +15,7 @@ from armtempo.cli import options
 if TYPE_CHECKING:
     from armtempo.kinematics.listing import Listing
     from armtempo.kinematics.solver import PoseSolver
-    from armtempo.model.target import Target
+    from armtempo.model.tool_pose import Pose
 
 Three = tuple[float, float, float]
 Four = tuple[float, float, float, float]
@@ -101,21 +101,21 @@ def command(
     from armtempo.kinematics.listing import listings
     from armtempo.kinematics.solver import PoseSolver
 
-    targets = [_within(target, tolerance_mm, tolerance_deg) for target in _targets(_Given(**given))]
+    wanted = [_within(pose, tolerance_mm, tolerance_deg) for pose in _poses(_Given(**given))]
     solver = PoseSolver(options.load_arm(arm_path))
-    found = listings(solver, targets, _posture(previous, solver), numerical)
+    found = listings(solver, wanted, _posture(previous, solver), numerical)
     show = _print_json if as_json else _print_text
     show(solver, found)
 
 
-def _within(target: Target, tolerance_mm: float | None, tolerance_deg: float | None) -> Target:
-    """The target with the tolerances that were given."""
+def _within(pose: Pose, tolerance_mm: float | None, tolerance_deg: float | None) -> Pose:
+    """The pose with the tolerances that were given."""
     if tolerance_mm is not None:
-        target = replace(target, tolerance_mm=tolerance_mm)
-    return target if tolerance_deg is None else replace(target, tolerance_deg=tolerance_deg)
+        pose = replace(pose, tolerance_mm=tolerance_mm)
+    return pose if tolerance_deg is None else replace(pose, tolerance_deg=tolerance_deg)
 
 
-def _targets(given: _Given) -> list[Target]:
+def _poses(given: _Given) -> list[Pose]:
     """The poses of the options; UsageError where they do not make exactly one of the three forms."""
     from armtempo.kinematics import pose_file
 
@@ -139,21 +139,20 @@ def _targets(given: _Given) -> list[Target]:
     return [_positioned(given, angles)]
 
 
-def _positioned(given: _Given, angles: dict[str, float]) -> Target:
-    """The target of --position and what goes with it."""
-    from armtempo.model import pose, target
+def _positioned(given: _Given, angles: dict[str, float]) -> Pose:
+    """The pose of --position and what goes with it."""
+    from armtempo.model.pose import from_quaternion
+    from armtempo.model.tool_pose import Pose
 
     assert given.position is not None
     if given.quaternion is not None:
-        matrix = pose.from_quaternion(given.position, given.quaternion, "--position --quaternion")
-        return target.of_matrix(matrix)
+        matrix = from_quaternion(given.position, given.quaternion, "--position --quaternion")
+        return Pose.of_matrix(matrix)
     if given.approach is not None:
-        return target.of_approach(given.position, given.approach, "--approach")
+        return Pose.of_approach(given.position, given.approach, "--approach")
     if given.rpy is not None:
         angles = dict(zip(("roll", "pitch", "yaw"), given.rpy, strict=True))
-    return target.of_angles(
-        given.position, angles, " ".join(("--position", *(f"--{name}" for name in angles)))
-    )
+    return Pose.of_angles(given.position, angles, " ".join(("--position", *(f"--{name}" for name in angles))))
 
 
 def _posture(previous: str | None, solver: PoseSolver) -> Sequence[float]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from armtempo.kinematics.forward import Frame
-from armtempo.model.target import APPROACH, PITCH, ROLL, YAW, Target
+from armtempo.model.tool_pose import APPROACH, PITCH, ROLL, YAW, Pose
 
 Vector = tuple[float, float, float]
 X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
@@ -64,7 +64,7 @@ class Direction(NamedTuple):
 class Constraint:
     """A target, ready for the solver."""
 
-    target: Target
+    target: Pose
     position: Vector
     axes: tuple[Vector, Vector, Vector]
     """x, y, z of the tool that the target's matrix shows."""
@@ -72,7 +72,7 @@ class Constraint:
     """What is asked of the orientation, where that is not all of it (or nothing)."""
 
     @classmethod
-    def of(cls, target: Target) -> Constraint:
+    def of(cls, target: Pose) -> Constraint:
         """Make ready."""
         x, y, z, position = (_column(target, index) for index in range(4))
         return cls(target, position, (x, y, z), _partly(target, (x, y, z)))
@@ -135,7 +135,7 @@ def _whole(axes: Sequence[Vector], tool: Frame[float]) -> Turned:
     return Turned(square, torque, 2.0, 0.0, (0.0, 0.0, 0.0))
 
 
-def _partly(target: Target, axes: tuple[Vector, Vector, Vector]) -> Component | Direction | None:
+def _partly(target: Pose, axes: tuple[Vector, Vector, Vector]) -> Component | Direction | None:
     x, y, z = axes
     upright = math.hypot(x[0], x[1]) < UPRIGHT
     below = x[2], y[2], z[2]  # the base's z axis, seen from the tool
@@ -156,7 +156,7 @@ def _partly(target: Target, axes: tuple[Vector, Vector, Vector]) -> Component | 
     return None
 
 
-def _column(target: Target, index: int) -> Vector:
+def _column(target: Pose, index: int) -> Vector:
     a, b, c = (float(row[index]) for row in target.matrix[:3])
     return a, b, c
 

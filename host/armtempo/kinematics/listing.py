@@ -15,7 +15,7 @@ from armtempo.kinematics.rejection import Rejection
 from armtempo.kinematics.solutions import ELBOW_STRETCHED, ON_AXIS_1, WRIST_STRAIGHT
 from armtempo.kinematics.solver import CLOSED_FORM, NUMERICAL, Answer, PoseSolver
 from armtempo.model.pose import to_rpy_deg
-from armtempo.model.target import Target
+from armtempo.model.tool_pose import Pose
 
 SINGULAR = {
     ON_AXIS_1: "wrist centre on axis 1: joint 1 kept as before",
@@ -34,7 +34,7 @@ class Listing:
 
 
 def listings(
-    solver: PoseSolver, targets: Iterable[Target], previous_rad: Sequence[float], numerically: bool
+    solver: PoseSolver, targets: Iterable[Pose], previous_rad: Sequence[float], numerically: bool
 ) -> Iterator[Listing]:
     """Solve targets one after the other, each nearest to the posture chosen before."""
     for target in targets:

@@ -15,7 +15,7 @@ from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.ranges import Ranges
 from armtempo.kinematics.rejection import Rejection, out_of_range, table
 from armtempo.model.arm import Arm
-from armtempo.model.target import Target
+from armtempo.model.tool_pose import Pose
 
 LEAST_STARTS, MOST_STARTS = 40, 240
 STARTS_PER_SOLUTION = 12
@@ -66,7 +66,7 @@ class MovingArm:
         placed = self.ranges.placed(angles_rad, previous_rad)
         return [placed[i] if i in self.moving else angle for i, angle in enumerate(angles_rad)]
 
-    def underdetermined(self, target: Target) -> bool:
+    def underdetermined(self, target: Pose) -> bool:
         """Whether more joints move than the target asks numbers for: then it leaves a choice of postures."""
         return len(self.moving) > target.constraints
 
@@ -89,7 +89,7 @@ class NumericalSolutions:
     """What the search found for one target."""
 
     arm: MovingArm
-    target: Target
+    target: Pose
     solutions: tuple[NumericalSolution, ...]
     """Each meets the target within its tolerances; those that can be used first, nearest first."""
     nearest: NumericalSolution
@@ -116,9 +116,7 @@ class NumericalSolutions:
         return why_not(self) + (table(each.rejections for each in self.solutions) if self.solutions else "")
 
 
-def search(
-    arm: MovingArm, target: Target, previous_rad: Sequence[float], seed: int = 0
-) -> NumericalSolutions:
+def search(arm: MovingArm, target: Pose, previous_rad: Sequence[float], seed: int = 0) -> NumericalSolutions:
     """Search the postures that meet ``target``, from ``previous_rad``, (joints,), and from random postures.
 
     The same ``seed`` gives the same answer. A target that leaves joints free gets the one posture that the
@@ -156,7 +154,7 @@ def _starts(arm: MovingArm, previous: list[float], seed: int) -> Iterator[list[f
         yield start
 
 
-def _enough(arm: MovingArm, target: Target, found: list[NumericalSolution], starts: int) -> bool:
+def _enough(arm: MovingArm, target: Pose, found: list[NumericalSolution], starts: int) -> bool:
     if arm.underdetermined(target) and found:
         return True
     return starts >= max(LEAST_STARTS, STARTS_PER_SOLUTION * (len(found) + 1)) or len(found) > MOST_SOLUTIONS
@@ -178,7 +176,7 @@ def _same(one: NumericalSolution, other: NumericalSolution) -> bool:
     )
 
 
-def _least_miss(arm: MovingArm, target: Target, previous: list[float], seed: int) -> NumericalSolution:
+def _least_miss(arm: MovingArm, target: Pose, previous: list[float], seed: int) -> NumericalSolution:
     """The posture within the ranges that misses the target by least, of those that a few starts lead to."""
     problem = arm.problem(Constraint.of(target), within=True)
     best = descend(problem, previous)

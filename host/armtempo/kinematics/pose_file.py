@@ -8,9 +8,8 @@ import numpy as np
 
 from armtempo.errors import InputError
 from armtempo.formats.atomic_file import why
-from armtempo.model import target
 from armtempo.model.pose import LARGEST, checked, from_quaternion
-from armtempo.model.target import WHOLE, Target
+from armtempo.model.tool_pose import WHOLE, Pose
 
 FORMS = {
     3: "x y z: position only",
@@ -24,7 +23,7 @@ FORMS = {
 FREE = "-"
 
 
-def read(path: Path | str) -> list[Target]:
+def read(path: Path | str) -> list[Pose]:
     """Return the poses of a file; InputError names the file and the line that is wrong."""
     try:
         text = Path(path).read_text(encoding="utf-8")
@@ -40,7 +39,7 @@ def read(path: Path | str) -> list[Target]:
     return poses
 
 
-def parse(text: str, what: str, counts: tuple[int, ...] = tuple(FORMS)) -> Target:
+def parse(text: str, what: str, counts: tuple[int, ...] = tuple(FORMS)) -> Pose:
     """Return the pose that ``text`` writes in as many numbers as ``counts`` allows."""
     words = text.replace(",", " ").split()
     if len(words) not in counts:
@@ -50,11 +49,11 @@ def parse(text: str, what: str, counts: tuple[int, ...] = tuple(FORMS)) -> Targe
         position = numbers(" ".join(words[:3]), what)
         fixed = {name: word for name, word in zip(WHOLE, words[3:], strict=False) if word != FREE}
         angles = dict(zip(fixed, numbers(" ".join(fixed.values()), what), strict=True))
-        return target.of_angles(position, angles, what)
+        return Pose.of_angles(position, angles, what)
     found = numbers(text, what)
     if len(words) == 7:
-        return target.of_matrix(from_quaternion(found[:3], found[3:], what))
-    return target.of_matrix(checked(np.reshape(found, (-1, 4)), what))
+        return Pose.of_matrix(from_quaternion(found[:3], found[3:], what))
+    return Pose.of_matrix(checked(np.reshape(found, (-1, 4)), what))
 
 
 def numbers(text: str, what: str) -> list[float]:

@@ -24,7 +24,7 @@ from armtempo.kinematics.rejection import out_of_range, table
 from armtempo.kinematics.shape import refusals
 from armtempo.kinematics.solutions import OK
 from armtempo.model.arm import Arm
-from armtempo.model.target import WHOLE, Target
+from armtempo.model.tool_pose import WHOLE, Pose
 
 CLOSED_FORM, NUMERICAL = "closed form", "numerical"
 
@@ -45,12 +45,17 @@ class Nearest:
     method: str
     """CLOSED_FORM or NUMERICAL."""
 
+    @property
+    def angles_deg(self) -> tuple[float, ...]:
+        """(joints,)"""
+        return tuple(map(math.degrees, self.angles_rad))
+
 
 @dataclass(frozen=True, eq=False)
 class Answer:
     """All that is known of a target's postures."""
 
-    target: Target
+    target: Pose
     choice: Choice | None
     """The eight solutions of the closed form, where it was asked."""
     search: NumericalSolutions | None
@@ -70,6 +75,11 @@ class Answer:
     def success(self) -> bool:
         """Whether a posture can be used."""
         return not self.reason
+
+    @property
+    def angles_deg(self) -> tuple[float, ...]:
+        """(joints,)"""
+        return tuple(map(math.degrees, self.angles_rad))
 
 
 @dataclass(frozen=True)
@@ -103,7 +113,7 @@ class PoseSolver:
         """Why the closed form does not serve this arm; empty if it does."""
         return refusals(self.geometry)
 
-    def nearest(self, target: Target, start_rad: Sequence[float]) -> Nearest:
+    def nearest(self, target: Pose, start_rad: Sequence[float]) -> Nearest:
         """The posture that meets ``target`` nearest to ``start_rad``, (joints,): well under a millisecond.
 
         Joints without a motor stay where they start. Arms of the closed form's class with six driven joints get
@@ -128,7 +138,7 @@ class PoseSolver:
         within = descend(self.moving.problem(constraint, within=True), start).angles_rad
         return self._answer(target, start, within, NUMERICAL, "; ".join(outside))
 
-    def solve(self, target: Target, previous_rad: Sequence[float], numerically: bool = False) -> Answer:
+    def solve(self, target: Pose, previous_rad: Sequence[float], numerically: bool = False) -> Answer:
         """All postures that meet ``target``, the one nearest to ``previous_rad``, (joints,), chosen.
 
         A whole pose is solved by the closed form where it serves the arm, unless ``numerically``, with all joints
@@ -156,7 +166,7 @@ class PoseSolver:
             raise InputError(f"{len(angles)} angles given, the arm has {len(self.arm.joints)} joints")
         return angles
 
-    def _nearest_of_eight(self, target: Target, start: list[float]) -> list[float] | None:
+    def _nearest_of_eight(self, target: Pose, start: list[float]) -> list[float] | None:
         """The nearest solution of the closed form within the ranges; None if there is none."""
         rows = [element for row in target.matrix for element in row]
         best, least = None, math.inf
@@ -170,7 +180,7 @@ class PoseSolver:
         return best
 
     def _answer(
-        self, target: Target, start: list[float], angles: list[float], method: str, outside: str = ""
+        self, target: Pose, start: list[float], angles: list[float], method: str, outside: str = ""
     ) -> Nearest:
         constraint = Constraint.of(target)
         miss = constraint.miss(frames(self.geometry, angles)[-1])
@@ -184,7 +194,7 @@ class PoseSolver:
 
     def _solved(
         self,
-        target: Target,
+        target: Pose,
         choice: Choice | None,
         found: NumericalSolutions | None,
         angles: Sequence[float],

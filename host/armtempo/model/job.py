@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import string
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from armtempo_shared.limits import MAX_NAME, MAX_SEGMENTS
@@ -12,24 +12,15 @@ from armtempo_shared.limits import MAX_NAME, MAX_SEGMENTS
 from armtempo.errors import InputError
 from armtempo.formats import toml_table
 from armtempo.formats.toml_table import Table
-from armtempo.model import target_table
+from armtempo.model import pose_table
 from armtempo.model.arm import Arm
-from armtempo.model.target import Target
+from armtempo.model.tool_pose import Pose as Pose
 
 OPTIMISERS = ("acs", "cs", "ga", "iaga", "pso", "hpso")
 """Names of the search algorithms (Table 4)."""
 
 REFINE, POPULATION, ITERATIONS = (1, 64), (4, 100_000), (1, 1_000_000)
 """Least and most of these settings."""
-
-
-@dataclass(frozen=True)
-class Pose:
-    """A tool pose to pass, or as much of one as its target asks for."""
-
-    target: Target
-    posture_deg: tuple[float, ...] | None = None
-    """Which solution to prefer; None: nearest to the one before."""
 
 
 @dataclass(frozen=True)
@@ -131,9 +122,9 @@ def _via(table: Table, where: str, arm: Arm) -> tuple[float, ...] | Pose:
         table.done()
         return angles
     posture = table.numbers("posture_deg", len(arm.joints)) if table.has("posture_deg") else None
-    target = target_table.read(table, where)
+    pose = pose_table.read(table, where)
     table.done()
-    return Pose(target, posture)
+    return replace(pose, posture_deg=posture)
 
 
 def _angles(table: Table, key: str, arm: Arm) -> tuple[float, ...]:

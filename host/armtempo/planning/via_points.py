@@ -29,9 +29,9 @@ from armtempo.kinematics.ranges import Ranges
 from armtempo.kinematics.rejection import table
 from armtempo.kinematics.solver import PoseSolver
 from armtempo.model.arm import Arm
-from armtempo.model.job import Job, Pose
+from armtempo.model.job import Job
 from armtempo.model.pose import checked
-from armtempo.model.target import WHOLE, Target
+from armtempo.model.tool_pose import WHOLE, Pose
 
 STAYS_DEG = 0.01
 """A joint without a motor that a pose needs this little away from home need not be named."""
@@ -89,7 +89,7 @@ class _Setup:
         """The posture with the driven joints at ``angles`` and the others at home."""
         return np.where(self.driven, angles, self.home)
 
-    def miss(self, target: Target, angles: Array) -> Miss:
+    def miss(self, target: Pose, angles: Array) -> Miss:
         """How far the tool stays from its pose if only the driven joints move."""
         tool = frames(self.solver.geometry, self.moved(angles).tolist())[-1]
         return Constraint.of(target).miss(tool)
@@ -110,8 +110,8 @@ def resolve(arm: Arm, job: Job) -> Resolved:
         where = f"job {job.name!r}, via {number}"
         choice = None
         if isinstance(via, Pose):
-            matrix = checked(via.target.matrix, where).tolist()
-            target = replace(via.target, matrix=tuple(map(tuple, matrix)))
+            matrix = checked(via.matrix, where).tolist()
+            target = replace(via, matrix=tuple(map(tuple, matrix)))
             previous = posture if via.posture_deg is None else _preferred(setup, via.posture_deg, where)
             needed, choice = _solve(setup, target, previous, via.posture_deg is None, where)
             notes += _miss_note(setup, target, needed, number)
@@ -136,7 +136,7 @@ def _spread(setup: _Setup, via: tuple[float, ...], where: str) -> Array:
 
 
 def _solve(
-    setup: _Setup, target: Target, previous: Array, home_first: bool, where: str
+    setup: _Setup, target: Pose, previous: Array, home_first: bool, where: str
 ) -> tuple[Array, Choice | None]:
     """All that the pose asks for, (joints,) in rad; the choice only where it came of the closed form."""
     if not setup.closed_form or target.fixed != WHOLE:
@@ -152,7 +152,7 @@ def _solve(
 
 
 def _searched(
-    setup: _Setup, target: Target, previous: Array, where: str, choice: Choice | None = None
+    setup: _Setup, target: Pose, previous: Array, where: str, choice: Choice | None = None
 ) -> Array:
     """A posture of the numerical search, (joints,) in rad; PlanError with all reasons where there is none."""
     answer = setup.solver.solve(target, previous.tolist(), numerically=True)
@@ -168,7 +168,7 @@ def _preferred(setup: _Setup, posture_deg: tuple[float, ...], where: str) -> Arr
     return np.radians(posture_deg)
 
 
-def _miss_note(setup: _Setup, target: Target, needed: Array, number: int) -> list[Note]:
+def _miss_note(setup: _Setup, target: Pose, needed: Array, number: int) -> list[Note]:
     """What to say where the tool does not quite reach the pose."""
     miss = setup.miss(target, needed)
     if not Constraint.of(target).reached(miss):

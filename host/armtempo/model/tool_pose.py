@@ -36,7 +36,7 @@ SMALLEST, LARGEST_MM, LARGEST_DEG = 1e-6, 1000.0, 180.0
 
 
 @dataclass(frozen=True)
-class Target:
+class Pose:
     """A tool pose, or as much of one as ``fixed`` says.
 
     The position always counts. Roll, pitch and yaw turn about x, then y, then z of the base.
@@ -44,13 +44,15 @@ class Target:
 
     matrix: Rows
     """4 rows of 4, lengths in mm; its rotation is one of those that are asked for."""
+    posture_deg: tuple[float, ...] | None = None
+    """In a job: angles of all joints; the solution nearest to them is taken. None: nearest to the one before."""
     fixed: tuple[str, ...] = WHOLE
     """A key of CONSTRAINTS: what counts of the orientation; "approach": the direction of the tool's z axis."""
     tolerance_mm: float = TOLERANCE_MM
     tolerance_deg: float = TOLERANCE_DEG
 
     def __post_init__(self) -> None:
-        """InputError for what makes no target."""
+        """InputError for what makes no pose."""
         if self.fixed not in CONSTRAINTS:
             allowed = ", ".join("+".join(fixed) or "nothing" for fixed in CONSTRAINTS)
             raise InputError(f"a pose may fix {allowed} of its orientation, not {'+'.join(self.fixed)}")
@@ -64,7 +66,7 @@ class Target:
 
     @property
     def constraints(self) -> int:
-        """How many numbers the target asks for, 3 to 6."""
+        """How many numbers the pose asks for, 3 to 6."""
         return CONSTRAINTS[self.fixed]
 
     @property
@@ -74,32 +76,36 @@ class Target:
             return "whole pose"
         return " and ".join(("position", *self.fixed)) if self.fixed else "position only"
 
+    @classmethod
+    def of_matrix(cls, matrix: Array, fixed: tuple[str, ...] = WHOLE) -> Pose:
+        """Of a checked matrix, (4, 4)."""
+        return cls(tuple(map(tuple, matrix.tolist())), fixed=fixed)
 
-def of_matrix(matrix: Array, fixed: tuple[str, ...] = WHOLE) -> Target:
-    """The target of a checked pose, (4, 4)."""
-    return Target(tuple(map(tuple, matrix.tolist())), fixed)
+    @classmethod
+    def of_angles(
+        cls, position: Sequence[float], angles_deg: Mapping[str, float], what: str = "the pose"
+    ) -> Pose:
+        """A position with any of "roll", "pitch" and "yaw"; those left out are free. InputError names ``what``."""
+        fixed = tuple(name for name in WHOLE if name in angles_deg)
+        if fixed not in CONSTRAINTS:
+            raise InputError(
+                f"{what}: roll and yaw without pitch leave too much open; give pitch too, or leave one out"
+            )
+        rpy = [angles_deg.get(name, 0.0) for name in WHOLE]
+        return cls.of_matrix(pose.from_rpy(position, rpy, what), fixed)
 
-
-def of_angles(position: Sequence[float], angles_deg: Mapping[str, float], what: str = "the pose") -> Target:
-    """A position with any of "roll", "pitch" and "yaw"; those left out are free. InputError names ``what``."""
-    fixed = tuple(name for name in WHOLE if name in angles_deg)
-    if fixed not in CONSTRAINTS:
-        raise InputError(
-            f"{what}: roll and yaw without pitch leave too much open; give pitch too, or leave one out"
-        )
-    rpy = [angles_deg.get(name, 0.0) for name in WHOLE]
-    return of_matrix(pose.from_rpy(position, rpy, what), fixed)
-
-
-def of_approach(position: Sequence[float], direction: Sequence[float], what: str = "the pose") -> Target:
-    """A position with the direction, of any length, in which the tool's z axis points."""
-    length = math.hypot(*direction)
-    if not 1e-9 <= length <= pose.LARGEST:
-        raise InputError(
-            f"{what}: the approach is a direction such as 0 0 -1 (straight down), not of length {length:g}"
-        )
-    z = np.array(direction) / length
-    x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
-    x /= np.linalg.norm(x)
-    matrix = np.column_stack((x, np.cross(z, x), z, position))
-    return of_matrix(pose.checked(matrix, what), (APPROACH,))
+    @classmethod
+    def of_approach(
+        cls, position: Sequence[float], direction: Sequence[float], what: str = "the pose"
+    ) -> Pose:
+        """A position with the direction, of any length, in which the tool's z axis points."""
+        length = math.hypot(*direction)
+        if not 1e-9 <= length <= pose.LARGEST:
+            raise InputError(
+                f"{what}: the approach is a direction such as 0 0 -1 (straight down), not of length {length:g}"
+            )
+        z = np.array(direction) / length
+        x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
+        x /= np.linalg.norm(x)
+        matrix = np.column_stack((x, np.cross(z, x), z, position))
+        return cls.of_matrix(pose.checked(matrix, what), (APPROACH,))

@@ -1,4 +1,4 @@
-"""A target from a TOML table: a tool pose, or as much of one as is asked for, with its tolerances."""
+"""A tool pose from a TOML table, or as much of one as is asked for, with its tolerances."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ import numpy as np
 
 from armtempo.errors import InputError
 from armtempo.formats.toml_table import Table
-from armtempo.model import pose, target
-from armtempo.model.target import LARGEST_DEG, LARGEST_MM, SMALLEST, WHOLE, Target
+from armtempo.model import pose
+from armtempo.model.tool_pose import LARGEST_DEG, LARGEST_MM, SMALLEST, WHOLE, Pose
 
 ORIENTATIONS = ("rpy_deg", "quaternion", "approach")
 """Keys that give an orientation in one piece; position_mm goes with one of them, with single angles, or alone."""
 
 
-def read(table: Table, where: str) -> Target:
-    """The target that ``table`` gives as ``matrix`` or ``position_mm``; InputError, naming ``where``, else."""
+def read(table: Table, where: str) -> Pose:
+    """The pose that ``table`` gives as ``matrix`` or ``position_mm``; InputError, naming ``where``, else."""
     found = _matrix(table, where) if table.has("matrix") else _positioned(table, where)
     return replace(
         found,
@@ -25,16 +25,16 @@ def read(table: Table, where: str) -> Target:
     )
 
 
-def _matrix(table: Table, where: str) -> Target:
+def _matrix(table: Table, where: str) -> Pose:
     given = table.array("matrix", "the 4 rows of a pose, lengths in mm")
     if len(given) != 4:
         raise table.fail("matrix", "4 rows of 4 numbers")
     rows = Table({f"row {n}": row for n, row in enumerate(given, 1)}, table.file, "matrix ")
     matrix = np.array([rows.numbers(f"row {n}", 4) for n in range(1, 5)])
-    return target.of_matrix(pose.checked(matrix, f"{where}.matrix"))
+    return Pose.of_matrix(pose.checked(matrix, f"{where}.matrix"))
 
 
-def _positioned(table: Table, where: str) -> Target:
+def _positioned(table: Table, where: str) -> Pose:
     position = table.numbers("position_mm", 3)
     angles = {name: table.number(f"{name}_deg") for name in WHOLE if table.has(f"{name}_deg")}
     given = [key for key in ORIENTATIONS if table.has(key)]
@@ -45,9 +45,9 @@ def _positioned(table: Table, where: str) -> Target:
         )
     if given == ["quaternion"]:
         matrix = pose.from_quaternion(position, table.numbers("quaternion", 4), f"{where}.quaternion")
-        return target.of_matrix(matrix)
+        return Pose.of_matrix(matrix)
     if given == ["approach"]:
-        return target.of_approach(position, table.numbers("approach", 3), f"{where}.approach")
+        return Pose.of_approach(position, table.numbers("approach", 3), f"{where}.approach")
     if given == ["rpy_deg"]:
         angles = dict(zip(WHOLE, table.numbers("rpy_deg", 3), strict=True))
-    return target.of_angles(position, angles, where)
+    return Pose.of_angles(position, angles, where)
