@@ -53,6 +53,7 @@ FIVE = arm(
 )
 SIX = replace(
     PAPER_ARM,
+    name="six",
     joints=tuple(
         replace(each, motor=replace(_DRIVE.motor, channel=number), limits=_DRIVE.limits)
         for number, each in enumerate(PAPER_ARM.joints, 1)
