@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from armtempo.model.arm import Limits
 from armtempo.runs.differentiation import WINDOW, derivative, noise, quantisation_sigma
-from armtempo.runs.run_folder import COMPLETE
 from armtempo.runs.reader import Samples
+from armtempo.runs.run_folder import COMPLETE
 from armtempo.splines.trajectory import Trajectory
 
 Array = NDArray[np.float64]

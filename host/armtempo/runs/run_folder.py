@@ -26,11 +26,11 @@ from typing import Any, Self
 from armtempo_shared import limits
 
 from armtempo import __version__
-from armtempo.model.arm import Arm
-from armtempo.records.encode import counts_per_deg, steps_per_deg
 from armtempo.errors import InputError, RunFolderError
 from armtempo.formats.atomic_file import replace_text
 from armtempo.link.messages import Sample, Stand
+from armtempo.model.arm import Arm
+from armtempo.records.encode import counts_per_deg, steps_per_deg
 
 FORMAT = "armtempo run"
 VERSION = 1
