@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -147,6 +149,17 @@ def test_a_refusal_lists_the_reasons_solution_by_solution() -> None:
     assert columns.split() == ["solution", "why", "not"]
     assert front.startswith("  1, 2, 3, 4  out of reach by 328.941 mm")
     assert rear.startswith("  5, 6, 7, 8  out of reach by 131.02 mm")
+
+
+def test_the_example_in_the_docs_runs() -> None:
+    page = Path(__file__).parents[2] / "host" / "docs" / "kinematics.md"
+    block = page.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
+    names: dict[str, Any] = {}
+    exec(block, names)
+    assert names["answer"].success
+    assert names["jog"].success
+    assert names["many"].angles_rad.shape == (1000, 8, 6)
+    np.testing.assert_allclose(names["one"].angles_rad, names["many"].angles_rad[0], atol=1e-12)
 
 
 def test_another_number_of_angles_is_refused() -> None:

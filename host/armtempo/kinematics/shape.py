@@ -20,7 +20,7 @@ Eq. (3), or that near to axis 1, is taken to lie on it."""
 
 ROUNDING = 1e-14
 """The same for a wrist centre within a border: just above what rounding makes of a pose. Elbow up and down
-are two solutions there, ever nearer to each other: at 1e-14 of the reach 3e-7 rad apart or so."""
+are two solutions farther in: from about 4e-7 rad of the elbow on."""
 
 
 STRAIGHT_WRIST = 1e-10
