@@ -37,7 +37,7 @@ ORDER = (
 LOWEST = ("__init__",)  # the version; its public names are imported when they are used
 HIGHEST = ("__main__",)
 MOST_PARAMETERS = 6
-OWN_PARAMETERS = ("search", "reasons")
+OWN_PARAMETERS = ("search",)
 """``optimise.*.search`` takes an algorithm's own parameters, each by its name in the algorithm's table."""
 SAME_BY_DESIGN = {
     "Timer",

@@ -54,9 +54,7 @@ def test_is_enough_to_plan_again(path: Path) -> None:
 
 
 def test_keeps_poses(plan: Plan, tmp_path: Path) -> None:
-    pose = Pose(
-        ((1.0, 0.0, 0.0, 5.0), (0.0, 1.0, 0.0, 6.0), (0.0, 0.0, 1.0, 7.0), (0.0, 0.0, 0.0, 1.0)), None
-    )
+    pose = Pose.of_angles((5.0, 6.0, 7.0), {"pitch": 20.0})
     posed = replace(plan, job=replace(plan.job, via=(plan.job.via[0], pose)))
     trajectory_file.save(posed, tmp_path / "posed.json")
     assert trajectory_file.load(tmp_path / "posed.json").job == posed.job

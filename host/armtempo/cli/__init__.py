@@ -20,6 +20,7 @@ COMMANDS = (
     "demo",
     "plan",
     "ik",
+    "fk",
     "bench",
     "paper",
     "upload",

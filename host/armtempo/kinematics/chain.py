@@ -1,11 +1,14 @@
-"""Where the whole arm is while its driven joints move: postures and tool path for the drawings."""
+"""From the driven joints to the whole arm: angles of all joints, and where they bring its links and its tool."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from armtempo.arrays import Array
+from armtempo.errors import InputError
 from armtempo.kinematics.forward import postures
-from armtempo.kinematics.geometry import Array, Geometry
+from armtempo.kinematics.geometry import Geometry
 from armtempo.model.arm import Arm
 from armtempo.splines.trajectory import Trajectory
 
@@ -18,6 +21,24 @@ def all_angles_deg(arm: Arm, driven_deg: Array) -> Array:
     angles = angles.copy()
     angles[..., [joint.motor is not None for joint in arm.joints]] = driven_deg
     return angles
+
+
+def spread_deg(arm: Arm, angles_deg: ArrayLike, what: str = "") -> Array:
+    """Angles of all joints (..., joints) from theirs or from those of the driven ones (..., J), the others at home.
+
+    Raises InputError, which begins with ``what``, for another number of angles.
+    """
+    angles = np.asarray(angles_deg, dtype=np.float64)
+    count = angles.shape[-1] if angles.ndim else 1
+    if angles.ndim and count == len(arm.joints):
+        return angles
+    if angles.ndim and count == len(arm.driven):
+        return all_angles_deg(arm, angles)
+    driven = "" if len(arm.driven) == len(arm.joints) else f", of which {len(arm.driven)} have a motor"
+    raise InputError(
+        f"{what}{count} angles given, but arm {arm.name!r} has {len(arm.joints)} joints{driven}; give one angle "
+        "for each"
+    )
 
 
 def chains_mm(arm: Arm, driven_deg: Array) -> Array:

@@ -4,9 +4,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple, TypeVar
 
-from armtempo.arrays import Array as Array
+from armtempo.arrays import Array
 from armtempo.model.arm import Arm
+
+T = TypeVar("T", float, Array)
+"""For formulas that serve floats and arrays alike, element by element."""
+
+
+class Link(NamedTuple):
+    """One Denavit-Hartenberg row, ready to use."""
+
+    d: float
+    a: float
+    cos_alpha: float
+    sin_alpha: float
+    offset: float
 
 
 @dataclass(frozen=True)
@@ -32,6 +47,12 @@ class Geometry:
             alpha=tuple(math.radians(joint.alpha_deg) for joint in arm.joints),
             offset=tuple(math.radians(joint.theta_offset_deg) for joint in arm.joints),
         )
+
+    @cached_property
+    def links(self) -> tuple[Link, ...]:
+        """The rows."""
+        rows = zip(self.d, self.a, self.alpha, self.offset, strict=True)
+        return tuple(Link(d, a, *twist(alpha), offset) for d, a, alpha, offset in rows)
 
     @property
     def joints(self) -> int:
