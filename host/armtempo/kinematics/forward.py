@@ -25,7 +25,7 @@ def frames(geometry: Geometry, angles_rad: ArrayLike) -> Iterator[Frame]:
 
     One array a matrix element, no products of 4 x 4 matrices: many postures cost little more than one.
     """
-    angles = np.asarray(angles_rad, dtype=np.float64)
+    angles = geometry.turns(np.asarray(angles_rad, dtype=np.float64))
     batch = angles.shape[:-1]
     x, y, z = (np.broadcast_to(unit.reshape(3, *(1,) * len(batch)), (3, *batch)) for unit in np.eye(3))
     origin = np.zeros((3, *batch))

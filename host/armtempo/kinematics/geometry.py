@@ -26,6 +26,9 @@ class Geometry:
     alpha: tuple[float, ...]
     offset: tuple[float, ...]
     """Added to each joint's angle."""
+    linked: tuple[bool, ...] = ()
+    """Joints that a parallel linkage turns: their angle less that of the joint before is what the row turns by.
+    Empty: none."""
 
     @classmethod
     def of(cls, arm: Arm) -> Geometry:
@@ -35,7 +38,17 @@ class Geometry:
             a=tuple(joint.a_mm for joint in arm.joints),
             alpha=tuple(math.radians(joint.alpha_deg) for joint in arm.joints),
             offset=tuple(math.radians(joint.theta_offset_deg) for joint in arm.joints),
+            linked=tuple(joint.parallel_linkage for joint in arm.joints),
         )
+
+    def turns(self, angles: Array) -> Array:
+        """What each row turns by beyond its offset, (..., joints), for the joints' angles (..., joints)."""
+        if not any(self.linked):
+            return angles
+        turns = angles.copy()
+        for i in np.flatnonzero(self.linked):
+            turns[..., i] -= angles[..., i - 1]
+        return turns
 
     @property
     def joints(self) -> int:

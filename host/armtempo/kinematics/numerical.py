@@ -105,7 +105,8 @@ def _jacobian(geometry: Geometry, angles: Array) -> Array:
         )
         for frame in before
     ]
-    return np.column_stack(columns)
+    # With parallel linkages the rows turn by differences of the angles, which come in linearly.
+    return np.column_stack(columns) @ geometry.turns(np.eye(geometry.joints)).T
 
 
 def _judged(geometry: Geometry, target: Array, angles: Array, starts: int) -> NumericalSolution:
