@@ -41,14 +41,17 @@ def _arm_option(text: str) -> Callable[[FC], FC]:
         envvar="ARMTEMPO_ARM",
         show_envvar=True,
         type=click.Path(path_type=Path),
-        metavar="FILE",
+        metavar="ARM",
         help=text,
     )
 
 
-arm = _arm_option("Arm file (TOML); without it the paper's 1:5 arm.")
+arm = _arm_option(
+    "Arm file (TOML), or the name of an arm that ships, such as ar4; without it the paper's 1:5 arm."
+)
 arm_of_file = _arm_option(
-    "Arm file (TOML), which a trajectory file must fit; without it the one in that file, else the paper's 1:5 arm."
+    "Arm file (TOML) or name of an arm that ships, which a trajectory file must fit; without it the one in that "
+    "file, else the paper's 1:5 arm."
 )
 job = click.option(
     "--job",
@@ -71,7 +74,20 @@ def load_arm(path: Path | None) -> Arm:
     """The arm of ``--arm``."""
     from armtempo.model import arm as arms
 
-    return arms.load_arm(path or arms.default_path())
+    return arms.load_arm(arm_file(path))
+
+
+def arm_file(path: Path | None) -> Path:
+    """The file of ``--arm``: a path, or the name of an arm that ships, which is said aloud."""
+    from armtempo.model import arm as arms
+    from armtempo.model import shipped
+
+    if path is None:
+        return arms.default_path()
+    file, ships = shipped.find(path)
+    if ships:
+        click.echo(f"arm: {path}, as it ships with armtempo ({file})", err=True)
+    return file
 
 
 @contextmanager
