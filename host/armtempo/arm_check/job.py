@@ -1,0 +1,54 @@
+"""A job against its arm: whether it can be read, reached and seen in steps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from armtempo.arm_check.finding import Finding, error, note, warning
+from armtempo.errors import ArmtempoError
+from armtempo.kinematics.geometry import Array
+from armtempo.model.arm import Arm
+from armtempo.model.job import load_job
+from armtempo.planning import checks, planner
+
+
+def findings(arm: Arm, path: Path) -> list[Finding]:
+    """What looks wrong about the job in the file ``path``."""
+    try:
+        job = load_job(path, arm)
+        checks.check_job(arm, job)
+        via_deg, notes = planner.via_angles(arm, job)
+    except ArmtempoError as refused:
+        return [error("job", str(refused), "correct that; the rest of the job was not looked at")]
+    told = [note("job", text, "change the pose, or take it as it is") for text in notes]
+    return [*told, *_ranges(arm, via_deg), *_steps(arm, via_deg)]
+
+
+def _ranges(arm: Arm, via_deg: Array) -> list[Finding]:
+    found = []
+    for joint, angles in zip(arm.driven, via_deg.T, strict=True):
+        low, high = joint.range_deg
+        outside = np.flatnonzero((angles < low) | (angles > high))
+        if len(outside):
+            points = ", ".join(f"P{number} ({angles[number]:g})" for number in outside)
+            text = f"{joint.name} leaves its range of {low:g} to {high:g} deg at {points}"
+            found.append(error("job", text, "move these via points into the range"))
+    return found
+
+
+def _steps(arm: Arm, via_deg: Array) -> list[Finding]:
+    """Joints that are to move, but by less than a step."""
+    found = []
+    for joint, angles in zip(arm.driven, via_deg.T, strict=True):
+        assert joint.motor is not None
+        way_deg = float(np.ptp(angles))
+        if 0.0 < way_deg * joint.motor.steps_per_deg < 1.0:
+            text = f"{joint.name} is to move by {way_deg:.2g} deg, less than a step"
+            found.append(
+                warning(
+                    "job", text, "check the unit: angles are degrees; it will stand still or make one step"
+                )
+            )
+    return found
