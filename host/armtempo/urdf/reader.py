@@ -74,7 +74,8 @@ def read(path: Path, base: str | None = None, tip: str | None = None) -> Chain:
     urdf = _reader()
     _check_text(path)
     try:
-        model = urdf.load(str(path), load_meshes=False, build_scene_graph=True)
+        with np.errstate(all="ignore"):  # it divides by the length of an axis that has none
+            model = urdf.load(str(path), load_meshes=False, build_scene_graph=True)
     except (
         Exception
     ) as error:  # the reader raises whatever its parts do: KeyError, ValueError, AttributeError
@@ -82,6 +83,8 @@ def read(path: Path, base: str | None = None, tip: str | None = None) -> Chain:
             f"{path}: is XML, but not a URDF that can be read ({type(error).__name__}: {error}); "
             "try it with another URDF tool, such as check_urdf, which names the place"
         ) from None
+    if not model.robot.joints:
+        raise InputError(f"{path}: this robot has no joints, so there is no chain; give another file")
     joints = _path(path, model, base, tip)
     _refuse(path, joints)
     moving = [joint for joint in joints if joint.type != "fixed"]
