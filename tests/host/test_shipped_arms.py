@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from armtempo.errors import InputError
 from armtempo.kinematics import Geometry, forward
+from armtempo.kinematics.shape import refusals
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
@@ -217,3 +218,15 @@ def test_an_unknown_name_names_those_there_are() -> None:
     for look_up in (shipped.find, shipped.load_shipped):
         with pytest.raises(InputError, match="paper, ar4, community, moveo, parol6, scara, thor"):
             look_up("ar5")
+
+
+def test_the_page_on_arms_lists_them_all() -> None:
+    page = (Path(__file__).parents[2] / "host" / "docs" / "arms.md").read_text(encoding="utf-8")
+    listed = [line.split("`")[1] for line in page.splitlines() if line.startswith("| `")]
+    assert listed == [shipped.PAPER, "ar4", "parol6", "thor", "moveo", "community", "scara"]
+    assert sorted(listed) == sorted(NAMES)
+    for name in NAMES:
+        row = next(line for line in page.splitlines() if line.startswith(f"| `{name}`"))
+        arm = shipped.load_shipped(name)
+        assert f"| {len(arm.driven)}" in row
+        assert ("closed form" in row) == (not refusals(Geometry.of(arm)))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from armtempo.arm_check import drives, encoders, geometry, job, resolution, torque, wiring
+from armtempo.arm_check import drives, encoders, geometry, resolution, torque, wiring
 from armtempo.arm_check.finding import Finding, Level, error, note
 from armtempo.errors import InputError
 from armtempo.model.arm import Arm, read_arm
@@ -31,6 +31,8 @@ def check(arm_file: Path, job_file: Path | None = None) -> tuple[Arm | None, lis
         return arm, found
     if any(finding.level is Level.ERROR for finding in found):
         return arm, [*found, note("job", "not looked at", "correct the arm first")]
+    from armtempo.arm_check import job  # here, because it brings the whole planner
+
     return arm, _sorted([*found, *job.findings(arm, job_file)])
 
 
@@ -41,9 +43,8 @@ def check_arm(arm: Arm) -> list[Finding]:
     """
     found = [*geometry.findings(arm), *_motors(arm)]
     if arm.driven:
-        collisions = wiring.findings(arm)
-        found += [*drives.findings(arm), *resolution.findings(arm), *encoders.findings(arm)]
-        found += [*torque.findings(arm), *collisions]
+        for part in (drives, resolution, encoders, torque, wiring):
+            found += part.findings(arm)
         if not any(finding.level is Level.ERROR for finding in found):
             found += drives.record_findings(arm)
     return _sorted(found)

@@ -23,19 +23,7 @@ def findings(arm: Arm, path: Path) -> list[Finding]:
     except ArmtempoError as refused:
         return [error("job", str(refused), "correct that; the rest of the job was not looked at")]
     told = [note("job", text, "change the pose, or take it as it is") for text in notes]
-    return [*told, *_ranges(arm, via_deg), *_steps(arm, via_deg)]
-
-
-def _ranges(arm: Arm, via_deg: Array) -> list[Finding]:
-    found = []
-    for joint, angles in zip(arm.driven, via_deg.T, strict=True):
-        low, high = joint.range_deg
-        outside = np.flatnonzero((angles < low) | (angles > high))
-        if len(outside):
-            points = ", ".join(f"P{number} ({angles[number]:g})" for number in outside)
-            text = f"{joint.name} leaves its range of {low:g} to {high:g} deg at {points}"
-            found.append(error("job", text, "move these via points into the range"))
-    return found
+    return [*told, *_steps(arm, via_deg)]
 
 
 def _steps(arm: Arm, via_deg: Array) -> list[Finding]:

@@ -34,7 +34,7 @@ def _channels(arm: Arm) -> list[Finding]:
             if part is not None:
                 users[what, part.channel].append(joint.name)
     return [
-        error(" and ".join(names), f"both have {what}.channel = {channel}", "give each its own channel")
+        error(" and ".join(names), f"share {what}.channel = {channel}", "give each its own channel")
         for (what, channel), names in users.items()
         if len(names) > 1
     ]
