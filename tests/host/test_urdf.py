@@ -268,3 +268,23 @@ def test_rows_of_300_random_chains() -> None:
             wanted = wanted @ about(np.array([0.0, 0.0, 1.0]), angle) @ move
         moved = [0.0 if row.joint is None else angles[row.joint] for row in table]
         np.testing.assert_allclose(forward(dh.geometry(table), moved), wanted, atol=1e-8)
+
+
+def test_blank_names_are_replaced(tmp_path: Path) -> None:
+    path, out = tmp_path / "robot.urdf", tmp_path / "arm.toml"
+    text = (FOLDER / "three_planar.urdf").read_text()
+    path.write_text(text.replace('"three planar"', '" "').replace('name="j2"', 'name=" "'))
+    result = CliRunner().invoke(main, ["import-urdf", str(path), "-o", str(out)])
+    assert result.exit_code == 0, result.output
+    assert read_arm(out).name == "imported arm"
+    assert [joint.name for joint in read_arm(out).joints] == ["j1", "joint 2", "j3"]
+
+
+def test_what_an_arm_file_cannot_hold_is_not_written(tmp_path: Path) -> None:
+    path, out = tmp_path / "robot.urdf", tmp_path / "arm.toml"
+    text = (FOLDER / "three_planar.urdf").read_text()
+    path.write_text(text.replace("0.25 0 0.02", "2500 0 0"))
+    result = CliRunner().invoke(main, ["import-urdf", str(path), "-o", str(out)])
+    assert result.exit_code == 2
+    assert "joint[1].a_mm = 2500000.0 is not allowed" in result.output
+    assert not out.exists()

@@ -29,7 +29,9 @@ def command(urdf: Path, out: Path, base: str | None, tip: str | None, force: boo
     written. Motors, which a URDF does not describe, are left as comments to fill in. Needs the extra 'urdf'.
     """
     from armtempo.errors import InputError
+    from armtempo.formats import toml_table
     from armtempo.formats.atomic_file import replace_text
+    from armtempo.model import arm as arms
     from armtempo.urdf import arm_text, fitting, reader
 
     if out.exists() and not force:
@@ -38,8 +40,10 @@ def command(urdf: Path, out: Path, base: str | None, tip: str | None, force: boo
         raise InputError(f"{out}: is the URDF itself; choose another name")
     chain = reader.read(urdf, base, tip)
     fit = fitting.fit(chain)
-    replace_text(out, arm_text.arm_text(chain, fit, urdf.name))
-    click.echo(f"{chain.robot}: {len(chain.joints)} joints from link {chain.base!r} to {chain.tip!r}")
+    text = arm_text.arm_text(chain, fit, urdf.name)
+    arms.of_table(toml_table.parse(text, str(out)))  # what would not be read again is not written
+    replace_text(out, text)
+    click.echo(f"{chain.robot!r}: {len(chain.joints)} joints from link {chain.base!r} to {chain.tip!r}")
     click.echo(
         f"worst error at {fit.postures} random postures: {fit.position_mm:.2g} mm and {fit.rotation_deg:.2g} degrees"
     )

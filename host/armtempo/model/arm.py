@@ -198,14 +198,18 @@ def read_arm(path: Path | str) -> Arm:
 
     Raises InputError as ``load_arm`` does for all else.
     """
-    top = toml_table.read(path)
+    return of_table(toml_table.read(path))
+
+
+def of_table(top: Table) -> Arm:
+    """The arm in the top table of a file, as ``read_arm`` gives it."""
     name = top.text("name")
     driver = _driver(top.table("driver"))
     safety = _safety(top.table("safety"))
     tables = top.tables("joint")
     joints = tuple(_joint(table, number) for number, table in enumerate(tables, 1))
     top.done()
-    return Arm(name, joints, driver, safety, str(path))
+    return Arm(name, joints, driver, safety, top.file)
 
 
 def _driver(table: Table | None) -> Driver:

@@ -40,7 +40,7 @@ def arm_text(chain: Chain, fit: Fit, source: str) -> str:
     """The arm file for ``chain`` with the rows of ``fit``; ``source`` names the URDF file."""
     head = _HEAD.format(
         source=_text(source),
-        robot=_text(chain.robot or "imported arm"),
+        robot=_text(chain.robot.strip() or "imported arm"),
         base=_text(chain.base),
         tip=_text(chain.tip),
         postures=fit.postures,
@@ -56,7 +56,8 @@ def _joint(row: Row, chain: Chain, first: bool) -> str:
         return _row_text(name, row, (-_STILL_DEG, _STILL_DEG), "a constant row: it never moves")
     joint = chain.joints[row.joint]
     note = "continuous in the URDF: widen it if the cables allow" if joint.continuous else ""
-    return _row_text(joint.name, row, _inside(joint.range_deg), note) + _placeholders(row.joint + 1, joint)
+    name = joint.name.strip() or f"joint {row.joint + 1}"
+    return _row_text(name, row, _inside(joint.range_deg), note) + _placeholders(row.joint + 1, joint)
 
 
 def _row_text(name: str, row: Row, range_deg: tuple[float, float], note: str) -> str:

@@ -56,7 +56,7 @@ def fit(chain: Chain) -> Fit:
                 return found
             if best is None or found.position_mm < best.position_mm:
                 best = found
-    assert best is not None
+    assert best is not None  # there is at least one way to round
     raise PlanError(
         f"no Denavit-Hartenberg table of {chain.robot!r} keeps to its URDF: the best one is off by "
         f"{best.position_mm:.3g} mm and {best.rotation_deg:.3g} deg at worst, which should not be; nothing was "
