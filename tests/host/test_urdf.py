@@ -176,6 +176,7 @@ def test_what_does_not_fit_is_refused_with_its_reasons(
     ("text", "said"),
     [
         ("<html/>", "not <robot>"),
+        ('<robot><link name="a"/></robot>', "has no name"),
         (
             '<robot name="x"><link name="a"/><joint name="j" type="revolute"/></robot>',
             "not a URDF that can be read",

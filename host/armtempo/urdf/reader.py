@@ -118,6 +118,8 @@ def _check_text(path: Path) -> None:
         raise InputError(f"{path}: not valid XML: {error}; mend the file there") from None
     if root.tag != "robot":
         raise InputError(f"{path}: its outermost element is <{root.tag}>, not <robot>; give a URDF file")
+    if root.get("name") is None:
+        raise InputError(f'{path}: its <robot> element has no name; give it one: <robot name="my_arm">')
     if any("xacro" in element.tag for element in root.iter()):
         raise InputError(f"{path}: is a xacro file; make a URDF of it first: xacro {path} > robot.urdf")
 
