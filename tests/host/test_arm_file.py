@@ -40,7 +40,11 @@ def test_the_shipped_arm_is_the_papers() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("speed_deg_s = 50.0", "speed_deg_s = -50.0", ["joint[1].limits.speed_deg_s = -50.0", "above 0"]),
+        (
+            "speed_deg_s = 50.0",
+            "speed_deg_s = -50.0",
+            ["joint[1].limits.speed_deg_s = -50.0", "at least 0.001"],
+        ),
         ("speed_deg_s = 50.0", "speed_deg_s = nan", ["joint[1].limits.speed_deg_s = nan", "a number"]),
         ("speed_deg_s = 50.0", 'speed_deg_s = "50"', ["speed_deg_s = '50'", "a number"]),
         ("speed_deg_s = 50.0, ", "", ["joint[1].limits.speed_deg_s is missing"]),
@@ -49,6 +53,18 @@ def test_the_shipped_arm_is_the_papers() -> None:
             "microsteps = 8.5",
             ["joint[2].motor.microsteps = 8.5", "whole number from 1 to 256"],
         ),
+        ("gear_ratio = 20.0", "gear_ratio = 1e-308", ["joint[2].motor.gear_ratio = 1e-308", "at least 0.1"]),
+        ("gear_ratio = 20.0", "gear_ratio = 1e5", ["joint[2].motor.gear_ratio = 100000.0", "at most 10000"]),
+        (
+            "jerk_deg_s3 = 150.0",
+            "jerk_deg_s3 = 1e-9",
+            ["joint[1].limits.jerk_deg_s3 = 1e-09", "at least 0.001"],
+        ),
+        ("speed_deg_s = 50.0", "speed_deg_s = 1e9", ["speed_deg_s = 1000000000.0", "at most 100000"]),
+        ("-10.0, 190.0", "-1e6, 190.0", ["joint[1].range_deg", "at most 36000 either way"]),
+        ("holding_torque_nm = 0.65", "holding_torque_nm = -1", ["holding_torque_nm = -1", "at least 0"]),
+        ("backlash_deg = 0.05", "backlash_deg = 500", ["backlash_deg = 500", "at most 90"]),
+        ("home_deg = 0.0", "parallel_linkage = true", ["joint[1].parallel_linkage", "no joint before it"]),
         ("microsteps = 8", "microstep = 8", ["joint[2].motor.microsteps is missing"]),
         ("gear_ratio = 20.0", "gear_ratio = 20.0, wheels = 3", ["joint[2].motor.wheels: unknown key"]),
         ("a_mm = ", "a_mm = 1e300 # ", ["joint[1].a_mm = 1e+300", "of at most 1e+06"]),

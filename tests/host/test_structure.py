@@ -21,8 +21,10 @@ ORDER = (
     "optimise",  # population searches
     "model",  # arm, job, pose, plan, and their files
     "kinematics",  # forward, inverse, choice
+    "urdf",  # from a robot description to an arm file
     "planning",  # from a job to a plan
     "records",  # arm and motion as the board takes them
+    "arm_check",  # what looks wrong about an arm and a job
     "simulator",  # the virtual board
     "link",  # port, session, commands, samples of a run
     "deploy",  # the board program onto a board

@@ -29,6 +29,8 @@ COMMANDS = (
     "report",
     "export",
     "import",
+    "import-urdf",
+    "check",
     "goto",
     "home",
     "stop",

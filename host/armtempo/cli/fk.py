@@ -49,5 +49,5 @@ def _angles(where: tuple[str, ...], arm: Arm, job_path: Path | None) -> Array:
     if len(where) == 1 and re.fullmatch(r"[Pp]\d+|.*\.json", where[0]):
         return spread_deg(arm, posture.parse(where[0], arm, job_path).tolist())
     if not where:
-        return spread_deg(arm, [joint.home_deg for joint in arm.joints])
+        return spread_deg(arm, arm.all_home_deg)
     return spread_deg(arm, numbers(" ".join(where), "the angles"))

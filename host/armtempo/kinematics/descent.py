@@ -101,8 +101,14 @@ def _system(problem: PoseProblem, at: Posture) -> tuple[Matrix, list[float]]:
     by_length, by_turn = problem.weights
     off = _from(problem.constraint.position, tool)
     _, torque, both, each, along = at.turned
+    linked = problem.geometry.linked
     axes = [at.frames[joint].z for joint in problem.moving]
     levers = [_swept(at.frames[joint], tool) for joint in problem.moving]
+    for i, joint in enumerate(problem.moving if linked else ()):
+        if joint + 1 in linked:  # that row turns back by as much
+            behind = at.frames[joint + 1]
+            axes[i] = _from(behind.z, axes[i])
+            levers[i] = _from(_swept(behind, tool), levers[i])
     parts = [dot(axis, along) for axis in axes] if each else [0.0] * len(axes)
     gradient = [
         by_length * dot(lever, off) - by_turn * dot(axis, torque)

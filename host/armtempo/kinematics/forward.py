@@ -52,16 +52,20 @@ def postures(geometry: Geometry, angles_rad: ArrayLike) -> Array:
 
 def frames(geometry: Geometry, angles_rad: Sequence[float]) -> list[Frame[float]]:
     """The base frame and the frame after each joint, with floats: one posture, ten times as fast as by arrays."""
-    turns = [angle + link.offset for angle, link in zip(angles_rad, geometry.links, strict=True)]
+    turns = [
+        angle + link.offset for angle, link in zip(geometry.turns(angles_rad), geometry.links, strict=True)
+    ]
     return _chain(geometry, [math.cos(turn) for turn in turns], [math.sin(turn) for turn in turns], 0.0, 1.0)
 
 
 def array_frames(geometry: Geometry, angles_rad: Array) -> list[Frame[Array]]:
     """The same with arrays, for angles of shape (..., joints): many postures cost little more than one."""
-    turns = angles_rad + np.array(geometry.offset)
-    cosines, sines = (np.moveaxis(part, -1, 0) for part in (np.cos(turns), np.sin(turns)))
+    columns = geometry.turns(list(np.moveaxis(angles_rad, -1, 0)))
+    turns = [column + link.offset for column, link in zip(columns, geometry.links, strict=True)]
     zero = np.zeros(angles_rad.shape[:-1])
-    return _chain(geometry, list(cosines), list(sines), zero, zero + 1.0)
+    return _chain(
+        geometry, [np.cos(turn) for turn in turns], [np.sin(turn) for turn in turns], zero, zero + 1.0
+    )
 
 
 def _chain(geometry: Geometry, cosines: Sequence[T], sines: Sequence[T], zero: T, one: T) -> list[Frame[T]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, TypeVar
@@ -37,6 +38,9 @@ class Geometry:
     alpha: tuple[float, ...]
     offset: tuple[float, ...]
     """Added to each joint's angle."""
+    linked: tuple[int, ...] = ()
+    """Indices of the joints that a parallel linkage turns: their angle less that of the joint before is what the
+    row turns by."""
 
     @classmethod
     def of(cls, arm: Arm) -> Geometry:
@@ -46,6 +50,7 @@ class Geometry:
             a=tuple(joint.a_mm for joint in arm.joints),
             alpha=tuple(math.radians(joint.alpha_deg) for joint in arm.joints),
             offset=tuple(math.radians(joint.theta_offset_deg) for joint in arm.joints),
+            linked=tuple(i for i, joint in enumerate(arm.joints) if joint.parallel_linkage),
         )
 
     @cached_property
@@ -53,6 +58,15 @@ class Geometry:
         """The rows."""
         rows = zip(self.d, self.a, self.alpha, self.offset, strict=True)
         return tuple(Link(d, a, *twist(alpha), offset) for d, a, alpha, offset in rows)
+
+    def turns(self, angles: Sequence[T]) -> Sequence[T]:
+        """What each row turns by beyond its offset, for each joint's angle: floats or arrays, as many as joints."""
+        if not self.linked:
+            return angles
+        turns = list(angles)
+        for joint in self.linked:
+            turns[joint] = angles[joint] - angles[joint - 1]
+        return turns
 
     @property
     def joints(self) -> int:

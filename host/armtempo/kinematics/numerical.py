@@ -44,8 +44,7 @@ class MovingArm:
     @classmethod
     def of(cls, arm: Arm) -> MovingArm:
         """The joints with a motor move."""
-        driven = tuple(index for index, joint in enumerate(arm.joints) if joint.motor is not None)
-        return cls(Geometry.of(arm), Ranges.of(arm), driven)
+        return cls(Geometry.of(arm), Ranges.of(arm), arm.driven_indices)
 
     @property
     def with_all(self) -> MovingArm:

@@ -136,6 +136,8 @@ def refusals(geometry: Geometry) -> list[str]:
     """Say why the closed form does not serve ``geometry``, one reason a line; empty if it does."""
     if geometry.joints != 6:
         return [f"it has {geometry.joints} joints, not 6"]
+    if geometry.linked:
+        return [f"a parallel linkage turns joint {geometry.linked[0] + 1}"]
     return [*_twist_refusals(geometry), *_length_refusals(geometry)]
 
 

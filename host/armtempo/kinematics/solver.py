@@ -107,7 +107,7 @@ class PoseSolver:
     @cached_property
     def home_rad(self) -> tuple[float, ...]:
         """(joints,)"""
-        return tuple(math.radians(joint.home_deg) for joint in self.arm.joints)
+        return tuple(map(math.radians, self.arm.all_home_deg))
 
     @cached_property
     def refusals(self) -> list[str]:
