@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 
 from armtempo.errors import InputError
+from armtempo.formats import json_codec
 
 
 @dataclass(frozen=True)
@@ -110,7 +111,7 @@ class Joint:
     encoder: Encoder | None = None
     switches: LimitSwitches = field(default_factory=LimitSwitches)
     model: JointModel = field(default_factory=JointModel)
-    parallel_linkage: bool = False
+    parallel_linkage: bool = field(default=False, metadata=json_codec.ADDED)
     """The drive stands on the link before the previous one and turns this link by a parallelogram: the angle
     is counted from that link, so it stays when the previous joint turns. The row turns by the difference."""
 

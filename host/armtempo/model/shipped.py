@@ -39,5 +39,6 @@ def find(given: Path | str) -> ArmFile:
     if named:
         return ArmFile(shipped[str(given)], True)
     raise InputError(
-        f"{given}: there is no such file, and no arm of that name ships with armtempo; those that do: {', '.join(shipped)}"
+        f"{given}: there is no such file, and no arm of that name ships with armtempo; those that do: "
+        f"{', '.join(shipped)}"
     )

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from armtempo.arrays import Array
 from armtempo.errors import InputError
+from armtempo.formats import json_codec
 from armtempo.model import pose
 
 Rows = tuple[tuple[float, ...], ...]
@@ -46,10 +47,10 @@ class Pose:
     """4 rows of 4, lengths in mm; its rotation is one of those that are asked for."""
     posture_deg: tuple[float, ...] | None = None
     """In a job: angles of all joints; the solution nearest to them is taken. None: nearest to the one before."""
-    fixed: tuple[str, ...] = WHOLE
+    fixed: tuple[str, ...] = field(default=WHOLE, metadata=json_codec.ADDED)
     """A key of CONSTRAINTS: what counts of the orientation; "approach": the direction of the tool's z axis."""
-    tolerance_mm: float = TOLERANCE_MM
-    tolerance_deg: float = TOLERANCE_DEG
+    tolerance_mm: float = field(default=TOLERANCE_MM, metadata=json_codec.ADDED)
+    tolerance_deg: float = field(default=TOLERANCE_DEG, metadata=json_codec.ADDED)
 
     def __post_init__(self) -> None:
         """InputError for what makes no pose."""
