@@ -9,7 +9,11 @@ from typing import Any
 
 from armtempo.arm_check import drives, torque
 from armtempo.arm_check.resolution import resolutions
+from armtempo.formats.text_table import aligned
 from armtempo.model.arm import Arm
+
+_HEAD = ("joint", "steps/deg", "step deg", "step at tool mm", "top steps/s", "motor rpm", "torque margin")
+_WIDTHS = (5, 11, 12, 17, 13, 11, 15)
 
 
 @dataclass(frozen=True)
@@ -54,18 +58,16 @@ def of(arm: Arm) -> tuple[JointFigures, ...]:
 
 def table(joints: Sequence[JointFigures]) -> list[str]:
     """Lines for people; none where nothing is driven."""
-    if not joints:
-        return []
-    width = max(len("joint"), *(len(joint.name) for joint in joints))
-    head = (
-        f"{'joint':<{width}}  steps/deg    step deg  step at tool mm  top steps/s  motor rpm  torque margin"
-    )
-    return [head, *(_line(joint, width) for joint in joints)]
+    return aligned([_HEAD, *map(_row, joints)], _WIDTHS) if joints else []
 
 
-def _line(joint: JointFigures, width: int) -> str:
-    margin = "not known" if joint.torque_margin is None else f"{joint.torque_margin:.3g} x"
+def _row(joint: JointFigures) -> tuple[str, ...]:
     return (
-        f"{joint.name:<{width}}  {joint.steps_per_deg:9.5g}  {joint.step_deg:10.4g}  {joint.step_at_tool_mm:15.3g}"
-        f"  {joint.top_steps_s:11.0f}  {joint.motor_rpm:9.4g}  {margin:>13}"
+        joint.name,
+        f"{joint.steps_per_deg:.5g}",
+        f"{joint.step_deg:.4g}",
+        f"{joint.step_at_tool_mm:.3g}",
+        f"{joint.top_steps_s:.0f}",
+        f"{joint.motor_rpm:.4g}",
+        "not known" if joint.torque_margin is None else f"{joint.torque_margin:.3g} x",
     )

@@ -6,6 +6,7 @@ from collections import defaultdict
 
 from armtempo.arm_check.finding import Finding, error, note, warning
 from armtempo.model.arm import Arm, DrivenJoint, Joint
+from armtempo.model.arm_file import shared_channels
 
 BUTTON_CHANNEL = 6
 """Its STEP pin is the one of the button."""
@@ -28,15 +29,9 @@ def findings(arm: Arm) -> list[Finding]:
 
 
 def _channels(arm: Arm) -> list[Finding]:
-    users: dict[tuple[str, int], list[str]] = defaultdict(list)
-    for joint in arm.joints:
-        for what, part in (("motor", joint.motor), ("encoder", joint.encoder)):
-            if part is not None:
-                users[what, part.channel].append(joint.name)
     return [
-        error(" and ".join(names), f"share {what}.channel = {channel}", "give each its own channel")
-        for (what, channel), names in users.items()
-        if len(names) > 1
+        error(" and ".join(joints), f"share {key}.channel = {channel}", "give each its own channel")
+        for key, channel, joints in shared_channels(arm)
     ]
 
 

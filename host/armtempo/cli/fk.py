@@ -40,13 +40,11 @@ def command(where: tuple[str, ...], job_path: Path | None, arm_path: Path | None
 
 def _angles(where: tuple[str, ...], arm: Arm, job_path: Path | None) -> Array:
     """Angles of all joints, deg (joints,)."""
-    import re
-
     from armtempo.cli import posture
     from armtempo.kinematics.chain import spread_deg
     from armtempo.kinematics.pose_file import numbers
 
-    if len(where) == 1 and re.fullmatch(r"[Pp]\d+|.*\.json", where[0]):
+    if len(where) == 1 and posture.is_named(where[0]):
         return spread_deg(arm, posture.parse(where[0], arm, job_path).tolist())
     if not where:
         return spread_deg(arm, arm.all_home_deg)

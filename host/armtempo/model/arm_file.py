@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from pathlib import Path
+from typing import NamedTuple
 
 from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS
 
@@ -203,13 +205,29 @@ def _model(table: Table | None) -> JointModel:
     return JointModel(**values)
 
 
+class SharedChannel(NamedTuple):
+    """A channel of the board that more than one joint has."""
+
+    key: str
+    """``"motor"`` or ``"encoder"``."""
+    channel: int
+    joints: tuple[str, ...]
+
+
+def shared_channels(arm: Arm) -> list[SharedChannel]:
+    """Channels that more than one joint has; empty for an arm that can be wired."""
+    users: dict[tuple[str, int], list[str]] = defaultdict(list)
+    for joint in arm.joints:
+        for key, part in (("motor", joint.motor), ("encoder", joint.encoder)):
+            if part is not None:
+                users[key, part.channel].append(joint.name)
+    return [SharedChannel(*place, tuple(names)) for place, names in users.items() if len(names) > 1]
+
+
 def _check_channels(arm: Arm, path: Path | str) -> None:
     if not arm.driven:
         raise InputError(f"{path}: no joint has a motor; at least one [joint.motor] is needed")
-    for what, channels in (
-        ("motor.channel", [joint.motor.channel for joint in arm.driven]),
-        ("encoder.channel", [joint.encoder.channel for joint in arm.driven if joint.encoder]),
-    ):
-        for channel in channels:
-            if channels.count(channel) > 1:
-                raise InputError(f"{path}: {what} = {channel} is used by two joints; each needs its own")
+    for key, channel, joints in shared_channels(arm):
+        raise InputError(
+            f"{path}: {key}.channel = {channel} is used by {' and '.join(joints)}; each needs its own"
+        )
