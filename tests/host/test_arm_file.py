@@ -74,7 +74,11 @@ def test_the_shipped_arm_is_the_papers() -> None:
         ("range_deg = [-10.0, 190.0]", "range_deg = [190.0]", ["joint[1].range_deg", "list of 2 numbers"]),
         ('enable_active = "low"', 'enable_active = "off"', ["driver.enable_active = 'off'", "'low', 'high'"]),
         ("estop_fitted = false", "estop_fitted = 0", ["safety.estop_fitted = 0", "True, False"]),
-        ("motor = { channel = 2,", "motor = { channel = 1,", ["motor.channel = 1 is used by joint 1 and joint 2"]),
+        (
+            "motor = { channel = 2,",
+            "motor = { channel = 1,",
+            ["motor.channel = 1 is used by joint 1 and joint 2"],
+        ),
         ('on = "joint"', 'on = "belt"', ["joint[1].encoder.on = 'belt'", "'joint', 'motor'"]),
         ('name = "paper-1to5"', 'name = ""', ["name = ''", "not empty"]),
         ('name = "paper-1to5"', 'name = "x', ["not valid TOML", "line"]),

@@ -60,7 +60,7 @@ def frames(geometry: Geometry, angles_rad: Sequence[float]) -> list[Frame[float]
 
 def array_frames(geometry: Geometry, angles_rad: Array) -> list[Frame[Array]]:
     """The same with arrays, for angles of shape (..., joints): many postures cost little more than one."""
-    columns = geometry.turns(list(np.moveaxis(angles_rad, -1, 0)))
+    columns = np.stack(geometry.turns(list(np.moveaxis(angles_rad, -1, 0))))
     turns = [column + link.offset for column, link in zip(columns, geometry.links, strict=True)]
     zero = np.zeros(angles_rad.shape[:-1])
     return _chain(
