@@ -14,13 +14,16 @@ _CRC_INIT = const(16)  # index in the table: what a crc begins with, and is inve
 _CRC_BYTES = const(4)
 _NIBBLE = const(15)
 _RESIDUE = const(0x2144DF1C)  # the crc32 of anything with its crc32 behind it
-_BYTES_OF_TICKS = const(8)
+_BYTES_OF_TICKS = const(16)
 _BYTES_OF_STEPS = const(4)
 _BYTES_OF_U32 = const(4)
 TICKS_LOW = const(0)
 TICKS_HIGH = const(1)
-COMMANDED = const(2)
-"""A sample is an array of words: its time, then the joints' commanded steps from here on, then their counts."""
+PATH_LOW = const(2)
+PATH_HIGH = const(3)
+COMMANDED = const(4)
+"""A sample is an array of words: its time, the motion's own time, then the joints' commanded steps from here on, then
+their counts."""
 
 APPEND = const(0)
 """Last argument of ``apply_crc``: write the crc behind the data."""
@@ -101,7 +104,7 @@ def equal(one: ptr8, other: ptr8, offsets: int, count: int) -> int:
 def sample_to_wire(target: ptr8, sample: ptr8, offsets: int, joints: int) -> object:
     """From the words of a sample to the order of the wire.
 
-    ``offsets``: in target, of the ticks and of the joints' pairs (commanded, count).
+    ``offsets``: in target, of both times and of the joints' pairs (commanded, count).
     """
     to = offsets & _OFFSET_MASK
     at = 0

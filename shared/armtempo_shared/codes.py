@@ -29,6 +29,7 @@ WRONG_START = 22
 TOO_LONG = 23
 TOO_ABRUPT = 24
 NO_SESSION = 25
+FIXED_SPEED = 26
 # faults: they stop the motion and stay until cleared
 ESTOP = 40
 LIMIT_SWITCH = 41

@@ -14,6 +14,8 @@ SAMPLE_TICKS = TICK_HZ // 10
 
 LONGEST_TICKS = 1 << 38
 """A time control point is below it, a little under an hour: units of 1024 ticks stay small integers of the board."""
+LONGEST_RUN_TICKS = 1 << 39
+"""A run at a lower speed, with its pauses, lasts at most 1 h 49 min."""
 LONGEST_SPAN_TICKS = 1 << 36
 """The time control points of a segment differ by less."""
 

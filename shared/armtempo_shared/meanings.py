@@ -33,6 +33,11 @@ _ROWS = (
     ),
     ("too_abrupt", "the motion reverses too fast for the step generator", "lower the limits"),
     ("no_session", "the board has started anew, or was never greeted in this session", "reconnect"),
+    (
+        "fixed_speed",
+        "the motion has no time in which its speed may change: it is of an older armtempo",
+        "upload it again; it can be run slower from its start",
+    ),
     ("estop", "the E-stop input tripped", "release it, then 'armtempo clear' and home"),
     ("limit_switch", "a limit switch tripped", "clear, then move away from it"),
     ("following", "the encoder is too far from the command (stall or slip)", "find the cause, then home"),
@@ -79,7 +84,9 @@ COMMANDS: "dict[str, str]" = {
     "`arm_crc` are 0 without an arm record; `boot` differs after every start of the program; the tail is the "
     "unique id in hex and the firmware.",
     "status": "What the board is doing. `known`: bit a joint, its position is known. `run`: number of the "
-    "current or last run since the start. `ticks`: motion clock. Tail: per joint commanded steps and encoder "
+    "current or last run since the start. `ticks`: motion clock. `path`: the motion's own time, which is behind the "
+    "clock where the speed was below 100 %. `rate`: the speed that is wanted, in thousandths, 0 in a pause; while "
+    "nothing moves that of the next start. Tail: per joint commanded steps and encoder "
     "counts (two i32).",
     "put_begin": "Begins an upload of `size` bytes; the tail is the trajectory's name, or `/arm` for the arm "
     "record. `crc` is the record's own checksum, its last four bytes. An upload under way is given up.",
@@ -97,6 +104,9 @@ COMMANDS: "dict[str, str]" = {
     "start": "Starts a stored trajectory whose checksum is `crc`. `flags` 1: a limit switch ends it without "
     "a fault. Answer: number of the run and its length in ticks.",
     "stop": "`now` 0: brake along the path (freeze where the motion has no braking time); 1: freeze.",
+    "speed": "Lets the motion's own time go on at `rate` thousandths of its planned rate (10 to 1000), along the same "
+    "path; 0: pause, 65535: as before the pause. Refused with `fixed_speed`, or with `too_long` where the run would "
+    "last longer than 1 h 49 min. While nothing moves: the rate of this session's next start.",
     "clear": "Clears the fault; refused with `fault_pending` while its cause is still there.",
     "leave": "Ends the program; the port becomes MicroPython's prompt.",
     "samples": "All samples before `acknowledged` have arrived and may go; those from there on, `wanted` of "
@@ -104,8 +114,8 @@ COMMANDS: "dict[str, str]" = {
 }
 """What each command does and what its answer says."""
 EVENTS: "dict[str, str]" = {
-    "sample": "One sample of run `run`, `index` counting from 0. `ticks`: motion clock. `flags` 1: taken "
-    "while braking. Tail: per joint commanded steps and encoder counts (two i32).",
+    "sample": "One sample of run `run`, `index` counting from 0. `ticks`: motion clock, `path`: the motion's own "
+    "time. `flags` 1: taken while braking. Tail: per joint commanded steps and encoder counts (two i32).",
     "done": "The run ended without a fault, at its end or after a stop; sent behind its last sample. "
     "`lost`: samples that gave way before they were acknowledged. Tail as in `sample`.",
     "fault": "Something went wrong; no step comes any more. `code` from the table below, `joint` 255 where "

@@ -1,6 +1,6 @@
 """Constants of the wire protocol; its messages are in ``table.py``, its frames in ``wire.py``."""
 
-PROTOCOL_VERSION = 1
+PROTOCOL_VERSION = 2
 SYNC = 0xA5
 MAX_PAYLOAD = 256
 OVERHEAD = 9
@@ -15,6 +15,11 @@ ARM_RECORD_NAME = "/arm"
 """put_begin with this name carries the arm record, not a trajectory."""
 
 SAMPLE_BRAKING = 1  # flag of a sample: taken while braking
+PERMILLE = 1000
+SLOWEST_PERMILLE = 10
+"""A rate of the motion's own time is in thousandths: from 10 (1 %) to 1000, as planned."""
+RESUME = 0xFFFF
+"""In the place of a rate: as before the pause."""
 START_HOMING = 1  # a limit switch ends the motion without a fault
 
 UNCONFIGURED, UNHOMED, IDLE, MOVING, BRAKING, FAULT = 0, 1, 2, 3, 4, 5

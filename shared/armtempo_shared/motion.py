@@ -9,7 +9,8 @@ angles in steps / 2**28, times in ticks / 2**16.
     0       4s     magic  b"ATM1"
     4       B      degree k, 3 or 5
     5       B      joints
-    6       B      flags: bit 0, all joints share one time axis
+    6       B      flags: bit 0, all joints share one time axis; bit 1, ``brake_ticks`` holds for every change
+                   of speed (without it for braking only)
     7       B      0
     8       H      segments n of the angle splines
     10      H      refine R: the time axes have n * R segments
@@ -27,6 +28,7 @@ from armtempo_shared.limits import MAX_JOINTS, MAX_SEGMENTS
 
 MAGIC = b"ATM1"
 SHARED_AXIS = 1
+RAMPS = 2
 _HEAD = "<4sBBBBHHII"
 HEAD_SIZE = struct.calcsize(_HEAD)
 
@@ -53,11 +55,11 @@ def pack(
     """A motion record of n path segments with ``refine`` R time segments each.
 
     ``angles``: per joint its n + k control points (int, steps * 2**28); ``times``: per joint, or one for
-    all, its n * R + k control points (int, ticks * 2**16).
+    all, its n * R + k control points (int, ticks * 2**16). ``brake_ticks`` must hold for every change of speed.
     """
     segments = len(angles[0]) - degree
     shared = len(times) == 1 and len(angles) > 1
-    flags = SHARED_AXIS if shared else 0
+    flags = RAMPS | (SHARED_AXIS if shared else 0)
     head = struct.pack(_HEAD, MAGIC, degree, len(angles), flags, 0, segments, refine, brake_ticks, arm_crc)
     body: "list[int]" = []
     for joint, points in enumerate(angles):
@@ -82,13 +84,14 @@ class Motion:
             raise MotionError("too short")
         (magic, self.degree, self.joints, flags, zero, self.segments, self.refine, self.brake_ticks,
          self.arm_crc) = struct.unpack_from(_HEAD, data, 0)  # fmt: skip
-        if magic != MAGIC or zero != 0 or flags & ~SHARED_AXIS:
+        if magic != MAGIC or zero != 0 or flags & ~(SHARED_AXIS | RAMPS):
             raise MotionError("not a motion record of this version")
         if self.degree not in (3, 5) or not 1 <= self.joints <= MAX_JOINTS:
             raise MotionError("unknown degree or number of joints")
         if self.segments < 1 or self.refine < 1 or self.segments * self.refine > MAX_SEGMENTS:
             raise MotionError("number of segments out of range")
         self.shared = bool(flags & SHARED_AXIS)
+        self.ramps = bool(flags & RAMPS)
         if len(data) != size(self.degree, self.joints, self.shared, self.segments, self.refine):
             raise MotionError("length does not fit the header")
         if crc32(memoryview(data)[:-4]) != struct.unpack_from("<I", data, len(data) - 4)[0]:

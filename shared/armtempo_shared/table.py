@@ -25,12 +25,13 @@ C home 20 joints:B bytes
 C start 21 flags:B crc:I text
 C stop 22 now:B
 C clear 23
+C speed 25 rate:H
 C leave 24
 C samples 30 acknowledged:I wanted:H
 A hello 01 protocol:B joints:B encoders:B state:B tick_hz:I max_rate:I max_rate_sum:I free_flash:I
  free_heap:I arm_crc:I program_crc:I boot:I text
-A status 02 state:B fault:B fault_joint:B known:B run:I ticks:Q samples_kept:H samples_lost:I frames_bad:I
- bytes
+A status 02 state:B fault:B fault_joint:B known:B run:I ticks:Q path:Q rate:H
+ samples_kept:H samples_lost:I frames_bad:I bytes
 A put_begin 10
 A put_data 11 next:I
 A put_commit 12
@@ -43,11 +44,12 @@ A home 20
 A start 21 run:I duration:Q
 A stop 22
 A clear 23
+A speed 25
 A leave 24
 A samples 30 first:I count:H
-E sample 40 run:I index:I ticks:Q flags:B bytes
-E done 41 run:I ticks:Q samples:I lost:I bytes
-E fault 42 run:I code:B joint:B ticks:Q bytes
+E sample 40 run:I index:I ticks:Q path:Q flags:B bytes
+E done 41 run:I ticks:Q path:Q samples:I lost:I bytes
+E fault 42 run:I code:B joint:B ticks:Q path:Q bytes
 E notice 43 text
 R ok 7e command:B bytes
 R error 7f command:B code:B joint:B value:q

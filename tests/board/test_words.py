@@ -107,7 +107,7 @@ def test_repeated_words_are_those_of_their_home(path: Path) -> None:
 def test_all_files_that_share_arrays_are_held_together() -> None:
     repeats = {path.stem: {home.stem for home, _, _ in blocks(path)} for path in FILES}
     assert {name for name, homes in repeats.items() if homes} == {
-        "subdivision", "newton", "cubics", "interval_steps", "braking", "isr", "rate_check",
+        "subdivision", "newton", "cubics", "interval_steps", "time_law", "isr", "rate_check",
     }  # fmt: skip
     assert repeats["interval_steps"] == {"step_queue", "newton"}
     assert sum(len(list(blocks(path))) for path in FILES) > 80

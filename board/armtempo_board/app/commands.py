@@ -1,13 +1,22 @@
 """What the board does for each command of the message table; refusals are raised as ``Refused``.
 
-While a motion runs only the commands of ``_WHILE_MOVING`` are taken, and all of them but ``hello`` allocate nothing.
+While a motion runs only the commands of ``_WHILE_MOVING`` are taken, and all of them but ``hello``, ``stop`` and
+``speed`` allocate nothing.
 The commands about the store are in ``store_commands.py``, which is imported when one comes.
 """
 
 from struct import calcsize, pack_into, unpack_from
 
 from armtempo_shared import codes, limits
-from armtempo_shared.messages import NO_JOINT, NUMBER_AT, PAYLOAD_AT, PROTOCOL_VERSION
+from armtempo_shared.messages import (
+    NO_JOINT,
+    NUMBER_AT,
+    PAYLOAD_AT,
+    PERMILLE,
+    PROTOCOL_VERSION,
+    RESUME,
+    SLOWEST_PERMILLE,
+)
 from micropython import const
 
 from armtempo_board.buffers import u32
@@ -20,7 +29,7 @@ if TYPE_CHECKING:
     from armtempo_board.app.controller import Controller
     from armtempo_board.link.serial_link import SerialLink
 
-_WHILE_MOVING = ("hello", "status", "stop", "samples")
+_WHILE_MOVING = ("hello", "status", "stop", "speed", "samples")
 _BYTES_PER_POSITION = const(4)
 _BYTES_OF_INDEX = const(4)  # of a sample
 _ANSWER_AT = const(6)  # in a reply: its payload begins with the command's number
@@ -158,6 +167,7 @@ class Commands:
         self._session = session
         self._link.forget()
         self.controller.samples.skip()
+        self.controller.forget_speed()
         self.controller.forget_store()
 
     def _status(self, row: tuple, length: int) -> int:
@@ -174,6 +184,8 @@ class Commands:
             controller.known(),
             controller.run_number,
             0,
+            0,
+            controller.speed(),
             samples.next - samples.first,
             samples.lost,
             self._link.reader.bad,
@@ -207,6 +219,12 @@ class Commands:
             raise Refused(codes.NOT_MOVING)
         self.controller.stop(self._link.reader.data[PAYLOAD_AT])
         return 0
+
+    def _speed(self, row: tuple, length: int) -> None:
+        (rate,) = self.fields(row)
+        if not (rate in (0, RESUME) or SLOWEST_PERMILLE <= rate <= PERMILLE):
+            raise Refused(codes.MALFORMED)
+        self.controller.change_speed(rate)
 
     def _clear(self, row: tuple, length: int) -> None:
         self.controller.clear()

@@ -16,7 +16,7 @@ from array import array
 import machine
 from armtempo_shared import codes, messages
 from armtempo_shared.limits import MAX_JOINTS
-from armtempo_shared.messages import ARM_RECORD_NAME, NO_JOINT, SAMPLE_BRAKING, START_HOMING
+from armtempo_shared.messages import ARM_RECORD_NAME, NO_JOINT, RESUME, SAMPLE_BRAKING, START_HOMING
 from armtempo_shared.motion import Motion, MotionError
 from micropython import const
 
@@ -36,6 +36,7 @@ _LEAST_SAMPLES = const(1024)  # and at least;
 _SAMPLES_SHARE = const(16)  # between them, this part of the free heap
 _BYTES_PER_JOINT = const(8)  # in a sample on the wire
 _CRC_BYTES = const(4)
+_PERMILLE = const(1000)
 _BOOT_BYTES = const(4)
 _NEVER_MS = const((1 << 30) - 1)
 
@@ -67,6 +68,7 @@ class Controller:
         self._running = False  # a run has begun and its end has not been noticed
         self._braking = False
         self._can_brake = False  # the motion can come to rest along its path
+        self._next_rate = _PERMILLE  # of the next run that a host starts
         self._by_host = False  # the run was started by a command
         self._assumed = 0  # joints whose position a homing motion took for granted
 
@@ -185,6 +187,7 @@ class Controller:
         unknown = self.everyone() & ~self.known()
         if unknown and not homing:
             raise Refused(codes.UNHOMED, _lowest(unknown))
+        rate, self._next_rate = self._next_rate, _PERMILLE
         motion = self.load(name, crc)
         self.forget_store()
         heap.forget()
@@ -192,7 +195,7 @@ class Controller:
         if homing:
             self._assume(motion, unknown)
         try:
-            self.engine.load(motion)
+            self.engine.load(motion, _PERMILLE if crc is None else rate)
         except Refused:
             self._withdraw_assumed()
             raise
@@ -248,6 +251,19 @@ class Controller:
         else:
             self.engine.brake()
 
+    def change_speed(self, rate: int) -> None:
+        """Let what moves go on at ``rate`` thousandths (0: pause, RESUME: as before), or the next run of a host begin so."""
+        if self.moving():
+            self.engine.change_rate(rate)
+        elif rate in (0, RESUME):
+            raise Refused(codes.NOT_MOVING)
+        else:
+            self._next_rate = rate
+
+    def forget_speed(self) -> None:
+        """A new host: what another one wanted for its next run is no longer meant."""
+        self._next_rate = _PERMILLE
+
     def clear(self) -> None:
         """Clear what is pending; the cause must be gone."""
         if self.engine and not self.engine.clear():
@@ -281,6 +297,10 @@ class Controller:
     def fault_joint(self) -> int:
         """The joint that the fault is about, or NO_JOINT."""
         return self.engine.fault_joint if self.engine and self.engine.fault else NO_JOINT
+
+    def speed(self) -> int:
+        """The rate that is wanted of the motion's own time, in thousandths; 0 in a pause."""
+        return self.engine.rate if self.moving() else self._next_rate
 
     def state(self) -> int:
         """Number of the state (messages.STATES)."""

@@ -59,7 +59,7 @@ class Events:
         if index < 0 or not link.room(size):
             return False
         at = link.payload()
-        pack_into(self._sample_layout, link.out, at, self._controller.run_number, index, 0, 0)
+        pack_into(self._sample_layout, link.out, at, self._controller.run_number, index, 0, 0, 0)
         samples.take(index, link.out, at + self._slot_at)
         link.event(self._sample, size)
         return True
@@ -69,17 +69,17 @@ class Events:
         if controller.done and self._room(self._done):
             controller.done = False
             samples = controller.samples
-            self._put(self._done, controller.run_number, 0, samples.next, samples.lost)
+            self._put(self._done, controller.run_number, 0, 0, samples.next, samples.lost)
         if self._fault_waits and self._room(self._fault):
             self._fault_waits = False
-            self._put(self._fault, controller.run_number, controller.fault(), controller.fault_joint(), 0)
+            self._put(self._fault, controller.run_number, controller.fault(), controller.fault_joint(), 0, 0)
 
     def _room(self, event: "tuple[int, str, int]") -> int:
         _, layout, _ = event
         return self._link.room(calcsize(layout) + _BYTES_PER_JOINT * self._controller.joints)
 
     def _put(self, event: "tuple[int, str, int]", *values: int) -> None:
-        """``values``: of the event's fields; the ticks, which are 0 there, and the joints are put in here."""
+        """``values``: of the event's fields; both times, which are 0 there, and the joints are put in here."""
         number, layout, ticks_at = event
         link = self._link
         at = link.payload()

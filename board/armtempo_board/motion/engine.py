@@ -21,7 +21,8 @@ from array import array
 
 import stm
 from armtempo_shared import codes
-from armtempo_shared.messages import NO_JOINT
+from armtempo_shared.limits import LONGEST_RUN_TICKS
+from armtempo_shared.messages import NO_JOINT, RESUME
 from armtempo_shared.motion import Motion
 from machine import mem32
 from micropython import const
@@ -35,8 +36,10 @@ from armtempo_board.hardware.inputs import Inputs
 from armtempo_board.hardware.sampler import Sampler
 from armtempo_board.motion.following_error import FollowingError
 from armtempo_board.motion.joint_drive import LOOKAHEAD_KITICKS, JointDrive
+from armtempo_board.motion.override import Override
 from armtempo_board.motion.readings import Readings
 from armtempo_board.motion.ring_feeder import RingFeeder
+from armtempo_board.stepgen import time_law
 
 LEAD_TICKS = const(1680000)
 """Time from the start of the counters to time 0: 20 ms, in which drivers switch on and DIR settles."""
@@ -44,7 +47,8 @@ LEAD_TICKS = const(1680000)
 _PREFILLS = const(32)
 _ANY_JOINT = const(0)
 _ROUNDS = const(8)  # of filling the queues, before other work gets its turn
-_BRAKE_MARGIN_KITICKS = const(2048)  # 25 ms, within which all joints get the law of braking
+_LAW_MARGIN_KITICKS = const(2048)  # 25 ms, within which all joints get another law of time
+_PERMILLE = const(1000)
 _PULSE_SPARE_US = const(5)
 _TICKS_PER_US = const(84)
 _START_US = const(50)
@@ -74,7 +78,8 @@ class Engine:
         self._joints = [JointDrive(n, head, row, self._sampler) for n, row in enumerate(joints)]
         self._encoders = [fitted[rows.index(row)] if row in rows else NoEncoder() for row in joints]
         slots = [isr.RAW_ENCODERS + rows.index(row) if row in rows else 0 for row in joints]
-        self._readings = Readings(self._sampler, self._joints, self._encoders, slots)
+        self._override = Override()
+        self._readings = Readings(self._sampler, self._joints, self._encoders, slots, self._override.law)
         self._following = [FollowingError(row) for row in joints]
         self._inputs = Inputs(head, joints, self._sampler)
         RingFeeder(self._inputs, self._joints, self._block)  # its timer's callback keeps it alive
@@ -85,8 +90,9 @@ class Engine:
         self._counter_kiticks = 0
         self._watched_joint = self._background_task = 0
         self._homing = False
-        self._brake_ticks = 0
-        self._braked = self._end_moves = False
+        self._can_brake = self._can_change = False
+        self._braked = self._end_moves = self._change_waits = False
+        self.rate = self._running_rate = _PERMILLE  # wanted, in thousandths; the last that was not 0
         self._in_service = False  # service() or refill() is at work, or has not come to its end
         self.moving = False
         self.finished = False
@@ -105,18 +111,29 @@ class Engine:
                 self._encoders[number].declare(self._following[number].expected(steps[number]))
         self.known |= mask
 
-    def load(self, motion: Motion) -> None:
-        """Check a motion and fill the rings; Refused where something is wrong."""
+    def load(self, motion: Motion, rate: int = _PERMILLE) -> None:
+        """Check a motion and fill the rings; Refused where something is wrong.
+
+        ``rate``, in thousandths: how fast the motion's own time is to run.
+        """
         self._check(motion)
+        self._override.begin(rate, motion.brake_ticks, self.duration_ticks)
+        self.duration_ticks = self._override.end_ticks()
+        if self.duration_ticks > LONGEST_RUN_TICKS:
+            raise Refused(codes.TOO_LONG)
         self._inputs.enable(True)
         self._set_clock(-LEAD_TICKS)
         self._end_ticks = self.duration_ticks
         self._sampler.plan(self._end_ticks)
         self._readings.clear()
-        self._brake_ticks = motion.brake_ticks
-        self._braked = self._end_moves = False
+        self._can_brake = motion.brake_ticks > 0
+        self._can_change = self._can_brake and motion.ramps
+        self._braked = self._end_moves = self._change_waits = False
+        self.rate = self._running_rate = rate
         for number, joint in enumerate(self._joints):
             joint.load(motion, number)
+            if rate != _PERMILLE:
+                joint.follow(self._override.law, False)
             self._inputs.watch(number, 1)
             self._prefill(joint)
         self.finished = False
@@ -187,6 +204,8 @@ class Engine:
             return
         if not self._refill_queues():
             return
+        if self._change_waits:
+            self._change_rate()
         self._background_task = self._background_task + 1 if self._background_task < _CHECK_INTERRUPT else 0
         if self._background_task == _POLL_SWITCHES:
             self._inputs.poll()
@@ -221,10 +240,14 @@ class Engine:
         return True
 
     def _has_ended(self) -> bool:
+        if not self._sampler.done():
+            return False
         for joint in self._joints:
             if not joint.ended:
+                if self.duration_ticks == LONGEST_RUN_TICKS:  # it has stood still for too long
+                    self.freeze()
                 return False
-        return self._sampler.done()
+        return True
 
     def _check_following(self) -> None:
         """Compare one joint with its encoder; the next joint comes with the next call."""
@@ -261,30 +284,75 @@ class Engine:
             self._stopped()
 
     def brake(self) -> None:
-        """Come to rest along the path; freeze where the motion's record has no brake time.
+        """Come to rest along the path; freeze where the motion's record has no time for it, or at rest in a pause.
 
-        Over the record's brake time acceleration and jerk stay within 1.25 times the arm's limits. Braking begins
-        behind what is in the rings, about 75 ms from now. A motion that is over by then ends by itself.
+        Over that time acceleration and jerk stay within 1.25 times the arm's limits. Braking begins behind what is
+        in the rings, about 75 ms from now; where the rate is changing, behind that. A motion that is over by then ends
+        by itself.
         """
         if not self.moving or self._braked:
             return
-        if not self._brake_ticks:
+        standing = self._override.rate == 0
+        if not self._can_brake or (standing and self._is_steady()):
             self.freeze()
             return
+        self._braked = True
+        self.rate = 0
+        if standing:  # it will soon
+            for joint in self._joints:
+                joint.finish()
+            self._change_waits = False
+            self._end_at(self._override.steady_ticks())
+        else:
+            self._change_rate()
+
+    def change_rate(self, rate: int) -> None:
+        """Let the motion's own time go on at another rate, in thousandths; 0: pause, RESUME: as before it.
+
+        Each change takes the record's brake time, with acceleration and jerk as in ``brake``. It begins as braking
+        does; one that comes while the rate is changing waits until that has ended, and only the last one counts.
+        """
+        if not self.moving:
+            raise Refused(codes.NOT_MOVING)
+        if self._braked:
+            raise Refused(codes.BUSY)
+        if not self._can_change:
+            raise Refused(codes.FIXED_SPEED)
+        if rate == RESUME:
+            rate = self._running_rate
+        if self._override.is_too_long(self.motion_ticks(), rate):
+            raise Refused(codes.TOO_LONG)
+        self.rate = rate
+        self._running_rate = rate or self._running_rate
+        self._change_rate()
+
+    def _is_steady(self) -> bool:
+        return self._clock() > self._override.steady_kiticks
+
+    def _change_rate(self) -> None:
+        """Begin the ramp to the rate that is wanted, or wait until the last one lies behind."""
+        self._change_waits = self._override.rate != self.rate
+        if not self._change_waits or not self._is_steady():
+            return
         now_kiticks = self._clock()
-        start_kiticks = now_kiticks + LOOKAHEAD_KITICKS + _BRAKE_MARGIN_KITICKS
+        start_kiticks = now_kiticks + LOOKAHEAD_KITICKS + _LAW_MARGIN_KITICKS
         for joint in self._joints:
             start_kiticks = max(start_kiticks, now_kiticks + joint.ahead_kiticks())
-        if start_kiticks << 10 < self.duration_ticks:
-            self._brake_at(start_kiticks << 10)
-
-    def _brake_at(self, start_ticks: int) -> None:
-        self._braked = self._end_moves = True
-        self.duration_ticks = self._end_ticks = start_ticks + self._brake_ticks
+        self._change_waits = False
+        if start_kiticks << 10 >= self.duration_ticks:
+            return
+        self._readings.convert(self._epoch, self._counter_kiticks)
+        self._override.ramp(start_kiticks << 10, self.rate)
+        is_last = self._braked
+        self._end_at(self._override.steady_ticks() if is_last else self._override.end_ticks())
         for joint in self._joints:
-            joint.brake(start_ticks, self._brake_ticks)
+            joint.follow(self._override.law, is_last)
             if not self._refill_queues():
                 break
+
+    def _end_at(self, ticks: int) -> None:
+        self.duration_ticks = self._end_ticks = ticks
+        self._end_moves = True
 
     def _fail(self, code: int, joint: int) -> None:
         self._inputs.freeze()
@@ -369,6 +437,7 @@ class Engine:
         low = ticks & 0xFFFFFFFF
         buffer[TICKS_LOW] = low - (1 << 32) if low >> 31 else low
         buffer[TICKS_HIGH] = ticks >> 32
+        time_law.to_motion_time(self._override.law, buffer, 0)
         count = len(self._joints)
         for number in range(count):
             buffer[COMMANDED + number] = self.commanded(number)

@@ -18,7 +18,7 @@ from armtempo_board.hardware.sampler import Sampler
 from armtempo_board.stepgen.step_generator import StepGenerator
 
 LOOKAHEAD_KITICKS = const(4096)
-"""How far ahead steps are computed: 50 ms. Braking begins behind what is computed."""
+"""How far ahead steps are computed: 50 ms. A change of rate begins behind what is computed."""
 
 _GUARD_KITICKS = const(16)  # 195 us: a turn of DIR is queued only behind an edge that is further away
 _OVERDUE_KITICKS = const(-164)  # 2 ms ago: the interrupt that fills the rings comes no more
@@ -134,6 +134,9 @@ class JointDrive:
             elif generator.at_turn:
                 ring.set_last_to_now()
                 self._turn()
+            elif generator.halted:
+                ring.push_away()
+                self._next_refill_kiticks = now_kiticks + _REFILL_KITICKS
             return 0
         if generator.next_kiticks() - now_kiticks > LOOKAHEAD_KITICKS:
             ring.push_away()
@@ -145,12 +148,17 @@ class JointDrive:
             return 0
         return codes.UNDERRUN if ring.run(generator.queue) else 0
 
-    def brake(self, start_ticks: int, length_ticks: int) -> None:
-        """Come to rest along the path (see ``StepGenerator.brake``)."""
+    def follow(self, law: "array[int]", is_last: bool) -> None:
+        """Take the motion's time by another law (see ``StepGenerator.follow``)."""
         fed = self.ring.feed(0)
-        self.generator.brake(start_ticks, length_ticks)
+        self.generator.follow(law, is_last)
         self._next_refill_kiticks = -LOOKAHEAD_KITICKS
         self.ring.feed(fed)
+
+    def finish(self) -> None:
+        """Where the motion's time will stand still, that is the end."""
+        self.generator.finish()
+        self._next_refill_kiticks = -LOOKAHEAD_KITICKS
 
     def empty(self) -> None:
         """Empty the ring; the position stays."""

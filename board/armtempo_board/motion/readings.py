@@ -12,13 +12,17 @@ from armtempo_board.hardware import isr
 from armtempo_board.hardware.encoders import EncoderInput, NoEncoder
 from armtempo_board.hardware.sampler import Sampler
 from armtempo_board.motion.joint_drive import JointDrive
+from armtempo_board.stepgen.time_law import to_motion_time
 
 _CAPACITY = const(4)  # samples
 _HALF_ROUND_KITICKS = const(1 << 21)  # of the counter
 
 
 class Readings:
-    """``joints`` and ``encoders``: one of each a joint; ``slots``: word of its encoder in a raw sample."""
+    """``joints`` and ``encoders``: one of each a joint; ``slots``: word of its encoder in a raw sample.
+
+    ``law``: of the motion's time (time_law.py).
+    """
 
     def __init__(
         self,
@@ -26,11 +30,13 @@ class Readings:
         joints: "list[JointDrive]",
         encoders: "list[EncoderInput | NoEncoder]",
         slots: "list[int]",
+        law: "array[int]",
     ) -> None:
         self._sampler = sampler
         self._joints = joints
         self._encoders = encoders
         self._slots = slots
+        self._law = law
         self._size = COMMANDED + 2 * len(joints)
         self._words = array("i", bytearray(4 * _CAPACITY * self._size))
         self._in = self._out = 0
@@ -65,6 +71,7 @@ class Readings:
         words[to + TICKS_HIGH] = max(epoch, 0)
         if epoch >= 0:
             isr.copy_word(raw, at, words, to)
+        to_motion_time(self._law, words, to)
         commanded, counts = to + COMMANDED, to + COMMANDED + len(self._joints)
         for number in range(len(self._joints)):
             joint = self._joints[number]

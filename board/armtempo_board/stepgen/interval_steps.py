@@ -3,9 +3,9 @@
 import micropython
 from micropython import const
 
-from armtempo_board.stepgen.braking import scale_slope, to_real_time
 from armtempo_board.stepgen.cubics import cubics_fit, put_cubics
 from armtempo_board.stepgen.newton import solve
+from armtempo_board.stepgen.time_law import scale_slope, to_real_time
 
 _MOST_STEPS = const(1024)  # of a cubic
 _SINGLY = const(8)  # steps solved one by one before a cubic is tried again; an item of the queue holds 8
@@ -30,13 +30,13 @@ _INTERVAL_HIGH = const(27)
 _MODE = const(28)
 _SINGLE_STEPS = const(29)
 _HELD_BACK = const(30)
-_ENDED = const(31)
+_HALTED = const(31)
 _ITEMS = const(32)
 _ITEMS_MASK = const(7)
 _HIGH_BIAS = const(1 << 28)
 _COUNT_MASK = const(0xFFFF)
 _FULL = const(7)
-_BRAKING = const(1)
+_BY_LAW = const(1)
 _AT_START = const(2)
 # as in newton.py: words of the solver
 _FIRST_NODE = const(28)
@@ -56,12 +56,12 @@ _NODE_WORDS = const(8)
 
 
 @micropython.viper
-def queue_steps(solver: object, queue: object, budget: int) -> object:
+def queue_steps(solver: object, queue: object, budget: int, law: object) -> object:
     """Queue the subinterval's steps behind REACHED, until all are in, or the queue is full or reaches UNTIL_KITICKS.
 
     ``budget``: nodes to be solved at most, or a few more; each takes about 2000 instructions. A last step that is
-    slow is not put in, but HELD_BACK is set. ENDED is set where braking ends before. The words of ``queue`` are named
-    in step_queue.py, those of ``solver`` in newton.py.
+    slow is not put in, but HELD_BACK is set. HALTED is set where by the law the next step never comes. The words of
+    ``queue`` are named in step_queue.py, those of ``solver`` in newton.py, those of ``law`` in time_law.py.
     """
     words = ptr32(queue)  # type: ignore[arg-type]
     nodes = ptr32(solver)  # type: ignore[arg-type]
@@ -90,11 +90,11 @@ def queue_steps(solver: object, queue: object, budget: int) -> object:
                 words[_BASE_HIGH] = high
                 verdict = 1
                 if mode:
-                    # Braking: the nodes in real time, all three counting from one base
-                    verdict = int(to_real_time(solver, _MIDDLE_NODE, high, scale))
+                    # The nodes in real time, all three counting from one base
+                    verdict = int(to_real_time(law, solver, _MIDDLE_NODE, scale))
                     if verdict:
                         scale_slope(solver, _MIDDLE_NODE)
-                        verdict = int(to_real_time(solver, _END_NODE, high, scale))
+                        verdict = int(to_real_time(law, solver, _END_NODE, scale))
                     if verdict:
                         scale_slope(solver, _END_NODE)
                         base = (nodes[_FIRST_DELAY] >> 12) << 12
@@ -133,15 +133,15 @@ def queue_steps(solver: object, queue: object, budget: int) -> object:
             solve(solver, reached + 1, 0)
             budget -= 1
             base = 0
-            if mode & _BRAKING:
-                if not int(to_real_time(solver, _FIRST_NODE, high, scale)):
-                    words[_ENDED] = 1
+            if mode & _BY_LAW:
+                if not int(to_real_time(law, solver, _FIRST_NODE, scale)):
+                    words[_HALTED] = 1
                     break
-                if mode == _BRAKING:
+                if mode == _BY_LAW:
                     scale_slope(solver, _FIRST_NODE)
                 base = nodes[_FIRST_DELAY]
             reached += 1
-            if reached == last and (mode > _BRAKING or nodes[_MANTISSA] >> nodes[_EXPONENT] > slow_ticks):
+            if reached == last and (mode > _BY_LAW or nodes[_MANTISSA] >> nodes[_EXPONENT] > slow_ticks):
                 words[_HELD_BACK] = 1
             else:
                 base += (nodes[_FIRST_TIME] + (1 << (scale - 1))) >> scale

@@ -39,15 +39,14 @@ _LAST_ANGLE = const(27)
 FIRST_NODE = const(28)
 MIDDLE_NODE = const(36)
 END_NODE = const(44)
-HELD_NODE = const(52)  # the step held back, only while braking moves it
-LAW = const(60)  # the law of braking, see braking.py
-SOLVER_SIZE = const(64)
+HELD_NODE = const(52)  # the step held back, only where the law of real time moves it
+SOLVER_SIZE = const(60)
 
 # words of a node; its time is ticks * 2**(scale of the subinterval's time), from the subinterval's first high word on
 NODE_TIME = const(0)
 NODE_MANTISSA = const(1)  # ticks per step = mantissa / 2**exponent; the mantissa has 29 or 30 bits
 NODE_EXPONENT = const(2)
-NODE_DELAY = const(3)  # while braking: whole ticks to be added to the time,
+NODE_DELAY = const(3)  # by the law of real time: whole ticks of it beside the time,
 NODE_RATE = const(4)  # and the rate of the motion's time
 _NODE_WORDS = const(8)
 

@@ -2,15 +2,15 @@
 
 A monotone subinterval's first step is solved by itself, the others as two cubics at a time between solved nodes, as
 long as the error bound allows it. Its last step is held back until it is known not to be followed by an opposite one.
+What steps come is found in the motion's own time, so it is the same however slowly that runs (time_law.py).
 """
 
 from array import array
 
 from micropython import const
 
-from armtempo_board.stepgen import braking, newton, step_queue, subdivision
+from armtempo_board.stepgen import newton, step_queue, subdivision, time_law
 from armtempo_board.stepgen.bezier import BIAS, HIGH, LOW
-from armtempo_board.stepgen.braking import is_past
 from armtempo_board.stepgen.interval_steps import queue_steps
 from armtempo_board.stepgen.newton import (
     FIRST_NODE,
@@ -22,8 +22,8 @@ from armtempo_board.stepgen.newton import (
 )
 from armtempo_board.stepgen.step_queue import (
     AT_START,
-    BRAKING,
-    ENDED,
+    BY_LAW,
+    HALTED,
     HELD_BACK,
     IN,
     INTERVAL_HIGH,
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 _ITEMS_PER_CALL = const(2)  # put into the queue by one call of ``prepare`` at most,
 _SEARCHES = const(4)  # and so many times a part of the motion looked at for each: bounds its time
 _NODES = const(12)  # solved in one call
-_CLEARED = (STEPS, LATEST_KITICKS, REACHED, LAST_STEP, MODE, HELD_BACK, ENDED)
+_CLEARED = (STEPS, LATEST_KITICKS, REACHED, LAST_STEP, MODE, HELD_BACK, HALTED)
 _FIRST_CUBIC_STEPS = const(16)  # tried first in a motion
 _FAR = const(1 << 16)  # in 4096 ticks: longer than any subinterval and gap, and a small integer in ticks
 
@@ -57,23 +57,28 @@ class StepGenerator:
     """Goes through one joint's motion; every buffer is made once.
 
     Steps go into ``queue`` (step_queue.py). ``direction`` (1 or -1) is that of the steps put in now. ``at_turn``: the
-    next step goes the other way, ``turn`` lets it come. ``ended``: no more steps are put in. Between motions
-    ``subintervals`` is free for the check of the next.
+    next step goes the other way, ``turn`` lets it come. ``halted``: the motion's time will stand still, and the next
+    step comes in another ``follow`` law. ``ended``: no more steps are put in. Between motions ``subintervals`` is free
+    for the check of the next.
     """
 
     def __init__(self) -> None:
         self.subintervals = Subintervals()
         self._solver = array("i", bytes(4 * newton.SOLVER_SIZE))
+        self._law = array("i", bytes(4 * time_law.LAW_WORDS))
         self.queue = array("i", bytes(4 * step_queue.QUEUE_SIZE))
         self.direction = self._heading = 1
         self.at_turn = False
         self.ended = True
+        self.halted = self._is_last_law = False
         # every attribute from the start, so that none is added while a motion runs
         self._held = False  # the last step of a subinterval is held back
         self._first_waits = False  # the subinterval's first step is solved, but not in the queue,
-        self._first_comes = False  # and braking lets it come
+        self._first_comes = False  # and by the law it comes
+        self._first_ticks = 0  # its time in the motion's own
         self._held_queued = False  # the last step in the queue was held back before
-        self._held_high = self._held_ticks = self._interval_in = 0
+        self._held_high = self._held_ticks = 0  # its time in the motion's own
+        self._interval_in = 0
         self._found = NOT_YET  # what is known of the next subinterval
 
     def load(
@@ -96,7 +101,7 @@ class StepGenerator:
         self._gap_ticks = gap_ticks
         self._position = position_steps + BIAS
         self.direction = 1
-        self.at_turn = self.ended = False
+        self.at_turn = self.ended = self.halted = self._is_last_law = False
         self._held = self._first_waits = self._held_queued = False
         self._found = NOT_YET
         while not holds_steps(queue) and not self.ended:
@@ -114,7 +119,7 @@ class StepGenerator:
         for _ in range(_ITEMS_PER_CALL):
             if not step_queue.has_room(queue):
                 return False
-            if not self._prepare() and (self.at_turn or self.ended):
+            if not self._prepare() and (self.at_turn or self.halted or self.ended):
                 return False
         return True
 
@@ -141,16 +146,21 @@ class StepGenerator:
         self.direction = -self.direction
         self.at_turn = False
 
-    def brake(self, start_ticks: int, length_ticks: int) -> None:
-        """Come to rest along the path from a time on (see braking.py); nothing may be written meanwhile.
+    def follow(self, law: "array[int]", is_last: bool) -> None:
+        """Take the motion's time by a law from the real time on at which its ramp begins (time_law.py).
 
-        It must not lie before any ``until_kiticks`` that ``prepare`` was given. Only what was put into the queue last
-        goes on beyond that: steps of one subinterval, or one that was held back.
+        Nothing may be written meanwhile. That time must not lie before any ``until_kiticks`` that ``prepare`` was
+        given. Only what was put into the queue last goes on beyond that: steps of one subinterval, or one that was held
+        back. The ramp of the law before must lie behind what was written. ``is_last``: where the motion's time stands
+        still behind the ramp, it is the end.
         """
-        braking.set_law(self._solver, start_ticks, length_ticks)
-        start_kiticks = start_ticks >> 10
+        time_law.copy_law(self._law, law)
+        start_kiticks = _kiticks(law[time_law.REAL_START_HIGH], 0)
         queue = self.queue
-        queue[MODE] |= BRAKING
+        if not queue[MODE] & BY_LAW:
+            self._law[time_law.MOTION_HIGH] = queue[INTERVAL_HIGH]
+        queue[MODE] |= BY_LAW
+        queue[INTERVAL_HIGH] = time_law.count_from(self._law, self._law[time_law.MOTION_HIGH])
         reached = queue[REACHED]
         if queue[LATEST_KITICKS] >= start_kiticks and holds_steps(queue):
             if self._held_queued:
@@ -161,20 +171,22 @@ class StepGenerator:
                 if self._held:
                     self._held = False
                     reached -= 1
-        if self._held:
-            self._brake_held()
         if reached < 0:
             reached = 0
             self._first_waits = True
         queue[REACHED] = reached
+        # what was written last may have followed the law before, so no cubic begins there
+        queue[SINGLE_STEPS] = max(queue[SINGLE_STEPS], 1)
         if self._first_waits or reached < queue[LAST_STEP]:
-            self._first_comes = self._solve(reached)
+            self._solve(reached)
+        self.halted = False
+        self.finish(is_last)
 
-    def _brake_held(self) -> None:
-        solver = self._solver
-        solver[HELD_NODE] = self._held_ticks
-        self._held = bool(braking.to_real_time(solver, HELD_NODE, self._held_high, 0))
-        self._held_ticks = solver[HELD_NODE] + solver[HELD_NODE + NODE_DELAY]
+    def finish(self, is_last: bool = True) -> None:
+        """Whether the motion is at its end where by the law its time stands still."""
+        self._is_last_law = is_last
+        if is_last and self.halted:
+            self.ended = True
 
     def next_kiticks(self) -> int:
         """Time of the next step to be written, or one before it while it is not known."""
@@ -191,7 +203,7 @@ class StepGenerator:
         """Put the next steps into the queue. False: at a turn, at the end, or not found yet."""
         before = self.queue[IN]
         for _ in range(_SEARCHES):
-            if self.at_turn or self.ended:
+            if self.at_turn or self.halted or self.ended:
                 return False
             if self._first_waits:
                 self._queue_first()
@@ -208,11 +220,14 @@ class StepGenerator:
         if self._found == NOT_YET:
             self._found = now.search(self._position)
         found = self._found
-        if found == END or (self.queue[MODE] & BRAKING and is_past(self._solver, now.time[HIGH])):
+        is_past = self.queue[MODE] & BY_LAW and time_law.is_past(self._law, now.time[HIGH])
+        if found == END or is_past:
             if self._held:
                 self._queue_held()
-            else:
+            elif found == END:
                 self.ended = True
+            else:
+                self._halt()
         elif self._held and self._since_held(now.time[HIGH], now.time[LOW] >> 16) > self._gap_ticks:
             self._queue_held()
         elif found != NOT_YET:
@@ -229,6 +244,8 @@ class StepGenerator:
         scale = now.time_measures[SCALE] - 12
         queue[TIME_SCALE] = scale
         queue[INTERVAL_HIGH] = now.time[HIGH]
+        if queue[MODE] & BY_LAW:
+            queue[INTERVAL_HIGH] = time_law.count_from(self._law, now.time[HIGH])
         solver[newton.TIME_OFFSET] = now.time[LOW] >> (16 - scale)
         if at_start:
             solver[newton.RANGE] = 0
@@ -239,34 +256,34 @@ class StepGenerator:
         self._heading = heading
         queue[LAST_STEP] = steps * heading - 1
         queue[REACHED] = queue[SINGLE_STEPS] = 0
-        queue[MODE] = queue[MODE] & BRAKING | (AT_START if at_start else 0)
+        queue[MODE] = queue[MODE] & BY_LAW | (AT_START if at_start else 0)
         self._first_waits = True
         self._interval_in = queue[IN]
-        self._first_comes = self._solve(0)
+        self._solve(0)
 
-    def _solve(self, index: int) -> bool:
-        """Set the first node to the subinterval's step ``index``; False where braking ends before it."""
+    def _solve(self, index: int) -> None:
+        """Set the first node to the subinterval's step ``index``."""
         solver = self._solver
         queue = self.queue
         solve(solver, index, 0)
-        if not queue[MODE] & BRAKING:
-            return True
-        comes = braking.to_real_time(solver, FIRST_NODE, queue[INTERVAL_HIGH], queue[TIME_SCALE])
-        if comes and queue[MODE] < AT_START:
-            braking.scale_slope(solver, FIRST_NODE)
-        return bool(comes)
+        self._first_ticks = self._node_ticks()
+        self._first_comes = True
+        if queue[MODE] & BY_LAW:
+            comes = time_law.to_real_time(self._law, solver, FIRST_NODE, queue[TIME_SCALE])
+            if comes and queue[MODE] < AT_START:
+                time_law.scale_slope(solver, FIRST_NODE)
+            self._first_comes = bool(comes)
 
     def _queue_first(self) -> None:
         """The first step of a subinterval, against the one that was held back before it."""
         if self._held:
             is_opposite = self._heading != self.direction
-            is_close = self._since_held(self.queue[INTERVAL_HIGH], self._ticks()) <= self._gap_ticks
-            if is_opposite and is_close and self._first_comes:
+            if is_opposite and self._since_held(self._high(), self._first_ticks) <= self._gap_ticks:
                 self._held = self._first_waits = False  # neither comes
             else:
                 self._queue_held()
         elif not self._first_comes:
-            self.ended = True
+            self._halt()
         elif self._heading != self.direction:
             self.at_turn = True
         else:
@@ -281,12 +298,21 @@ class StepGenerator:
         """The next steps of the subinterval."""
         queue = self.queue
         self._held_queued = False
-        queue_steps(self._solver, queue, _NODES)
+        queue_steps(self._solver, queue, _NODES, self._law)
         if queue[HELD_BACK]:
             queue[HELD_BACK] = 0
+            if queue[MODE] & BY_LAW:  # its node is in real time
+                solve(self._solver, queue[LAST_STEP], 0)
+            self._first_ticks = self._node_ticks()
             self._hold_back()
-        if queue[ENDED]:
-            self.ended = True
+        if queue[HALTED]:
+            queue[HALTED] = 0
+            self._halt()
+
+    def _halt(self) -> None:
+        """By the law nothing comes any more: the end, or until another law."""
+        self.halted = True
+        self.finish(self._is_last_law)
 
     def _queue_single(self) -> None:
         """Queue the step at the first node, or hold it back."""
@@ -299,8 +325,8 @@ class StepGenerator:
     def _hold_back(self) -> None:
         """Hold back the step at the first node."""
         self._held = True
-        self._held_high = self.queue[INTERVAL_HIGH]
-        self._held_ticks = self._ticks()
+        self._held_high = self._high()
+        self._held_ticks = self._first_ticks
 
     def _is_slow(self) -> bool:
         """Whether the step at the first node may be followed by an opposite one within the gap.
@@ -312,24 +338,44 @@ class StepGenerator:
         return self.queue[MODE] >= AT_START or ticks > self.queue[step_queue.SLOW_TICKS]
 
     def _queue_held(self) -> None:
-        """Queue the step that was held back."""
+        """Queue the step that was held back, if by the law it comes."""
+        high, ticks = self._held_high, self._held_ticks
+        if self.queue[MODE] & BY_LAW:
+            solver, law = self._solver, self._law
+            before = law[time_law.MOTION_HIGH]
+            high = time_law.count_from(law, high)
+            solver[HELD_NODE] = ticks
+            comes = time_law.to_real_time(law, solver, HELD_NODE, 0)
+            ticks = solver[HELD_NODE] + solver[HELD_NODE + NODE_DELAY]
+            time_law.count_from(law, before)
+            if not comes:
+                self._halt()
+                return
         self._held = False
         self._held_queued = True
-        put_single(self.queue, self._held_high, self._held_ticks)
+        put_single(self.queue, high, ticks)
         self._interval_in = self.queue[IN]
 
     def _since_held(self, high: int, ticks: int) -> int:
-        """Ticks from the step held back to a time; any large number where it is far."""
+        """Ticks of the motion's time from the step held back to another; any large number where it is far."""
         high -= self._held_high
         if high > _FAR:
             high = _FAR
         return (high << 12) + ticks - self._held_ticks
 
-    def _ticks(self) -> int:
-        """Time of the first node in ticks from INTERVAL_HIGH on."""
+    def _high(self) -> int:
+        """What the motion's times of the subinterval count from."""
+        return self._law[time_law.MOTION_HIGH] if self.queue[MODE] & BY_LAW else self.queue[INTERVAL_HIGH]
+
+    def _node_ticks(self) -> int:
+        """Time of the first node in ticks, rounded."""
         scale = self.queue[TIME_SCALE]
-        ticks = (self._solver[FIRST_NODE] + (1 << (scale - 1))) >> scale
-        return ticks + self._solver[FIRST_NODE + NODE_DELAY] if self.queue[MODE] & BRAKING else ticks
+        return (self._solver[FIRST_NODE] + (1 << (scale - 1))) >> scale
+
+    def _ticks(self) -> int:
+        """Real time of the first node in ticks from INTERVAL_HIGH on."""
+        ticks = self._node_ticks()
+        return ticks + self._solver[FIRST_NODE + NODE_DELAY] if self.queue[MODE] & BY_LAW else ticks
 
 
 def _kiticks(high: int, ticks: int) -> int:

@@ -42,18 +42,18 @@ REACHED = const(23)  # its step that was put in last
 LAST_STEP = const(24)  # its last one
 CUBIC_STEPS = const(25)  # steps of a cubic that kept the error bound
 SLOW_TICKS = const(26)  # a last step that takes longer is held back
-INTERVAL_HIGH = const(27)  # what the subinterval's times count from; 4096 ticks, + 2**28
+INTERVAL_HIGH = const(27)  # what the subinterval's real times count from; 4096 ticks, + 2**28
 MODE = const(28)
 SINGLE_STEPS = const(29)  # steps to be solved one by one before a cubic is tried again
 HELD_BACK = const(30)
-ENDED = const(31)
+HALTED = const(31)  # by the law of real time its next step never comes
 _ITEMS = const(32)  # CAPACITY of them
 CAPACITY = const(8)  # items
 QUEUE_SIZE = const(136)
 
 _FULL = const(7)  # items: there is no room for two more
 # bits of MODE
-BRAKING = const(1)
+BY_LAW = const(1)  # real time is not the motion's own, see time_law.py
 AT_START = const(2)  # all steps come at the start of the subinterval
 
 _ITEMS_MASK = const(7)

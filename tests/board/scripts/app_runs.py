@@ -14,7 +14,7 @@ def case_stop_brakes_or_freezes():
     assert host.ask("stop", (0,)) == ("ok", (), b"")
     assert state(host) == "braking"
     app.controller.engine.advance(1)
-    assert host.turn()[-1][2][16] == messages.SAMPLE_BRAKING
+    assert host.turn()[-1][2][24] == messages.SAMPLE_BRAKING
     app.controller.engine.finish()
     assert state(host) == "idle"
     assert ends_of(host)[-1][0] == "done"

@@ -19,9 +19,9 @@ def whole(values, scale):
     return [round(value * scale) for value in values]
 
 
-def record(brake_ticks):
-    angles = [whole(points, 1 << 28) for points in ANGLES]
-    times = [whole(TIMES, TICK_HZ << 16)]
+def record(brake_ticks, control_points=ANGLES, time_points=TIMES):
+    angles = [whole(points, 1 << 28) for points in control_points]
+    times = [whole(time_points, TICK_HZ << 16)]
     return motion.Motion(motion.pack(5, angles, times, 1, brake_ticks, 0))
 
 

@@ -53,7 +53,7 @@ def anywhere():
         last = (rig.samples[-1][0] & 0xFFFFFFFF) - end
         assert 0 <= last < 1000, last
         assert len(rig.samples) == -(-end // (TICK_HZ // 10)) + 1, len(rig.samples)
-        assert rig.samples[-1][2:5] == rig.commanded()
+        assert rig.samples[-1][4:7] == rig.commanded()
 
 
 def too_late():

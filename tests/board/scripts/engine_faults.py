@@ -36,7 +36,7 @@ def stopped(rig, code=0, joint=255):
     for pulses in rig.pulses:
         pulses.check_end(frozen=True)
     assert rig.commanded() == rig.stepped(), (rig.commanded(), rig.stepped())
-    assert rig.samples[-1][2:5] == rig.stepped()[:3]
+    assert rig.samples[-1][4:7] == rig.stepped()[:3]
 
 
 def again(rig):

@@ -44,6 +44,7 @@ class Motion:
     """What the engine is given instead of a motion; each joint's ``Steps``."""
 
     brake_ticks = 0
+    ramps = True
 
     def __init__(self, duration_ticks, *joints):
         self.duration = duration_ticks
@@ -56,6 +57,8 @@ class StepGenerator:
     waits = step_generator.StepGenerator.waits
     latest_kiticks = step_generator.StepGenerator.latest_kiticks
     write = step_generator.StepGenerator.write
+
+    halted = False
 
     def __init__(self):
         self.ended = True
@@ -289,7 +292,7 @@ class Rig:
     def turn(self):
         """One turn of the main loop."""
         self.engine.service()
-        buffer = [0] * (2 + 2 * len(self.joints))
+        buffer = array("i", [0] * (4 + 2 * len(self.joints)))
         while self.engine.next_sample(buffer):
             self.samples.append(list(buffer))
         self.board.spend(self.turn_ticks)

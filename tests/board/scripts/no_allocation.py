@@ -22,7 +22,7 @@ from armtempo_shared import armrecord  # noqa: F401
 from brake_motion import BRAKE_TICKS, record
 
 STEP_TICKS = 30_000
-BUFFER = array("i", [0] * 8)
+BUFFER = array("i", [0] * 10)
 
 
 def compare_of(ring):

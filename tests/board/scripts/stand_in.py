@@ -80,9 +80,11 @@ class Engine:
         self.explode = None
         self.duration_ticks = 84000
         self.ticks = 0
+        self.rate = 1000
 
-    def load(self, motion):
+    def load(self, motion, rate=1000):
         self.calls.append("load")
+        self.rate = rate
         if self.refusal:
             from armtempo_board.errors import Refused
 
@@ -104,6 +106,10 @@ class Engine:
 
     def brake(self):
         self.calls.append("brake")
+
+    def change_rate(self, rate):
+        self.calls.append("rate")
+        self.rate = rate
 
     def freeze(self):
         self.calls.append("freeze")
@@ -128,9 +134,10 @@ class Engine:
         low = self.ticks & 0xFFFFFFFF
         raw[0] = low - (1 << 32) if low >> 31 else low
         raw[1] = self.ticks >> 32
+        raw[2:4] = raw[:2]
         for joint in range(self.joints):
-            raw[2 + joint] = self.steps[joint]
-            raw[2 + self.joints + joint] = 10 * self.steps[joint]
+            raw[4 + joint] = self.steps[joint]
+            raw[4 + self.joints + joint] = 10 * self.steps[joint]
 
     def next_sample(self, raw):
         if not self.pending:
@@ -142,7 +149,7 @@ class Engine:
     # for tests
 
     def sample(self):
-        raw = [0] * (2 + 2 * self.joints)
+        raw = [0] * (4 + 2 * self.joints)
         self.snapshot(raw)
         self.pending.append(raw)
 

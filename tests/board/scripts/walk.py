@@ -13,10 +13,12 @@ import micropython
 from armtempo_board.errors import Refused
 from armtempo_board.motion import motion_check as checking
 from armtempo_board.motion import rate_check
+from armtempo_board.motion.override import Override
 from armtempo_board.stepgen.step_generator import StepGenerator
 from armtempo_shared.motion import Motion
 
 MASK = 1023
+OVERRIDE = Override()
 NEVER = 1 << 28
 checking.MAX_STEP_RATE = 333_000  # the evaluator is tried beyond what the program's loop keeps up with
 rate_check.MAX_STEP_RATE_SUM = 1_000_000
@@ -29,6 +31,7 @@ def walk(motion, joint, generator, out, pulse, gap, room, start, length):
     generator.load(motion, joint, first_position(motion, joint), pulse, gap)
     head = 0
     braked = not length
+    OVERRIDE.begin(1000, length, 1 << 38)
     start_kiticks = start >> 10
     lock, unlock = heap_lock, heap_unlock
     while generator.waits() or not generator.ended:
@@ -41,7 +44,8 @@ def walk(motion, joint, generator, out, pulse, gap, room, start, length):
         count = 0 if brake_now else generator.write(ring, MASK, head, room)
         unlock()
         if brake_now:
-            generator.brake(start, length)
+            OVERRIDE.ramp(start, 0)
+            generator.follow(OVERRIDE.law, True)
             braked = True
         for i in range(0, count, 2):
             rise = ring[(head + i) & MASK]

@@ -1,0 +1,68 @@
+"""Feed override: the rate at which the motion's own time runs, and ramps from one rate to another.
+
+The same law serves a slower run, a change of speed, a pause and braking (stepgen/time_law.py). Rates are in
+thousandths. Numbers here may be large integers: it is called when a motion is loaded or a rate is asked for.
+"""
+
+from array import array
+
+from armtempo_shared.limits import LONGEST_RUN_TICKS
+
+from armtempo_board.stepgen import time_law
+from armtempo_board.stepgen.time_law import PERMILLE
+
+
+class Override:
+    """``law`` is what the joints follow; ``rate`` that behind its ramp, steady from ``steady_kiticks`` on."""
+
+    def __init__(self) -> None:
+        self.law = array("i", bytes(4 * time_law.LAW_WORDS))
+        self.begin(PERMILLE, 0, 0)
+
+    def begin(self, rate: int, ramp_ticks: int, duration_ticks: int) -> None:
+        """Stand at time 0 of a motion. ``ramp_ticks``: length of each ramp, rounded up to the grid; at most 12.8 s."""
+        grid = time_law.RAMP_GRID_TICKS
+        self._ramp_ticks = min(-(-ramp_ticks // grid), time_law.LONGEST_RAMP_TICKS // grid) * grid
+        self._duration_ticks = duration_ticks
+        self._motion_ticks = self._real_ticks = 0  # at the end of the last ramp
+        self.rate = rate
+        time_law.set_length(self.law, 0)
+        self._set(time_law.START_HIGH, rate, rate)
+        self._set(time_law.END_HIGH, rate, rate)
+        self.steady_kiticks = -1 << 20
+
+    def ramp(self, from_ticks: int, rate: int) -> None:
+        """Go to another rate, from a real time on that lies behind the last ramp."""
+        thousands = max(-(-(from_ticks - self._real_ticks) // PERMILLE), 0)
+        self._real_ticks += PERMILLE * thousands
+        self._motion_ticks += self.rate * thousands
+        time_law.set_length(self.law, self._ramp_ticks)
+        self._set(time_law.START_HIGH, self.rate, rate)
+        self._real_ticks += self._ramp_ticks
+        self._motion_ticks += (self.rate + rate) * (self._ramp_ticks // (2 * PERMILLE))
+        self._set(time_law.END_HIGH, self.rate, rate)
+        self.rate = rate
+        self.steady_kiticks = (self._real_ticks >> 10) + 1
+
+    def _set(self, end: int, before: int, after: int) -> None:
+        """Put one end of the ramp, where motion and real time are now, and the rates into the law."""
+        time_law.set_times(self.law, end, self._motion_ticks)
+        time_law.set_times(self.law, end + time_law.REAL_START_HIGH - time_law.START_HIGH, self._real_ticks)
+        time_law.set_rates(self.law, before, after)
+
+    def end_ticks(self) -> int:
+        """Real time at which the motion ends: of the ramp's end, where it ends within; LONGEST_RUN_TICKS: never."""
+        left = max(self._duration_ticks - self._motion_ticks, 0)
+        if left and not self.rate:
+            return LONGEST_RUN_TICKS
+        return self._real_ticks + (-(-left * PERMILLE // self.rate) if left else 0)
+
+    def steady_ticks(self) -> int:
+        """Real time at which the last ramp ends."""
+        return self._real_ticks
+
+    def is_too_long(self, from_ticks: int, rate: int) -> bool:
+        """Whether at a rate, taken up at about a real time, the run could last longer than LONGEST_RUN_TICKS."""
+        left = max(self._duration_ticks - self._motion_ticks, 0)
+        latest = max(from_ticks, self._real_ticks) + 2 * self._ramp_ticks
+        return rate > 0 and latest + left * PERMILLE // rate > LONGEST_RUN_TICKS
