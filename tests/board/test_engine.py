@@ -14,7 +14,7 @@ HEAP = {"cpython": "", "micropython": "16M", "micropython-arm": "6M"}
 
 
 @pytest.mark.parametrize(
-    "script", ["engine_pulses", "engine_faults", "engine_brake", "ring_cases", "encoder_cases"]
+    "script", ["engine_pulses", "engine_faults", "engine_brake", "engine_override", "ring_cases", "encoder_cases"]
 )
 def test_cases(interpreter: str, script: str) -> None:
     path = SCRIPTS / f"{script}.py"
@@ -22,6 +22,14 @@ def test_cases(interpreter: str, script: str) -> None:
     short = ["short"] if interpreter == "micropython-arm" else []
     assert interpreters.run(interpreter, path, *short, heap=HEAP[interpreter]).split() == listed
     assert len(listed) >= 4
+
+
+@pytest.mark.skipif("micropython" not in interpreters.AVAILABLE, reason="needs MicroPython")
+def test_two_hundred_changes_of_speed() -> None:
+    """Where it is quickest, on more motions; the other interpreters have a few of them above."""
+    script = SCRIPTS / "engine_override.py"
+    output = interpreters.run("micropython", script, "30", "whole_path", "stops", heap="16M")
+    assert output.split() == ["whole_path", "stops"]
 
 
 @pytest.mark.parametrize("name", [name for name in interpreters.AVAILABLE if name != "cpython"])
