@@ -66,11 +66,11 @@ if TYPE_CHECKING:
         RunFolderError,
     )
     from armtempo.kinematics.of_arm import forward, inverse
-    from armtempo.link.ports import find_ports
     from armtempo.model.arm import Arm
     from armtempo.model.job import Job, Pose
     from armtempo.model.plan import Plan
     from armtempo.pipeline import compare, connect, plan, summary
+    from armtempo.ports.listing import find_ports
     from armtempo.robot.board import Board
     from armtempo.robot.recording import Watcher
     from armtempo.robot.run import Run
@@ -89,7 +89,7 @@ _HOMES = {
         "RunFolderError",
     ),
     "armtempo.kinematics.of_arm": ("forward", "inverse"),
-    "armtempo.link.ports": ("find_ports",),
+    "armtempo.ports.listing": ("find_ports",),
     "armtempo.model.arm": ("Arm",),
     "armtempo.model.job": ("Job", "Pose"),
     "armtempo.model.plan": ("Plan",),

@@ -26,7 +26,7 @@ from armtempo.planning import planner
 from armtempo.progress import Progress
 from armtempo.records import encode
 from armtempo.report import comparison, text_summary
-from armtempo.robot.board import connect
+from armtempo.robot.connect import connect
 from armtempo.robot.recording import Watcher
 from armtempo.robot.run import Run
 
@@ -60,13 +60,15 @@ def load(path: Path | str, arm: Arm | None = None) -> Plan:
 
 def run(
     plan: Plan,
-    port: str = "sim",
+    port: str | None = None,
     repeat: int = 1,
     out: Path | str = "runs",
     progress: Progress | None = None,
     watcher: Watcher | None = None,
 ) -> Run:
-    """Replay a plan on the board of ``port`` and record it: ``Board.run`` with a connection of its own."""
+    """Replay a plan on the board of ``port`` (as for ``connect``) and record it: ``Board.run`` with a connection of
+    its own.
+    """
     with connect(port, plan.arm) as board:
         return board.run(plan, repeat, out, progress, watcher)
 

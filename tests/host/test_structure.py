@@ -16,7 +16,11 @@ ORDER = (
     "errors",
     "arrays",
     "progress",
+    "virtual_id",  # how a virtual board is told from a real one
     "formats",  # TOML tables, JSON, text tables, whole files
+    "ports",  # names of serial ports, and which there are
+    "share",  # the program that has a port answers others
+    "project",  # armtempo.toml, variables; which board is meant
     "splines",  # B-splines, the time axis, trajectories, bounds of their extremes
     "optimise",  # population searches
     "model",  # arm, job, pose, plan, and their files

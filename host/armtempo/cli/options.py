@@ -103,7 +103,7 @@ def board(
     sink: Sink | None = None,
 ) -> Board:
     """The board of ``--port``; a virtual one moves ``arm``; ``sink`` takes the traffic."""
-    from armtempo.robot.board import connect
+    from armtempo.robot.connect import connect
 
     return connect(
         port,

@@ -12,6 +12,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from armtempo.errors import InputError
+from armtempo.formats.spelling import did_you_mean
 
 
 def encode(value: Any) -> Any:
@@ -99,7 +100,8 @@ def _dataclass(kind: Any, value: Any, where: str) -> Any:
     names = [field.name for field in dataclasses.fields(kind)]
     for what, keys in (("unknown", value.keys() - set(names)), ("missing", set(names) - value.keys())):
         if keys:
-            raise InputError(f"{where}: {what} key {', '.join(sorted(keys))}")
+            meant = did_you_mean(min(keys), names) if what == "unknown" else ""
+            raise InputError(f"{where}: {what} key {', '.join(sorted(keys))}{meant}")
     hints = _hints(kind)
     return kind(**{name: decode(hints[name], value[name], f"{where}.{name}") for name in names})
 

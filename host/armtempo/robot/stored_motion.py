@@ -48,6 +48,7 @@ def replay(
     cannot be reached any more, Stopped where the stop was asked for before the start.
     """
     client.session.stopping = lambda: stop.wanted
+    stop.wake = client.session.wake
     stop.check()
     started = client.start(motion.name, motion.crc, flags)
     follower = Follower(client, started.run)
@@ -98,7 +99,7 @@ class _Brake:
         self._client = client
         self._stop = stop
         brake_s = 0.0 if now else BRAKE_S
-        self._steps: list[tuple[float, Callable[[], None]]] = [
+        self._steps: list[tuple[float, Callable[[], object]]] = [
             (0.0, lambda: send_stop(client, now)),
             (brake_s, lambda: send_stop(client, now=True)),
             (brake_s + FREEZE_S, _does_not_stop),
@@ -118,13 +119,15 @@ def _does_not_stop() -> None:
     raise LinkError("the board was told to stop and does not; switch off the motors' power")
 
 
-def send_stop(client: Client, now: bool = False) -> None:
-    """Tell the board to brake along the path, or to freeze; nothing happens where nothing moves."""
+def send_stop(client: Client, now: bool = False) -> bool:
+    """Tell the board to brake along the path, or to freeze; False where nothing moves, and nothing happens."""
     try:
         client.stop(now)
+        return True
     except BoardError as error:
         if error.code != wire.ERROR_CODES["not_moving"]:
             raise
+        return False
 
 
 def stop(client: Client, now: bool) -> None:
