@@ -47,14 +47,17 @@ def summary(plan: Plan) -> list[str]:
     return text_summary.lines(plan)
 
 
-def load(path: Path | str, arm: Arm | None = None) -> Plan:
+def load(path: Path | str, arm: Arm | None = None, altered: bool = False) -> Plan:
     """The plan of a trajectory file.
 
-    Raises InputError where the file is none or damaged, or was planned for another arm than ``arm``.
+    ``altered``: also of one that was altered after it had been written. Raises InputError where the file is none,
+    damaged or altered, or was planned for another arm than ``arm``.
     """
-    found = trajectory_file.load(path)
+    found = trajectory_file.load(path, altered)
     if arm is not None and encode.arm_record(arm) != encode.arm_record(found.arm):
-        raise InputError(f"{path} was planned for another arm than {arm.source}; plan it again with this arm")
+        raise InputError(
+            f"{path} was planned for another arm than {arm.name!r} ({arm.source}); plan it again with this arm"
+        )
     return found
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from armtempo.cli import main
-from armtempo.model import trajectory_file
+from armtempo.model import arm_file, trajectory_file
 from armtempo.planning import planner
 from click.testing import CliRunner, Result
 
@@ -18,8 +18,9 @@ iterations = 10
 
 
 def run(*arguments: str) -> Result:
-    """The command's outcome."""
-    return CliRunner().invoke(main, ["plan", *arguments])
+    """The command's outcome; a job is for the arm that ships with armtempo."""
+    arm = {"ARMTEMPO_ARM": str(arm_file.default_path())} if "--job" in arguments else {}
+    return CliRunner(env=arm).invoke(main, ["plan", *arguments])
 
 
 @pytest.fixture(autouse=True)

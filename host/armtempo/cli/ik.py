@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import chosen, options
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -62,7 +62,7 @@ def command(
     from armtempo.kinematics.shape import refusals
 
     targets = _targets(matrix, position, rpy, quaternion, poses)
-    arm = options.load_arm(arm_path)
+    arm = chosen.arm_or_paper(arm_path)
     geometry = Geometry.of(arm)
     reasons = refusals(geometry)
     found = answers(geometry, Ranges.of(arm), targets, _posture(previous, arm), numerical or bool(reasons))

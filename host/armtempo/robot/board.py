@@ -97,14 +97,17 @@ class Board:
         name: str | None = None,
         default: bool = False,
         progress: Progress | None = None,
+        replace: bool = False,
     ) -> EncodedMotion:
         """Store a motion, unless the board has just this one already; ``progress`` counts bytes.
 
         ``name``: on the board, else made of the job's name. ``default``: let the board's button start it.
+        ``replace``: also in the place of another motion of this name, which the button then starts no longer.
+        Raises LinkError where there is such a motion, or the board is set up for another arm.
         """
         encoded = encoded_motion.of_plan(motion, name) if isinstance(motion, Plan) else motion
         self.configure(encoded.arm)
-        stored_motion.store(self.client, encoded.name, encoded.data, progress)
+        stored_motion.store(self.client, encoded.name, encoded.data, progress, replace)
         if default:
             self.client.set_default(encoded.name)
         return encoded
@@ -137,7 +140,7 @@ class Board:
     def home(self, arm: Arm, where: Where | None = None) -> None:
         """Declare that ``arm`` is at ``where``, or at its home posture; nothing moves.
 
-        Raises InputError for a posture that does not fit the arm.
+        Raises InputError for a posture that does not fit the arm, LinkError where the board is set up for another.
         """
         self.configure(arm)
         arm_state.home(self.client, arm, None if where is None else self._posture(where))
@@ -180,7 +183,8 @@ class Board:
         """Replay a motion ``repeat`` times and record what comes back in a new run folder below ``out``.
 
         ``motion``: a plan, or the name of a motion on the board. The arm must be homed and be where the motion
-        begins, else LinkError; the arm of a virtual board is brought there. Between repetitions it returns along
+        begins, else LinkError, as where the board keeps another motion under its name (``upload`` can replace it)
+        or is set up for another arm. The arm of a virtual board is brought there. Between repetitions it returns along
         the same path. ``progress`` counts seconds of motion; ``watcher`` sees folder, samples and repetitions.
         Whatever ends the run early raises, and what was recorded until then is ``last_run``.
         """
@@ -206,7 +210,7 @@ class Board:
         ``motion`` is what was run; None: the motion that the button starts. Such a run needs no host; one under
         way is followed to its end. Raises LinkError where the board keeps no samples.
         """
-        encoded = self._encoded(self._default() if motion is None else motion, replace=False)
+        encoded = self._encoded(self._default() if motion is None else motion)
         folder = recording.fetch(self.client, encoded, Path(out), self.port)
         self._last_folder = folder.path
         return Run.load(folder.path)
@@ -245,12 +249,12 @@ class Board:
             return where.start_deg
         return point_to_point.posture(where, self._known_arm())
 
-    def _encoded(self, motion: Plan | EncodedMotion | str, replace: bool = True) -> EncodedMotion:
+    def _encoded(self, motion: Plan | EncodedMotion | str) -> EncodedMotion:
         """The motion for a board that is set up for its arm."""
         if isinstance(motion, str):
             return self.read(motion)
         encoded = encoded_motion.of_plan(motion) if isinstance(motion, Plan) else motion
-        self.configure(encoded.arm, replace)
+        self.configure(encoded.arm)
         return encoded
 
     def _default(self) -> str:

@@ -16,8 +16,8 @@ from armtempo.robot.board_state import BoardState
 from armtempo.share import claim
 from armtempo.share.caller import Caller
 
-ANSWER_S = 3.0
-"""The program that has the port answers a request within this time, or hangs."""
+ANSWER_S = 8.0
+"""The program that has the port answers a request within this time, even where the board is silent, or it hangs."""
 REST_S = 10.0
 """A board that was told to stop rests within this time: it brakes for at most 5 s, then it is frozen."""
 _LOOK_S = 0.05

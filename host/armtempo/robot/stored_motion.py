@@ -26,12 +26,29 @@ FREEZE_S = 2.0
 """Freezing takes no longer than this."""
 
 
-def store(client: Client, name: str, data: bytes, progress: Progress | None = None) -> MotionKey:
-    """Upload a motion record under ``name``, unless the board has just this one already."""
+TEMPORARY = "tmp-"
+"""Names of motions that are removed after use begin so."""
+
+
+def store(
+    client: Client, name: str, data: bytes, progress: Progress | None = None, replace: bool = False
+) -> MotionKey:
+    """Upload a motion record under ``name``, unless the board has just this one already.
+
+    Raises LinkError where the board keeps another motion under this name, unless ``replace``, or the name or what
+    stands there is worth nothing: temporary or damaged.
+    """
     key = MotionKey(name, wire.record_crc(data))
     found = client.find(name)
-    if found is None or found.crc != key.crc:
-        client.upload(name, data, progress)
+    if found is not None and found.crc == key.crc:
+        return key
+    if found is not None and found.joints and not replace and not name.startswith(TEMPORARY):
+        button = ", which its button starts" if found.default else ""
+        raise LinkError(
+            f"the board keeps another motion {name!r}{button} ({found.duration_s:.3f} s, checksum {found.crc:08x}); "
+            "--force replaces it, 'armtempo upload --name' stores this one under another name"
+        )
+    client.upload(name, data, progress)
     return key
 
 
