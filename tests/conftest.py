@@ -20,7 +20,9 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 @pytest.fixture(scope="session", autouse=True)
 def own_settings() -> Iterator[None]:
     """No setting of the user's reaches a test, and no port that a test opens is known outside of it."""
-    for name in [name for name in os.environ if name.startswith("ARMTEMPO_") and name != "ARMTEMPO_MICROPYTHON"]:
+    for name in [
+        name for name in os.environ if name.startswith("ARMTEMPO_") and name != "ARMTEMPO_MICROPYTHON"
+    ]:
         del os.environ[name]
     folder = tempfile.mkdtemp(prefix="run-")  # short: the path of a socket has 100 bytes
     os.environ["XDG_RUNTIME_DIR"] = folder

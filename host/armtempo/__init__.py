@@ -67,8 +67,9 @@ if TYPE_CHECKING:
     )
     from armtempo.kinematics.of_arm import forward, inverse
     from armtempo.model.arm import Arm
-    from armtempo.model.job import Job, Pose
+    from armtempo.model.job import Job
     from armtempo.model.plan import Plan
+    from armtempo.model.tool_pose import Pose
     from armtempo.pipeline import compare, connect, plan, summary
     from armtempo.ports.listing import find_ports
     from armtempo.robot.board import Board
@@ -91,8 +92,9 @@ _HOMES = {
     "armtempo.kinematics.of_arm": ("forward", "inverse"),
     "armtempo.ports.listing": ("find_ports",),
     "armtempo.model.arm": ("Arm",),
-    "armtempo.model.job": ("Job", "Pose"),
+    "armtempo.model.job": ("Job",),
     "armtempo.model.plan": ("Plan",),
+    "armtempo.model.tool_pose": ("Pose",),
     "armtempo.pipeline": ("compare", "connect", "plan", "summary"),
     "armtempo.robot.board": ("Board",),
     "armtempo.robot.recording": ("Watcher",),

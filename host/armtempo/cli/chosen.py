@@ -35,6 +35,16 @@ def named_arm(path: Path | None) -> Arm | None:
     return Arm.load(setting.path)
 
 
+def arm_file(path: Path | None) -> Path:
+    """The file of the same, or the paper's arm's, which is said aloud."""
+    from armtempo.model import shipped
+
+    setting = ProjectSettings().get(ARM, path)
+    if not setting:
+        tell(f"no arm is named; this is for the one that ships with armtempo, {shipped.PAPER!r}")
+    return shipped.find(setting.value or shipped.PAPER).path
+
+
 def load_arm(path: Path | None) -> Arm:
     """The same; InputError where none is named."""
     found = named_arm(path)

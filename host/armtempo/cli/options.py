@@ -11,6 +11,7 @@ import click
 FC = TypeVar("FC", bound=Callable[..., Any] | click.Command)
 
 _ELSE = "Without it: variable ARMTEMPO_{}, else what the project folder's armtempo.toml says"
+_ARM = "Arm file (TOML), or the name of an arm that ships, such as ar4"
 
 port = click.option(
     "--port",
@@ -28,15 +29,15 @@ log_traffic = click.option(
 
 
 def _arm_option(text: str) -> Callable[[FC], FC]:
-    return click.option("--arm", "arm_path", type=click.Path(path_type=Path), metavar="FILE", help=text)
+    return click.option("--arm", "arm_path", type=click.Path(path_type=Path), metavar="ARM", help=text)
 
 
-arm = _arm_option(f"Arm file (TOML). {_ELSE.format('ARM')}.")
+arm = _arm_option(f"{_ARM}. {_ELSE.format('ARM')}.")
 arm_of_board = _arm_option(
-    f"Arm file (TOML). {_ELSE.format('ARM')}, else the arm that ships with armtempo if the board is set up for it."
+    f"{_ARM}. {_ELSE.format('ARM')}, else the paper's arm if the board is set up for it."
 )
 arm_of_file = _arm_option(
-    f"Arm file (TOML), which a trajectory file must fit. {_ELSE.format('ARM')}, else the arm in the trajectory file."
+    f"{_ARM}, which a trajectory file must fit. {_ELSE.format('ARM')}, else the arm in the trajectory file."
 )
 replace_arm = click.option(
     "--replace-arm",

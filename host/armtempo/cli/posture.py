@@ -19,6 +19,12 @@ if TYPE_CHECKING:
     from armtempo.robot.board import Board
 
 HOME = "home"
+_VIA = re.compile(r"[Pp]\d+")
+
+
+def is_named(text: str) -> bool:
+    """Whether the text means home, a via point or a trajectory file, and no angles."""
+    return text == HOME or bool(_VIA.fullmatch(text)) or text.endswith(".json")
 
 
 @dataclass(frozen=True)
@@ -47,7 +53,7 @@ class Posture:
             return self.plan.trajectory(0.0)
         if self.text == HOME:
             return point_to_point.posture(arm.home_deg, arm)
-        if re.fullmatch(r"[Pp]\d+", self.text):
+        if _VIA.fullmatch(self.text):
             return _via(int(self.text[1:]), arm, job_path)
         try:
             angles_deg = [float(cell) for cell in self.text.split(",")]

@@ -98,6 +98,13 @@ def nothing_set(name: str, what: str) -> InputError:
 
 
 def _from_file(file: Path, name: str, value: str) -> str:
+    if (
+        name == ARM
+        and Path(value).name == value
+        and not Path(value).suffix
+        and not (file.parent / value).exists()
+    ):
+        return value  # the name of an arm that ships
     if name != PORT:
         return _beside(file, value)
     kind, colon, folder = value.partition(":")

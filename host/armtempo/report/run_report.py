@@ -218,8 +218,9 @@ def _origin(sheet: html_page.Page, found: Evaluation) -> None:
     meta = found.run.meta
     sheet.heading("How to repeat it")
     sheet.code("armtempo run trajectory.json --repeat " + str(len(found.run.repetitions)))
-    known = [(key, _flat(meta[key])) for key in ("port", "board") if key in meta]
-    known.append(("virtual board", "yes" if meta.get("virtual") else "no"))
+    known: list[tuple[str, str]] = [(key, _flat(meta[key])) for key in ("port", "board") if key in meta]
+    if "virtual" in meta:
+        known.append(("virtual board", "yes" if meta["virtual"] else "no"))
     plan_section.origin(sheet, found.plan, known)
 
 
