@@ -33,8 +33,11 @@ def command(
     from armtempo.kinematics import frame_listing
     from armtempo.kinematics.chain import spread_deg
 
-    if len(where) == 1 and posture.is_named(where[0]):
-        wanted = posture.Posture.of(where[0], arm_path, altered)
+    if len(where) == 1 and posture.is_via(where[0]):
+        arm, job = chosen.arm_and_job(arm_path, job_path)
+        angles_deg = spread_deg(arm, posture.via_deg(where[0], arm, job).tolist())
+    elif len(where) == 1 and posture.is_named(where[0]):
+        wanted = posture.NamedPosture.of(where[0], arm_path, altered)
         arm = wanted.arm or chosen.arm_or_paper(arm_path)
         angles_deg = spread_deg(arm, wanted.angles_deg(arm, job_path).tolist())
     else:

@@ -35,7 +35,7 @@ def command(
     """
     from armtempo.robot.stop_request import Stopped
 
-    wanted = posture.Posture.of(where, arm_path, altered)
+    wanted = posture.NamedPosture.of(where, arm_path, altered)
     with chosen.board(port, log_traffic, wanted.arm) as board:
         arm = chosen.arm_of_board(board, wanted.arm)
         target_deg = wanted.angles_deg(arm, job_path)

@@ -36,7 +36,7 @@ def command(
     """
     if switches and where != posture.HOME:
         raise click.UsageError("give either WHERE or --switches")
-    wanted = posture.Posture.of(where, arm_path, altered)
+    wanted = posture.NamedPosture.of(where, arm_path, altered)
     with chosen.board(port, log_traffic, wanted.arm) as board:
         arm = chosen.arm_of_board(board, wanted.arm)
         angles_deg = wanted.angles_deg(arm, job_path)

@@ -15,6 +15,7 @@ from armtempo.errors import InputError
 if TYPE_CHECKING:
     from armtempo.arrays import Array
     from armtempo.model.arm import Arm
+    from armtempo.model.job import Job
     from armtempo.model.plan import Plan
     from armtempo.robot.board import Board
 
@@ -24,11 +25,11 @@ _VIA = re.compile(r"[Pp]\d+")
 
 def is_named(text: str) -> bool:
     """Whether the text means home, a via point or a trajectory file, and no angles."""
-    return text == HOME or bool(_VIA.fullmatch(text)) or text.endswith(".json")
+    return text == HOME or is_via(text) or text.endswith(".json")
 
 
 @dataclass(frozen=True)
-class Posture:
+class NamedPosture:
     """What a user calls a posture, before the arm is known for which it is meant."""
 
     text: str
@@ -38,7 +39,7 @@ class Posture:
     """Of the trajectory file."""
 
     @classmethod
-    def of(cls, text: str, arm_path: Path | None, altered: bool) -> Posture:
+    def of(cls, text: str, arm_path: Path | None, altered: bool) -> NamedPosture:
         """The posture that ``text`` names; InputError where its trajectory file or the arm cannot be read."""
         if text.endswith(".json"):
             plan = chosen.load_plan(Path(text), arm_path, altered)
@@ -53,8 +54,8 @@ class Posture:
             return self.plan.trajectory(0.0)
         if self.text == HOME:
             return point_to_point.posture(arm.home_deg, arm)
-        if _VIA.fullmatch(self.text):
-            return _via(int(self.text[1:]), arm, job_path)
+        if is_via(self.text):
+            return via_deg(self.text, arm, chosen.load_job(job_path, arm))
         try:
             angles_deg = [float(cell) for cell in self.text.split(",")]
         except ValueError:
@@ -80,13 +81,19 @@ def words(angles_deg: Array, arm: Arm) -> str:
     )
 
 
-def _via(index: int, arm: Arm, job_path: Path | None) -> Array:
+def is_via(text: str) -> bool:
+    """Whether the text means a via point of a job, such as P0."""
+    return bool(_VIA.fullmatch(text))
+
+
+def via_deg(text: str, arm: Arm, job: Job) -> Array:
+    """The angles of a via point of a job, degrees (J,); InputError where the job has no such point."""
     import numpy as np
 
     from armtempo.planning import planner
 
-    job = chosen.load_job(job_path, arm)
-    via_deg, _ = planner.via_angles(arm, job)
-    if index >= len(via_deg):
-        raise InputError(f"job {job.name!r} has the via points P0 to P{len(via_deg) - 1}, not P{index}")
-    return np.asarray(via_deg[index])
+    points_deg, _ = planner.via_angles(arm, job)
+    index = int(text[1:])
+    if index >= len(points_deg):
+        raise InputError(f"job {job.name!r} has the via points P0 to P{len(points_deg) - 1}, not P{index}")
+    return np.asarray(points_deg[index])
