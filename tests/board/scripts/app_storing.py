@@ -62,10 +62,10 @@ def case_default_is_one_content_of_its_name():
     assert host.ask("set_default", (), "feed")[0] == "ok"
     assert host.upload("feed", other)[-1][0] == "ok"
     assert host.ask("list", (0,))[1][5] == 0
-    assert app.store().default() == ""  # the button starts nothing
+    assert app.controller.store().default() == ""  # the button starts nothing
     assert host.upload("feed", host.record)[-1][0] == "ok"
     assert host.ask("list", (0,))[1][5] == 1
-    assert app.store().default() == "feed"
+    assert app.controller.store().default() == "feed"
 
 
 def case_damaged_file_in_flash_is_not_run():
