@@ -39,6 +39,7 @@ BOARD_COMMANDS = (
 @pytest.fixture(autouse=True)
 def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(board_port, "_open_ports", list)
 
 
 def run(*arguments: str, **variables: str) -> Result:
