@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from armtempo import deploy
+from armtempo.deploy import program_files
 from armtempo.errors import InputError, LinkError
 from armtempo.link import diagnose
 from armtempo.link.transport import SerialTransport
@@ -48,6 +49,25 @@ class Silent:
 )
 def test_what_else_sits_on_a_port(answer: bytes, words: str) -> None:
     assert words in str(diagnose.explain(Silent(answer), b""))
+
+
+class Prompt(Silent):
+    """MicroPython's prompt, as mpremote leaves it; it says that the program is in the flash."""
+
+    def write(self, data: bytes) -> None:
+        echo = data + b"\n"
+        self.answer = echo + (b"armtempo is here\r\n>>> " if data.startswith(b"print(") else b">>> ")
+
+
+def test_a_program_that_mpremote_has_ended_needs_a_reset_only() -> None:
+    said = str(diagnose.explain(Prompt(), b""))
+    assert "mpremote connect there reset" in said
+    assert "reset button" in said
+
+
+def test_compiled_files_for_a_virtual_board_under_cpython() -> None:
+    with pytest.raises(LinkError, match=r"runs under CPython\. Leave --mpy out"):
+        program_files._compiler(0)
 
 
 def test_port_that_does_not_exist() -> None:

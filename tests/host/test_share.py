@@ -92,6 +92,11 @@ def test_lives_hangs_died(server: Server, monkeypatch: pytest.MonkeyPatch) -> No
 def test_who_lost_the_port_uses_it_no_more(server: Server) -> None:
     server.check()
     taker = Server(claim.new("/dev/p", "/dev/p", "/dev/p"), {})
+    time.sleep(0.05)
+    taker.close()
+    with pytest.raises(PortError, match="has taken /dev/p over"):
+        server.check()  # also after the other one has given it up again
+    taker = Server(claim.new("/dev/p", "/dev/p", "/dev/p"), {})
     try:
         time.sleep(0.05)
         with pytest.raises(PortError, match="has taken /dev/p over"):

@@ -55,20 +55,32 @@ class PortClaim:
         """Put the claim in place of an earlier one. OSError where that fails."""
         folder()
         for path in self._files():
-            aside = path.with_suffix(f".{self.number}")
-            with os.fdopen(os.open(aside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
-                json.dump(asdict(self), file)
-            os.replace(aside, path)
+            before = _read(path)
+            if before is not None and before.number != self.number:
+                self._write(before._marker(path))  # it may wake up after this program has ended
+            self._write(path)
+
+    def _write(self, path: Path) -> None:
+        aside = path.with_suffix(f".{self.number}")
+        with os.fdopen(os.open(aside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
+            json.dump(asdict(self), file)
+        os.replace(aside, path)
+
+    def _marker(self, path: Path) -> Path:
+        """Where it stands who has taken the port over from this program, also when that has given it up again."""
+        return path.with_name(f"{self.number}.taken")
 
     def taken_by(self) -> PortClaim | None:
-        """The claim of another program that stands in the place of this one."""
-        found = [_read(path) for path in self._files()]
+        """The claim of another program that stands, or stood, in the place of this one."""
+        files = self._files()
+        found = [_read(path) for path in (*files, *(self._marker(file) for file in files))]
         return next((claim for claim in found if claim is not None and claim.number != self.number), None)
 
     def remove(self) -> None:
         """Give the port up, unless another program has claimed it since."""
         with suppress(OSError):
             for path in self._files():
+                self._marker(path).unlink(missing_ok=True)
                 found = _read(path)
                 if found is not None and found.number == self.number:
                     path.unlink()
