@@ -67,7 +67,8 @@ def test_a_token_is_asked_for_where_there_are_no_modes(monkeypatch: pytest.Monke
             assert other.ask("echo", 5.0, text="1")["echo"] == "1"
         with socket.create_connection(("127.0.0.1", int(server.claim.address))) as stranger:
             stranger.sendall(b'{"id":1,"request":"echo"}\n{"id":2,"request":"hello","token":"x"}\n')
-            answers = stranger.makefile().readline() + stranger.makefile().readline()
+            lines = stranger.makefile()
+            answers = lines.readline() + lines.readline()
         assert "say hello with the token first" in answers
         assert '"ok":true' not in answers
     finally:
