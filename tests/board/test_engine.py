@@ -14,7 +14,8 @@ HEAP = {"cpython": "", "micropython": "16M", "micropython-arm": "6M"}
 
 
 @pytest.mark.parametrize(
-    "script", ["engine_pulses", "engine_faults", "engine_brake", "engine_override", "ring_cases", "encoder_cases"]
+    "script",
+    ["engine_pulses", "engine_faults", "engine_brake", "engine_override", "ring_cases", "encoder_cases"],
 )
 def test_cases(interpreter: str, script: str) -> None:
     path = SCRIPTS / f"{script}.py"

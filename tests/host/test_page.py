@@ -44,7 +44,7 @@ def figure(name: str) -> str:
     limits = [joint.limits for joint in plan.arm.driven if joint.limits]
     times = np.linspace(0.0, plan.trajectory.duration_s, 50)
     theory = np.stack([plan.trajectory(times, order) for order in range(3)])
-    seen = analysis.Curves(times, theory[None], theory, 0.1 * np.abs(theory), theory, theory)
+    seen = analysis.Curves(times, theory[None], theory, 0.1 * np.abs(theory), theory, theory, times)
     runs = [Trial(Case("acs", 10, seed), (), 1, 1.0, ((0, 6.0 + seed),)) for seed in (1, 2)]
     chains = chain.chains_mm(plan.arm, plan.via_deg)
     drawn = {

@@ -252,7 +252,7 @@ class Controller:
             self.engine.brake()
 
     def change_speed(self, rate: int) -> None:
-        """Let what moves go on at ``rate`` thousandths (0: pause, RESUME: as before), or the next run of a host begin so."""
+        """What moves goes on at ``rate`` thousandths (0: pause, RESUME: as before), or a host's next run begins so."""
         if self.moving():
             self.engine.change_rate(rate)
         elif rate in (0, RESUME):

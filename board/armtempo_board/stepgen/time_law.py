@@ -1,9 +1,9 @@
 """Real time as a function of the motion's own time, whose rate is 1 as planned and may be anything below.
 
-The rate keeps still but for ramps: over a length L of real time it goes from one value to another as S(x) = 10 x**3 -
+The rate is constant but for ramps: over a length L of real time it goes from one value to another as S(x) = 10 x**3 -
 15 x**4 + 6 x**5, x = (real time - start) / L. Braking is a ramp to 0. Counted by r from that end of the ramp at which
-the rate is least, the rate is b + h S(r), and the motion's time passed from there is b r + h e(r) of L, e(r) = r**4 (2.5
-- 3 r + r**2), which is convex. This law moves the nodes, time and slope; all steps between them follow. Rates
+the rate is least, the rate is b + h S(r), and the motion's time from there on is b r + h e(r) of L, with the convex
+e(r) = r**4 (2.5 - 3 r + r**2). This law moves the nodes, time and slope; all steps between them follow. Rates
 are in thousandths and times at the ends of a ramp in whole ticks, so beside the ramps real time is exact, however
 long the motion is. Fractions here have 30 bits.
 """
@@ -143,7 +143,7 @@ def _stretched(time: int, rate: int) -> int:
 
 @micropython.viper
 def _evaluate(law: ptr32, r: int, left: int) -> int:
-    """Set _SLOPE to b + h S(r), _VALUE to b r + h e(r); with a ``left`` of at least 0, first r so that this is ``left``.
+    """Set _SLOPE to b + h S(r), _VALUE to b r + h e(r); with a ``left`` from 0 on, first r so that this is ``left``.
 
     Returns r. Newton's method, from an r that is too large.
     """
@@ -160,10 +160,14 @@ def _evaluate(law: ptr32, r: int, left: int) -> int:
         fourth = first * first + ((first * second) >> 14)
         first = cube >> 15
         second = cube & _HALF_MASK
-        rate = (first * (rate >> 15) + ((second * (rate >> 15)) >> 15) + ((first * (rate & _HALF_MASK)) >> 15)) << 4
+        rate = (
+            first * (rate >> 15) + ((second * (rate >> 15)) >> 15) + ((first * (rate & _HALF_MASK)) >> 15)
+        ) << 4
         first = fourth >> 15
         second = fourth & _HALF_MASK
-        way = (first * (way >> 15) + ((second * (way >> 15)) >> 15) + ((first * (way & _HALF_MASK)) >> 15)) << 2
+        way = (
+            first * (way >> 15) + ((second * (way >> 15)) >> 15) + ((first * (way & _HALF_MASK)) >> 15)
+        ) << 2
         first = law[_RISE] >> 15
         second = law[_RISE] & _HALF_MASK
         rate = first * (rate >> 15) + ((second * (rate >> 15)) >> 15) + ((first * (rate & _HALF_MASK)) >> 15)
@@ -203,7 +207,7 @@ def _evaluate(law: ptr32, r: int, left: int) -> int:
 
 @micropython.viper
 def _share(law: ptr32, ticks: int, fraction: int, scale: int) -> int:
-    """Ticks, and a fraction with ``scale`` bits, as a share of the ramp's length: a long division with 15-bit digits."""
+    """Ticks, and a fraction with ``scale`` bits, as a share of the ramp's length: a long division in 15-bit digits."""
     unit = law[UNIT]
     length = law[LENGTH]
     way = ticks >> unit
@@ -245,8 +249,8 @@ def _ticks_of(law: ptr32, share: int) -> int:
 def to_real_time(given: object, node: ptr32, place: int, scale: int) -> int:
     """Move the time of a node, 2**-scale ticks from MOTION_HIGH on, to real time; 0: it never comes, else 1.
 
-    ``given``: the law; ``node``: the solver; ``place``: word at which the node begins in it. NODE_DELAY becomes the whole
-    ticks from REAL_HIGH on, the time the rest; NODE_RATE becomes that of the motion's time. ``node`` becomes
+    ``given``: the law; ``node``: the solver; ``place``: word at which the node begins in it. NODE_DELAY becomes the
+    whole ticks from REAL_HIGH on, the time the rest; NODE_RATE becomes that of the motion's time. ``node`` becomes
     the node, ``place`` many things, as the compiler keeps the arguments in registers.
     """
     law = ptr32(given)  # type: ignore[arg-type]

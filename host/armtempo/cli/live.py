@@ -39,7 +39,7 @@ class Live(Watcher):
 
     def sample(self, sample: Sample, duration_s: float) -> None:
         """Show one sample."""
-        time_s = sample.ticks / TICK_HZ
+        time_s = sample.path_ticks / TICK_HZ  # the motion's own time
         angles = self._angles_deg(sample)
         errors = angles - self._motion.trajectory(time_s)
         pairs = (f"{angle:.1f}° ({error:+.2f})" for angle, error in zip(angles, errors, strict=True))

@@ -62,6 +62,15 @@ altered = click.option(
     is_flag=True,
     help="Take the trajectory file although it was altered after it had been written.",
 )
+speed = click.option(
+    "--speed",
+    "percent",
+    type=click.FloatRange(1, 100),
+    default=100.0,
+    show_default=True,
+    metavar="PERCENT",
+    help="Part of the planned speed; the path stays as it is.",
+)
 as_json = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from armtempo.cli import chosen, options
+from armtempo.robot.speed import permille
 
 if TYPE_CHECKING:
     from armtempo.model.plan import Plan
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 @click.argument("what")
 @click.option("--repeat", type=click.IntRange(1, 99), default=1, show_default=True, help="Repetitions.")
 @click.option("--live", is_flag=True, help="Open a window that follows the run (matplotlib and a display).")
+@options.speed
 @options.force("another motion that the board keeps under this one's name")
 @options.out
 @options.arm_of_file
@@ -31,6 +33,7 @@ def command(
     what: str,
     repeat: int,
     live: bool,
+    percent: float,
     force: bool,
     out: Path | None,
     arm_path: Path | None,
@@ -44,7 +47,7 @@ def command(
     WHAT is a trajectory file or the name of a motion on the board; the samples go into a new run folder.
     The arm must be homed ('armtempo home') and stand where the motion begins ('armtempo goto'); a virtual
     board sees to that itself. Between repetitions the arm returns along the same path. Ctrl-C brakes, and so
-    does 'armtempo stop' in another terminal.
+    does 'armtempo stop' in another terminal; 'armtempo speed', 'pause' and 'resume' work there too.
     """
     plan = chosen.load_plan(Path(what), arm_path, altered) if chosen.is_file(what) else None
     named = plan.arm if plan else chosen.named_arm(arm_path)
@@ -53,6 +56,7 @@ def command(
         board.configure(arm, replace=replace_arm)
         click.echo(f"arm: {chosen.words(arm)}")
         motion = board.upload(plan, replace=force) if plan else what
+        board.client.rate = permille(percent / 100)
         run_and_tell(board, motion, repeat, chosen.runs(out), live)
 
 

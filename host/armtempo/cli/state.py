@@ -23,12 +23,18 @@ def lines(state: BoardState) -> list[str]:
 
 def motion_lines(state: BoardState) -> list[str]:
     """What the board is doing, where the joints are."""
-    found = [f"state     {state.state}"]
+    found = [f"state     {state.state}{_speed(state)}"]
     if state.fault:
         found.append(f"fault     {state.fault}; see 'armtempo clear'")
     found += [f"          {line}" for line in joint_lines(state)]
     found.append(f"link      {state.frames_bad} damaged messages, {state.samples_lost} samples lost")
     return found
+
+
+def _speed(state: BoardState) -> str:
+    if state.speed_percent == 100.0 or not state.moving:
+        return ""
+    return f", at {state.speed_percent:g} % of the planned speed" if state.speed_percent else ", in a pause"
 
 
 def joint_lines(state: BoardState) -> list[str]:

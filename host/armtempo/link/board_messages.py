@@ -54,6 +54,10 @@ class Status:
     known: int
     run: int
     ticks: int
+    path_ticks: int
+    """The motion's own time, behind the clock where the speed was below 100 %."""
+    rate: int
+    """Of the motion's own time, in thousandths: the one that is wanted; 0 in a pause."""
     samples_kept: int
     samples_lost: int
     frames_bad: int
@@ -89,11 +93,12 @@ class StoredMotion:
 
 @dataclass(frozen=True)
 class Sample:
-    """One sample; ``ticks`` is the motion clock."""
+    """One sample; ``ticks`` is the motion clock, ``path_ticks`` the motion's own time."""
 
     run: int
     index: int
     ticks: int
+    path_ticks: int
     flags: int
     positions: Positions
 
@@ -104,6 +109,7 @@ class Done:
 
     run: int
     ticks: int
+    path_ticks: int
     samples: int
     lost: int
     positions: Positions
@@ -117,6 +123,7 @@ class Fault:
     code: int
     joint: int
     ticks: int
+    path_ticks: int
     positions: Positions
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armtempo_shared import limits, wire
-from armtempo_shared.messages import MAX_PAYLOAD
+from armtempo_shared.messages import MAX_PAYLOAD, PERMILLE
 
 from armtempo.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
 from armtempo.link import board_messages
@@ -70,6 +70,8 @@ class Client:
         self._number = harmless_number() if session_number is None else session_number
         self._piece = LARGEST_PIECE
         self._info: board_messages.Hello | None = None
+        self.rate = PERMILLE
+        """At which motions are started, in thousandths of their planned speed."""
         session.greet = self._greet_again
 
     @property
@@ -199,7 +201,9 @@ class Client:
         self.session.command("home", (mask,), tail)
 
     def start(self, name: str, crc: int, flags: int = 0) -> Started:
-        """Start a stored motion; ``crc`` is the record's own checksum, ``flags`` START_HOMING or 0."""
+        """Start a stored motion at ``rate``; ``crc`` is the record's own checksum, ``flags`` START_HOMING or 0."""
+        if self.rate != PERMILLE:
+            self.session.command("speed", (self.rate,))
         (run, duration), _ = self.session.command(
             "start", (flags, crc), name, silence_timeout_s=FLASH_TIMEOUT_S, answer_timeout_s=FLASH_TIMEOUT_S
         )
@@ -208,6 +212,10 @@ class Client:
     def stop(self, now: bool = False) -> None:
         """Brake along the path, or freeze."""
         self.session.command("stop", (int(now),))
+
+    def speed(self, rate: int) -> None:
+        """Let what moves go on at ``rate`` thousandths of its planned speed; 0: pause, RESUME: as before it."""
+        self.session.command("speed", (rate,))
 
     def clear(self) -> None:
         """Clear a fault."""

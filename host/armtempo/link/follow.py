@@ -40,6 +40,8 @@ class RunEnd:
     fault_joint: int
     ticks: int
     """The motion clock at the end."""
+    path_ticks: int
+    """The motion's own time then."""
     positions: Positions
     received: int
     """Samples that arrived."""
@@ -169,10 +171,17 @@ class Follower:
         if status.run == self._run and not status.moving:
             if status.state == "fault":
                 self._last = Fault(
-                    status.run, status.fault, status.fault_joint, status.ticks, status.positions
+                    status.run,
+                    status.fault,
+                    status.fault_joint,
+                    status.ticks,
+                    status.path_ticks,
+                    status.positions,
                 )
             else:
-                self._last = Done(status.run, status.ticks, 0, status.samples_lost, status.positions)
+                self._last = Done(
+                    status.run, status.ticks, status.path_ticks, 0, status.samples_lost, status.positions
+                )
         elif self._stuck(status.ticks):
             raise LinkError("the board says that it moves, but its motion clock stands still; reset it")
 
@@ -185,4 +194,6 @@ class Follower:
     def _run_end(self, last: Done | Fault) -> RunEnd:
         fault, joint = (last.code, last.joint) if isinstance(last, Fault) else (0, 255)
         lost, notices = tuple(self._lost), tuple(self._notices)
-        return RunEnd(fault, joint, last.ticks, last.positions, self._received, lost, notices)
+        return RunEnd(
+            fault, joint, last.ticks, last.path_ticks, last.positions, self._received, lost, notices
+        )

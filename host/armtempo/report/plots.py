@@ -19,6 +19,7 @@ import numpy as np
 from armtempo.arrays import Array
 from armtempo.errors import MissingPackageError
 from armtempo.model.arm import Limits
+from armtempo.runs import stretched
 from armtempo.runs.analysis import Curves
 from armtempo.splines.trajectory import Trajectory
 
@@ -63,9 +64,15 @@ def motion(trajectory: Trajectory, limits: Sequence[Limits], names: Sequence[str
 def tracking(found: Curves, trajectory: Trajectory, limits: Sequence[Limits], names: Sequence[str]) -> Figure:
     """Measured mean with its standard error as a band, against theory (Figs. 11 and 12)."""
     figure, axes = new_figure(3, len(names), 3.4 * len(names) + 0.6, 6.5)
-    times = np.linspace(0.0, max(trajectory.duration_s, found.times_s[-1]), _POINTS)
+    times: Array = np.linspace(0.0, max(trajectory.duration_s, found.times_s[-1]), _POINTS)
+    if np.array_equal(found.path_s, found.times_s):
+        path_s = times
+    else:
+        times = times[times <= found.times_s[-1]]
+        path_s = np.interp(times, found.times_s, found.path_s)
+    curves = stretched.theory(trajectory, times, path_s)
     for order in range(3):
-        theory = trajectory(times, order)
+        theory = curves[order]
         for joint, axis in enumerate(axes[order]):
             colour = COLOURS[joint % len(COLOURS)]
             mean, sem = found.mean[order, :, joint], found.sem[order, :, joint]

@@ -16,7 +16,7 @@ from armtempo.model import trajectory_file
 from armtempo.model.arm import Arm, Limits
 from armtempo.model.plan import Plan
 from armtempo.report import html_page, plan_section, plots
-from armtempo.runs import analysis, reader
+from armtempo.runs import analysis, reader, stretched
 from armtempo.runs.run_folder import COMPLETE
 
 if TYPE_CHECKING:
@@ -88,6 +88,8 @@ def complaints(run: reader.RunData) -> list[str]:
             found.append(f"{repetition.file}: samples {first} to {last} are missing")
         if np.any(steps <= 0):
             found.append(f"{repetition.file}: the sample count starts again in the middle (a reset?)")
+        if words := stretched.note(repetition):
+            found.append(words)
         if repetition.state != COMPLETE:
             end = repetition.time_s[-1]
             state = f"{entry.state} ({entry.fault})" if entry.fault else entry.state

@@ -63,6 +63,8 @@ class BoardState:
     """One of ``armtempo_shared.messages.STATES``."""
     moving: bool
     """Whether steps may still come."""
+    speed_percent: float
+    """Of the planned speed, as it was asked for last; 0 in a pause."""
     fault: str
     """Name of the pending fault, "" for none."""
     frames_bad: int
@@ -124,6 +126,7 @@ def read(client: Client, port: str) -> BoardState:
         max_rate_sum=info.max_rate_sum,
         state=status.state,
         moving=status.moving,
+        speed_percent=status.rate / 10,
         fault=fault_name(status.fault),
         frames_bad=status.frames_bad,
         samples_lost=status.samples_lost,

@@ -56,6 +56,6 @@ def shown(progress: Progress | None) -> SampleSink:
 
     def show(sample: Sample, duration_s: float) -> None:
         if progress is not None:
-            progress(sample.ticks / limits.TICK_HZ, duration_s)
+            progress(sample.path_ticks / limits.TICK_HZ, duration_s)
 
     return show

@@ -54,7 +54,7 @@ class ProgressWatcher(Watcher):
         """See Watcher."""
         if self._progress is not None:
             before_s = self._ended * duration_s
-            self._progress(before_s + sample.ticks / TICK_HZ, self._repetitions * duration_s)
+            self._progress(before_s + sample.path_ticks / TICK_HZ, self._repetitions * duration_s)
         self._inner.sample(sample, duration_s)
 
     def end(self, repetition: Repetition) -> None:
@@ -136,7 +136,7 @@ def fetch(client: Client, motion: EncodedMotion, folder_in: Path, port: str) -> 
         for sample in follower.samples():
             file.append(sample)
         end = follower.end
-        cut = end.ticks < motion.trajectory.duration_s * TICK_HZ - TICK_HZ * _END_S
+        cut = end.path_ticks < motion.trajectory.duration_s * TICK_HZ - TICK_HZ * _END_S
         state = FAULT if end.fault else INTERRUPTED if cut else COMPLETE
         file.repetition.end(state, fault_name(end.fault), end.ticks, end.positions, end.lost)
     return folder

@@ -90,8 +90,8 @@ class Run:
         """All samples of all repetitions, (N,), as a structured array.
 
         Its fields: ``repetition`` from 1, ``index`` of the sample in its repetition from 0, ``time_s`` by the
-        board's motion clock; with an entry for each driven joint, (J,): ``commanded_steps``,
-        ``commanded_deg``, and ``angle_deg`` by the encoder, NaN for a joint without one.
+        board's motion clock and ``path_s`` in the motion's own time; with an entry for each driven joint, (J,):
+        ``commanded_steps``, ``commanded_deg``, and ``angle_deg`` by the encoder, NaN for a joint without one.
         """
         joints = len(self._content.joints)
         kind = np.dtype(
@@ -99,6 +99,7 @@ class Run:
                 ("repetition", np.int64),
                 ("index", np.int64),
                 ("time_s", np.float64),
+                ("path_s", np.float64),
                 ("commanded_steps", np.int64, (joints,)),
                 ("commanded_deg", np.float64, (joints,)),
                 ("angle_deg", np.float64, (joints,)),

@@ -46,6 +46,10 @@ class SharedBoard:
         """
         return bool(self._caller.ask("stop", ANSWER_S, now=now, by=by)["moving"])
 
+    def speed(self, rate: int) -> None:
+        """Let what moves go on at ``rate`` thousandths of its planned speed; 0: pause, RESUME: as before it."""
+        self._caller.ask("speed", ANSWER_S, rate=rate)
+
     def wait_for_rest(self) -> BoardState:
         """The state in which the board comes to rest; LinkError where it does not within REST_S."""
         limit_s = time.monotonic() + REST_S

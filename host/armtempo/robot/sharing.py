@@ -20,6 +20,7 @@ from armtempo.link.traffic import Chunk
 from armtempo.model.arm import Arm
 from armtempo.ports import names
 from armtempo.robot.board_state import BoardState
+from armtempo.robot.speed import change_speed
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.stored_motion import fault_name, send_stop
 from armtempo.share import claim
@@ -60,7 +61,7 @@ class Sharing:
             return
         session = self._client.session
         device = session.transport.name if names.is_sim(port) else port
-        handlers = {"status": self._status, "stop": self._stop}
+        handlers = {"status": self._status, "stop": self._stop, "speed": self._speed}
         self._server = Server(claim.new(name, port, device), handlers)
         session.check = self._server.check
         session.heard = self._heard
@@ -97,6 +98,16 @@ class Sharing:
             self._server.publish("event", {"event": "stop", "now": now})
         return {"moving": moving}
 
+    def _speed(self, request: Message) -> Message:
+        rate = int(request["rate"])
+        with self._client.session.in_a_hurry(TURN_S) as mine:
+            if not mine:
+                raise NoAnswerError("the program that has the port waits for the board's answer; try again")
+            change_speed(self._client, rate)
+        if self._server is not None:
+            self._server.publish("event", {"event": "speed", "rate": rate})
+        return {}
+
     def _read(self) -> BoardState:
         with self._client.session.in_a_hurry(TURN_S) as mine:
             if not mine:
@@ -132,6 +143,7 @@ def sample_json(sample: Sample, arm: Arm | None) -> dict[str, Any]:
         "run": sample.run,
         "index": sample.index,
         "time_s": sample.ticks / TICK_HZ,
+        "path_s": sample.path_ticks / TICK_HZ,
         "commanded_steps": list(steps),
         "counts": list(counts),
     }

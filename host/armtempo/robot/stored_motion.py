@@ -6,6 +6,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from armtempo_shared import wire
+from armtempo_shared.messages import PERMILLE
 
 from armtempo.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
 from armtempo.link import Client
@@ -68,11 +69,10 @@ def replay(
     stop.wake = client.session.wake
     stop.check()
     started = client.start(motion.name, motion.crc, flags)
+    motion_s = started.duration_s * client.rate / PERMILLE
     follower = Follower(client, started.run)
     try:
-        return _follow(
-            client, follower, _Brake(client, stop), lambda sample: sink(sample, started.duration_s)
-        )
+        return _follow(client, follower, _Brake(client, stop), lambda sample: sink(sample, motion_s))
     except OtherBoardError as error:
         raise LinkError(f"{error}; what came after the last sample cannot be known") from error
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from armtempo.arrays import Array
 from armtempo.model.arm import Limits
+from armtempo.runs import stretched
 from armtempo.runs.differentiation import WINDOW, derivative, noise, quantisation_sigma
 from armtempo.runs.reader import RepetitionData
 from armtempo.runs.run_folder import COMPLETE
@@ -19,6 +20,7 @@ from armtempo.splines.trajectory import Trajectory
 SAMPLE_S = SAMPLE_TICKS / TICK_HZ
 """Time between two samples, by the board's motion clock."""
 ORDERS = ("angle", "speed", "acceleration")
+_SAME_S = 1e-3
 EDGE_S = 1.0
 """Length of the intervals at start and end over which the lag is estimated."""
 
@@ -39,6 +41,8 @@ class Curves:
     sem: Array
     theory: Array
     shown: Array
+    path_s: Array
+    """(K,), the motion's own time; behind ``times_s`` where the speed was below 100 %."""
 
 
 @dataclass(frozen=True)
@@ -73,21 +77,30 @@ class LimitCheck:
 def curves(repetitions: Sequence[RepetitionData], trajectory: Trajectory) -> Curves:
     """Mean, scatter and theory of the repetitions of one trajectory.
 
+    Those that ran at another speed than the one that went furthest are left out; theory is the plan at that speed.
     Raises ValueError where there is no sample at all.
     """
     count = max((_grid_size(repetition) for repetition in repetitions), default=0)
     if count == 0:
         raise ValueError("no samples to analyse")
     times: Array = np.arange(count, dtype=np.float64) * SAMPLE_S
-    each = np.stack([_differentiated(_on_grid(one, count), one.state == COMPLETE) for one in repetitions])
-    theory: Array = np.stack([trajectory(times, order) for order in range(3)])
+    paths = [stretched.path_times(one, times) for one in repetitions]
+    path_s = max(paths, key=lambda path: float(path[-1])) if len(paths) > 1 else paths[0]
+    each = np.stack(
+        [
+            _differentiated(_on_grid(one, count), one.state == COMPLETE)
+            for one, path in zip(repetitions, paths, strict=True)
+            if _same_speed(one, path, path_s)
+        ]
+    )
+    theory: Array = stretched.theory(trajectory, times, path_s)
     shown = _differentiated(theory[0], ended=True)
     present = np.sum(~np.isnan(each), axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         mean: Array = np.nansum(each, axis=0) / present
         spread = np.sqrt(np.nansum((each - mean) ** 2, axis=0) / (present - 1))
         sem: Array = np.where(present > 1, spread / np.sqrt(present), np.nan)
-    return Curves(times, each, mean, sem, theory, shown)
+    return Curves(times, each, mean, sem, theory, shown, path_s)
 
 
 def deviations(found: Curves) -> list[list[Deviation]]:
@@ -98,7 +111,7 @@ def deviations(found: Curves) -> list[list[Deviation]]:
 
 def final_errors(repetition: RepetitionData, trajectory: Trajectory) -> Array:
     """Measured minus planned angle (J,) at the last sample, in degrees."""
-    planned: Array = trajectory(repetition.time_s[-1], 0)
+    planned: Array = trajectory(repetition.path_s[-1], 0)
     return np.asarray(repetition.angle_deg[-1] - planned)
 
 
@@ -137,12 +150,19 @@ def lags_s(found: Curves, trajectory: Trajectory) -> Array:
     lags = np.full((2, len(ends)), np.nan)
     for joint, end in enumerate(ends):
         for row, (low, high) in enumerate(((0.0, EDGE_S), (end - EDGE_S, end))):
-            inside = (found.times_s >= low) & (found.times_s <= high) & ~np.isnan(found.mean[1, :, joint])
+            inside = (found.path_s >= low) & (found.path_s <= high) & ~np.isnan(found.mean[1, :, joint])
             slope = found.theory[2, inside, joint]
             error = found.mean[1, inside, joint] - found.shown[1, inside, joint]
             if slope @ slope > 0.0:
                 lags[row, joint] = -(error @ slope) / (slope @ slope)
     return lags
+
+
+def _same_speed(repetition: RepetitionData, path_s: Array, reference_s: Array) -> bool:
+    """Whether a repetition's own time goes as that of another, as far as it has samples."""
+    known = _indices(repetition)
+    known = known[known >= 0]
+    return bool(np.all(np.abs(path_s[known] - reference_s[known]) < _SAME_S))
 
 
 def _peak(values: Array) -> float:

@@ -33,6 +33,8 @@ class RepetitionData:
     """(N,), from 0; a jump is a gap."""
     time_s: Array
     """(N,)"""
+    path_s: Array
+    """(N,), the motion's own time; behind ``time_s`` where the speed was below 100 %."""
     commanded_steps: NDArray[np.int64]
     """(N, J)"""
     commanded_deg: Array
@@ -141,6 +143,7 @@ def _parsed(
         state,
         column("index", _LARGEST).astype(np.int64),
         column("time_s", _LONGEST_S),
+        column("path_s" if "path_s" in table else "time_s", _LONGEST_S),
         joint_columns("commanded_steps").astype(np.int64),
         joint_columns("commanded_deg"),
         angle_deg,

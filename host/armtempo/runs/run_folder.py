@@ -60,6 +60,7 @@ def columns(joints: Sequence[JointScale]) -> dict[str, str]:
         "index": "number of the sample in its repetition, from 0",
         "ticks": f"motion clock of the board, ticks of 1/{limits.TICK_HZ} s",
         "time_s": "the same in seconds",
+        "path_s": "the motion's own time in seconds: behind the clock where the speed was below 100 %",
     }
     for number, joint in enumerate(joints, start=1):
         found |= {
@@ -77,6 +78,7 @@ def columns(joints: Sequence[JointScale]) -> dict[str, str]:
 def row(sample: Sample, joints: Sequence[JointScale]) -> list[str]:
     """One line of a sample file."""
     cells = [str(sample.index), str(sample.ticks), f"{sample.ticks / limits.TICK_HZ:.9f}"]
+    cells.append(f"{sample.path_ticks / limits.TICK_HZ:.9f}")
     for joint, steps, counts in zip(
         joints, sample.positions.commanded_steps, sample.positions.counts, strict=True
     ):

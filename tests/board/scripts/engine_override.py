@@ -1,8 +1,8 @@
 """Changes of speed, pauses and stops at random moments of random motions, on simulated hardware.
 
-Every step of the path comes once and in order, at the time that the law of the changes gives it; samples say the motion's
-own time. What is expected are the steps of the same motion without a change. An argument beside the case's name,
-a number, is how many motions are tried: 1000 as a benchmark.
+Every step of the path comes once and in order, at the time that the law of the changes gives it; samples say the
+motion's own time. What is expected are the steps of the same motion without a change. A number as an argument is how
+many motions are tried.
 """
 
 import random
@@ -94,9 +94,7 @@ def begin(motion, rate=1000):
 
 def motion_ticks(laws, ticks):
     """The motion's own time at a real time: the law in words of paper."""
-    for start, passed, length, before, after in reversed(laws):
-        if ticks >= start:
-            break
+    start, passed, length, before, after = [law for law in laws if law[0] <= max(ticks, 0)][-1]
     if ticks >= start + length:
         return passed + (before + after) * length / 2000 + (ticks - start - length) * after / 1000
     x = (ticks - start) / length
@@ -128,8 +126,10 @@ def change(rig):
     """Another rate, a pause or the end of one, and some time with it."""
     engine = rig.engine
     slow = engine.rate < 200
-    rate = random.choice((1000, RESUME, random.randrange(300, 1000))) if slow else random.choice(
-        (0, 10, random.randrange(10, 1000), random.randrange(10, 1000))
+    rate = (
+        random.choice((1000, RESUME, random.randrange(300, 1000)))
+        if slow
+        else random.choice((0, 10, random.randrange(10, 1000), random.randrange(10, 1000)))
     )
     engine.change_rate(rate)
     rig.run_to(rig.board.now - rig.zero() + random.randrange(TICK_HZ // 3))

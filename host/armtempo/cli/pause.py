@@ -1,0 +1,21 @@
+"""``armtempo pause``: come to rest on the path, to go on later."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from armtempo.cli import options
+from armtempo.cli.speed import change
+
+
+@click.command()
+@options.port
+@options.log_traffic
+def command(port: str | None, log_traffic: Path | None) -> None:
+    """Let what moves come to rest on its path; 'armtempo resume' goes on, 'armtempo stop' ends it.
+
+    The drivers hold meanwhile. A run, its pauses counted, lasts at most 1 h 49 min.
+    """
+    change(port, log_traffic, 0, "paused")

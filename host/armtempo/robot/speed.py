@@ -1,0 +1,29 @@
+"""How fast motions run: in parts of their planned speed, from the start or while they go on."""
+
+from __future__ import annotations
+
+from armtempo_shared.messages import PERMILLE, RESUME, SLOWEST_PERMILLE
+
+from armtempo.errors import InputError
+from armtempo.link import Client
+
+
+def permille(fraction: float) -> int:
+    """The board's number for a part of the planned speed, 0.01 to 1; InputError for another."""
+    rate = round(fraction * PERMILLE)
+    if not SLOWEST_PERMILLE <= rate <= PERMILLE:
+        raise InputError(
+            f"speed {100 * fraction:g} %: it must be from {100 * SLOWEST_PERMILLE / PERMILLE:g} to 100 % of the "
+            "planned one; a quicker motion needs a plan with higher limits"
+        )
+    return rate
+
+
+def change_speed(client: Client, rate: int) -> None:
+    """Let what moves go on at ``rate`` (0: pause, RESUME: as before it), and what this program starts later too.
+
+    Raises BoardError where nothing moves, and where the board refuses.
+    """
+    client.speed(rate)
+    if rate not in (0, RESUME):
+        client.rate = rate

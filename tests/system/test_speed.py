@@ -1,0 +1,151 @@
+"""Runs at another speed than planned, changes of it while they run, pauses: library, commands, report."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import armtempo
+import numpy as np
+import pytest
+from armtempo.errors import BoardError, InputError
+from armtempo.link.board_messages import Sample
+from armtempo.planning import brake_time
+from armtempo.report import run_report
+from armtempo.robot.recording import Watcher
+from armtempo.robot.run import Run
+from armtempo.runs import stretched
+from armtempo.simulator import LaunchOptions, launch
+
+from tests.system import boards
+from tests.system.boards import small_plan
+
+NEAR_DEG = 0.03
+"""More than half a step and a sample's 20 us."""
+
+
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory: pytest.TempPathFactory) -> armtempo.Plan:
+    return armtempo.Plan.load(small_plan(tmp_path_factory.mktemp("speed") / "small.json"))
+
+
+def check_on_path(run: Run, plan: armtempo.Plan) -> None:
+    """Every sample is where the plan is at the sample's own time of the motion, and that goes on to the end."""
+    samples = run.samples[run.samples["repetition"] == 1]
+    off = samples["commanded_deg"] - plan.trajectory(samples["path_s"])
+    assert np.max(np.abs(off)) < NEAR_DEG
+    assert np.all(np.diff(samples["path_s"]) >= 0)
+    assert np.all(samples["path_s"] <= samples["time_s"] + 1e-6)
+    assert samples["path_s"][-1] >= plan.total_s - 1e-6
+
+
+def test_half_the_speed_takes_twice_the_time_on_the_same_path(plan: armtempo.Plan, tmp_path: Path) -> None:
+    with armtempo.connect("sim", plan.arm) as board:
+        run = board.run(plan, repeat=2, out=tmp_path, speed=0.5)
+        assert board.client.rate == 1000
+    assert run.complete
+    check_on_path(run, plan)
+    first = run.samples[run.samples["repetition"] == 1]
+    np.testing.assert_allclose(first["path_s"], first["time_s"] / 2, atol=1e-6)
+    assert first["time_s"][-1] == pytest.approx(2 * plan.total_s, abs=1e-4)
+    evaluation = run_report.evaluate(run.path)
+    assert [text for text in evaluation.complaints if "ran at 50 % of the planned speed" in text]
+    assert np.nanmax(np.abs(evaluation.curves.mean[0] - evaluation.curves.theory[0])) < 0.5
+    speed = np.abs(evaluation.curves.theory[1]).max(axis=0)
+    planned = np.abs(plan.trajectory(np.linspace(0, plan.total_s, 200), 1)).max(axis=0)
+    np.testing.assert_allclose(speed, planned / 2, rtol=0.05)
+
+
+class Changing(Watcher):
+    """Changes the speed, pauses and goes on as samples come."""
+
+    def __init__(self, board: armtempo.Board) -> None:
+        self._board = board
+        self.pause_s: list[float] = []
+
+    def sample(self, sample: Sample, duration_s: float) -> None:
+        at = {2: 0.3, 20: 0.0, 80: -1.0, 110: 1.0}.get(sample.index)
+        if at == 0.0:
+            self._board.pause()
+        elif at == -1.0:
+            self._board.resume()
+        elif at is not None:
+            self._board.speed(at)
+
+
+def test_changes_and_a_pause_while_it_runs(plan: armtempo.Plan, tmp_path: Path) -> None:
+    with armtempo.connect("sim", plan.arm) as board:
+        run = board.run(plan, out=tmp_path, watcher=Changing(board))
+        with pytest.raises(BoardError, match="nothing is moving"):
+            board.pause()
+        for wrong in (0.0, 0.005, 1.2, -1.0):
+            with pytest.raises(InputError, match="from 1 to 100 %"):
+                board.speed(wrong)
+    assert run.complete
+    check_on_path(run, plan)
+    resting = np.sum(np.diff(run.samples["path_s"]) == 0.0)
+    assert resting > 10
+    (repetition,) = run.repetitions
+    assert "ran between 0 and" in stretched.note(repetition)
+    assert run.report().is_file()
+
+
+def test_another_program_changes_the_speed(plan: armtempo.Plan, tmp_path: Path) -> None:
+    file = tmp_path / "small.json"
+    plan.save(file)
+    with launch(LaunchOptions(tmp_path / "flash", virtual_time=False)) as board:
+
+        def on_board(*arguments: str | Path, code: int = 0) -> str:
+            return boards.armtempo(*arguments, "--port", board.port, cwd=tmp_path, code=code)
+
+        on_board("home", "--arm", "paper")
+        assert "nothing moves" in on_board("speed", "50", code=1)
+        on_board("speed", "0.5", code=2)
+        on_board("run", file, "--speed", "101", code=2)
+        on_board("goto", file, "--arm", "paper")
+        running = boards.start("run", file, "--speed", "5", "--port", board.port, cwd=tmp_path)
+        limit_s = time.monotonic() + boards.TIMEOUT_S
+        while "at 5 % of the planned speed" not in on_board("status"):
+            assert time.monotonic() < limit_s
+        assert "through" in on_board("pause")
+        assert "in a pause" in on_board("status")
+        on_board("resume")
+        assert "at 5 %" in on_board("status")
+        on_board("speed", "100")
+        output, _ = running.communicate(timeout=boards.TIMEOUT_S)
+        assert running.returncode == 0, output
+        assert "complete" in output
+
+
+def test_changes_keep_the_brake_times_limits() -> None:
+    """Numerically, on the stretched path itself: any two rates, anywhere, acceleration and jerk within EXCESS."""
+    rng = np.random.default_rng(20_264)
+    arm = boards.ARM
+    limits = [joint.limits for joint in arm.driven]
+    allowed = np.array([limit.values for limit in limits])
+    for _ in range(4):
+        ends = [np.array([30.0, -70.0, 20.0]) + rng.uniform(-25, 25, 3) for _ in range(2)]
+        job = armtempo.Job(
+            "any", via_deg=[ends[0], (ends[0] + ends[1]) / 2 + 3, ends[1]], population=5, iterations=5
+        )
+        trajectory = armtempo.plan(arm, job).trajectory
+        ramp_s = brake_time.brake_time_s(trajectory, limits)
+        worst = 0.0
+        for _ in range(60):
+            before, after = (
+                rng.uniform(0.01, 1.0, 2)
+                if rng.random() < 0.6
+                else rng.permutation([0.0, rng.uniform(0.1, 1.0)])
+            )
+            step = ramp_s / 1500
+            x = np.arange(1501) / 1500
+            rate = before + (after - before) * (10 * x**3 - 15 * x**4 + 6 * x**5)
+            passed = np.concatenate([[0], np.cumsum((rate[1:] + rate[:-1]) / 2)]) * step
+            values = trajectory(
+                np.minimum(rng.uniform(0, trajectory.duration_s) + passed, trajectory.duration_s)
+            )
+            for order in range(3):
+                values = np.diff(values, axis=0) / step
+                if order:
+                    worst = max(worst, float(np.max(np.abs(values[: -3 or None]) / allowed[:, order])))
+        assert worst < brake_time.EXCESS * 1.02, worst
