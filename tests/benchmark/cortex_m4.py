@@ -27,7 +27,6 @@ sys.path[:0] = [str(ROOT)] + [
 import micropython  # noqa: E402, F401  (puts ptr32 and its like into place)
 from armtempo_board.stepgen import (  # noqa: E402
     bezier,
-    braking,
     cubics,
     interval_steps,
     newton,
@@ -35,6 +34,7 @@ from armtempo_board.stepgen import (  # noqa: E402
     step_queue,
     subdivision,
     subintervals,
+    time_law,
 )
 from armtempo_shared.motion import Motion  # noqa: E402
 
@@ -56,7 +56,7 @@ machine code over its lines. A call in it takes CALL more."""
 CALL = 250
 """Instructions of calling one compiled function from another (see board/docs/hardware.md)."""
 
-COMPILED = (bezier, subdivision, newton, cubics, step_queue, braking)
+COMPILED = (bezier, subdivision, newton, cubics, step_queue, time_law)
 ALL = (*COMPILED, subintervals, interval_steps, step_generator)
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from tests.benchmark import memory
 
-PEAK = 60_000
-MOTION = 55_000
-MACHINE_CODE = 26_000
+PEAK = 63_000
+MOTION = 58_000
+MACHINE_CODE = 28_500
 
 
 def test_heap_of_the_compiled_program() -> None:

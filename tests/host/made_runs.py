@@ -51,5 +51,9 @@ def _samples(made: Plan, scatter_deg: float, rng: np.random.Generator) -> list[S
         steps = tuple(round(a * s.steps_per_deg) for a, s in zip(angles, scales, strict=True))
         seen = angles + rng.normal(scale=scatter_deg, size=len(angles))
         counts = tuple(round(a * s.counts_per_deg) for a, s in zip(seen, scales, strict=True))
-        found.append(Sample(run=1, index=index, ticks=tick, flags=0, positions=Positions(steps, counts)))
+        found.append(
+            Sample(
+                run=1, index=index, ticks=tick, path_ticks=tick, flags=0, positions=Positions(steps, counts)
+            )
+        )
     return found

@@ -33,7 +33,7 @@ def samples(delay_s: float = 0.0, seed: int | None = None, resolution: float = 0
     if resolution:
         angles = np.rint(angles / resolution) * resolution
     return RepetitionData(
-        "x", "complete", np.arange(len(times)), times, np.zeros(angles.shape, int), PLAN(times), angles
+        "x", "complete", np.arange(len(times)), times, times, np.zeros(angles.shape, int), PLAN(times), angles
     )
 
 
@@ -64,6 +64,7 @@ def test_a_gap_leaves_a_hole_and_nothing_else() -> None:
         whole,
         index=whole.index[keep],
         time_s=whole.time_s[keep],
+        path_s=whole.time_s[keep],
         angle_deg=whole.angle_deg[keep],
         commanded_deg=whole.commanded_deg[keep],
     )

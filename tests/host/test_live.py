@@ -29,7 +29,9 @@ def sample(time_s: float, off_deg: float) -> Sample:
     angles = plan.trajectory(time_s)
     steps = tuple(round(a * s.steps_per_deg) for a, s in zip(angles, scales, strict=True))
     counts = tuple(round((a + off_deg) * s.counts_per_deg) for a, s in zip(angles, scales, strict=True))
-    return Sample(1, round(time_s * 10), round(time_s * 84e6), 0, Positions(steps, counts))
+    return Sample(
+        1, round(time_s * 10), round(time_s * 84e6), round(time_s * 84e6), 0, Positions(steps, counts)
+    )
 
 
 def test_angles_and_errors_stand_beside_the_bar(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,7 +17,14 @@ SCALES = run_folder.scales(Arm.paper())
 
 
 def sample(index: int) -> Sample:
-    return Sample(1, index, index * 8_400_000, 0, Positions((index, -index, 0), (3 * index, -3 * index, 7)))
+    return Sample(
+        1,
+        index,
+        index * 8_400_000,
+        index * 8_400_000,
+        0,
+        Positions((index, -index, 0), (3 * index, -3 * index, 7)),
+    )
 
 
 def folder(path: Path) -> run_folder.RunFolder:

@@ -61,6 +61,7 @@ _TICKS_HIGH = const(1)
 _PATH_LOW = const(2)
 _PATH_HIGH = const(3)
 
+_FRACTION_BITS = const(30)
 _BIAS = const(1 << 28)
 _HALF_MASK = const((1 << 15) - 1)
 _LONGEST = const(1 << 28)
@@ -87,29 +88,18 @@ def set_length(law: "array[int]", ticks: int) -> None:
     law[UNIT] = unit
 
 
-@micropython.viper
-def set_rates(law: ptr32, before: int, after: int) -> object:
+def set_rates(law: "array[int]", before: int, after: int) -> None:
     """The rates, in thousandths."""
     law[BEFORE] = before
     law[AFTER] = after
-    if after < before:
-        rise = before - after
-    else:
-        rise = after - before
-        after = before
-    before = (after << 20) // PERMILLE
-    law[_LEAST] = (before << 10) + (((after << 20) - before * PERMILLE) << 10) // PERMILLE
-    before = (rise << 20) // PERMILLE
-    law[_RISE] = (before << 10) + (((rise << 20) - before * PERMILLE) << 10) // PERMILLE
+    law[_LEAST] = (min(before, after) << _FRACTION_BITS) // PERMILLE
+    law[_RISE] = (abs(after - before) << _FRACTION_BITS) // PERMILLE
 
 
-@micropython.viper
-def copy_law(target: ptr32, law: ptr32) -> object:
+def copy_law(target: "array[int]", law: "array[int]") -> None:
     """Copy a law, but not what belongs to a joint."""
-    word = 0
-    while word < _GIVEN_WORDS:
+    for word in range(_GIVEN_WORDS):
         target[word] = law[word]
-        word += 1
 
 
 def is_past(law: "array[int]", high: int) -> bool:

@@ -13,7 +13,7 @@ def case_fault_stays_until_cleared():
         False,
     )
     assert state(host) == "fault"
-    assert ends_of(host)[-1] == ("fault", (1, 42, 1, 8400000))
+    assert ends_of(host)[-1] == ("fault", (1, 42, 1, 8400000, 8400000))
     assert start(host) == ("error", "fault_pending", 1, 42)
     assert host.ask("home", (3,), bytes(8)) == ("error", "fault_pending", 1, 42)
     assert host.ask("clear")[0] == "ok"

@@ -23,6 +23,31 @@ def case_stop_brakes_or_freezes():
     assert app.controller.engine.calls[-1] == "freeze"
 
 
+def case_speed_of_what_moves_and_of_the_next_start():
+    app, host = connected()
+    assert host.ask("speed", (0,)) == ("error", "not_moving", 255, 0)
+    for wrong in (1, 9, 1001, 0xFFFE):
+        assert host.ask("speed", (wrong,)) == ("error", "malformed", 255, 0)
+    assert host.ask("speed", (500,)) == ("ok", (), b"")
+    assert host.ask("status")[1][7] == 500
+    start(host)
+    engine = app.controller.engine
+    assert engine.rate == 500
+    for rate in (10, 0, messages.RESUME, 1000):
+        assert host.ask("speed", (rate,)) == ("ok", (), b"")
+        assert engine.rate == rate
+    engine.finish()
+    start(host)
+    assert engine.rate == 1000
+    engine.finish()
+    host.ask("speed", (500,))
+    other = stand_in.Host(app, host.port)
+    other.ask("hello", (wire.PROTOCOL_VERSION, 99))
+    other.record = host.record
+    start(other)
+    assert engine.rate == 1000
+
+
 def case_stop_freezes_what_cannot_brake():
     app, host = connected()
     crc = armrecord.unpack(stand_in.arm())[2]
@@ -62,8 +87,8 @@ def case_oldest_sample_gives_way_and_is_counted():
     got = samples_of(host)
     queued = got.index(got[-1] - places + 1)  # what had been queued before the host stalled
     assert got[queued:] == list(range(21, 21 + places))
-    assert host.ask("status")[1][6:8] == (places, 21)
-    assert ends_of(host)[-1] == ("done", (1, 8400000 * (places + 20), places + 21, 21))
+    assert host.ask("status")[1][8:10] == (places, 21)
+    assert ends_of(host)[-1] == ("done", (1, *(8400000 * (places + 20),) * 2, places + 21, 21))
 
 
 def case_samples_of_a_run_without_host_are_kept():
