@@ -41,8 +41,8 @@ def check_on_path(run: Run, plan: armtempo.Plan) -> None:
 
 def test_half_the_speed_takes_twice_the_time_on_the_same_path(plan: armtempo.Plan, tmp_path: Path) -> None:
     with armtempo.connect("sim", plan.arm) as board:
-        run = board.run(plan, repeat=2, out=tmp_path, speed=0.5)
-        assert board.client.rate == 1000
+        board.speed(0.5)
+        run = board.run(plan, repeat=2, out=tmp_path)
     assert run.complete
     check_on_path(run, plan)
     first = run.samples[run.samples["repetition"] == 1]

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import click
 
 from armtempo.cli import chosen, options
-from armtempo.robot.speed import permille
 
 if TYPE_CHECKING:
     from armtempo.model.plan import Plan
@@ -56,7 +55,7 @@ def command(
         board.configure(arm, replace=replace_arm)
         click.echo(f"arm: {chosen.words(arm)}")
         motion = board.upload(plan, replace=force) if plan else what
-        board.client.rate = permille(percent / 100)
+        board.speed(percent / 100)
         run_and_tell(board, motion, repeat, chosen.runs(out), live)
 
 

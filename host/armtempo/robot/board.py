@@ -181,20 +181,19 @@ class Board:
         progress: Progress | None = None,
         watcher: Watcher | None = None,
         stop: StopRequest | None = None,
-        speed: float | None = None,
     ) -> Run:
         """Replay a motion ``repeat`` times and record what comes back in a new run folder below ``out``.
 
         ``motion``: a plan, or the name of a motion on the board. The arm must be homed and be where the motion
         begins, else LinkError, as where the board keeps another motion under its name (``upload`` can replace it)
         or is set up for another arm. The arm of a virtual board is brought there. Between repetitions it returns along
-        the same path. ``speed``: part of the planned speed, 0.01 to 1; None: as ``speed()`` was told last.
-        ``progress`` counts seconds of motion; ``watcher`` sees folder, samples and repetitions.
+        the same path, all at the speed that ``speed`` was told last. ``progress`` counts seconds of
+        motion; ``watcher`` sees folder, samples and repetitions.
         Whatever ends the run early raises, and what was recorded until then is ``last_run``.
         """
         encoded = self._encoded(motion)
         seen = recording.ProgressWatcher(progress, repeat, watcher or Watcher())
-        with self._stoppable(stop) as wanted, self._at_speed(speed):
+        with self._stoppable(stop) as wanted:
             self._bring_to_start(encoded, wanted)
             folder = recording.new_run(Path(out), encoded, self.port, self.client)
             self._last_folder = folder.path
@@ -228,11 +227,11 @@ class Board:
         stored_motion.stop(self.client, now)
 
     def speed(self, part: float) -> None:
-        """Let what moves go on at a part of its planned speed, 0.01 to 1, and start later motions so.
+        """Run at a part of the planned speed, 0.01 to 1: what this object starts from now on, and what moves.
 
-        The path stays as it is; the speed goes over smoothly in the motion's brake time. For another thread than the
-        one that waits in ``run``, or for what the button started. Raises InputError for another part, BoardError
-        where the board refuses.
+        The path stays as it is; while it moves, the speed goes over smoothly in the motion's brake time: from a
+        ``Watcher``, from another thread than the one that waits in ``run``, or for what the button started.
+        Raises InputError for another part, BoardError where the board refuses.
         """
         change_speed(self.client, permille(part))
 
@@ -243,18 +242,6 @@ class Board:
     def resume(self) -> None:
         """Go on along the path at the speed before the pause; BoardError where nothing moves."""
         change_speed(self.client, RESUME)
-
-    @contextmanager
-    def _at_speed(self, part: float | None) -> Iterator[None]:
-        """Start motions at a part of their planned speed, then at that before; None: as before."""
-        before = self.client.rate
-        if part is not None:
-            self.client.rate = permille(part)
-        try:
-            yield
-        finally:
-            if part is not None:
-                self.client.rate = before
 
     def clear(self) -> None:
         """Clear a fault; BoardError while its cause is still there."""
