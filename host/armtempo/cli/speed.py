@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import click
 
 from armtempo.cli import chosen, options
+from armtempo.errors import PortError
+
+_PORT_FREE_S = 5.0
+"""Within this time a program that has just taken the port answers for it."""
+_LOOK_S = 0.1
 
 
 @click.command()
@@ -26,18 +32,31 @@ def command(percent: float, port: str | None, log_traffic: Path | None) -> None:
 
 def change(port: str | None, log_traffic: Path | None, rate: int, said: str) -> None:
     """Ask for a rate in thousandths, through the program that has the port where there is one, and say so."""
+    name = chosen.port(port, others=True)
+    limit_s = time.monotonic() + _PORT_FREE_S
+    while True:
+        try:
+            who = _asked(name, log_traffic, rate)
+            break
+        except PortError:  # the other program is about to answer for the port, or to give it up
+            if time.monotonic() > limit_s:
+                raise
+            time.sleep(_LOOK_S)
+    click.echo(said + who)
+
+
+def _asked(name: str, log_traffic: Path | None, rate: int) -> str:
+    """Ask for the rate; through whom, in words."""
     from armtempo.robot import shared_board
     from armtempo.robot.speed import change_speed
 
-    name = chosen.port(port, others=True)
     shared = shared_board.find(name)
     if shared is not None:
         with shared:
             shared.speed(rate)
-            click.echo(f"{said}, through {shared.program}")
-        return
+            return f", through {shared.program}"
     with chosen.board(name, log_traffic) as board:
         if not board.status().moving:
             raise click.ClickException("nothing moves; 'armtempo run --speed' begins at a lower speed")
         change_speed(board.client, rate)
-    click.echo(said)
+    return ""
