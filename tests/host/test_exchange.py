@@ -80,7 +80,7 @@ def test_via_points_come_from_any_sensible_table(tmp_path: Path, text: str, radi
         ("0,-60,40\n20,x,50\n", "line 2: 'x' is not a finite number"),
         ("0,-60,40\n20,nan,50\n", "line 2: 'nan'"),
         ("0,-60,inf\n20,-75,50\n", "line 1: 'inf'"),
-        ("joint 1,joint 2\n1,2\n", "line 1: the header must name"),
+        ("joint 1,joint 2\n1,2\n", "line 1: the header does not name"),
     ],
 )
 def test_a_table_that_will_not_do_is_refused_with_its_line(tmp_path: Path, text: str, said: str) -> None:

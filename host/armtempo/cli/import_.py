@@ -32,7 +32,7 @@ def command(table: Path, arm_path: Path | None, name: str | None, radians: bool,
     title = name or table.stem
     target = output or Path(f"{title}.toml")
     if target.exists():
-        raise InputError(f"{target} exists; choose another place with --output")
+        raise InputError(f"{target} exists", "choose another place with --output")
     text = exchange.job_text(title, exchange.via_from_csv(table, arm, radians))
     job_file.of_table(toml_table.parse(text, str(table)), arm)
     replace_text(target, text)

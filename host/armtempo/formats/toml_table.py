@@ -25,9 +25,12 @@ def read(path: Path | str) -> Table:
     try:
         text = Path(path).read_text(encoding="utf-8-sig")  # some editors begin a file with a mark
     except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file") from None
+        raise InputError(f"{path}: there is no such file", "check the path") from None
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {why(error)}") from None
+        raise InputError(
+            f"{path}: cannot be read: {why(error)}",
+            "check that it is a text file in UTF-8 that you may read",
+        ) from None
     return parse(text, str(path))
 
 
@@ -36,7 +39,10 @@ def parse(text: str, file: str) -> Table:
     try:
         return Table(tomllib.loads(text), file)
     except (ValueError, RecursionError) as error:  # not all of tomllib's are its own: numbers of 5000 digits
-        raise InputError(f"{file}: not valid TOML: {error}") from None
+        raise InputError(
+            f"{file}: not valid TOML: {error}",
+            "correct that place; strings stand in quotes, tables in [brackets]",
+        ) from None
 
 
 class Table:
@@ -52,9 +58,9 @@ class Table:
         """The error for a key: say what is there and what is allowed."""
         name = f"{self._place}{key}"
         if key not in self._values:
-            return InputError(f"{self.file}: {name} is missing; it must be {allowed}")
+            return InputError(f"{self.file}: {name} is missing", f"write {name} = {allowed}")
         value = reprlib.repr(self._values[key])
-        return InputError(f"{self.file}: {name} = {value} is not allowed; it must be {allowed}")
+        return InputError(f"{self.file}: {name} = {value} is not allowed", f"give {allowed}")
 
     def has(self, key: str) -> bool:
         """Whether the key is given."""
@@ -153,9 +159,11 @@ class Table:
             if key in self._asked:
                 continue
             near = difflib.get_close_matches(key, self._asked, 1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            known = ", ".join(sorted(set(self._asked)))
-            raise InputError(f"{self.file}: {self._place}{key}: unknown key{hint} Known here: {known}")
+            known = f"known here: {', '.join(sorted(set(self._asked)))}"
+            raise InputError(
+                f"{self.file}: {self._place}{key}: unknown key",
+                f"did you mean {near[0]!r}? {known}" if near else known,
+            )
 
 
 def _is_number(value: Any) -> bool:

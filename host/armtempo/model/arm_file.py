@@ -167,11 +167,14 @@ def _model(table: Table | None) -> JointModel:
 
 def _check_channels(arm: Arm, path: Path | str) -> None:
     if not arm.driven:
-        raise InputError(f"{path}: no joint has a motor; at least one [joint.motor] is needed")
+        raise InputError(f"{path}: no joint has a motor", "add at least one [joint.motor]")
     for what, channels in (
         ("motor.channel", [joint.motor.channel for joint in arm.driven]),
         ("encoder.channel", [joint.encoder.channel for joint in arm.driven if joint.encoder]),
     ):
         for channel in channels:
             if channels.count(channel) > 1:
-                raise InputError(f"{path}: {what} = {channel} is used by two joints; each needs its own")
+                raise InputError(
+                    f"{path}: {what} = {channel} is used by two joints",
+                    "give each joint its own",
+                )

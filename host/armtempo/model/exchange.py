@@ -27,7 +27,8 @@ def times_s(duration_s: float, rate_hz: float) -> Array:
     """
     if not 0.0 < rate_hz <= MAX_RATE_HZ:
         raise InputError(
-            f"a rate of {rate_hz:g} Hz is not allowed; it must be above 0, at most {MAX_RATE_HZ:g}"
+            f"a rate of {rate_hz:g} Hz is not allowed",
+            f"give one above 0, at most {MAX_RATE_HZ:g} Hz",
         )
     count = max(math.ceil(duration_s * rate_hz - 1e-9), 1)
     return np.append(np.arange(count) / rate_hz, duration_s)
@@ -81,13 +82,19 @@ def via_from_csv(path: Path, arm: Arm, radians: bool = False) -> Array:
                 (number, row) for number, row in enumerate(csv.reader(file), 1) if any(map(str.strip, row))
             ]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path}: cannot be read: {why(error)}") from None
+        raise InputError(
+            f"{path}: cannot be read: {why(error)}",
+            "check the path, and that it is a text file in UTF-8",
+        ) from None
     columns = list(range(len(arm.driven)))
     if rows and not all(map(_is_float, rows[0][1])):
         columns = _columns(path, rows.pop(0)[1], arm)
     points = np.array([_point(path, number, row, columns) for number, row in rows]).reshape(-1, len(columns))
     if len(points) < 2:
-        raise InputError(f"{path}: {len(points)} via points; a motion needs at least 2")
+        raise InputError(
+            f"{path}: {len(points)} via points are no motion",
+            "give at least 2 lines of angles",
+        )
     return np.degrees(points) if radians else points
 
 
@@ -108,16 +115,25 @@ def _columns(path: Path, header: list[str], arm: Arm) -> list[int]:
         return list(range(len(names)))
     if len(found) != len(arm.driven):
         expected = ", ".join(joint.name for joint in arm.driven)
-        raise InputError(f"{path}: line 1: the header must name a column for each of {expected}")
+        raise InputError(
+            f"{path}: line 1: the header does not name a column for each driven joint",
+            f"name a column for each of {expected}",
+        )
     return found
 
 
 def _point(path: Path, number: int, row: list[str], columns: list[int]) -> list[float]:
     if len(row) <= max(columns):
-        raise InputError(f"{path}: line {number}: {len(row)} values; at least {max(columns) + 1} are needed")
+        raise InputError(
+            f"{path}: line {number}: {len(row)} values; at least {max(columns) + 1} are needed",
+            "complete the line",
+        )
     for column in columns:
         if not _is_number(row[column]):
-            raise InputError(f"{path}: line {number}: {row[column]!r} is not a finite number")
+            raise InputError(
+                f"{path}: line {number}: {row[column]!r} is not a finite number",
+                "write numbers with a decimal point; columns are separated by commas",
+            )
     return [float(row[column]) for column in columns]
 
 

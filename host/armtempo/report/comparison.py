@@ -24,7 +24,10 @@ def write(folders: Sequence[Path], path: Path) -> Path:
     """
     readable, complaints = _read(folders)
     if len(readable) < 2:
-        raise RunFolderError("fewer than two runs can be compared: " + "; ".join(complaints))
+        raise RunFolderError(
+            "fewer than two runs can be compared: " + "; ".join(complaints),
+            "name two runs or more that can be read",
+        )
     replace_text(path, render(readable, complaints))
     return path
 
@@ -59,7 +62,7 @@ def _read(folders: Sequence[Path]) -> tuple[dict[str, run_report.Evaluation], li
         try:
             evaluation = run_report.evaluate(folder)
         except RunFolderError as error:
-            complaints.append(str(error))
+            complaints.append(error.problem)
             continue
         name = folder.resolve().name
         readable[name if name not in readable else str(folder)] = evaluation

@@ -27,7 +27,10 @@ class LivePlot:
         except ImportError:
             raise MissingPackageError("a live plot", "matplotlib", "plot") from None
         if plt.get_backend().lower() in _WITHOUT_WINDOW:
-            raise ArmtempoError("there is no display to open a window on")
+            raise ArmtempoError(
+                "there is no display to open a window on",
+                "leave --live out, or connect a display",
+            )
         self._plt: Any = plt
         self._figure, axes = plt.subplots(len(names), 1, squeeze=False, sharex=True, layout="constrained")
         times = np.linspace(0.0, trajectory.duration_s, 300)

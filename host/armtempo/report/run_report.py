@@ -55,16 +55,19 @@ def evaluate(folder: Path) -> Evaluation:
     """
     run = reader.load(folder)
     if run.trajectory_path is None:
-        raise RunFolderError(f"{folder}: has no trajectory.json, so there is no theory to compare with")
+        raise RunFolderError(f"{folder}: has no trajectory.json", "run again from a trajectory file")
     plan = trajectory_file.load(run.trajectory_path)
     if len(run.joints) != len(plan.arm.driven):
         raise RunFolderError(
-            f"{folder}: run.json tells of {len(run.joints)} joints, trajectory.json of {len(plan.arm.driven)}; "
-            "they are not of one run"
+            (
+                f"{folder}: run.json tells of {len(run.joints)} joints, trajectory.json of "
+                f"{len(plan.arm.driven)}; they are not of one run"
+            ),
+            "run again, or put the trajectory.json of this run there",
         )
     usable = [repetition for repetition in run.repetitions if len(repetition.time_s)]
     if not usable:
-        raise RunFolderError(f"{folder}: holds no sample; run it again")
+        raise RunFolderError(f"{folder}: holds no sample", "run it again")
     return Evaluation(run, plan, analysis.curves(usable, plan.trajectory), tuple(complaints(run)))
 
 

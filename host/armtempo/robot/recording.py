@@ -128,7 +128,10 @@ def fetch(client: Client, motion: EncodedMotion, folder_in: Path, port: str) -> 
     """
     status = client.status()
     if not status.run or not (status.moving or status.samples_kept):
-        raise LinkError("the board keeps no samples: nothing was run since it started, or they were fetched")
+        raise LinkError(
+            "the board keeps no samples: nothing was run since it started, or they were fetched",
+            "fetch before the next run and before a reset; a new run: 'armtempo run'",
+        )
     follower = Follower(client, status.run)
     folder = new_run(folder_in, motion, port, client)
     with folder.begin_repetition() as file:

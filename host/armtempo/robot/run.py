@@ -82,7 +82,10 @@ class Run:
         try:
             data = (self.path / MOTION).read_bytes()
         except OSError as error:
-            raise RunFolderError(f"{self.path / MOTION}: cannot be read: {why(error)}") from error
+            raise RunFolderError(
+                f"{self.path / MOTION}: cannot be read: {why(error)}",
+                "restore the folder from a copy, or run again",
+            ) from error
         return decode.trajectory(data, self._content.joints, self.name)
 
     @property

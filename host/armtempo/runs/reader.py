@@ -72,7 +72,10 @@ def load(path: Path) -> RunData:
         entries = tuple(_entry(entry) for entry in meta["repetitions"])
         meta |= {key: str(meta[key]) for key in ("name", "started")}
     except (KeyError, TypeError, ValueError) as error:
-        raise RunFolderError(f"{path / META}: {error} is missing or wrong; the folder is damaged") from error
+        raise RunFolderError(
+            f"{path / META}: {error} is missing or wrong",
+            "restore the folder from a copy, or run again",
+        ) from error
     repetitions = tuple(_samples(path / entry.file, entry.state, joints) for entry in entries)
     return RunData(path, meta, joints, repetitions, entries)
 
@@ -94,13 +97,24 @@ def _meta(path: Path) -> dict[str, Any]:
     try:
         meta = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise RunFolderError(f"{path.parent} is not a run folder: {path.name}: {error.strerror}") from error
+        raise RunFolderError(
+            f"{path.parent} is not a run folder: {path.name}: {error.strerror}",
+            "give a folder that 'armtempo run' or 'armtempo fetch' wrote",
+        ) from error
     except ValueError as error:
-        raise RunFolderError(f"{path}: damaged: {error}") from error
+        raise RunFolderError(
+            f"{path}: damaged: {error}", "restore the folder from a copy, or run again"
+        ) from error
     if not isinstance(meta, dict) or meta.get("format") != FORMAT:
-        raise RunFolderError(f"{path}: not the description of an armtempo run")
+        raise RunFolderError(
+            f"{path}: not the description of an armtempo run",
+            "give a folder that 'armtempo run' or 'armtempo fetch' wrote",
+        )
     if meta.get("version") != VERSION:
-        raise RunFolderError(f"{path}: version {meta.get('version')}; this armtempo reads {VERSION}")
+        raise RunFolderError(
+            f"{path}: version {meta.get('version')}; this armtempo reads {VERSION}",
+            "update armtempo, or read it with the version that wrote it",
+        )
     return meta
 
 

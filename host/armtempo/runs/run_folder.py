@@ -198,8 +198,11 @@ def new_folder(parent: Path, name: str) -> Path:
                 path.mkdir(parents=True)
                 return path
     except OSError as error:
-        raise InputError(f"{parent}: the run folder cannot be made: {error.strerror}") from error
-    raise InputError(f"{parent} holds 9999 runs of {name!r}; move some away")
+        raise InputError(
+            f"{parent}: the run folder cannot be made: {error.strerror}",
+            "choose another place with --out",
+        ) from error
+    raise InputError(f"{parent} holds 9999 runs of {name!r}", "move some away")
 
 
 @contextmanager
@@ -208,7 +211,8 @@ def _writing(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise RunFolderError(
-            f"{path}: cannot be written: {error.strerror}; what came before is kept; make room, then run again"
+            f"{path}: cannot be written: {error.strerror}; what came before is kept",
+            "make room, then run again",
         ) from None
 
 
