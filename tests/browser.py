@@ -26,11 +26,16 @@ _QUIET = [
 ]
 _PROBE = """<script>addEventListener('load', () => {
   const style = getComputedStyle(document.body);
+  const figures = [...document.querySelectorAll('figure svg:not(.sheet)')];
   document.body.setAttribute('data-probe', JSON.stringify({
     fetched: performance.getEntriesByType('resource').map(entry => entry.name),
     overflow: document.documentElement.scrollWidth - document.documentElement.clientWidth,
     width: document.documentElement.clientWidth,
-    figures: [...document.querySelectorAll('figure svg')].map(svg => svg.getBoundingClientRect().height),
+    figures: figures.map(svg => svg.getBoundingClientRect().height),
+    scales: figures.map(svg => svg.getBoundingClientRect().width / svg.viewBox.baseVal.width),
+    cut: [...document.querySelectorAll('body *')].filter(one => !one.closest('svg') && (
+      one.scrollWidth > one.clientWidth + 1 && getComputedStyle(one).overflowX != 'visible'
+      || one.getBoundingClientRect().right > document.documentElement.clientWidth + 1)).map(one => one.outerHTML),
     tables: document.querySelectorAll('table').length,
     text: document.body.innerText,
     colour: style.color, background: style.backgroundColor,

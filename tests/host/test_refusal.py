@@ -15,7 +15,6 @@ from armtempo_shared.meanings import VALUES
 from tests.host.linked import ready
 from tests.inprocess import Pipe
 
-
 OF_A_JOINT = {
     "too_fast": "the motion is faster than the joint's speed limit in the arm file that the board has"
 }

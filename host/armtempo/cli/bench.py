@@ -148,11 +148,11 @@ def _write(out: Path, found: Sequence[Row], with_paper: bool, plot: bool) -> Non
 
 def _plot(path: Path, found: Sequence[Row]) -> list[str]:
     """Draws the curves; without matplotlib it says so, and the tables stand."""
-    from armtempo.report import plots
+    from armtempo.report import drawing
     from armtempo.research.bench import result_plot
 
     try:
-        plots.save(result_plot.convergence(found), path)
+        drawing.save(result_plot.convergence(found), path)
     except MissingPackageError as error:
         messages.show(error, "no plot")
         return []

@@ -12,7 +12,7 @@ from armtempo_shared.basis import BASIS
 from armtempo.errors import InputError
 from armtempo.formats import json_codec
 from armtempo.formats.atomic_file import replace_text, why
-from armtempo.model.arm import Joint
+from armtempo.model import arm_json
 from armtempo.model.plan import Plan
 from armtempo.splines.trajectory import JointSpline
 
@@ -76,8 +76,7 @@ def _refuse(name: str) -> None:
 
 def _check(plan: Plan, path: Path | str) -> None:
     """Check what types cannot express: shapes, increasing times, one spline for each driven joint."""
-    for joint in plan.arm.joints:
-        _check_drive(joint, f"{path}: arm: {joint.name}")
+    arm_json.check(plan.arm, f"{path}: arm", "plan it again")
     joints, driven = plan.trajectory.joints, plan.arm.driven
     if not joints or len(joints) != len(driven):
         raise InputError(
@@ -100,19 +99,6 @@ def _check(plan: Plan, path: Path | str) -> None:
         )
     if any(not 0 <= index < len(joints) for search in plan.searches for index in search.joints):
         raise InputError(f"{path}: searches name a joint that there is not", "plan it again")
-
-
-def _check_drive(joint: Joint, where: str) -> None:
-    """A joint with a motor can be driven, and its figures can be divided by."""
-    motor, encoder = joint.motor, joint.encoder
-    if motor is None:
-        return
-    if joint.limits is None or min(joint.limits.values) <= 0:
-        raise InputError(f"{where}: has no limits above 0", "plan it again")
-    if min(motor.steps_per_rev, motor.microsteps, motor.gear_ratio) <= 0:
-        raise InputError(f"{where}: its motor's figures must be above 0", "plan it again")
-    if encoder is not None and encoder.counts_per_rev <= 0:
-        raise InputError(f"{where}: its encoder's counts_per_rev must be above 0", "plan it again")
 
 
 def _check_spline(spline: JointSpline, segments: int, where: str) -> None:

@@ -4,6 +4,7 @@
 
     run.json          what ran, when, on which board; how each repetition ended; the columns' meaning
     trajectory.json   the plan, where it is known
+    arm.json          else the arm
     motion.bin        what the board replayed
     samples-01.csv    one file a repetition, one line a sample (columns: see ``columns``)
 
@@ -36,6 +37,7 @@ FORMAT = "armtempo run"
 VERSION = 1
 META = "run.json"
 TRAJECTORY = "trajectory.json"
+ARM = "arm.json"
 MOTION = "motion.bin"
 RUNNING, COMPLETE, INTERRUPTED, FAULT, BROKEN = "running", "complete", "interrupted", "fault", "broken"
 
