@@ -204,7 +204,7 @@ def test_an_arm_that_does_not_follow_is_not_ok(tmp_path: Path) -> None:
     path = made_runs.make(tmp_path / "run", scatter_deg=3.0)
     line = verdict.of(evaluate(path)).line
     assert line.startswith("Not OK: ")
-    assert re.search(r"joint 1 was up to \d+\.\d\d° from the plan, 5° are allowed", line)
+    assert re.search(r"joint 1 was up to \d+\.\d\d° from the plan, 2° are allowed", line)
 
 
 def test_every_column_is_explained(folder: Path) -> None:

@@ -7,20 +7,10 @@ from dataclasses import KW_ONLY, InitVar, dataclass, field
 from pathlib import Path
 
 from armtempo.model.arm import Arm
+from armtempo.model.tool_pose import Pose
 
 REFINE, POPULATION, ITERATIONS = (1, 64), (4, 100_000), (1, 1_000_000)
 """Least and largest values of these settings."""
-
-Rows = tuple[tuple[float, ...], ...]
-
-
-@dataclass(frozen=True)
-class Pose:
-    """A tool pose to pass: 4 x 4 homogeneous matrix rows, lengths in mm."""
-
-    matrix: Rows
-    posture_deg: tuple[float, ...] | None = None
-    """Which solution to prefer; None: nearest to the one before."""
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +19,23 @@ ROUNDED = 1e-3
 """How far a rotation or a unit quaternion may be off by rounding of the printed numbers."""
 
 
+class RollPitchYaw(NamedTuple):
+    """Angles in degrees about the x, then the y, then the z axis of the base."""
+
+    roll_deg: float
+    pitch_deg: float
+    yaw_deg: float
+
+
+class Quaternion(NamedTuple):
+    """A unit quaternion, its real part first."""
+
+    w: float
+    x: float
+    y: float
+    z: float
+
+
 def checked(matrix: ArrayLike, what: str = "the pose") -> Array:
     """Return a (4, 4) pose, its rotation part made exact; InputError, naming ``what``, if it is no pose.
 
@@ -27,12 +45,19 @@ def checked(matrix: ArrayLike, what: str = "the pose") -> Array:
     if pose.shape == (3, 4):
         pose = np.vstack((pose, (0.0, 0.0, 0.0, 1.0)))
     if pose.shape != (4, 4):
-        raise InputError(f"{what}: a pose is a matrix of 4 rows of 4 numbers, or its first 3 rows")
+        raise InputError(
+            f"{what}: a matrix of shape {pose.shape} is no pose",
+            "give 4 rows of 4 numbers, or the first 3 of them",
+        )
     if not np.all(np.abs(pose) <= LARGEST):
-        raise InputError(f"{what}: every number of a pose must be finite, and at most {LARGEST:g}")
+        raise InputError(
+            f"{what}: one of its numbers is too large or no number",
+            f"every number of a pose must be finite, and at most {LARGEST:g}",
+        )
     if np.abs(pose[3] - (0.0, 0.0, 0.0, 1.0)).max() > 1e-9:
         raise InputError(
-            f"{what}: the last row of a pose is 0 0 0 1, not {' '.join(f'{v:g}' for v in pose[3])}"
+            f"{what}: the last row of a pose is 0 0 0 1, not {' '.join(f'{v:g}' for v in pose[3])}",
+            "write it so, with the position in the last column",
         )
     pose[:3, :3] = _nearest_rotation(pose[:3, :3], what)
     pose[3] = (0.0, 0.0, 0.0, 1.0)
@@ -44,12 +69,12 @@ def _nearest_rotation(part: Array, what: str) -> Array:
     off = float(np.abs(stretch - 1.0).max())
     if off > ROUNDED:
         raise InputError(
-            f"{what}: the 3 x 3 part is not a rotation: its columns must have length 1 and be square to each "
-            f"other (off by {off:.3g}, {ROUNDED:g} allowed)"
+            f"{what}: the 3 x 3 part is not a rotation (off by {off:.3g}, {ROUNDED:g} allowed)",
+            "its columns must have length 1 and be square to each other: give more digits, or roll, pitch and yaw",
         )
     rotation: Array = left @ right
     if np.linalg.det(rotation) < 0.0:
-        raise InputError(f"{what}: the 3 x 3 part is a mirror image (left-handed); swap or negate a column")
+        raise InputError(f"{what}: the 3 x 3 part is a mirror image (left-handed)", "swap or negate a column")
     # An exact matrix stays as it is, to the last bit.
     return part if np.abs(rotation - part).max() < 1e-14 else rotation
 
@@ -71,7 +96,8 @@ def from_quaternion(position: Sequence[float], wxyz: Sequence[float], what: str 
     length = math.hypot(*wxyz)
     if not abs(length - 1.0) <= ROUNDED:
         raise InputError(
-            f"{what}: a quaternion w x y z of length 1 is needed; this one has length {length:.6g}"
+            f"{what}: this quaternion has length {length:.6g}",
+            "give w x y z of length 1, w (the real part) first",
         )
     w, x, y, z = (value / length for value in wxyz)
     rotation = (
@@ -80,6 +106,38 @@ def from_quaternion(position: Sequence[float], wxyz: Sequence[float], what: str 
         (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
     )
     return _joined(rotation, position, what)
+
+
+def to_rpy_deg(matrix: ArrayLike) -> RollPitchYaw:
+    """Roll, pitch and yaw of a pose (4, 4) or rotation (3, 3); roll is 0 where the x axis stands upright."""
+    r = np.asarray(matrix, dtype=np.float64)
+    level = math.hypot(r[0, 0], r[1, 0])
+    pitch = math.atan2(-r[2, 0], level)
+    if level < 1e-9:
+        return RollPitchYaw(0.0, _degrees(pitch), _degrees(math.atan2(-r[0, 1], r[1, 1])))
+    roll, yaw = math.atan2(r[2, 1], r[2, 2]), math.atan2(r[1, 0], r[0, 0])
+    return RollPitchYaw(_degrees(roll), _degrees(pitch), _degrees(yaw))
+
+
+def _degrees(angle_rad: float) -> float:
+    """From above -180 to 180, and never -0; rounding makes no -180 of a half turn."""
+    angle_deg = math.degrees(angle_rad)
+    return 180.0 if angle_deg < -180.0 + 1e-9 else angle_deg + 0.0
+
+
+def to_quaternion(matrix: ArrayLike) -> Quaternion:
+    """Unit quaternion w x y z of a pose (4, 4) or rotation (3, 3), with w not below 0."""
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = np.asarray(matrix, dtype=np.float64)[:3, :3].tolist()
+    # Four times the products of the quaternion's elements; the row of the largest square has the most digits.
+    rows = (
+        (1 + xx + yy + zz, zy - yz, xz - zx, yx - xy),
+        (zy - yz, 1 + xx - yy - zz, xy + yx, xz + zx),
+        (xz - zx, xy + yx, 1 - xx + yy - zz, yz + zy),
+        (yx - xy, xz + zx, yz + zy, 1 - xx - yy + zz),
+    )
+    best = max(rows, key=lambda row: math.hypot(*row))
+    length = math.hypot(*best) * (-1.0 if best[0] < 0.0 else 1.0)
+    return Quaternion(*(element / length + 0.0 for element in best))
 
 
 def _joined(rotation: ArrayLike, position: Sequence[float], what: str) -> Array:

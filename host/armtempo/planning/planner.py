@@ -12,8 +12,9 @@ import numpy as np
 import armtempo
 from armtempo.arrays import Array
 from armtempo.model.arm import Arm, Limits
-from armtempo.model.job import Job, Pose
+from armtempo.model.job import Job
 from armtempo.model.plan import Plan, Search
+from armtempo.model.tool_pose import Pose
 from armtempo.planning import checks, lower_bounds, time_parameterization
 from armtempo.planning.time_parameterization import Timed
 from armtempo.progress import Progress

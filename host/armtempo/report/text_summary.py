@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from armtempo.arm_check.resolution import findings as coarse_steps
 from armtempo.formats.text_table import aligned
 from armtempo.model.plan import Plan, Search
 from armtempo.planning import path_deviation
@@ -23,7 +24,10 @@ _FLOORS = {
 
 
 def lines(plan: Plan) -> list[str]:
-    """A plan: motion times beside their lower bounds, extremes beside their limits; one string a line."""
+    """A plan: motion times beside their lower bounds, extremes beside their limits; one string a line.
+
+    Then what the user should know: notes on the poses, joints whose steps are coarse.
+    """
     job = plan.job
     made = f"{job.optimiser}, {job.population} x {job.iterations}, seed {job.seed}"
     shape = f"degree {job.degree}, refine {job.refine}"
@@ -35,6 +39,9 @@ def lines(plan: Plan) -> list[str]:
     if job.timing == "per-joint" and len(plan.searches) > 1:
         text.extend(_separation(plan))
     text.extend(f"note: {note}" for note in plan.notes)
+    text.extend(
+        f"{each.level.value}: {each.where}: {each.what}; {each.next_step}" for each in coarse_steps(plan.arm)
+    )
     return text
 
 
