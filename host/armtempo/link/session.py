@@ -229,7 +229,7 @@ def _answer(name: str, reply: wire.Frame) -> Answer:
         values, tail = wire.decode(wire.EVENT_BY_ID[reply.number], reply.payload)
         if wire.EVENT_BY_ID[reply.number][0] == "error":
             raise refusal(f"the board refused '{name}'", *values[1:])
-        answer: Answer = wire.decode(wire.ANSWER[name], tail)
+        answer: Answer = board_messages.decode(wire.ANSWER[name], tail)
     except wire.WireError as error:
         raise LinkError(
             f"the board's answer to '{name}' does not fit protocol {wire.PROTOCOL_VERSION} ({error})",

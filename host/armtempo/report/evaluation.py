@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from armtempo.model.arm import Arm, Limits
 from armtempo.model.plan import Plan
 from armtempo.runs import analysis, peaks, reader, replayed
 from armtempo.runs.run_folder import COMPLETE
+from armtempo.splines import extremes
 from armtempo.splines.trajectory import Trajectory
 
 
@@ -38,6 +40,11 @@ class Evaluation:
     def limits(self) -> list[Limits]:
         """Their limits; empty where the arm is not known."""
         return [joint.limits for joint in self.arm.driven] if self.arm else []
+
+    @property
+    def extremes(self) -> Sequence[extremes.Extremes]:
+        """The planned motion's largest speed, acceleration and jerk of each joint."""
+        return self.plan.extremes if self.plan else extremes.of_joints(self.trajectory.joints)
 
     @property
     def limit_checks(self) -> list[list[peaks.LimitCheck]]:

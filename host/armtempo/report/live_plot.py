@@ -41,7 +41,7 @@ class LivePlot:
         for joint, (axis, name) in enumerate(zip(axes[:, 0], names, strict=True)):
             axis.plot(times, planned[:, joint], ":", color="gray")
             self._lines += axis.plot([], [], color=COLOURS[joint % len(COLOURS)])
-            axis.set_ylabel(f"{name} (°)")
+            axis.set_ylabel(f"{name} (°)", parse_math=False)
         axes[-1][0].set_xlabel("time (s)")
         self._figure.show()
 

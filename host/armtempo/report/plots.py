@@ -95,7 +95,7 @@ def overlay(runs: Mapping[str, tuple[Array, Array, Array]]) -> Figure:
     figure, axes = new_figure(4, 1, 4.8, 8.0)
     for index, (name, (times, mean, error)) in enumerate(runs.items()):
         for axis, values in zip(axes[:, 0], (*mean, error), strict=True):
-            axis.plot(times, values, color=COLOURS[index % len(COLOURS)], label=name)
+            axis.plot(times, values, color=COLOURS[index % len(COLOURS)], label=_shown(name))
     axes[0][0].legend(frameon=False)
     _label(axes, ("",), (*_LABELS[:3], "error (°)"))
     return figure
@@ -106,12 +106,17 @@ def convergence(histories: Mapping[str, Array]) -> Figure:
     figure, axes = new_figure(1, 1, 4.8, 2.6)
     axis = axes[0][0]
     for index, (name, history) in enumerate(histories.items()):
-        axis.plot(history, color=COLOURS[index % len(COLOURS)], label=name)
+        axis.plot(history, color=COLOURS[index % len(COLOURS)], label=_shown(name))
     axis.set_xlabel("iteration")
     axis.set_ylabel("best fitness (s)")
     axis.legend(frameon=False)
     theme(axis)
     return figure
+
+
+def _shown(name: str) -> str:
+    """A name for a legend, which leaves out what begins with an underscore."""
+    return f" {name}" if name.startswith("_") else name
 
 
 def _mark_limits(axis: Axes, limits: Limits, order: int) -> None:

@@ -9,7 +9,6 @@ import numpy as np
 from armtempo.report import html_page, verdict
 from armtempo.report.evaluation import Evaluation
 from armtempo.runs import analysis, peaks
-from armtempo.splines import extremes
 
 _MEASURED = {
     "joint": "",
@@ -33,11 +32,14 @@ _PEAKS = {
     "joint": "",
     "quantity": "",
     "planned": "the largest magnitude in the plan, exact",
-    "measured": "the largest magnitude measured ± its standard uncertainty; – without an encoder",
     "limit": "what the arm file allows",
-    "verdict": f"{peaks.KEPT}, {peaks.WITHIN} or {peaks.EXCEEDED}: three uncertainties more or less do not change it; "
-    "a time-optimal motion reaches its limits, so no measurement could show that one is kept exactly",
+    "measured": "the largest magnitude measured ± its standard uncertainty; – without an encoder",
+    "verdict": f"{peaks.KEPT}, {peaks.WITHIN} or {peaks.EXCEEDED}: three uncertainties more or less do not change it, "
+    f"else it {peaks.UNDECIDED}; a time-optimal motion reaches its limits, so no measurement could show that one is "
+    "kept exactly",
 }
+_MEASURED_PEAKS = ("measured", "verdict")
+"""Columns that a table has only where something was measured."""
 _COLOURS = {
     peaks.EXCEEDED: html_page.BAD,
     peaks.KEPT: html_page.GOOD,
@@ -96,14 +98,19 @@ def _steps(sheet: html_page.Page, found: Evaluation) -> None:
 
 
 def _peaks(sheet: html_page.Page, found: Evaluation) -> None:
-    planned = found.plan.extremes if found.plan else extremes.of_joints(found.trajectory.joints)
+    seen = bool(found.curves.measured.any())
     rows: list[Sequence[object]] = []
-    for name, most, checks in zip(found.names, planned, found.limit_checks, strict=True):
+    for name, most, checks in zip(found.names, found.extremes, found.limit_checks, strict=True):
         for quantity, unit, value, check in zip(
             ("speed", "acceleration"), ("°/s", "°/s²"), most.values, checks, strict=False
         ):
-            measured = "–" if np.isnan(check.peak) else f"{check.peak:.2f} ± {check.sigma:.2f}"
-            kind = _COLOURS.get(check.verdict, "")
-            limit = f"{check.limit:g} {unit}"
-            rows.append((name, quantity, f"{value:.2f}", measured, limit, (check.verdict, kind)))
-    sheet.table(tuple(_PEAKS), rows, "Peaks beside the limits", _PEAKS)
+            cells = (name, quantity, f"{value:.2f}", f"{check.limit:g} {unit}")
+            rows.append((*cells, *_measured_peak(check)) if seen else cells)
+    columns = {name: text for name, text in _PEAKS.items() if seen or name not in _MEASURED_PEAKS}
+    sheet.table(tuple(columns), rows, "Peaks beside the limits", columns)
+
+
+def _measured_peak(check: peaks.LimitCheck) -> tuple[object, object]:
+    """The cells of _MEASURED_PEAKS."""
+    measured = "–" if np.isnan(check.peak) else f"{check.peak:.2f} ± {check.sigma:.2f}"
+    return measured, (check.verdict, _COLOURS.get(check.verdict, ""))

@@ -41,10 +41,11 @@ def write(folder: Path) -> Path:
 def figures(found: Evaluation) -> dict[str, tuple[Figure, str]]:
     """The figures by file name, each with its caption."""
     trajectory, names, limits = found.trajectory, found.names, found.limits
+    band = " with its standard error (band)" if found.curves.measured.any() else ""
     drawn = {
         "tracking": (
             plots.tracking(found.curves, trajectory, limits, names),
-            f"{_what_is_seen(found)} (solid) with its standard error (band), the plan (dotted), limits (dashed).",
+            f"{_what_is_seen(found)} (solid){band}, the plan (dotted), limits (dashed).",
         ),
         "errors": (
             plots.errors(found.curves, names),

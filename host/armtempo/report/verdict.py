@@ -16,6 +16,8 @@ GOOD, BAD, OPEN = "good", "bad", "open"
 """What a finding is: as it should be, not so, or not to be told from what was recorded."""
 STEPS_OFF = 1
 """Step pulses at the end that may differ: an angle halfway between two steps rounds either way."""
+ROUNDED = 1e-3
+"""Fraction above a limit that the rounding of a record may make."""
 _SUMMARIES = {GOOD: "OK", BAD: "Not OK", OPEN: "OK as far as it was measured"}
 
 
@@ -57,6 +59,7 @@ def of(found: Evaluation) -> Verdict:
         *_repetitions(found),
         *_samples(found),
         *_steps(found),
+        *_commanded(found),
         *_following(found),
         *_limits(found),
     ]
@@ -99,6 +102,23 @@ def planned_steps(found: Evaluation) -> NDArray[np.int64]:
     scale = np.array([joint.steps_per_deg for joint in found.run.joints])
     ends = np.stack([found.trajectory(0.0), found.trajectory(found.trajectory.duration_s)])
     return np.asarray(np.rint(ends * scale), dtype=np.int64)
+
+
+def _commanded(found: Evaluation) -> Iterator[Finding]:
+    """Whether joints without an encoder were asked for more than their limits."""
+    blind = zip(found.names, found.extremes, found.limits, found.curves.measured, strict=False)
+    asked = [
+        (name, np.array(most.values[:2]), np.array(limit.values[:2]))
+        for name, most, limit, measured in blind
+        if not measured
+    ]
+    beyond = [name for name, most, limit in asked if np.any(most > limit * (1.0 + ROUNDED))]
+    if beyond:
+        yield Finding(
+            BAD, f"the commanded motion exceeds the speed or acceleration limit of {_listed(beyond)}"
+        )
+    elif asked:
+        yield Finding(GOOD, "the commanded motion keeps the limits of speed and acceleration")
 
 
 def _following(found: Evaluation) -> Iterator[Finding]:
