@@ -30,6 +30,22 @@ def test_a_column_is_aligned_as_a_whole() -> None:
     ]
 
 
+@pytest.mark.parametrize("turn_deg", [0.0, 37.0, 90.0, 160.0, 250.0])
+def test_labels_of_the_arms_figure_are_inside_of_it(turn_deg: float) -> None:
+    plan = shipped_plan()
+    times = np.linspace(0.0, plan.trajectory.duration_s, 50)
+    turn = np.radians(turn_deg)
+    about_z = np.array([[np.cos(turn), np.sin(turn), 0], [-np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
+    chains = chain.chains_mm(plan.arm, plan.via_deg) @ about_z
+    drawn = arm_figure.postures(chains, chain.tool_path_mm(plan.arm, plan.trajectory, times) @ about_z)
+    drawn.draw_without_rendering()
+    (axis,) = drawn.axes
+    for part in (axis.xaxis, axis.yaxis, axis.zaxis):
+        box = part.label.get_window_extent()
+        assert drawn.bbox.x0 <= box.x0 < box.x1 <= drawn.bbox.x1, part.label.get_text()
+        assert drawn.bbox.y0 <= box.y0 < box.y1 <= drawn.bbox.y1, part.label.get_text()
+
+
 def test_text_is_escaped() -> None:
     sheet = html_page.Page("a < b", "x & y")
     sheet.note("<script>")

@@ -64,6 +64,6 @@ def _theme(axis: Any) -> None:
         part.set_pane_color((0.5, 0.5, 0.5, 0.08))
         part.set_label_text(f"{name} (mm)")
         part.label.set_color(PAGE_COLOUR)
-        part.labelpad = 8
+        part.labelpad = 8 if name == "y" else 3
     axis.tick_params(colors=PAGE_COLOUR, labelsize=8)
     axis.locator_params(nbins=5)
