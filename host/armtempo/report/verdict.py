@@ -22,7 +22,7 @@ _SUMMARIES = {GOOD: "OK", BAD: "Not OK", OPEN: "OK as far as it was measured"}
 
 
 @dataclass(frozen=True)
-class Finding:
+class VerdictItem:
     """One sentence of the verdict; ``state`` is GOOD, BAD or OPEN."""
 
     state: str
@@ -33,7 +33,7 @@ class Finding:
 class Verdict:
     """All findings on a run, the bad ones first."""
 
-    findings: tuple[Finding, ...]
+    findings: tuple[VerdictItem, ...]
 
     @property
     def state(self) -> str:
@@ -67,22 +67,22 @@ def of(found: Evaluation) -> Verdict:
     return Verdict(tuple(sorted(findings, key=lambda finding: order.index(finding.state))))
 
 
-def _repetitions(found: Evaluation) -> Iterator[Finding]:
+def _repetitions(found: Evaluation) -> Iterator[VerdictItem]:
     states = [repetition.state for repetition in found.run.repetitions]
     done = states.count(COMPLETE)
     text = f"{done} of {len(states)} repetitions complete"
-    yield Finding(GOOD if done == len(states) else BAD, text)
+    yield VerdictItem(GOOD if done == len(states) else BAD, text)
 
 
-def _samples(found: Evaluation) -> Iterator[Finding]:
+def _samples(found: Evaluation) -> Iterator[VerdictItem]:
     """Cut-short repetitions are told by their number; here is what is missing or damaged of the record."""
     missing = [text for text in found.complaints if "cut short" not in text]
-    yield from (Finding(OPEN, text) for text in missing)
+    yield from (VerdictItem(OPEN, text) for text in missing)
     if not missing:
-        yield Finding(GOOD, "no sample is missing")
+        yield VerdictItem(GOOD, "no sample is missing")
 
 
-def _steps(found: Evaluation) -> Iterator[Finding]:
+def _steps(found: Evaluation) -> Iterator[VerdictItem]:
     """Whether every complete repetition ended at the step where the motion ends."""
     ends = [entry.commanded_steps for entry in found.run.entries if entry.state == COMPLETE]
     ends = [steps for steps in ends if len(steps) == len(found.names)]
@@ -92,9 +92,9 @@ def _steps(found: Evaluation) -> Iterator[Finding]:
     names = [name for name, off in zip(found.names, wrong, strict=True) if off > STEPS_OFF]
     if names:
         text = f"{_listed(names)} ended up to {wrong.max()} steps from where the motion ends"
-        yield Finding(BAD, f"{text}: report it, the board should have made them all")
+        yield VerdictItem(BAD, f"{text}: report it, the board should have made them all")
     else:
-        yield Finding(GOOD, "the board made every step pulse of the motion")
+        yield VerdictItem(GOOD, "the board made every step pulse of the motion")
 
 
 def planned_steps(found: Evaluation) -> NDArray[np.int64]:
@@ -104,7 +104,7 @@ def planned_steps(found: Evaluation) -> NDArray[np.int64]:
     return np.asarray(np.rint(ends * scale), dtype=np.int64)
 
 
-def _commanded(found: Evaluation) -> Iterator[Finding]:
+def _commanded(found: Evaluation) -> Iterator[VerdictItem]:
     """Whether joints without an encoder were asked for more than their limits."""
     blind = zip(found.names, found.extremes, found.limits, found.curves.measured, strict=False)
     asked = [
@@ -114,19 +114,19 @@ def _commanded(found: Evaluation) -> Iterator[Finding]:
     ]
     beyond = [name for name, most, limit in asked if np.any(most > limit * (1.0 + ROUNDED))]
     if beyond:
-        yield Finding(
+        yield VerdictItem(
             BAD, f"the commanded motion exceeds the speed or acceleration limit of {_listed(beyond)}"
         )
     elif asked:
-        yield Finding(GOOD, "the commanded motion keeps the limits of speed and acceleration")
+        yield VerdictItem(GOOD, "the commanded motion keeps the limits of speed and acceleration")
 
 
-def _following(found: Evaluation) -> Iterator[Finding]:
+def _following(found: Evaluation) -> Iterator[VerdictItem]:
     """Whether the arm followed, by its encoders; joints without one are named."""
     measured = found.curves.measured
     blind = [name for name, known in zip(found.names, measured, strict=True) if not known]
     if blind:
-        yield Finding(OPEN, without_encoder(blind))
+        yield VerdictItem(OPEN, without_encoder(blind))
     if not measured.any():
         return
     error = np.abs(found.curves.each[:, 0] - found.curves.theory[0])
@@ -137,10 +137,10 @@ def _following(found: Evaluation) -> Iterator[Finding]:
         for name, off, most in zip(found.names, largest, allowed, strict=True)
         if 0.0 < most < off
     ]
-    yield from (Finding(BAD, text) for text in too_far)
+    yield from (VerdictItem(BAD, text) for text in too_far)
     if not too_far:
         worst = int(np.nanargmax(largest))
-        yield Finding(
+        yield VerdictItem(
             GOOD, f"the arm followed: at most {largest[worst]:.2f}° from the plan ({found.names[worst]})"
         )
 
@@ -160,18 +160,18 @@ def _following_errors_deg(found: Evaluation) -> list[float]:
     return [joint.encoder.following_error_deg if joint.encoder else 0.0 for joint in found.arm.driven]
 
 
-def _limits(found: Evaluation) -> Iterator[Finding]:
+def _limits(found: Evaluation) -> Iterator[VerdictItem]:
     kept = 0
     for name, checks in zip(found.names, found.limit_checks, strict=False):
         for quantity, check in zip(("speed", "acceleration"), checks, strict=True):
             text = f"{name}: {quantity} {check.peak:.1f} ± {check.sigma:.1f} of {check.limit:g}"
             if check.verdict == peaks.EXCEEDED:
-                yield Finding(BAD, f"{text}: the limit was exceeded")
+                yield VerdictItem(BAD, f"{text}: the limit was exceeded")
             elif check.verdict == peaks.UNDECIDED:
-                yield Finding(OPEN, f"{text}: whether the limit was kept {peaks.UNDECIDED}")
+                yield VerdictItem(OPEN, f"{text}: whether the limit was kept {peaks.UNDECIDED}")
             kept += check.verdict in (peaks.KEPT, peaks.WITHIN)
     if kept and kept == 2 * int(found.curves.measured.sum()):
-        yield Finding(
+        yield VerdictItem(
             GOOD, f"speed and acceleration stayed within {peaks.TOLERANCE:.0%} of their limits, as measured"
         )
 
