@@ -56,7 +56,8 @@ def load(path: Path | str, arm: Arm | None = None, altered: bool = False) -> Pla
     found = trajectory_file.load(path, altered)
     if arm is not None and encode.arm_record(arm) != encode.arm_record(found.arm):
         raise InputError(
-            f"{path} was planned for another arm than {arm.name!r} ({arm.source}); plan it again with this arm"
+            f"{path} was planned for another arm than {arm.name!r} ({arm.source})",
+            "plan it again with this arm",
         )
     return found
 

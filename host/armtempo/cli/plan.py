@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from armtempo.cli import chosen, options
+from armtempo.cli import chosen, messages, options
 from armtempo.cli.progress import ProgressBar
 
 
@@ -66,4 +66,4 @@ def command(
     try:
         checks.check_held(plan.trajectory, arm)
     except PlanError as error:
-        click.echo(f"not for a board as it is: {error}", err=True)
+        messages.show(error, "not for a board as it is")

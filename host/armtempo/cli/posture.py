@@ -60,8 +60,8 @@ class NamedPosture:
             angles_deg = [float(cell) for cell in self.text.split(",")]
         except ValueError:
             raise InputError(
-                f"{self.text!r} is no posture: give 'home', angles in degrees ('0,-60,40'), a via point of the job "
-                "('P0') or a trajectory file"
+                f"{self.text!r} is no posture",
+                "give 'home', angles in degrees ('0,-60,40'), a via point of the job ('P0') or a trajectory file",
             ) from None
         return point_to_point.posture(angles_deg, arm)
 
@@ -95,5 +95,7 @@ def via_deg(text: str, arm: Arm, job: Job) -> Array:
     points_deg, _ = planner.via_angles(arm, job)
     index = int(text[1:])
     if index >= len(points_deg):
-        raise InputError(f"job {job.name!r} has the via points P0 to P{len(points_deg) - 1}, not P{index}")
+        raise InputError(
+            f"job {job.name!r} has no via point P{index}", f"give one of P0 to P{len(points_deg) - 1}"
+        )
     return np.asarray(points_deg[index])

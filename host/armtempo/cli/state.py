@@ -27,7 +27,7 @@ def motion_lines(state: BoardState) -> list[str]:
     if state.fault:
         found.append(f"fault     {state.fault}; see 'armtempo clear'")
     found += [f"          {line}" for line in joint_lines(state)]
-    found.append(f"link      {state.frames_bad} damaged messages, {state.samples_lost} samples lost")
+    found.append(f"link      {_link(state)}")
     return found
 
 
@@ -37,6 +37,14 @@ def joint_lines(state: BoardState) -> list[str]:
 
     rows = [_cells(joint) for joint in state.joints]
     return [row.rstrip() for row in aligned(rows, (12, 10, 1, 1))] if rows else []
+
+
+def _link(state: BoardState) -> str:
+    if not state.frames_bad and not state.samples_lost:
+        return "sound: no message arrived damaged, no sample was lost"
+    return (
+        f"messages damaged {state.frames_bad} times, {state.samples_lost} samples lost: check cable and plugs"
+    )
 
 
 def _arm(state: BoardState) -> str:

@@ -34,8 +34,9 @@ def configure(client: Client, arm: Arm, replace: bool) -> None:
 def _other_arm(arm: Arm, old: bytes, new: bytes) -> LinkError:
     return LinkError(
         f"the board is set up for another arm than {arm.name!r} ({arm.source}): "
-        f"{arm_difference.describe(old, new)}. Name that arm's file with --arm; or, if this is the arm on the board "
-        f"now, 'armtempo configure' or --replace-arm sets the board up for it, {arm_difference.consequence(old, new)}"
+        f"{arm_difference.describe(old, new)}",
+        f"name that arm's file with --arm; or, if this is the arm on the board "
+        f"now, 'armtempo configure' or --replace-arm sets the board up for it, {arm_difference.consequence(old, new)}",
     )
 
 
@@ -65,8 +66,8 @@ def posture_deg(client: Client, arm: Arm) -> Array:
     unknown = [joint.name for index, joint in enumerate(arm.driven) if not status.joint_known(index)]
     if unknown:
         raise LinkError(
-            f"the position of {', '.join(unknown)} is unknown; bring the arm to its home posture and run "
-            "'armtempo home'"
+            f"the position of {', '.join(unknown)} is unknown",
+            "bring the arm to its home posture and run 'armtempo home'",
         )
     return np.array(status.positions.commanded_steps, dtype=float) / _steps_per_deg(arm)
 

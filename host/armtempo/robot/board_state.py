@@ -82,7 +82,7 @@ class BoardState:
             return cls(**{**values, "joints": joints})
         except (TypeError, KeyError) as error:
             raise LinkError(
-                "the program that has the port is of another version of armtempo; end it and start it again"
+                "the program that has the port is of another version of armtempo", "end it and start it again"
             ) from error
 
     def named(self, arm: Arm | None) -> BoardState:
