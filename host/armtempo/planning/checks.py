@@ -11,7 +11,7 @@ from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS, MAX_STEP_RATE
 from armtempo import optimise
 from armtempo.errors import InputError, PlanError
 from armtempo.model.arm import Arm, Joint, Limits
-from armtempo.model.job import ITERATIONS, POPULATION, REFINE, Job
+from armtempo.model.job import AUTO, GRADIENT, ITERATIONS, POPULATION, REFINE, STARTS, TIMINGS, Job
 from armtempo.splines import bspline, extremes
 from armtempo.splines.bspline import Array
 from armtempo.splines.extremes import Extremes
@@ -64,20 +64,23 @@ def _check_step_rate(arm: Arm, joint: Joint, speed_deg_s: float) -> None:
 
 def check_job(arm: Arm, job: Job) -> None:
     """Raises InputError for settings that the planner does not know or the board cannot hold."""
-    if job.timing not in ("per-joint", "shared"):
+    if job.timing not in TIMINGS:
         raise InputError(f"job {job.name!r}: timing {job.timing!r} must be 'per-joint' or 'shared'")
-    for name, (least, most) in (("refine", REFINE), ("population", POPULATION), ("iterations", ITERATIONS)):
-        if not least <= getattr(job, name) <= most:
-            raise InputError(
-                f"job {job.name!r}: {name} {getattr(job, name)} must be a whole number from {least} to {most}"
-            )
+    whole = {"population": POPULATION, "iterations": ITERATIONS, "starts": STARTS}
+    if job.refine != AUTO:
+        whole["refine"] = REFINE
+    for name, (least, most) in whole.items():
+        value = getattr(job, name)
+        if not isinstance(value, int) or not least <= value <= most:
+            raise InputError(f"job {job.name!r}: {name} {value} must be a whole number from {least} to {most}")
+    refine = 1 if isinstance(job.refine, str) else job.refine
     segments = len(job.via) - 1
-    if segments * job.refine > MAX_SEGMENTS:
+    if segments * refine > MAX_SEGMENTS:
         raise InputError(
-            f"job {job.name!r}: {segments} segments with refine {job.refine} make more than the board's "
+            f"job {job.name!r}: {segments} segments with refine {refine} make more than the board's "
             f"{MAX_SEGMENTS}; lower refine or use fewer via points"
         )
-    size = motion.size(job.degree, len(arm.driven), job.timing == "shared", segments, job.refine)
+    size = motion.size(job.degree, len(arm.driven), job.timing == "shared", segments, refine)
     if size > MAX_MOTION_BYTES:
         raise InputError(
             f"job {job.name!r}: its motion record would have {size} bytes, the board takes "
@@ -86,7 +89,8 @@ def check_job(arm: Arm, job: Job) -> None:
     kind = job.parameters.get("fitness", FITNESS[0])
     if kind not in FITNESS:
         raise InputError(f"job {job.name!r}: fitness {kind!r} must be one of {', '.join(FITNESS)}")
-    optimise.parameters(job.optimiser)
+    if job.optimiser != GRADIENT:
+        optimise.parameters(job.optimiser)
 
 
 def check_via(arm: Arm, job: Job, via_deg: Array) -> None:

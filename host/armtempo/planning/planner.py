@@ -14,7 +14,7 @@ from armtempo.model.arm import Arm, Limits
 from armtempo.model.job import Job, Pose
 from armtempo.model.plan import Plan, Search
 from armtempo.planning import checks, lower_bounds, time_parameterization
-from armtempo.planning.time_parameterization import Timed
+from armtempo.planning.time_parameterization import Group, Timed
 from armtempo.splines import bspline, extremes
 from armtempo.splines.bspline import Array
 from armtempo.splines.trajectory import JointSpline, Trajectory
@@ -35,18 +35,14 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     via, notes = via_angles(arm, job)
     points = bspline.fit(via, job.degree)
     checks.check_ranges(arm, points, job.degree)
-    moving = [int(joint) for joint in np.flatnonzero(np.ptp(via, axis=0) > checks.TOLERANCE)]
-    groups = [moving] if job.timing == "shared" else [[joint] for joint in moving]
-    timed = []
-    for number, joints in enumerate(groups):
-        part = None if progress is None else _part(progress, number, len(groups))
-        timed.append(_time(points, joints, limits, job, part))
+    groups = _groups(points, via, limits, job)
+    most = time_parameterization.most_refine(job, len(via) - 1, len(limits))
+    timed = time_parameterization.axes(groups, job, most, progress)
     trajectory = _trajectory(job, points, groups, timed)
     reached = extremes.of_joints(trajectory.joints)
     checks.check_reached(arm, reached)
-    searches = tuple(
-        _search(points, joints, limits, job, axis) for joints, axis in zip(groups, timed, strict=True)
-    )
+    searches = tuple(_search(group, job, axis) for group, axis in zip(groups, timed, strict=True))
+    notes += tuple(note for axis in timed for note in axis.notes)
     return Plan(arm, job, via, notes, trajectory, searches, reached, versions())
 
 
@@ -75,28 +71,23 @@ def via_angles(arm: Arm, job: Job) -> tuple[Array, tuple[str, ...]]:
     return angles, notes
 
 
-def _part(progress: Progress, number: int, parts: int) -> Progress:
-    return lambda done, whole: progress(number + done / whole, parts)
+def _groups(points: Array, via: Array, limits: list[Limits], job: Job) -> list[Group]:
+    """The joints that move, together or one by one."""
+    moving = [int(joint) for joint in np.flatnonzero(np.ptp(via, axis=0) > checks.TOLERANCE)]
+    together = [moving] if job.timing == "shared" else [[joint] for joint in moving]
+    return [
+        Group(tuple(joints), points[:, joints], [limits[joint] for joint in joints]) for joints in together
+    ]
 
 
-def _time(
-    points: Array, joints: list[int], limits: list[Limits], job: Job, progress: Progress | None
-) -> Timed:
-    """The time axis of these joints; its random numbers depend on the seed and the first joint only."""
-    rng = np.random.default_rng([job.seed, joints[0]])
-    return time_parameterization.axis(
-        points[:, joints], [limits[joint] for joint in joints], job, rng, progress
-    )
-
-
-def _trajectory(job: Job, points: Array, groups: list[list[int]], timed: list[Timed]) -> Trajectory:
+def _trajectory(job: Job, points: Array, groups: list[Group], timed: list[Timed]) -> Trajectory:
     """All joints on their time axes; one that does not move takes the longest axis."""
     longest = max(timed, key=lambda axis: axis.total_s)
-    axes = {joint: axis for joints, axis in zip(groups, timed, strict=True) for joint in joints}
+    axes = {joint: axis for group, axis in zip(groups, timed, strict=True) for joint in group.joints}
     joints = tuple(
         JointSpline(
             job.degree,
-            job.refine,
+            longest.refine,
             np.ascontiguousarray(points[:, joint]),
             axes.get(joint, longest).time_points_s,
         )
@@ -105,12 +96,10 @@ def _trajectory(job: Job, points: Array, groups: list[list[int]], timed: list[Ti
     return Trajectory(job.name, joints, job.timing == "shared")
 
 
-def _search(points: Array, joints: list[int], limits: list[Limits], job: Job, timed: Timed) -> Search:
-    floor_s, floor_kind = lower_bounds.floor(
-        points[:, joints], job.degree, [limits[joint] for joint in joints]
-    )
+def _search(group: Group, job: Job, timed: Timed) -> Search:
+    floor_s, floor_kind = lower_bounds.floor(group.angle_points_deg, job.degree, group.limits)
     return Search(
-        joints=tuple(joints),
+        joints=group.joints,
         intervals_s=timed.intervals_s,
         total_s=timed.total_s,
         searched_s=timed.searched_s,

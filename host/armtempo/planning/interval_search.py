@@ -1,0 +1,132 @@
+"""The search for the intervals of a time axis, within bounds that follow from the job and give way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from armtempo import optimise
+from armtempo.model.arm import Limits
+from armtempo.model.job import Job
+from armtempo.optimise.tracker import Result
+from armtempo.planning import checks
+from armtempo.planning.fitness import Fitness
+from armtempo.planning.fixed_path import FixedPath
+from armtempo.splines import bspline
+from armtempo.splines.bspline import Array
+
+_REACH = 6.0
+"""Bounds are this factor below and above what an interval would need by itself."""
+_LEAST_SHARE = 0.05
+"""An interval whose joints hardly move counts as this part of the mean one."""
+_WIDER = 6.0
+_WIDENINGS = 3
+_NEAR = 1.01
+"""So near to a bound, as a factor, is at it."""
+_COARSE_GAP = 1e-3
+
+Progress = Callable[[float, float], None]
+"""Called with the work done and the whole of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What the search found, and what the user must know of it."""
+
+    result: Result
+    notes: tuple[str, ...]
+
+
+def bounds_s(angle_points_deg: Array, degree: int, limits: Sequence[Limits]) -> Array:
+    """Shortest and longest interval to look at for each path segment: (n, 2).
+
+    About what each segment would take from rest to rest, as a multiple and as a part of it.
+    """
+    pieces = bspline.polynomials(angle_points_deg, degree)
+    via = np.concatenate([pieces[:, 0], pieces[-1:].sum(axis=1)])
+    ways = np.abs(np.diff(via, axis=0))
+    speed, acceleration, jerk = np.array([limit.values for limit in limits]).T
+    needs = np.maximum(ways / speed, np.maximum(np.sqrt(4 * ways / acceleration), np.cbrt(32 * ways / jerk)))
+    needed = needs.max(axis=1)
+    needed = np.maximum(needed, _LEAST_SHARE * needed.mean())
+    return np.stack([needed / _REACH, needed * _REACH], axis=1)
+
+
+def search(
+    angle_points_deg: Array, limits: Sequence[Limits], job: Job, rng: np.random.Generator, progress: Progress
+) -> Found:
+    """Intervals (n,) by the job's optimiser, for joints on one axis with control points (n + degree, J).
+
+    Where the result ends at bounds that follow from the job, they are widened and it goes on from anew; at
+    bounds that the job gives, that is only said.
+    """
+    box = bounds_s(angle_points_deg, job.degree, limits)
+    if job.bounds_s is not None:
+        box = np.tile(np.array(job.bounds_s), (len(box), 1))
+    notes: list[str] = []
+    best: Result | None = None
+    for widening in range(_WIDENINGS + 1):
+        found = _once(angle_points_deg, limits, job, box, rng, progress)
+        best = found if best is None or found.value < best.value else best
+        held = _held(found.x, box, relative=job.parameters.get("fitness", checks.FITNESS[0]) == "stretched")
+        if not len(held):
+            break
+        named = ", ".join(str(number + 1) for number in held)
+        if job.bounds_s is not None:
+            notes.append(
+                f"the search ended at bounds_s with interval {named}; without bounds_s in the job they follow from it"
+            )
+            break
+        if widening < _WIDENINGS:
+            notes.append(f"the search ended at the bounds of interval {named}; they were widened {_WIDER:g} times")
+            box = box * np.array([1.0 / _WIDER, _WIDER])
+    assert best is not None
+    return Found(best, tuple(notes))
+
+
+def _once(
+    points: Array, limits: Sequence[Limits], job: Job, box: Array, rng: np.random.Generator, progress: Progress
+) -> Result:
+    if job.optimiser == "gradient":
+        path = FixedPath(points, job.degree, limits, mirrored=True)
+        return gradient(path, box, rng, job.starts, progress)
+    fitness = Fitness(points, job.degree, limits)
+    parameters = dict(job.parameters)
+    function = getattr(fitness, str(parameters.pop("fitness", checks.FITNESS[0])))
+    return optimise.minimise(
+        function, box, rng, job.population, job.iterations, job.optimiser, progress, **parameters
+    )
+
+
+def gradient(
+    path: FixedPath, box: Array, rng: np.random.Generator, starts: int, progress: Progress
+) -> Result:
+    """The best of the local optima that ``starts`` random intervals within ``box`` (n, 2) lead to.
+
+    An evaluation is a start; the history is the best motion time after each.
+    """
+    best, history, intervals = np.inf, [], box[:, 0]
+    low, high = np.log(box).T
+    for number in range(starts):
+        start = np.exp(rng.uniform(low, high))
+        optimum = path.optimum(path.of_intervals(start), _COARSE_GAP)
+        if optimum.total_s < best or not number:
+            best, intervals = optimum.total_s, path.intervals(optimum.differences_s)
+        history.append(best)
+        progress(number + 1, starts)
+    return Result(intervals, best, starts, np.array(history))
+
+
+def _held(x: Array, box: Array, relative: bool) -> np.ndarray:
+    """Indices of the intervals x (n,) that the bounds hold back.
+
+    With ``relative`` only their ratios count: where all of x can be scaled away from the bounds, none is held.
+    """
+    low, high = x / box[:, 0], box[:, 1] / x
+    if not relative:
+        return np.flatnonzero((low < _NEAR) | (high < _NEAR))
+    if low.min() * high.min() > _NEAR**2:
+        return np.empty(0, dtype=np.intp)
+    return np.flatnonzero((low < low.min() * _NEAR) | (high < high.min() * _NEAR))

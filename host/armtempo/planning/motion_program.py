@@ -1,0 +1,118 @@
+"""The motion time as a smooth program of control points: limits, bounds, and what must be met exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+
+from armtempo.optimise.interior_point import Linearised
+from armtempo.optimise.kkt import BandedKkt, Equalities
+from armtempo.planning.linear_rows import LinearRows
+from armtempo.planning.shape import Index, Shape, time_basis
+from armtempo.splines.bspline import Array
+
+
+class LinearisedBlock(Protocol):
+    """Derivatives of some of the inequalities; see ``optimise.interior_point.Linearised``."""
+
+    def forward(self, step: Array) -> Array: ...
+
+    def backward(self, weights: Array) -> Array: ...
+
+    def hessian(self, weights: Array, multipliers: Array | None) -> Array: ...
+
+
+class Block(Protocol):
+    """Some of the inequalities; ``rows`` and ``columns`` are the positions of their entries in the matrix."""
+
+    rows: Index
+    columns: Index
+
+    def values(self, x: Array) -> Array: ...
+
+    def linearise(self, x: Array) -> LinearisedBlock: ...
+
+
+class MotionProgram:
+    """Motion time a segment plus ``smoothing`` times the squared steps between neighbouring time differences.
+
+    Angle and time may be traded against each other wherever the arm does not notice; the smoothing decides
+    between such motions. ``blocks``: the inequalities besides differences above 0.
+    """
+
+    def __init__(
+        self, shape: Shape, blocks: Sequence[Block], equalities: Equalities, smoothing: float = 0.0
+    ) -> None:
+        self.shape, self.equalities = shape, equalities
+        index = shape.difference_index
+        above = np.zeros(len(index))
+        positive = LinearRows(shape.size, index[:, None], np.ones((len(index), 1)), above, above + np.inf)
+        self.blocks: list[Block] = [*blocks, positive]
+        self._smoothing = smoothing
+        self._time = np.zeros(shape.size)
+        self._time[index] = time_weights(shape) / shape.segments
+        left, right = index[:-1], index[1:]
+        rows = [left, right, left, right, *(block.rows for block in self.blocks)]
+        columns = [left, right, right, left, *(block.columns for block in self.blocks)]
+        self.kkt = BandedKkt(shape.places, np.concatenate(rows), np.concatenate(columns), equalities)
+
+    def duration(self, x: Array) -> float:
+        """Motion time a segment, in the program's unit."""
+        return float(self._time @ x)
+
+    def objective(self, x: Array) -> float:
+        """See ``optimise.interior_point.Program``."""
+        steps = np.diff(self.shape.time_differences(x))
+        return self.duration(x) + self._smoothing * float(steps @ steps)
+
+    def inequalities(self, x: Array) -> Array:
+        """See there."""
+        return np.concatenate([block.values(x) for block in self.blocks])
+
+    def linearise(self, x: Array) -> Linearised:
+        """See there."""
+        return _Linearised(self, x)
+
+
+class _Linearised:
+    def __init__(self, program: MotionProgram, x: Array) -> None:
+        self._smoothing = program._smoothing
+        self._count = program.shape.differences - 1
+        self._blocks = [block.linearise(x) for block in program.blocks]
+        sizes = [len(block.values(x)) for block in program.blocks]
+        self._splits = np.cumsum(sizes)[:-1]
+        steps = 2.0 * self._smoothing * np.diff(program.shape.time_differences(x))
+        self.gradient = program._time.copy()
+        index = program.shape.difference_index
+        self.gradient[index[1:]] += steps
+        self.gradient[index[:-1]] -= steps
+
+    def forward(self, step: Array) -> Array:
+        return np.concatenate([block.forward(step) for block in self._blocks])
+
+    def backward(self, weights: Array) -> Array:
+        parts = np.split(weights, self._splits)
+        return np.asarray(
+            sum(block.backward(part) for block, part in zip(self._blocks, parts, strict=True))
+        )
+
+    def hessian(self, weights: Array, multipliers: Array | None) -> Array:
+        parts = np.split(weights, self._splits)
+        others = [None] * len(parts) if multipliers is None else np.split(multipliers, self._splits)
+        smooth = np.full(self._count, 2.0 * self._smoothing)
+        entries = [smooth, smooth, -smooth, -smooth]
+        for block, part, other in zip(self._blocks, parts, others, strict=True):
+            entries.append(block.hessian(part, other))
+        return np.concatenate(entries)
+
+
+def time_weights(shape: Shape) -> Array:
+    """Weights of the differences in the motion time: (S + k - 1,)."""
+    nodes, weights = np.polynomial.legendre.leggauss(shape.degree)
+    mean = (weights / 2) @ time_basis(shape.degree, (nodes + 1) / 2)[:, 0]
+    whole = np.zeros(shape.differences)
+    for offset, weight in enumerate(mean):
+        whole[offset : offset + shape.segments] += weight
+    return whole
