@@ -8,7 +8,7 @@ import numpy as np
 
 from armtempo.planning.fitness import stretch_of
 from armtempo.planning.shape import Index
-from armtempo.splines import extremes
+from armtempo.splines import bspline, extremes, time_axis
 from armtempo.splines.bspline import Array
 from armtempo.splines.trajectory import derivatives
 
@@ -51,6 +51,11 @@ class Curve:
             values = [derivatives(angle, self.time, segment, u, order) for order in (1, 2, 3)]
             joints.append(np.abs(np.stack(values)) / limits[:, None])
         return np.stack(joints, axis=1)
+
+    def angles_at(self, time_s: Array) -> Array:
+        """Angles at times (N,): (N, J)."""
+        segment, u = time_axis.parameter(self.time, time_s)
+        return np.stack([bspline.evaluate(angle, segment, u) for angle in self.angle], axis=1)
 
     def stretch(self) -> float:
         """The factor on time that brings the motion just within its limits, proven."""

@@ -18,6 +18,7 @@ class LinearRows:
         self._size, self._columns, self._weights = size, columns, weights
         self._low, self._high = low, high
         self._lower, self._upper = np.flatnonzero(np.isfinite(low)), np.flatnonzero(np.isfinite(high))
+        self.count = len(self._lower) + len(self._upper)
         width = columns.shape[1]
         self.rows = np.repeat(columns, width, axis=1).ravel()
         self.columns = np.tile(columns, (1, width)).ravel()

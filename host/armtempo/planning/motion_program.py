@@ -36,21 +36,21 @@ class Block(Protocol):
 
 
 class MotionProgram:
-    """Motion time a segment plus ``smoothing`` times the squared steps between neighbouring time differences.
+    """Motion time a segment plus the squared steps between neighbouring time differences, weighted.
 
-    Angle and time may be traded against each other wherever the arm does not notice; the smoothing decides
-    between such motions. ``blocks``: the inequalities besides differences above 0.
+    Angle and time may be traded against each other wherever the arm does not notice; the ``smoothing`` of each
+    step, (S + k - 2,), decides between such motions. ``blocks``: the inequalities besides differences above 0.
     """
 
     def __init__(
-        self, shape: Shape, blocks: Sequence[Block], equalities: Equalities, smoothing: float = 0.0
+        self, shape: Shape, blocks: Sequence[Block], equalities: Equalities, smoothing: Array | None = None
     ) -> None:
         self.shape, self.equalities = shape, equalities
         index = shape.difference_index
         above = np.zeros(len(index))
         positive = LinearRows(shape.size, index[:, None], np.ones((len(index), 1)), above, above + np.inf)
         self.blocks: list[Block] = [*blocks, positive]
-        self._smoothing = smoothing
+        self._smoothing = np.zeros(len(index) - 1) if smoothing is None else smoothing
         self._time = np.zeros(shape.size)
         self._time[index] = time_weights(shape) / shape.segments
         left, right = index[:-1], index[1:]
@@ -65,7 +65,7 @@ class MotionProgram:
     def objective(self, x: Array) -> float:
         """See ``optimise.interior_point.Program``."""
         steps = np.diff(self.shape.time_differences(x))
-        return self.duration(x) + self._smoothing * float(steps @ steps)
+        return self.duration(x) + float(self._smoothing @ steps**2)
 
     def inequalities(self, x: Array) -> Array:
         """See there."""
@@ -79,7 +79,6 @@ class MotionProgram:
 class _Linearised:
     def __init__(self, program: MotionProgram, x: Array) -> None:
         self._smoothing = program._smoothing
-        self._count = program.shape.differences - 1
         self._blocks = [block.linearise(x) for block in program.blocks]
         sizes = [len(block.values(x)) for block in program.blocks]
         self._splits = np.cumsum(sizes)[:-1]
@@ -101,18 +100,19 @@ class _Linearised:
     def hessian(self, weights: Array, multipliers: Array | None) -> Array:
         parts = np.split(weights, self._splits)
         others = [None] * len(parts) if multipliers is None else np.split(multipliers, self._splits)
-        smooth = np.full(self._count, 2.0 * self._smoothing)
+        smooth = 2.0 * self._smoothing
         entries = [smooth, smooth, -smooth, -smooth]
         for block, part, other in zip(self._blocks, parts, others, strict=True):
             entries.append(block.hessian(part, other))
         return np.concatenate(entries)
 
 
+def mean_slopes(degree: int) -> Array:
+    """Weights of a segment's k differences in the time that it takes: (k,)."""
+    nodes, weights = np.polynomial.legendre.leggauss(degree)
+    return np.asarray((weights / 2) @ time_basis(degree, (nodes + 1) / 2)[:, 0])
+
+
 def time_weights(shape: Shape) -> Array:
     """Weights of the differences in the motion time: (S + k - 1,)."""
-    nodes, weights = np.polynomial.legendre.leggauss(shape.degree)
-    mean = (weights / 2) @ time_basis(shape.degree, (nodes + 1) / 2)[:, 0]
-    whole = np.zeros(shape.differences)
-    for offset, weight in enumerate(mean):
-        whole[offset : offset + shape.segments] += weight
-    return whole
+    return np.convolve(np.ones(shape.segments), mean_slopes(shape.degree))
