@@ -15,7 +15,7 @@ from typing import Any
 from unittest.mock import patch
 
 from armtempo.errors import LinkError
-from armtempo.link import Board, greet
+from armtempo.link import Client, greet
 
 from tests.board.scripts import stand_in
 
@@ -201,7 +201,7 @@ class Pipe:
                 engine.finish()
 
 
-def connect(pipe: Pipe) -> Board:
+def connect(pipe: Pipe) -> Client:
     """A greeted board."""
     board = greet(pipe, 1, pipe.clock)
     board.session.reopen = pipe.reopen

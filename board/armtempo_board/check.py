@@ -7,7 +7,7 @@ passes is proven, not sampled.
 import struct
 
 from armtempo_shared import codes
-from armtempo_shared.limits import MAX_STEP_RATE, TICK_FRACTION_BITS, TICK_HZ
+from armtempo_shared.limits import LONGEST_TICKS, MAX_STEP_RATE, TICK_FRACTION_BITS, TICK_HZ
 from micropython import const
 
 from armtempo_board import cell, points, rates
@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from array import array
 
     from armtempo_shared.motion import Motion
-
-LONGEST_TICKS = 1 << 38
-"""A little under an hour: 1024-tick units stay small integers."""
 
 GAP_TICKS = const(25200)
 """Least time between opposite steps that is reckoned with where none is given: 0.3 ms."""

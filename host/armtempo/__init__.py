@@ -1,3 +1,120 @@
-"""Time-optimal B-spline motions for stepper arms on an STM32F407 with MicroPython."""
+"""Time-optimal B-spline motions for stepper arms on an STM32F407 with MicroPython.
+
+The library, in the order in which a motion goes through it::
+
+    arm = armtempo.Arm.load("my_arm.toml")          # or Arm.paper(), the shipped one
+    job = armtempo.Job.load("my_job.toml", arm)     # or Job("mine", via_deg=[[0, -60, 40], [30, -20, 10]])
+    plan = armtempo.plan(arm, job)                  # plan.trajectory(time_s, order), plan.total_s, plan.save(…)
+    with armtempo.connect("/dev/ttyACM0") as board: # or "sim", a virtual board
+        board.home(arm)                             # "the arm is in its home posture"; nothing moves
+        run = board.run(plan, repeat=3)
+    run.report()                                    # run.samples: a structured array
+
+Public is what ``__all__`` names, and what the objects' own docstrings describe. Angles are in degrees, times in
+seconds, lengths in mm. Arrays with an entry for each driven joint are said to have the shape (J,). Names are
+imported when they are first used, so that ``import armtempo`` by itself loads neither numpy nor scipy.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "Arm",
+    "ArmtempoError",
+    "Board",
+    "BoardError",
+    "InputError",
+    "Job",
+    "LinkError",
+    "MissingPackageError",
+    "Plan",
+    "PlanError",
+    "Pose",
+    "Run",
+    "RunFolderError",
+    "Spline",
+    "StopRequest",
+    "Stopped",
+    "Trajectory",
+    "Watcher",
+    "__version__",
+    "compare",
+    "connect",
+    "deploy",
+    "find_ports",
+    "forward",
+    "inverse",
+    "optimise",
+    "plan",
+    "simulator",
+    "summary",
+]
+
+if TYPE_CHECKING:
+    from armtempo import deploy, optimise, simulator
+    from armtempo.errors import (
+        ArmtempoError,
+        BoardError,
+        InputError,
+        LinkError,
+        MissingPackageError,
+        PlanError,
+        RunFolderError,
+    )
+    from armtempo.kinematics.of_arm import forward, inverse
+    from armtempo.link.ports import find_ports
+    from armtempo.model.arm import Arm
+    from armtempo.model.job import Job, Pose
+    from armtempo.model.plan import Plan
+    from armtempo.pipeline import compare, connect, plan, summary
+    from armtempo.robot.board import Board
+    from armtempo.robot.recording import Watcher
+    from armtempo.robot.run import Run
+    from armtempo.robot.stop_request import Stopped, StopRequest
+    from armtempo.splines.spline import Spline
+    from armtempo.splines.trajectory import Trajectory
+
+_HOMES = {
+    "armtempo.errors": (
+        "ArmtempoError",
+        "BoardError",
+        "InputError",
+        "LinkError",
+        "MissingPackageError",
+        "PlanError",
+        "RunFolderError",
+    ),
+    "armtempo.kinematics.of_arm": ("forward", "inverse"),
+    "armtempo.link.ports": ("find_ports",),
+    "armtempo.model.arm": ("Arm",),
+    "armtempo.model.job": ("Job", "Pose"),
+    "armtempo.model.plan": ("Plan",),
+    "armtempo.pipeline": ("compare", "connect", "plan", "summary"),
+    "armtempo.robot.board": ("Board",),
+    "armtempo.robot.recording": ("Watcher",),
+    "armtempo.robot.run": ("Run",),
+    "armtempo.robot.stop_request": ("StopRequest", "Stopped"),
+    "armtempo.splines.spline": ("Spline",),
+    "armtempo.splines.trajectory": ("Trajectory",),
+}
+_MODULES = ("deploy", "optimise", "simulator")
+"""Packages that are public as a whole; their own ``__all__`` says what of them."""
+_HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    """A public name, imported when it is first used (PEP 562)."""
+    if name in _MODULES:
+        return import_module(f"{__name__}.{name}")
+    if name not in _HOME_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(_HOME_OF[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -2,18 +2,27 @@
 
 ::
 
-    ArmtempoError                exit code 1 unless a subclass says otherwise
-    ├── InputError               the user's file, option or argument is wrong (exit code 2)
-    ├── PlanError                no plan under these limits, or no posture for this pose
-    ├── MissingPackageError      an optional package is not installed
-    ├── RunFolderError           a recorded run cannot be read, is not whole, or cannot be written
-    └── LinkError                the board cannot be reached or stopped answering
-        └── BoardError           the board answered, and refused; carries its code
+    ArmtempoError                  exit code 1 unless a subclass says otherwise
+    ├── InputError                 the user's file, option or argument is wrong (exit code 2)
+    ├── PlanError                  no plan under these limits, or no posture for this pose
+    ├── MissingPackageError        an optional package is not installed
+    ├── RunFolderError             a recorded run cannot be read, is not whole, or cannot be written
+    └── LinkError                  the board cannot be reached or stopped answering
+        ├── PortError              the port is there and cannot be opened
+        ├── NoAnswerError          the port is open and the board does not answer in time
+        ├── NoProgramError         MicroPython's prompt answers instead of the board program
+        ├── DisturbedError         pieces of messages arrive, too few of them whole
+        ├── OtherBoardError        another board answers than before, or the same one started anew
+        └── BoardError             the board refused a command or a fault ended a motion; carries the code
 
-Every message says what is wrong, where, and what to do.
+Every message says what is wrong, where, and what to do. Beside the tree stands Stopped, a KeyboardInterrupt: a
+motion was brought to rest because a stop was asked for.
 """
 
 from __future__ import annotations
+
+INTERRUPTED = 130
+"""Exit code of the command after Ctrl-C."""
 
 
 class ArmtempoError(Exception):
@@ -33,7 +42,12 @@ class PlanError(ArmtempoError):
 
 
 class MissingPackageError(ArmtempoError):
-    """An optional package is needed for this and is not installed."""
+    """``what`` needs an optional ``package`` that is not installed; ``extra`` is armtempo's extra that brings it."""
+
+    def __init__(self, what: str, package: str, extra: str) -> None:
+        super().__init__(
+            f"{what} needs {package}, which is not installed; install it with: pip install 'armtempo[{extra}]'"
+        )
 
 
 class RunFolderError(ArmtempoError):
@@ -44,10 +58,30 @@ class LinkError(ArmtempoError):
     """No board, no answer, or the connection broke."""
 
 
+class PortError(LinkError):
+    """The port is there, but it cannot be opened."""
+
+
+class NoAnswerError(LinkError):
+    """The board did not answer a command in time."""
+
+
+class NoProgramError(LinkError):
+    """MicroPython's prompt answers: the board program is not installed or does not run."""
+
+
+class DisturbedError(LinkError):
+    """Pieces of messages arrive, but too few whole ones: worth another try."""
+
+
+class OtherBoardError(LinkError):
+    """The board that answers is not the one that was there before, or was started anew since."""
+
+
 class BoardError(LinkError):
     """The board refused a command or reported a fault.
 
-    ``code`` is the number from ``armtempo_shared.wire.ERRORS``.
+    ``code`` is the number from ``armtempo_shared.codes``.
     """
 
     def __init__(self, message: str, code: int) -> None:

@@ -1,1 +1,1 @@
-"""What host and board both need to agree on; runs on CPython and on MicroPython, without numpy."""
+"""Definitions shared by host and board; runs on CPython and MicroPython, without numpy."""

@@ -1,6 +1,7 @@
-"""The arm record: what the board must know of the arm, in steps, counts and ticks only.
+"""The arm record: the arm's figures for the board, in steps, counts and ticks only.
 
-Made by the host from the arm file, kept in the board's flash; its crc32 ties motions to it.
+The host makes it from the arm file; the board keeps it in its flash. A motion record names its arm by this
+record's crc32.
 Little endian: the header, then one entry a joint, then the crc32 over all before it.
 """
 
@@ -19,7 +20,7 @@ HEAD = (
     ("low_ticks", "H"),  # least STEP low time
     ("dir_setup_ticks", "H"),  # DIR stable before the rising STEP edge
     ("dir_hold_ticks", "H"),  # DIR stable after the falling STEP edge
-    ("link_timeout_ms", "H"),  # host silent that long while moving: see FLAG_STOP_ON_LINK_LOSS
+    ("link_timeout_ms", "H"),  # after this silence of the host while moving: see FLAG_STOP_ON_LINK_LOSS
 )
 FLAG_ENABLE_HIGH = 1  # ENABLE pin is active high
 FLAG_ESTOP_RELEASES = 2  # an E-stop also releases ENABLE

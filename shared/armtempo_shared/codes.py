@@ -1,6 +1,6 @@
-"""Numbers of refusals and faults; the only home of these numbers.
+"""Numbers of refusals and faults.
 
-What each means and what to do is in ``meanings.py``, which the board never loads.
+Their meanings are in ``meanings.py``, which the board never loads.
 """
 
 # refusals of a command

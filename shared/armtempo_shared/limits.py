@@ -1,4 +1,4 @@
-"""Figures of the board that host and board must agree on: ticks, sampling, highest rates, sizes."""
+"""Limits of the board, for host and board: clock, sampling, highest step rates, sizes."""
 
 TICK_HZ = 84_000_000
 """Timer ticks per second: TIM2 and TIM5 unscaled (RM0090, APB1 timer clock at 168 MHz core)."""
@@ -21,13 +21,17 @@ MAX_NAME = 24
 """Longest name of a stored trajectory, in bytes; letters, digits, '-', '_'."""
 
 MAX_STEP_RATE = 240_000
-"""Highest step rate of one joint, steps/s: what the program's loop keeps up with, not its evaluator alone.
+"""Highest step rate of one joint, steps/s: limited by the main loop, not by the evaluator alone.
 
-Seen to run on the emulated chip at 3 cycles an instruction, with one, two and three joints: board/docs/evaluator.md.
+Measured on the emulated chip at 3 cycles an instruction, with one, two and three joints: board/docs/evaluator.md.
 """
 
 MAX_STEP_RATE_SUM = 240_000
 """Highest sum of the step rates of all joints, steps/s. The same."""
+
+LONGEST_TICKS = 1 << 38
+"""Times in a motion stay below this, a little under an hour: in units of 1024 ticks they are small integers
+of 32-bit MicroPython."""
 
 MAX_MOTION_BYTES = 16384
 """Largest motion record that the board takes: it must fit into its memory whole."""

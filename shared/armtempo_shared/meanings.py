@@ -1,4 +1,4 @@
-"""What the numbers of ``codes.py`` mean and what to do, in words; kept off the board's small heap."""
+"""Meaning and cure of each code of ``codes.py``, and of each message; the board never loads this."""
 
 from armtempo_shared import codes
 

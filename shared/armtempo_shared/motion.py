@@ -1,6 +1,6 @@
-"""The motion record: what the host uploads, the flash keeps and the evaluator reads.
+"""The motion record: uploaded by the host, kept in the flash, read by the evaluator.
 
-Little endian. Control points are exact integers, so host and board mean the same spline to the bit:
+Little endian. Control points are integers, so host and board have exactly the same spline:
 angles in steps / 2**28, times in ticks / 2**16.
 
 ::
@@ -32,7 +32,7 @@ HEAD_SIZE = struct.calcsize(_HEAD)
 
 
 class MotionError(ValueError):
-    """The record is damaged or asks for what this program does not know."""
+    """The record is damaged or of an unknown kind."""
 
 
 def size(degree: int, joints: int, shared: bool, segments: int, refine: int) -> int:
@@ -46,16 +46,16 @@ def pack(
     degree: int,
     angles: "list[list[int]]",
     times: "list[list[int]]",
-    segments: int,
     refine: int,
     brake_ticks: int,
     arm_crc: int,
 ) -> bytes:
-    """A motion record.
+    """A motion record of n path segments with ``refine`` R time segments each.
 
     ``angles``: per joint its n + k control points (int, steps * 2**28); ``times``: per joint, or one for
     all, its n * R + k control points (int, ticks * 2**16).
     """
+    segments = len(angles[0]) - degree
     shared = len(times) == 1 and len(angles) > 1
     flags = SHARED_AXIS if shared else 0
     head = struct.pack(_HEAD, MAGIC, degree, len(angles), flags, 0, segments, refine, brake_ticks, arm_crc)
@@ -73,8 +73,8 @@ def pack(
 class Motion:
     """A checked view of a motion record; copies nothing but the header.
 
-    Raises MotionError where the record is cut, damaged or of an unknown kind. It does not judge the
-    motion itself (ranges, rates, order of times): that is the board's check before a start.
+    Raises MotionError where the record is cut, damaged or of an unknown kind. It does not check the
+    motion itself (ranges, rates, order of times): the board does before a start.
     """
 
     def __init__(self, data: bytes) -> None:

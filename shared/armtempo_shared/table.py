@@ -1,7 +1,7 @@
 """The message table: every command, answer, event and reply with its number and fields. Their only home.
 
 ``wire.py`` encodes and decodes by it, ``shared/docs/protocol.md`` is generated from it. It is one text, so
-that the board can read it and forget it again.
+that the board can parse it and free the memory again.
 
 A row: kind (C command, A the answer to it, E event, R reply), name, number in hex, fields as ``name:type`` in
 the letters of ``struct``, little endian without padding, then ``text`` (UTF-8) or ``bytes`` where the rest of

@@ -4,10 +4,10 @@ A frame::
 
     0xA5 | length N (H) | sequence (B) | message id (B) | payload, N bytes | crc32 over length..payload (I)
 
-little endian. A frame whose check fails is dropped and the search for 0xA5 goes on at the next byte;
-nothing in it is acted on. The host sends commands; the board answers each with ``ok`` or ``error``
-carrying the command's sequence number. A repeated frame is answered again from memory but not acted on
-again. Events come from the board unasked, under their own sequence numbers.
+little endian. A frame whose checksum fails is ignored and the search for 0xA5 goes on at the next byte. The host
+sends commands; the board answers each with ``ok`` or ``error`` carrying the command's sequence number. A repeated
+command is answered again from memory but not executed again. The board sends events by itself, under their own
+sequence numbers.
 
 The board has its own frame finder, which allocates nothing (``armtempo_board/frames.py``); a test feeds
 both the same bytes.
@@ -15,6 +15,7 @@ both the same bytes.
 
 import struct
 from binascii import crc32
+from collections import namedtuple
 
 try:
     from typing import Any
@@ -49,6 +50,10 @@ ANSWER, ANSWER_BY_ID = _index("A")
 EVENT, EVENT_BY_ID = _index("ER")
 
 
+Frame = namedtuple("Frame", ("sequence", "number", "payload"))
+"""A received frame: sequence number, message id, payload."""
+
+
 class WireError(ValueError):
     """A payload that does not fit its message."""
 
@@ -75,7 +80,7 @@ def decode(entry: "Any", payload: bytes) -> "tuple[tuple[Any, ...], Any]":
 
 
 def record_crc(data: bytes) -> int:
-    """What names a record in commands and answers: its own crc32, the last four bytes.
+    """The number that identifies a record in commands and answers: its own crc32, the last four bytes.
 
     (The crc32 over all of a record that ends with its crc32 is the same number for every record.)
     """
@@ -89,9 +94,9 @@ def frame(sequence: int, number: int, payload: bytes) -> bytes:
 
 
 class Parser:
-    """Finds frames in a byte stream; keeps what is incomplete.
+    """Finds frames in a byte stream; keeps an incomplete one.
 
-    ``bad`` counts stretches of bytes that were passed over.
+    ``bad`` counts sequences of bytes that belonged to no frame.
     """
 
     def __init__(self, limit: int = MAX_PAYLOAD) -> None:
@@ -109,7 +114,7 @@ class Parser:
         return len(self._buffer)
 
     def drop(self) -> None:
-        """Give up on the oldest byte: called when the rest of a frame does not come."""
+        """Skip the oldest byte: for a frame whose rest does not come."""
         self._skip(1)
 
     def _skip(self, count: int) -> None:
@@ -119,8 +124,8 @@ class Parser:
             self._skipping = True
             self._buffer = self._buffer[count:]
 
-    def next(self) -> "tuple[int, int, bytes] | None":
-        """(sequence, id, payload) of the next whole frame, or None."""
+    def next(self) -> "Frame | None":
+        """The next whole frame, or None."""
         while True:
             start = self._buffer.find(bytes((SYNC,)))
             self._skip(len(self._buffer) if start < 0 else start)
@@ -139,4 +144,4 @@ class Parser:
             payload = bytes(self._buffer[1 + _HEAD : end])
             self._buffer = self._buffer[end + 4 :]
             self._skipping = False
-            return sequence, number, payload
+            return Frame(sequence, number, payload)

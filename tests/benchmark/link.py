@@ -15,15 +15,15 @@ import tempfile
 import time
 from pathlib import Path
 
-from armtempo import pipeline
 from armtempo.errors import LinkError
-from armtempo.link import Board, open_board
+from armtempo.link import Client, open_board
 from armtempo.link.follow import Follower
-from armtempo.model import arm as arms
-from armtempo.model import job as jobs
 from armtempo.model import trajectory_file
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
 from armtempo.planning import planner
-from armtempo.robot import operate
+from armtempo.records import encoded_motion
+from armtempo.robot import arm_state
 from armtempo.simulator import launch
 from armtempo_shared import armrecord, motion, wire
 
@@ -41,10 +41,10 @@ def motion_record(numbers: random.Random, arm: bytes = ARM, segments: int = 6) -
     """A record of the shipped job's size: three joints, six segments, quintic."""
     _, joints, crc = armrecord.unpack(arm)
     points = [[numbers.randrange(2**40) for _ in range(segments + 5)] for _ in joints]
-    return motion.pack(5, points, points, segments, 1, 0, crc)
+    return motion.pack(5, points, points, 1, 0, crc)
 
 
-def ready(pipe: Pipe, arm: bytes = ARM) -> tuple[Board, int]:
+def ready(pipe: Pipe, arm: bytes = ARM) -> tuple[Client, int]:
     """A board with arm, motion ``feed`` and known positions, and that motion's checksum."""
     board = connect(pipe)
     board.upload(wire.ARM_RECORD_NAME, arm)
@@ -70,15 +70,15 @@ def uploads(folder: Path, rate: float, kinds: tuple[str, ...]) -> str:
 
 def upload_to_ready_s() -> tuple[float, float]:
     """Seconds from the first byte of an upload until its motion may be started, and of the whole command."""
-    arm = arms.load_arm(arms.default_path())
-    plan = planner.plan(arm, jobs.load_job(jobs.default_path(), arm))
+    arm = Arm.paper()
+    plan = planner.plan(arm, Job.paper(arm))
     with tempfile.TemporaryDirectory() as name, launch() as process:
         file = Path(name) / "feed.json"
         trajectory_file.save(plan, file)
         with open_board(process.port) as board:
-            operate.configure(board, arm, replace=True)
+            arm_state.configure(board, arm, replace=True)
             begin_s = time.monotonic()
-            board.upload("first", pipeline.planned(plan).data)
+            board.upload("first", encoded_motion.of_plan(plan).data)
             upload_s = time.monotonic() - begin_s
         begin_s = time.monotonic()
         words = ["-c", "from armtempo.cli import main; main()", "upload", str(file), "--port", process.port]
@@ -93,7 +93,7 @@ def runs(rate: float, kind: str) -> str:
         with tempfile.TemporaryDirectory() as name:
             pipe = Pipe(Path(name) / "flash")
             board, crc = ready(pipe)
-            run, _ = board.start("feed", crc)
+            run = board.start("feed", crc).run
             follower = Follower(board, run)
             pipe.disturb(Noise(f"to {number}", rate, (kind,)), Noise(f"from {number}", rate, (kind,)))
             try:
@@ -101,7 +101,7 @@ def runs(rate: float, kind: str) -> str:
                     arrived += 1
             except LinkError:
                 given_up += 1
-            lost += follower.end.samples_lost if follower.end else 0
+            lost += follower.end.samples_lost if follower.ended else 0
     return f"{arrived:8}{lost:8}{given_up:10}"
 
 
@@ -111,7 +111,7 @@ def survives(pause_s: float, arm: bytes) -> bool:
         pipe = Pipe(Path(name) / "flash")
         pipe.run_samples = 700
         board, crc = ready(pipe, arm)
-        run, _ = board.start("feed", crc)
+        run = board.start("feed", crc).run
         follower = Follower(board, run)
         pipe.wait_away(pause_s)
         return len(list(follower.samples())) == pipe.run_samples

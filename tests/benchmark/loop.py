@@ -23,8 +23,8 @@ from typing import Any
 from zlib import crc32
 
 from armtempo.deploy import firmware as deployed
-from armtempo.deploy import program
-from armtempo.model import arm as arms
+from armtempo.deploy import program_files
+from armtempo.model.arm import Arm
 from armtempo.records import encode
 from armtempo_shared import armrecord, limits, wire
 from armtempo_shared.limits import TICK_HZ
@@ -107,7 +107,7 @@ def cruise(rate: int, joints: int, ramp_s: float = RAMP_S, whole_s: float = WHOL
 
 def paper() -> Case:
     """The paper's motion on the shipped arm."""
-    head, rows, _ = armrecord.unpack(encode.arm_record(arms.load_arm(arms.default_path())))
+    head, rows, _ = armrecord.unpack(encode.arm_record(Arm.paper()))
     flags = head["flags"] & ~armrecord.FLAG_STOP_ON_LINK_LOSS | armrecord.FLAG_ESTOP_ACTIVE_HIGH
     start = [round(rate * via) for rate, via in zip(motions.STEPS_PER_DEG, motions.VIA_DEG[0], strict=True)]
     return Case("paper", {**head, "flags": flags}, rows, motions.feeding(), start)
@@ -176,7 +176,7 @@ def _lift_limits(folder: Path) -> None:
 
 def _short(label: str) -> str:
     """What the compact program calls a function of the sources."""
-    known = program.compact_program(deployed._HASH_MODULE).functions
+    known = program_files.compact_program(deployed._HASH_MODULE).functions
     (name,) = {
         short
         for (module, short), found in known.items()
@@ -210,7 +210,7 @@ def _write(tree: Path, case: Case, settings: dict[str, Any]) -> None:
             frame = wire.frame(sequence, entry[1], wire.encode(entry, values, tail))
             file.write(struct.pack("<H", len(frame)) + frame)
     probe = f"import probe\n\nprobe.replace({settings!r})\n{firmware.START}, core\n\nprobe.hook(core)\n"
-    for path, data in program.start_files().items():
+    for path, data in program_files.start_files().items():
         (tree / Path(path).name).write_text(data.decode().replace(firmware.START, probe))
 
 

@@ -14,12 +14,12 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from armtempo.deploy import program
+from armtempo.deploy import program_files
 from armtempo.deploy.package import STM32F4
 from armtempo.model import arm
+from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
 from armtempo.records import encode
-from armtempo.robot import operate
 from armtempo_shared import wire
 
 from tests import interpreters
@@ -34,13 +34,16 @@ HEAP = 103_400
 
 def measure() -> dict[str, int]:
     """Bytes in use at each stage, and ``machine code``."""
-    library = {path.removeprefix(f"{program.ROOT}/"): data for path, data in program.library(STM32F4).items()}
+    library = {
+        path.removeprefix(f"{program_files.ROOT}/"): data
+        for path, data in program_files.library(STM32F4).items()
+    }
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for path, data in library.items():
             (folder / path).parent.mkdir(parents=True, exist_ok=True)
             (folder / path).write_bytes(data)
-        write_session(folder, arm.load_arm(arm.default_path()))
+        write_session(folder, Arm.paper())
         machine_code = sum(map(machine_code_bytes, library.values()))
         lines = _run(folder, HEAP - machine_code).splitlines()
         assert accepted((folder / "answers").read_bytes()) == len(SESSION)
@@ -51,7 +54,7 @@ def measure() -> dict[str, int]:
 
 def write_session(folder: Path, of_arm: arm.Arm) -> None:
     """Store an arm and a motion, and write the frames of a host that starts it."""
-    home_deg = operate.home_deg(of_arm)
+    home_deg = np.array(of_arm.home_deg)
     trajectory = point_to_point.straight(
         "go", home_deg, home_deg + np.resize([2.0, 1.0, -2.0], home_deg.shape), of_arm
     )
@@ -59,7 +62,7 @@ def write_session(folder: Path, of_arm: arm.Arm) -> None:
     (folder / "arm.ata").write_bytes(encode.arm_record(of_arm))
     (folder / "go.atm").write_bytes(motion)
     pairs = zip(home_deg, of_arm.driven, strict=True)
-    steps = [round(float(angle) * encode.steps_per_deg(joint)) for angle, joint in pairs]
+    steps = [round(float(angle) * joint.steps_per_deg) for angle, joint in pairs]
     values = {
         "hello": ((wire.PROTOCOL_VERSION, 1), b""),
         "home": (((1 << len(steps)) - 1,), struct.pack(f"<{len(steps)}i", *steps)),

@@ -17,13 +17,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from armtempo.link import open_board
-from armtempo.model import arm as arms
 from armtempo.model import trajectory_file
+from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.planning import planner
-from armtempo.robot import operate
-from armtempo.simulator import launch
+from armtempo.robot import arm_state
+from armtempo.simulator import LaunchOptions, launch
 
 SPEED_DEG_S = 0.3
 VIAS = ((0.0, -60.0, 40.0), (90.0, -100.0, 0.0), (180.0, -38.0, -52.0))
@@ -33,7 +33,7 @@ SEED = 3
 
 def slow_plan() -> Plan:
     """A motion of about ten minutes."""
-    arm = arms.load_arm(arms.default_path())
+    arm = Arm.paper()
     joints = [
         replace(joint, limits=replace(joint.limits, speed_deg_s=SPEED_DEG_S)) if joint.limits else joint
         for joint in arm.joints
@@ -47,10 +47,10 @@ def record(plan: Plan, folder: Path, numbers: random.Random) -> list[float]:
     file = folder / "slow.json"
     trajectory_file.save(plan, file)
     pauses = []
-    with launch(arm=plan.arm, virtual_time=False) as process:
+    with launch(LaunchOptions(arm=plan.arm, virtual_time=False)) as process:
         with open_board(process.port) as board:
-            operate.configure(board, plan.arm, replace=True)
-            operate.home(board, plan.arm)
+            arm_state.configure(board, plan.arm, replace=True)
+            arm_state.home(board, plan.arm)
         words = ["run", str(file), "--port", process.port, "--out", str(folder)]
         host = subprocess.Popen([sys.executable, "-c", "from armtempo.cli import main; main()", *words])
         while True:

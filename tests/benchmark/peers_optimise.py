@@ -25,8 +25,8 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 import numpy as np  # noqa: E402
 from armtempo import optimise  # noqa: E402
-from armtempo.model import arm as arms  # noqa: E402
-from armtempo.model import job as jobs  # noqa: E402
+from armtempo.model.arm import Arm  # noqa: E402
+from armtempo.model.job import Job  # noqa: E402
 from armtempo.optimise.tracker import Array  # noqa: E402
 from armtempo.research.bench import cases  # noqa: E402
 
@@ -90,8 +90,8 @@ def main() -> None:
     parser.add_argument("--evaluations", type=int, default=10_000)
     parser.add_argument("--fitness", choices=["stretched", "penalised"], default="stretched")
     options = parser.parse_args()
-    arm = arms.load_arm(arms.default_path())
-    job = jobs.load_job(jobs.default_path(), arm)
+    arm = Arm.paper()
+    job = Job.paper(arm)
     solvers = dict(own(options.evaluations)) | peers(options.evaluations)
     for joint in (int(number) for number in options.joints.split(",")):
         problem = cases.problem_of(arm, job, joint, options.fitness, 500)
@@ -137,7 +137,8 @@ def own(evaluations: int) -> Iterator[tuple[str, Search]]:
             fitness: Counted, seed: int, algorithm: str = algorithm, iterations: int = iterations
         ) -> None:
             rng = np.random.default_rng(seed)
-            optimise.minimise(fitness.population, fitness.bounds, rng, NESTS, iterations, algorithm)
+            settings = optimise.Settings(algorithm, NESTS, iterations)
+            optimise.minimise(fitness.population, fitness.bounds, rng, settings)
 
         yield f"armtempo {algorithm}, {NESTS} x {iterations}", search
 

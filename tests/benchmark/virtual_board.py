@@ -12,21 +12,21 @@ from pathlib import Path
 
 import numpy as np
 from armtempo.link import open_board
-from armtempo.link.messages import Sample
-from armtempo.model import job as jobs
-from armtempo.model.arm import Arm, Encoder, default_path, load_arm
+from armtempo.link.board_messages import Sample
+from armtempo.model.arm import Arm, Encoder
+from armtempo.model.job import Job
 from armtempo.planning import planner
 from armtempo.records import encode
-from armtempo.robot import operate
+from armtempo.robot import arm_state, stored_motion
 from armtempo.robot.stop_request import StopRequest
-from armtempo.simulator import edgelog, launch
+from armtempo.simulator import LaunchOptions, edgelog, launch
 from armtempo.splines.trajectory import Trajectory
 from armtempo_shared.limits import TICK_HZ
 
 from tests import interpreters
 
 FINE_COUNTS = 400_000
-ARM = load_arm(default_path())
+ARM = Arm.paper()
 
 
 def replay(
@@ -35,21 +35,23 @@ def replay(
     """(seconds that the replay took, its samples)."""
     samples: list[Sample] = []
     with (
-        launch(interpreter=interpreters.starter(interpreter), arm=model, edge_log=log) as process,
+        launch(
+            LaunchOptions(interpreter=interpreters.starter(interpreter), arm=model, edge_log=log)
+        ) as process,
         open_board(process.port) as board,
         StopRequest() as stop,
     ):
-        operate.configure(board, arm, replace=True)
-        operate.home(board, arm)
-        stored = operate.store(board, "feed", encode.motion_record(trajectory, arm))
+        arm_state.configure(board, arm, replace=True)
+        arm_state.home(board, arm)
+        stored = stored_motion.store(board, "feed", encode.motion_record(trajectory, arm))
         begin_s = time.monotonic()
-        operate.replay(board, stored, stop, lambda sample, _: samples.append(sample))
+        stored_motion.replay(board, stored, stop, lambda sample, _: samples.append(sample))
         return time.monotonic() - begin_s, samples
 
 
 def plan(arm: Arm, degree: int) -> Trajectory:
     """The feeding motion."""
-    return planner.plan(arm, replace(jobs.load_job(jobs.default_path(), arm), degree=degree)).trajectory
+    return planner.plan(arm, replace(Job.paper(arm), degree=degree)).trajectory
 
 
 def speed() -> None:
@@ -80,7 +82,7 @@ def ringing() -> None:
         trajectory = plan(arm, degree)
         _, samples = replay(trajectory, arm, interpreters.AVAILABLE[-1], arm, None)
         time_s = np.array([sample.ticks / TICK_HZ for sample in samples])
-        seen_deg = np.array([sample.stand.counts[0] for sample in samples]) * 360 / FINE_COUNTS
+        seen_deg = np.array([sample.positions.counts[0] for sample in samples]) * 360 / FINE_COUNTS
         off_deg = np.abs(seen_deg - trajectory(time_s)[:, 0])
         end_s = trajectory.joints[0].duration_s
         parts = (time_s <= 0.6, (time_s >= end_s - 0.6) & (time_s <= end_s + 0.05), time_s >= 0)

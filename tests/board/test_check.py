@@ -33,7 +33,6 @@ def straight(times_s: list[float], angles: list[float]) -> bytes:
         3,
         [[round(angle * 2**limits.STEP_FRACTION_BITS) for angle in angles]],
         [[round(time * limits.TICK_HZ * 2**limits.TICK_FRACTION_BITS) for time in times_s]],
-        len(angles) - 3,
         1,
         0,
         0,
@@ -115,7 +114,7 @@ def test_reversal_that_the_driver_cannot_follow(interpreter: str, tmp_path: Path
 
 def test_numbers_beyond_the_evaluator(interpreter: str, tmp_path: Path) -> None:
     """The bounds are those by which the host refuses a plan."""
-    span_s, most_s = (ticks / limits.TICK_HZ for ticks in (checks.LONGEST_SPAN_TICKS, checks.LONGEST_TICKS))
+    span_s, most_s = (ticks / limits.TICK_HZ for ticks in (checks.LONGEST_SPAN_TICKS, limits.LONGEST_TICKS))
     span_steps, segments = float(checks.MOST_SPAN_STEPS), 100
     spread = [most_s * part / (segments + 2) for part in range(segments + 3)]
     flat = [0.0] * (segments + 3)

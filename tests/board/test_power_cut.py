@@ -6,14 +6,13 @@ from pathlib import Path
 
 import numpy as np
 from armtempo.errors import LinkError
-from armtempo.link.board import Board
+from armtempo.link.client import Client
 from armtempo.link.session import Session
 from armtempo.link.transport import SerialTransport
-from armtempo.model import arm
+from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
 from armtempo.records import encode
-from armtempo.robot import operate
-from armtempo.simulator import launch
+from armtempo.simulator import LaunchOptions, launch
 from armtempo_shared import wire
 
 from tests import interpreters
@@ -23,8 +22,8 @@ INTERPRETER = interpreters.starter(interpreters.AVAILABLE[min(1, len(interpreter
 
 
 def test_upload_is_old_or_new(tmp_path: Path) -> None:
-    paper_arm = arm.load_arm(arm.default_path())
-    home_deg = operate.home_deg(paper_arm)
+    paper_arm = Arm.paper()
+    home_deg = np.array(paper_arm.home_deg)
     old, new = (
         encode.motion_record(
             point_to_point.straight("go", home_deg, home_deg + np.array(move), paper_arm), paper_arm
@@ -51,16 +50,16 @@ def test_upload_is_old_or_new(tmp_path: Path) -> None:
 
 def _upload_with_a_cut(flash: Path, cut: int, data: bytes) -> tuple[bool, int]:
     """Whether the upload was acknowledged, and the checksum of what is stored once the board is up again."""
-    with launch(flash, power_cut_at=cut, interpreter=INTERPRETER) as virtual:
+    with launch(LaunchOptions(flash, power_cut_at=cut, interpreter=INTERPRETER)) as virtual:
         transport = SerialTransport(virtual.port)
-        board = Board(Session(transport))
+        board = Client(Session(transport))
         done = True
         try:
             board.hello()
             board.upload("go", data)
         except LinkError:
             done = False
-        board = Board(Session(transport))
+        board = Client(Session(transport))
         board.hello()
         entry = board.find("go")
         assert entry is not None, cut

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.model import arm
+from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
 from armtempo.records import encode
-from armtempo.robot import operate
 
 from tests import interpreters
 
@@ -19,8 +18,8 @@ SCRIPT = Path(__file__).parent / "scripts" / "replay.py"
 @pytest.mark.parametrize("name", interpreters.AVAILABLE)
 def test_replay_from_the_repl(name: str, tmp_path: Path) -> None:
     """The first call takes the posture for the start and moves; the second finds the arm elsewhere."""
-    paper_arm = arm.load_arm(arm.default_path())
-    home_deg = operate.home_deg(paper_arm)
+    paper_arm = Arm.paper()
+    home_deg = np.array(paper_arm.home_deg)
     trajectory = point_to_point.straight("go", home_deg, home_deg + np.array([2.0, 1.0, -2.0]), paper_arm)
     (tmp_path / "armtempo").mkdir()
     (tmp_path / "armtempo" / "arm.ata").write_bytes(encode.arm_record(paper_arm))
@@ -34,6 +33,4 @@ def test_replay_from_the_repl(name: str, tmp_path: Path) -> None:
 
 def _steps(trajectory, paper_arm):
     end = trajectory(trajectory.duration_s)
-    return [
-        round(angle * encode.steps_per_deg(joint)) for angle, joint in zip(end, paper_arm.driven, strict=True)
-    ]
+    return [round(angle * joint.steps_per_deg) for angle, joint in zip(end, paper_arm.driven, strict=True)]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import random
 
-from armtempo.link import Board
+from armtempo.link import Client
+from armtempo.link.board_messages import Sample
 from armtempo.link.follow import Follower, RunEnd
-from armtempo.link.messages import Sample
-from armtempo_shared import armrecord, motion, wire
+from armtempo_shared import motion, wire
 
 from tests.board.scripts import stand_in
 from tests.inprocess import Pipe, connect
@@ -18,10 +18,10 @@ ARM = stand_in.arm(3)
 def random_motion(numbers: random.Random, segments: int = 6, joints: int = 3) -> bytes:
     """A motion record for ``ARM``; its numbers mean nothing."""
     points = [[numbers.randrange(2**40) for _ in range(segments + 5)] for _ in range(joints)]
-    return motion.pack(5, points, points, segments, 1, 0, armrecord.unpack(ARM)[2])
+    return motion.pack(5, points, points, 1, 0, wire.record_crc(ARM))
 
 
-def ready(pipe: Pipe) -> tuple[Board, bytes]:
+def ready(pipe: Pipe) -> tuple[Client, bytes]:
     """A board with arm, motion ``feed`` and known positions."""
     board = connect(pipe)
     board.upload(wire.ARM_RECORD_NAME, ARM)
@@ -34,12 +34,12 @@ def ready(pipe: Pipe) -> tuple[Board, bytes]:
 def started(pipe: Pipe) -> Follower:
     """A run of ``feed`` that has just begun on a board made ready for it."""
     board, data = ready(pipe)
-    run, _ = board.start("feed", wire.record_crc(data))
+    run = board.start("feed", wire.record_crc(data)).run
     return Follower(board, run)
 
 
 def follow(follower: Follower) -> tuple[list[Sample], RunEnd]:
     """All samples of the run, and how it ended."""
     samples = list(follower.samples())
-    assert follower.end is not None
+    assert follower.ended
     return samples, follower.end

@@ -6,10 +6,10 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from armtempo.link.messages import Sample, Stand
-from armtempo.model import arm as arm_file
-from armtempo.model import job as job_file
+from armtempo.link.board_messages import Positions, Sample
 from armtempo.model import trajectory_file
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.planning.planner import plan
 from armtempo.runs import run_folder
@@ -19,8 +19,8 @@ from armtempo_shared.limits import SAMPLE_TICKS, TICK_HZ
 @cache
 def shipped_plan() -> Plan:
     """The plan of the shipped job."""
-    arm = arm_file.load_arm(arm_file.default_path())
-    return plan(arm, job_file.load_job(job_file.default_path(), arm))
+    arm = Arm.paper()
+    return plan(arm, Job.paper(arm))
 
 
 def make(
@@ -37,7 +37,7 @@ def make(
             for sample in _samples(made, scatter_deg, rng):
                 if number or sample.index not in drop:
                     file.append(sample)
-            file.repetition.end(run_folder.COMPLETE, "", sample.ticks, sample.stand, ())
+            file.repetition.end(run_folder.COMPLETE, "", sample.ticks, sample.positions, ())
     return path
 
 
@@ -51,5 +51,5 @@ def _samples(made: Plan, scatter_deg: float, rng: np.random.Generator) -> list[S
         steps = tuple(round(a * s.steps_per_deg) for a, s in zip(angles, scales, strict=True))
         seen = angles + rng.normal(scale=scatter_deg, size=len(angles))
         counts = tuple(round(a * s.counts_per_deg) for a, s in zip(seen, scales, strict=True))
-        found.append(Sample(run=1, index=index, ticks=tick, flags=0, stand=Stand(steps, counts)))
+        found.append(Sample(run=1, index=index, ticks=tick, flags=0, positions=Positions(steps, counts)))
     return found

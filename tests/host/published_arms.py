@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 from armtempo.kinematics import Geometry, Ranges
-from armtempo.model.arm import default_path, load_arm
+from armtempo.model.arm import Arm
 
 FOLDER = Path(__file__).parents[1] / "data" / "arms"
 FILES = sorted(FOLDER.glob("*.toml"))
-PAPER = Geometry.of(load_arm(default_path()))
+PAPER = Geometry.of(Arm.paper())
 PAPER_FULL_SIZE = Geometry(
     tuple(5 * length / 10 for length in PAPER.d),
     tuple(5 * length / 10 for length in PAPER.a),

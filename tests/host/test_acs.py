@@ -30,7 +30,7 @@ def test_is_near_the_best_known_with_every_seed(joint: int) -> None:
     function = fitness_of(joint).stretched
     excess = []
     for seed in range(12):
-        found = optimise.minimise(function, [(0.1, 3.0)] * 6, np.random.default_rng(seed), 10, 500)
+        found = optimise.minimise(function, [(0.1, 3.0)] * 6, np.random.default_rng(seed))
         assert found.evaluations <= 2 * 10 * 500
         excess.append(100 * (found.value / FEEDING.best_s[joint] - 1))
     assert np.median(excess) <= 0.05, f"seeds 0 to 11: {excess}"
@@ -42,7 +42,8 @@ def test_finds_a_narrow_valley(variant: str) -> None:
     def valley(x: np.ndarray) -> np.ndarray:
         return np.asarray(100 * (x[:, 1] - x[:, 0] ** 2) ** 2 + (1 - x[:, 0]) ** 2)
 
-    found = optimise.minimise(valley, [(-2, 2)] * 2, np.random.default_rng(1), 10, 400, variant=variant)
+    settings = optimise.Settings("acs", 10, 400, {"variant": variant})
+    found = optimise.minimise(valley, [(-2, 2)] * 2, np.random.default_rng(1), settings)
     assert found.value < {"differences": 1e-6, "paper": 1e-2}[variant]
 
 
@@ -56,5 +57,6 @@ def test_finds_a_narrow_valley(variant: str) -> None:
     ],
 )
 def test_refuses_other_parameters(parameters: dict[str, object], message: str) -> None:
+    settings = optimise.Settings("acs", 10, 5, parameters)
     with pytest.raises(InputError, match=message):
-        optimise.minimise(lambda x: x.sum(1), [(0, 1)], np.random.default_rng(1), 10, 5, **parameters)
+        optimise.minimise(lambda x: x.sum(1), [(0, 1)], np.random.default_rng(1), settings)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from armtempo.model.arm import Limits
 from armtempo.runs import analysis
-from armtempo.runs.reader import Samples
+from armtempo.runs.reader import RepetitionData
 from armtempo.splines import bspline
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
@@ -24,7 +24,7 @@ PLAN = Trajectory("t", (joint(VIA[0], 2.0), joint(VIA[1], 2.2)), False)
 LIMITS = (Limits(70.0, 80.0, 500.0), Limits(40.0, 80.0, 500.0))
 
 
-def samples(delay_s: float = 0.0, seed: int | None = None, resolution: float = 0.0) -> Samples:
+def samples(delay_s: float = 0.0, seed: int | None = None, resolution: float = 0.0) -> RepetitionData:
     """The plan as an encoder would see it: late, with noise, rounded."""
     times = np.append(np.arange(0.0, PLAN.duration_s, 0.1), PLAN.duration_s)
     angles = PLAN(times - delay_s)
@@ -32,7 +32,7 @@ def samples(delay_s: float = 0.0, seed: int | None = None, resolution: float = 0
         angles = angles + np.random.default_rng(seed).normal(scale=0.05, size=angles.shape)
     if resolution:
         angles = np.rint(angles / resolution) * resolution
-    return Samples(
+    return RepetitionData(
         "x", "complete", np.arange(len(times)), times, np.zeros(angles.shape, int), PLAN(times), angles
     )
 

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import pytest
 from armtempo.errors import InputError
-from armtempo.model.arm import default_path, load_arm
+from armtempo.model import arm_file
+from armtempo.model.arm import Arm
 
 
 def changed(tmp_path: Path, old: str, new: str) -> Path:
     """The shipped arm file with one text replaced."""
-    text = default_path().read_text()
+    text = arm_file.default_path().read_text()
     assert old in text
     path = tmp_path / "arm.toml"
     path.write_text(text.replace(old, new, 1))
@@ -19,7 +20,7 @@ def changed(tmp_path: Path, old: str, new: str) -> Path:
 
 
 def test_the_shipped_arm_is_the_papers() -> None:
-    arm = load_arm(default_path())
+    arm = Arm.paper()
     assert [joint.d_mm * 5 for joint in arm.joints] == [650, 0, 0, 1800, 0, 200]  # Table 1
     assert [joint.a_mm * 5 for joint in arm.joints] == [-500, 1500, 600, 0, 0, 0]
     assert [joint.alpha_deg for joint in arm.joints] == [-90, 0, -90, 90, -90, 0]
@@ -69,25 +70,25 @@ def test_what_is_wrong_is_said_with_file_key_and_value(
 ) -> None:
     path = changed(tmp_path, old, new)
     with pytest.raises(InputError) as error:
-        load_arm(path)
+        Arm.load(path)
     for text in [str(path), *said]:
         assert text in str(error.value)
 
 
 def test_a_missing_file_and_an_empty_one(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
-        load_arm(tmp_path / "none.toml")
+        Arm.load(tmp_path / "none.toml")
     empty = tmp_path / "empty.toml"
     empty.touch()
     with pytest.raises(InputError, match="name is missing"):
-        load_arm(empty)
+        Arm.load(empty)
 
 
 def test_a_drive_without_limits_and_an_arm_without_drives(tmp_path: Path) -> None:
     limits = "limits = { speed_deg_s = 60.0, acceleration_deg_s2 = 40.0, jerk_deg_s3 = 150.0 }\n"
     with pytest.raises(InputError, match=r"joint\[3\]\.limits is missing"):
-        load_arm(changed(tmp_path, limits, ""))
+        Arm.load(changed(tmp_path, limits, ""))
     path = tmp_path / "still.toml"
     path.write_text('name = "x"\n[[joint]]\nd_mm = 0\na_mm = 0\nalpha_deg = 0\nrange_deg = [0, 1]\n')
     with pytest.raises(InputError, match="no joint has a motor"):
-        load_arm(path)
+        Arm.load(path)

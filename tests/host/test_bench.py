@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 from armtempo.cli import main
 from armtempo.errors import ArmtempoError, InputError
-from armtempo.model import arm as arms
-from armtempo.model import job as jobs
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
 from armtempo.research.bench import cases, result_plot, result_store, result_table, worker_pool
 from click.testing import CliRunner
 
@@ -27,8 +27,8 @@ SMALL = ["--populations", "4,6", "--seeds", "2", "--iterations", str(ITERATIONS)
 
 @pytest.fixture(scope="module")
 def problem() -> cases.Problem:
-    arm = arms.load_arm(arms.default_path())
-    return cases.problem_of(arm, jobs.load_job(jobs.default_path(), arm), 1, "stretched", ITERATIONS)
+    arm = Arm.paper()
+    return cases.problem_of(arm, Job.paper(arm), 1, "stretched", ITERATIONS)
 
 
 @pytest.fixture(scope="module")
@@ -37,11 +37,11 @@ def some() -> list[cases.Case]:
 
 
 @pytest.fixture(scope="module")
-def runs(problem: cases.Problem, some: list[cases.Case]) -> dict[cases.Case, cases.Run]:
+def runs(problem: cases.Problem, some: list[cases.Case]) -> dict[cases.Case, cases.Trial]:
     return {case: cases.solve(problem, case) for case in some}
 
 
-def _numbers(run: cases.Run) -> tuple[object, ...]:
+def _numbers(run: cases.Trial) -> tuple[object, ...]:
     """All of a run but the time it took."""
     return run.case, run.intervals_s, run.evaluations, run.improvements
 
@@ -57,20 +57,20 @@ def test_problem_is_the_planners_fitness(problem: cases.Problem) -> None:
 
 
 def test_problem_refuses_joints_that_cannot_be_timed() -> None:
-    arm = arms.load_arm(arms.default_path())
-    job = jobs.load_job(jobs.default_path(), arm)
+    arm = Arm.paper()
+    job = Job.paper(arm)
     with pytest.raises(InputError, match="joints 1 to 3"):
         cases.problem_of(arm, job, 4, "stretched", 1)
 
 
 def test_history_is_rebuilt_from_improvements() -> None:
-    run = cases.Run(cases.Case("ga", 4, 1), (), 4, 0.0, ((0, 9.0), (2, 7.5), (5, 7.0)))
+    run = cases.Trial(cases.Case("ga", 4, 1), (), 4, 0.0, ((0, 9.0), (2, 7.5), (5, 7.0)))
     assert run.history(6).tolist() == [9.0, 9.0, 7.5, 7.5, 7.5, 7.0, 7.0]
     assert run.best_s == 7.0
 
 
 def test_processes_give_the_same_numbers(
-    problem: cases.Problem, some: list[cases.Case], runs: dict[cases.Case, cases.Run]
+    problem: cases.Problem, some: list[cases.Case], runs: dict[cases.Case, cases.Trial]
 ) -> None:
     with worker_pool.local(2) as executor:
         found = {run.case: run for run in cases.execute(problem, some, executor)}
@@ -78,13 +78,13 @@ def test_processes_give_the_same_numbers(
 
 
 def test_a_cluster_of_two_workers_gives_the_same_numbers(
-    tmp_path: Path, runs: dict[cases.Case, cases.Run], problem: cases.Problem
+    tmp_path: Path, runs: dict[cases.Case, cases.Trial], problem: cases.Problem
 ) -> None:
     with distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None) as cluster:
         more = ["--algorithms", "acs,ga,pso", "--scheduler", cluster.scheduler_address, "--no-plot"]
         done = CliRunner().invoke(main, ["bench", *SMALL, *more, "--out", str(tmp_path)])
     assert done.exit_code == 0, done.output
-    found = result_store.Store(tmp_path, problem).runs
+    found = result_store.ResultStore(tmp_path, problem).runs
     assert {case: _numbers(run) for case, run in found.items()} == {c: _numbers(r) for c, r in runs.items()}
 
 
@@ -136,42 +136,42 @@ def test_goes_on_where_it_was_interrupted(tmp_path: Path) -> None:
 
 
 def test_a_line_cut_off_is_done_again(
-    tmp_path: Path, problem: cases.Problem, runs: dict[cases.Case, cases.Run]
+    tmp_path: Path, problem: cases.Problem, runs: dict[cases.Case, cases.Trial]
 ) -> None:
-    store = result_store.Store(tmp_path, problem)
+    store = result_store.ResultStore(tmp_path, problem)
     for run in runs.values():
         store.add(run)
     content = store.path.read_bytes()
     store.path.write_bytes(content[:-7])
-    again = result_store.Store(tmp_path, problem)
+    again = result_store.ResultStore(tmp_path, problem)
     assert again.runs == dict(list(runs.items())[:-1])
     again.add(list(runs.values())[-1])
     assert store.path.read_bytes() == content
 
 
 def test_runs_of_another_problem_and_other_files_are_refused(tmp_path: Path, problem: cases.Problem) -> None:
-    result_store.Store(tmp_path, problem)
+    result_store.ResultStore(tmp_path, problem)
     other = cases.Problem(**{**vars(problem), "iterations": 7, "fitness": "penalised"})
     with pytest.raises(InputError, match="differs in fitness, iterations"):
-        result_store.Store(tmp_path, other)
+        result_store.ResultStore(tmp_path, other)
     (tmp_path / result_store.FILE).write_text("a shopping list\n")
     with pytest.raises(InputError, match="not a file of runs"):
-        result_store.Store(tmp_path, problem)
+        result_store.ResultStore(tmp_path, problem)
     (tmp_path / result_store.FILE).unlink()
-    store = result_store.Store(tmp_path, problem)
+    store = result_store.ResultStore(tmp_path, problem)
     head = store.path.read_text()
     for improvements in ([], [["a", "b"]], [[0]]):
         case = {"algorithm": "acs", "population": 4, "seed": 1}
         run = {"case": case, "intervals_s": [], "evaluations": 1, "seconds": 0, "improvements": improvements}
         store.path.write_text(f"{head}{json.dumps(run)}\n")
         with pytest.raises(InputError, match="not a file of runs"):
-            result_store.Store(tmp_path, problem)
+            result_store.ResultStore(tmp_path, problem)
     (tmp_path / "flat").write_text("")
     with pytest.raises(InputError, match="cannot be used"):
-        result_store.Store(tmp_path / "flat", problem)
+        result_store.ResultStore(tmp_path / "flat", problem)
 
 
-def test_tables_say_what_the_runs_are(runs: dict[cases.Case, cases.Run]) -> None:
+def test_tables_say_what_the_runs_are(runs: dict[cases.Case, cases.Trial]) -> None:
     found = result_table.rows(runs.values(), ITERATIONS)
     assert [(row.algorithm, row.population) for row in found] == [
         ("ga", 4), ("ga", 6), ("pso", 4), ("pso", 6), ("acs", 4), ("acs", 6),
@@ -200,7 +200,7 @@ def test_the_paper_stands_beside_its_own_problem_only(tmp_path: Path) -> None:
         assert ("10.491" in done.output) is expected
 
 
-def test_draws_the_curves(runs: dict[cases.Case, cases.Run], tmp_path: Path) -> None:
+def test_draws_the_curves(runs: dict[cases.Case, cases.Trial], tmp_path: Path) -> None:
     figure = result_plot.convergence(result_table.rows(runs.values(), ITERATIONS))
     titles = [axis.get_title() for axis in figure.axes]
     assert titles == ["population 4", "population 6"]

@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 from armtempo import link
 from armtempo.cli import COMMANDS, main
-from armtempo.link import Board, greet
-from armtempo.model import arm, trajectory_file
+from armtempo.link import Client, greet
+from armtempo.model import arm_file, trajectory_file
+from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import planner
 from armtempo.robot.stop_request import StopRequest
@@ -20,7 +21,7 @@ from click.testing import CliRunner, Result
 
 from tests.inprocess import Pipe
 
-ARM = arm.load_arm(arm.default_path())
+ARM = Arm.paper()
 START, END = (0.0, -60.0, 40.0), (10.0, -50.0, 45.0)
 Run = Callable[..., Result]
 
@@ -32,7 +33,7 @@ def pipe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pipe:
     found.run_samples = 12
 
     @contextmanager
-    def open_board(port: str, *arguments: Any, **options: Any) -> Iterator[Board]:
+    def open_board(port: str, *arguments: Any, **options: Any) -> Iterator[Client]:
         yield greet(found, None, found.clock)
 
     monkeypatch.setattr(link, "open_board", open_board)
@@ -153,7 +154,7 @@ def test_interrupt_brakes_then_freezes_and_keeps_the_samples(
 def test_arm_is_not_replaced_silently(run: Run, file: str, tmp_path: Path) -> None:
     run("upload", file)
     other = tmp_path / "other.toml"
-    other.write_text(arm.default_path().read_text().replace("pulse_us = 2.0", "pulse_us = 3.0"))
+    other.write_text(arm_file.default_path().read_text().replace("pulse_us = 2.0", "pulse_us = 3.0"))
     run("home", "--arm", str(other))
     assert "name its arm file with --arm" in run("home", code=1).output
     assert "planned for another arm" in run("run", file, "--arm", str(other), code=2).output

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
-from armtempo import pipeline
 from armtempo.cli import show
 from armtempo.formats.text_table import aligned
 from armtempo.model.plan import Plan
+from armtempo.records import encoded_motion
 from armtempo.report import text_summary
 from armtempo.runs import run_folder
+from armtempo.runs.reader import RunData
+from armtempo.runs.results import results
 from armtempo.runs.run_folder import Repetition
 
 from tests.host import made_runs
@@ -57,10 +60,11 @@ def test_a_plan_of_joints_with_long_names(made: Plan) -> None:
 
 
 def test_results_and_times_of_joints_with_long_names(made: Plan) -> None:
-    motion = pipeline.planned(made)
+    motion = encoded_motion.of_plan(made)
     scales = run_folder.scales(made.arm)
     steps = tuple(-1_234_567 for _ in scales)
-    lines = pipeline.results(motion, Repetition("", commanded_steps=steps, counts=steps))
+    run = RunData(Path(), {}, scales, (), (Repetition("", commanded_steps=steps, counts=steps),))
+    lines = text_summary.result_lines(results(run, made.trajectory))
     assert len({len(line) for line in lines}) == 1
     assert all(f"{joint.name} " in line for joint, line in zip(made.arm.driven, lines[2:], strict=True))
     times = show._lines(motion)[3:]

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from armtempo.deploy import program
+from armtempo.deploy import program_files
 from armtempo.deploy.compact import Compact, compact
 
 SOURCES = {
@@ -190,7 +190,7 @@ def test_what_nothing_uses_is_left_out() -> None:
 
 def test_the_most_used_names_come_first() -> None:
     """What gives them their numbers is the first thing in the file, and goes again."""
-    body = ast.parse(program.compact_program().sources["armtempo_board.core"]).body
+    body = ast.parse(program_files.compact_program().sources["armtempo_board.core"]).body
     first, gone = body[:2]
     assert isinstance(first, ast.Assign)
     assert isinstance(first.value, ast.List)
@@ -212,7 +212,7 @@ def test_a_name_that_is_not_there_is_told() -> None:
 
 
 def test_the_board_program_is_mostly_one_module() -> None:
-    made = program.compact_program()
+    made = program_files.compact_program()
     for text in made.sources.values():
         ast.parse(text)
     core = made.sources["armtempo_board.core"]
@@ -223,7 +223,7 @@ def test_the_board_program_is_mostly_one_module() -> None:
 
 def _frame(label: str) -> str:
     """A line of a traceback, as the compiled program gives it."""
-    known = program.compact_program().functions
+    known = program_files.compact_program().functions
     module, short = next(
         key for key, functions in known.items() if label in [function.label for function in functions]
     )
@@ -240,24 +240,24 @@ def test_traceback_of_the_compiled_program_is_readable() -> None:
         "engine.Engine._stopped",
     )
     given = "".join(map(_frame, chain)) + "ValueError: deliberate\n"
-    lines = program.in_full(given).splitlines()
+    lines = program_files.in_full(given).splitlines()
     assert [line.rsplit("(")[-1].rstrip(")") for line in lines[:-1]] == list(chain)
     assert lines[-1] == "ValueError: deliberate"
     (module, short), several = next(
-        item for item in program.compact_program().functions.items() if len(item[1]) > 1
+        item for item in program_files.compact_program().functions.items() if len(item[1]) > 1
     )
     alone = f'  File "{module}", line 1, in {short}\n'
     labels = " or ".join(function.label for function in several)
-    assert program.in_full(alone) == f"{alone[:-1]} ({labels})\n", "nothing tells which"
+    assert program_files.in_full(alone) == f"{alone[:-1]} ({labels})\n", "nothing tells which"
 
 
 def test_traceback_from_the_firmware_and_of_others() -> None:
     line = _frame("app.App.turn")
     frozen = line.replace('"core"', '"armtempo_board/core.py"')
-    assert "app.App.turn" in program.in_full(frozen)
+    assert "app.App.turn" in program_files.in_full(frozen)
     for other in (
         '  File "main.py", line 3, in turn\n',
         '  File "core", line 1, in nothing\n',
         "no traceback",
     ):
-        assert program.in_full(other) == other
+        assert program_files.in_full(other) == other

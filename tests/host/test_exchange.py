@@ -10,13 +10,13 @@ import pytest
 from armtempo.cli import main
 from armtempo.errors import InputError
 from armtempo.model import exchange, trajectory_file
-from armtempo.model.arm import default_path, load_arm
-from armtempo.model.job import load_job
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
 from click.testing import CliRunner
 
 from tests.host.made_runs import shipped_plan
 
-ARM = load_arm(default_path())
+ARM = Arm.paper()
 
 
 def test_csv_is_the_trajectory_at_any_rate_end_included() -> None:
@@ -98,7 +98,7 @@ def test_the_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert run(main, ["export", "feed.json", "--format", "ros"]).output.startswith("header:")
     made = run(main, ["import", "feed.csv", "--name", "again"])
     assert made.exit_code == 0, made.output
-    assert len(load_job("again.toml", ARM).via) == len(Path("feed.csv").read_text().splitlines()) - 1
+    assert len(Job.load("again.toml", ARM).via) == len(Path("feed.csv").read_text().splitlines()) - 1
     again = run(main, ["import", "feed.csv", "--name", "again"])
     assert again.exit_code == 2
     assert "exists" in again.output

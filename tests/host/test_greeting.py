@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from armtempo.link import Board
-from armtempo.link.board import harmless_number
+from armtempo.link import Client
+from armtempo.link.client import harmless_number
 from armtempo.link.session import Session
 from armtempo_shared import wire
 
@@ -22,5 +22,5 @@ def test_a_greeting_holds_no_ctrl_c() -> None:
 
 
 def test_no_command_has_ctrl_c_for_its_number(tmp_path: Path) -> None:
-    board = Board(Session(Pipe(tmp_path / "flash"), lambda: 0.0))
+    board = Client(Session(Pipe(tmp_path / "flash"), lambda: 0.0))
     assert 3 not in {board.session._next_sequence() for _ in range(600)}

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from armtempo.cli import main
 from armtempo.kinematics import forward
-from armtempo.model.arm import default_path
+from armtempo.model import arm_file
 from click.testing import CliRunner, Result
 
 from tests.host.published_arms import PAPER
@@ -114,7 +114,7 @@ def test_singular_poses_say_so() -> None:
 def test_an_arm_outside_the_class_is_searched_numerically(tmp_path: Path) -> None:
     arm = tmp_path / "arm.toml"
     arm.write_text(
-        default_path().read_text().replace("d_mm = 360.0\na_mm = 0.0", "d_mm = 360.0\na_mm = 10.0")
+        arm_file.default_path().read_text().replace("d_mm = 360.0\na_mm = 0.0", "d_mm = 360.0\na_mm = 10.0")
     )
     form = ("--arm", arm, "--position", "300", "200", "300", "--rpy", "10", "20", "30")
     result = run(*form)

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from armtempo.kinematics import BRANCHES, Branch, Geometry, Ranges, branch_of, choose, forward
 from armtempo.kinematics.choice import Choice
-from armtempo.model.arm import default_path, load_arm
+from armtempo.model.arm import Arm
 
 from tests.host.published_arms import FILES, NAMED, PAPER, read
 from tests.host.test_kinematics_singular import SHAPE, with_wrist_at
 
-ARM = load_arm(default_path())
+ARM = Arm.paper()
 RANGES = Ranges.of(ARM)
 ANY = Ranges(np.full(6, -2 * np.pi), np.full(6, 2 * np.pi))
 HOME = np.radians([joint.home_deg for joint in ARM.joints])

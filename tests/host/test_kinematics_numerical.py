@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from armtempo.kinematics import Geometry, Ranges, forward, inverse, refusals
 from armtempo.kinematics.numerical import solve
-from armtempo.model.arm import default_path, load_arm
+from armtempo.model.arm import Arm
 
 from tests.host.published_arms import PAPER
 
-RANGES = Ranges.of(load_arm(default_path()))
+RANGES = Ranges.of(Arm.paper())
 OFFSET_WRIST = replace(PAPER, a=(*PAPER.a[:3], 15.0, 0.0, 0.0))
 
 

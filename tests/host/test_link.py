@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 from armtempo.errors import BoardError, LinkError
 from armtempo.link.follow import Follower
-from armtempo.robot import operate
+from armtempo.records.encoded_motion import MotionKey
+from armtempo.robot import stored_motion
 from armtempo.robot.stop_request import StopRequest
 from armtempo_shared import wire
 
@@ -38,7 +39,7 @@ def test_run_gives_every_sample_once_in_order(tmp_path: Path) -> None:
     samples, end = follow(started(pipe))
     assert [sample.index for sample in samples] == list(range(pipe.run_samples))
     assert (end.fault, end.lost, end.received) == (0, (), pipe.run_samples)
-    assert samples[-1].stand == end.stand
+    assert samples[-1].positions == end.positions
 
 
 def test_repeated_command_acts_once(tmp_path: Path) -> None:
@@ -47,7 +48,7 @@ def test_repeated_command_acts_once(tmp_path: Path) -> None:
     lost = [True]
     send = pipe._send
     pipe._send = lambda way, frame: None if way == 1 and lost and lost.pop() else send(way, frame)  # type: ignore[method-assign]
-    run, _ = board.start("feed", wire.record_crc(data))
+    run = board.start("feed", wire.record_crc(data)).run
     assert board.session.repeats == 1
     assert (run, pipe.app.engine.calls.count("start")) == (1, 1)
 
@@ -68,11 +69,11 @@ def test_gap_is_counted_where_the_board_ran_out_of_memory(tmp_path: Path) -> Non
     pipe = Pipe(tmp_path / "flash")
     pipe.run_samples = 500
     board, data = ready(pipe)
-    run, _ = board.start("feed", wire.record_crc(data))
+    run = board.start("feed", wire.record_crc(data)).run
     pipe.wait_away(45.0)
     follower = Follower(board, run)
     samples = list(follower.samples())
-    assert follower.end is not None
+    assert follower.ended
     missing = set(range(500)) - {sample.index for sample in samples}
     assert missing
     assert {index for first, count in follower.end.lost for index in range(first, first + count)} == missing
@@ -95,7 +96,7 @@ def test_fault_ends_the_run(tmp_path: Path) -> None:
         if sample.index == 10:
             pipe.app.engine.fault, pipe.app.engine.fault_joint = wire.ERROR_CODES["following"], 1
             pipe.app.engine.finish()
-    assert follower.end is not None
+    assert follower.ended
     assert (follower.end.fault, follower.end.fault_joint) == (wire.ERROR_CODES["following"], 1)
 
 
@@ -108,10 +109,10 @@ def test_homing_motion_starts_anywhere_and_leaves_nothing_known(tmp_path: Path) 
     board.home([7, None, None])
     with pytest.raises(BoardError, match="position is unknown"):
         board.start("feed", wire.record_crc(data))
-    run, _ = board.start("feed", wire.record_crc(data), wire.START_HOMING)
+    run = board.start("feed", wire.record_crc(data), wire.START_HOMING).run
     assert board.status().known == 7
     samples = list(Follower(board, run).samples())
-    assert samples[0].stand.commanded_steps == (7, 7, 7)
+    assert samples[0].positions.commanded_steps == (7, 7, 7)
     assert board.status().known == 1
 
 
@@ -132,7 +133,7 @@ def test_a_board_that_does_not_stop_is_given_up(tmp_path: Path, monkeypatch: pyt
     begin_s = pipe.clock()
     pipe.run_samples = 10_000
     with pytest.raises(LinkError, match="does not; switch off"):
-        operate.stop(board, now=False)
+        stored_motion.stop(board, now=False)
     assert pipe.clock() - begin_s < 15.0
 
 
@@ -142,5 +143,5 @@ def test_what_was_to_stop_before_does_not_start(tmp_path: Path) -> None:
     stop = StopRequest()
     stop.wanted = True
     with pytest.raises(KeyboardInterrupt):
-        operate.replay(board, operate.Stored("feed", wire.record_crc(data)), stop)
+        stored_motion.replay(board, MotionKey("feed", wire.record_crc(data)), stop)
     assert pipe.app.engine.calls.count("start") == 0

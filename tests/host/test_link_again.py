@@ -7,12 +7,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from armtempo.errors import LinkError
-from armtempo.link import Board
+from armtempo.errors import LinkError, NoAnswerError, OtherBoardError
+from armtempo.link import Client
+from armtempo.link.board_messages import Sample
 from armtempo.link.follow import Follower, RunEnd
-from armtempo.link.messages import Sample
-from armtempo.link.session import NoAnswer, OtherBoard
-from armtempo.robot import operate
+from armtempo.records.encoded_motion import MotionKey
+from armtempo.robot import stored_motion
 from armtempo.robot.stop_request import StopRequest
 from armtempo_shared import wire
 
@@ -20,14 +20,14 @@ from tests.host.linked import random_motion, ready
 from tests.inprocess import Pipe, connect
 
 
-def prepared(pipe: Pipe) -> tuple[Board, operate.Stored]:
+def prepared(pipe: Pipe) -> tuple[Client, MotionKey]:
     """A board with known positions and a motion."""
     board, data = ready(pipe)
-    return board, operate.Stored("feed", wire.record_crc(data))
+    return board, MotionKey("feed", wire.record_crc(data))
 
 
 def replay(
-    board: Board, stored: operate.Stored, at_20: Callable[[], None], stop: StopRequest | None = None
+    board: Client, stored: MotionKey, at_20: Callable[[], None], stop: StopRequest | None = None
 ) -> tuple[RunEnd, list[int]]:
     """Run it; ``at_20`` is called with the sample number 20."""
     indices: list[int] = []
@@ -37,7 +37,7 @@ def replay(
         if sample.index == 20:
             at_20()
 
-    return operate.replay(board, stored, stop or StopRequest(), take), indices
+    return stored_motion.replay(board, stored, stop or StopRequest(), take), indices
 
 
 @pytest.mark.parametrize("trouble", ["unplug_for", "silence_for"])
@@ -84,7 +84,7 @@ def test_the_same_board_started_anew_is_found_out_before_any_command(tmp_path: P
     board, _ = prepared(pipe)
     pipe.unplug_for(1.0)
     pipe.swap_board(pipe.app.board_id)
-    with pytest.raises(OtherBoard, match="started anew"):
+    with pytest.raises(OtherBoardError, match="started anew"):
         board.home([1, 2, 3])
     assert "home" not in pipe.app.engine.calls
     assert board.session.reopen is not None
@@ -119,7 +119,7 @@ def test_cable_out_during_a_run_costs_no_sample(tmp_path: Path) -> None:
     board, data = ready(pipe)
     told: list[str] = []
     board.session.tell = told.append
-    run, _ = board.start("feed", wire.record_crc(data))
+    run = board.start("feed", wire.record_crc(data)).run
     indices = []
     follower = Follower(board, run)
     for sample in follower.samples():
@@ -159,7 +159,7 @@ def test_silent_board_is_reported_in_time(tmp_path: Path) -> None:
     board = connect(pipe)
     pipe._send = lambda way, frame: None  # type: ignore[method-assign]
     begin_s = pipe.clock()
-    with pytest.raises(NoAnswer, match="did not answer 'status'"):
+    with pytest.raises(NoAnswerError, match="did not answer 'status'"):
         board.status()
     assert pipe.clock() - begin_s < 4.0
 

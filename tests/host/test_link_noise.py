@@ -40,7 +40,7 @@ def test_runs_over_a_bad_line_are_complete(tmp_path: Path, seed: int) -> None:
 def test_five_percent_is_survived_or_said(tmp_path: Path, kind: str) -> None:
     pipe = Pipe(tmp_path / "flash")
     board, old = ready(pipe)
-    run, _ = board.start("feed", wire.record_crc(old))
+    run = board.start("feed", wire.record_crc(old)).run
     pipe.disturb(Noise(f"to {kind}", 0.05, (kind,)), Noise(f"from {kind}", 0.05, (kind,)))
     follower = Follower(board, run)
     indices: list[int] = []
@@ -48,9 +48,9 @@ def test_five_percent_is_survived_or_said(tmp_path: Path, kind: str) -> None:
     said = ""
     try:
         for sample in follower.samples():
-            assert sample.stand.commanded_steps == (sample.index,) * 3
+            assert sample.positions.commanded_steps == (sample.index,) * 3
             indices.append(sample.index)
-        assert follower.end is not None
+        assert follower.ended
         missing = [index for first, count in follower.end.lost for index in range(first, first + count)]
         assert sorted(indices + missing) == list(range(pipe.run_samples))
         board.upload("feed", new)

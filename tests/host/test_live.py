@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from armtempo.cli.live import Live
-from armtempo.cli.progress import Progress
-from armtempo.link.messages import Sample, Stand
-from armtempo.pipeline import planned
+from armtempo.cli.progress import ProgressBar
+from armtempo.link.board_messages import Positions, Sample
+from armtempo.records import encoded_motion
 from armtempo.report.live_plot import LivePlot
 from armtempo.runs import run_folder
+from armtempo.runs.run_folder import RunFolder
 
 from tests.host.made_runs import shipped_plan
+
+FOLDER = RunFolder(Path("runs/feed-001"), "feed", ())
 
 
 def sample(time_s: float, off_deg: float) -> Sample:
@@ -25,14 +29,15 @@ def sample(time_s: float, off_deg: float) -> Sample:
     angles = plan.trajectory(time_s)
     steps = tuple(round(a * s.steps_per_deg) for a, s in zip(angles, scales, strict=True))
     counts = tuple(round((a + off_deg) * s.counts_per_deg) for a, s in zip(angles, scales, strict=True))
-    return Sample(1, round(time_s * 10), round(time_s * 84e6), 0, Stand(steps, counts))
+    return Sample(1, round(time_s * 10), round(time_s * 84e6), 0, Positions(steps, counts))
 
 
 def test_angles_and_errors_stand_beside_the_bar(monkeypatch: pytest.MonkeyPatch) -> None:
     notes: list[Any] = []
-    with Live(planned(shipped_plan()), window=False) as live:
+    with Live(window=False) as live:
+        live.begin(encoded_motion.of_plan(shipped_plan()), FOLDER)
         monkeypatch.setattr(live, "_progress", lambda *shown: notes.append(shown))
-        live(sample(3.0, 0.9), 6.8)
+        live.sample(sample(3.0, 0.9), 6.8)
         monkeypatch.undo()
     time_s, whole_s, note = notes[0]
     assert (time_s, whole_s) == (3.0, 6.8)
@@ -44,8 +49,9 @@ def test_without_a_display_the_run_goes_on(capsys: pytest.CaptureFixture[str]) -
     import matplotlib as mpl
 
     mpl.use("agg")
-    with Live(planned(shipped_plan()), window=True) as live:
-        live(sample(1.0, 0.0), 6.8)
+    with Live(window=True) as live:
+        live.begin(encoded_motion.of_plan(shipped_plan()), FOLDER)
+        live.sample(sample(1.0, 0.0), 6.8)
     assert "no live plot: there is no display" in capsys.readouterr().err
 
 
@@ -78,9 +84,9 @@ def test_the_bar_never_wraps(
     columns: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("COLUMNS", str(columns))
-    monkeypatch.setattr(Progress, "_wanted", lambda self: True)
+    monkeypatch.setattr(ProgressBar, "_wanted", lambda self: True)
     monkeypatch.setattr("click._termui_impl.isatty", lambda stream: True)
-    with Progress("moving") as progress:
+    with ProgressBar("moving") as progress:
         for done in range(9):
             progress(done, 9, "12 s  " + "-123.4° (+0.12)  " * 6)
     lines = capsys.readouterr().err.replace("\x1b[?25l", "").replace("\x1b[?25h", "").split("\r")

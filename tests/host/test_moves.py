@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from armtempo.errors import InputError
-from armtempo.model import arm
+from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
 from armtempo.records import decode, encode
 
-ARM = arm.load_arm(arm.default_path())
+ARM = Arm.paper()
 START, END = np.array([0.0, -60.0, 40.0]), np.array([180.0, -38.0, -52.0])
 
 
@@ -47,8 +47,8 @@ def test_backwards_mirrors_time() -> None:
 def test_records_read_back() -> None:
     motion = point_to_point.straight("x", START, END, ARM)
     data = encode.motion_record(motion, ARM)
-    found = decode.trajectory(data, ARM, "x")
+    found = decode.trajectory(data, ARM.driven, "x")
     times = np.linspace(0.0, motion.duration_s, 101)
     np.testing.assert_allclose(found(times), motion(times), atol=1e-7)
     with pytest.raises(InputError, match="not a motion record"):
-        decode.trajectory(data[:-1], ARM, "x")
+        decode.trajectory(data[:-1], ARM.driven, "x")

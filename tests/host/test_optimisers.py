@@ -32,9 +32,16 @@ class Bowl:
         return 1.0 + np.square(points - CENTRE).sum(axis=1)
 
 
-def _search(algorithm: str, function: optimise.Function, seed: int = 7, **more: int) -> optimise.Result:
-    sizes = {"population": 11, "iterations": 40, **more}
-    return optimise.minimise(function, BOUNDS, np.random.default_rng(seed), algorithm=algorithm, **sizes)
+def _search(
+    algorithm: str,
+    function: optimise.Function,
+    seed: int = 7,
+    population: int = 11,
+    iterations: int = 40,
+    **parameters: float | str,
+) -> optimise.Result:
+    settings = optimise.Settings(algorithm, population, iterations, parameters)
+    return optimise.minimise(function, BOUNDS, np.random.default_rng(seed), settings)
 
 
 @pytest.mark.parametrize("algorithm", EVERY)
@@ -80,7 +87,11 @@ def test_a_seed_repeats_and_another_differs(algorithm: str) -> None:
 def test_progress_is_told_after_each_iteration(algorithm: str) -> None:
     told: list[tuple[int, int]] = []
     optimise.minimise(
-        Bowl(), BOUNDS, np.random.default_rng(1), 6, 5, algorithm, lambda done, of: told.append((done, of))
+        Bowl(),
+        BOUNDS,
+        np.random.default_rng(1),
+        optimise.Settings(algorithm, 6, 5),
+        lambda done, of: told.append((done, of)),
     )
     assert told == [(n, 5) for n in range(1, 6)]
 
@@ -115,20 +126,26 @@ def test_bears_with_nothing_but_infinity(algorithm: str) -> None:
 def test_a_variable_without_room_stays(algorithm: str) -> None:
     bounds = np.array([[0.0, 1.0], [0.7, 0.7]])
     found = optimise.minimise(
-        lambda points: points.sum(axis=1), bounds, np.random.default_rng(1), 8, 20, algorithm
+        lambda points: points.sum(axis=1),
+        bounds,
+        np.random.default_rng(1),
+        optimise.Settings(algorithm, 8, 20),
     )
     assert found.x[1] == 0.7
 
 
 @pytest.mark.parametrize("algorithm", EVERY)
 def test_unknown_and_unfit_parameters_are_refused(algorithm: str) -> None:
-    run = (Bowl(), BOUNDS, np.random.default_rng(1), 8, 2, algorithm)
+    def run(**parameters: object) -> None:
+        settings = optimise.Settings(algorithm, 8, 2, parameters)  # type: ignore[arg-type]
+        optimise.minimise(Bowl(), BOUNDS, np.random.default_rng(1), settings)
+
     with pytest.raises(InputError, match="wingspan"):
-        optimise.minimise(*run, wingspan=3.0)
+        run(wingspan=3.0)
     for name, parameter in optimise.parameters(algorithm).items():
         for value in ([1], True, "x", math.nan, -math.inf, 1e9, 10**400, None):
             with pytest.raises(InputError, match=rf"{name} = .* must be {re.escape(parameter.allowed)}"):
-                optimise.minimise(*run, **{name: value})  # type: ignore[arg-type]
+                run(**{name: value})
 
 
 @pytest.mark.parametrize("algorithm", EVERY)

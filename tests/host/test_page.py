@@ -9,7 +9,7 @@ import pytest
 from armtempo.kinematics import chain
 from armtempo.report import html_page, plots
 from armtempo.research.bench import result_plot
-from armtempo.research.bench.cases import Case, Run
+from armtempo.research.bench.cases import Case, Trial
 from armtempo.research.bench.result_table import rows
 from armtempo.runs import analysis
 
@@ -45,7 +45,7 @@ def figure(name: str) -> str:
     times = np.linspace(0.0, plan.trajectory.duration_s, 50)
     theory = np.stack([plan.trajectory(times, order) for order in range(3)])
     seen = analysis.Curves(times, theory[None], theory, 0.1 * np.abs(theory), theory, theory)
-    runs = [Run(Case("acs", 10, seed), (), 1, 1.0, ((0, 6.0 + seed),)) for seed in (1, 2)]
+    runs = [Trial(Case("acs", 10, seed), (), 1, 1.0, ((0, 6.0 + seed),)) for seed in (1, 2)]
     chains = chain.chains_mm(plan.arm, plan.via_deg)
     drawn = {
         "motion": lambda: plots.motion(plan.trajectory, limits, names),

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from armtempo.research.bench.cases import Case, Run
+from armtempo.research.bench.cases import Case, Trial
 from armtempo.research.bench.result_table import rows
 from armtempo.research.paper import motions, postures, printed, searches
 from armtempo.research.paper.claims import BETTER, DIFFERS, SAME, compared
@@ -53,7 +53,7 @@ def test_a_plan_that_is_slower_differs_and_says_why(made: motions.Plans) -> None
 
 @pytest.mark.parametrize(("best", "verdict"), [(6.034, SAME), (6.2, DIFFERS)])
 def test_table_4_is_judged_by_the_median(best: float, verdict: str) -> None:
-    runs = [Run(Case("acs", 10, seed), (), 1, 1.0, ((0, best + 0.001 * seed),)) for seed in (-1, 0, 1)]
+    runs = [Trial(Case("acs", 10, seed), (), 1, 1.0, ((0, best + 0.001 * seed),)) for seed in (-1, 0, 1)]
     (claim,) = searches.claims(rows(runs, 5))
     assert claim.verdict == verdict
     assert claim.printed == "6.034"

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from armtempo.errors import LinkError
 from armtempo.report import run_report
-from armtempo.research.bench.cases import Case, Run
+from armtempo.research.bench.cases import Case, Trial
 from armtempo.research.bench.result_table import Row, rows
 from armtempo.research.paper import experiment, motions, sheet
 from armtempo.research.paper.claims import DIFFERS, SAME, Claim
@@ -40,7 +40,9 @@ def series(folder: Path, scatter_deg: dict[str, float]) -> list[Series]:
 
 def searched() -> list[Row]:
     """Two searches of two seeds."""
-    return rows([Run(Case("acs", n, seed), (), 1, 1.0, ((0, 6.0),)) for n in (10, 50) for seed in (1, 2)], 5)
+    return rows(
+        [Trial(Case("acs", n, seed), (), 1, 1.0, ((0, 6.0),)) for n in (10, 50) for seed in (1, 2)], 5
+    )
 
 
 @pytest.mark.parametrize(("quintic", "cubic", "verdict"), [(0.02, 0.2, SAME), (0.2, 0.02, DIFFERS)])

@@ -8,8 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from armtempo.errors import InputError, PlanError
-from armtempo.model import arm as arms
-from armtempo.model import job as jobs
 from armtempo.model.arm import Arm, Limits
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
@@ -19,8 +17,8 @@ from armtempo_shared.limits import MAX_STEP_RATE
 from tests.host import problems
 from tests.host.test_extremes import dense
 
-ARM = arms.load_arm(arms.default_path())
-JOB = jobs.load_job(jobs.default_path(), ARM)
+ARM = Arm.paper()
+JOB = Job.paper(ARM)
 PROBLEMS = problems.load()
 
 

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from armtempo.errors import InputError, RunFolderError
-from armtempo.link.messages import Sample, Stand
-from armtempo.model import arm
+from armtempo.link.board_messages import Positions, Sample
+from armtempo.model.arm import Arm
 from armtempo.runs import reader, run_folder
 
-SCALES = run_folder.scales(arm.load_arm(arm.default_path()))
+SCALES = run_folder.scales(Arm.paper())
 
 
 def sample(index: int) -> Sample:
-    return Sample(1, index, index * 8_400_000, 0, Stand((index, -index, 0), (3 * index, -3 * index, 7)))
+    return Sample(1, index, index * 8_400_000, 0, Positions((index, -index, 0), (3 * index, -3 * index, 7)))
 
 
 def folder(path: Path) -> run_folder.RunFolder:
@@ -30,7 +30,7 @@ def test_whole_run(tmp_path: Path) -> None:
         with run.begin_repetition() as file:
             for index in range(5):
                 file.append(sample(index))
-            file.repetition.end(run_folder.COMPLETE, "", 33_600_000, sample(4).stand, ())
+            file.repetition.end(run_folder.COMPLETE, "", 33_600_000, sample(4).positions, ())
     found = reader.load(run.path)
     assert [(part.file, part.state) for part in found.repetitions] == [
         ("samples-01.csv", "complete"),

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from armtempo.model import arm as arms
-from armtempo.model import job as jobs
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.planning import path_deviation, planner
 from armtempo.report import text_summary
 
-ARM = arms.load_arm(arms.default_path())
-JOB = replace(jobs.load_job(jobs.default_path(), ARM), iterations=120)
+ARM = Arm.paper()
+JOB = replace(Job.paper(ARM), iterations=120)
 
 
 @pytest.fixture(scope="module")

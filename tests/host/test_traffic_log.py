@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 from armtempo.errors import InputError, LinkError
-from armtempo.link import Board, traffic
-from armtempo.link.replay import ReplayTransport
+from armtempo.link import Client, traffic
 from armtempo.link.session import Session
 from armtempo_shared import wire
 
 from tests.inprocess import Pipe
+from tests.replay_transport import ReplayTransport
 
 
 def test_recorded_traffic_replays(tmp_path: Path) -> None:
@@ -19,9 +19,9 @@ def test_recorded_traffic_replays(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
     with traffic.LogFile(path) as log:
         logged = traffic.LoggedTransport(pipe, log)
-        seen = [Board(Session(logged, pipe.clock), 1).hello()]
+        seen = [Client(Session(logged, pipe.clock), 1).hello()]
     path.write_text(path.read_text(encoding="utf-8") + "0.1\t<\tcut", encoding="utf-8")
-    replayed = Board(Session(ReplayTransport(traffic.read_log(path))), 1)
+    replayed = Client(Session(ReplayTransport(traffic.read_log(path))), 1)
     assert replayed.hello() == seen[0]
     with pytest.raises(LinkError, match="replay"):
         replayed.status()
@@ -54,7 +54,7 @@ def test_a_log_on_a_full_disk_is_cut_short_and_the_traffic_goes_on(tmp_path: Pat
         return
     pipe = Pipe(tmp_path / "flash")
     with pytest.raises(InputError, match="cut short: No space left"), traffic.LogFile(full) as log:  # noqa: PT012
-        board = Board(Session(traffic.LoggedTransport(pipe, log), pipe.clock), 1)
+        board = Client(Session(traffic.LoggedTransport(pipe, log), pipe.clock), 1)
         board.hello()
         board.status()
     with pytest.raises(InputError, match="cannot be written"):

@@ -11,17 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 from armtempo.errors import InputError
-from armtempo.model import arm as arms
-from armtempo.model import job as jobs
 from armtempo.model import trajectory_file
-from armtempo.model.job import Pose
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job, Pose
 from armtempo.model.plan import Plan
 from armtempo.planning import planner
 
-ARM = arms.load_arm(arms.default_path())
-JOB = replace(
-    jobs.load_job(jobs.default_path(), ARM), iterations=20, parameters={"a": 0.5, "variant": "paper"}
-)
+ARM = Arm.paper()
+JOB = replace(Job.paper(ARM), iterations=20, parameters={"a": 0.5, "variant": "paper"})
 
 
 @pytest.fixture(scope="module")

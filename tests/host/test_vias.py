@@ -10,16 +10,15 @@ import pytest
 from armtempo.cli import main
 from armtempo.errors import InputError, PlanError
 from armtempo.kinematics import Geometry, forward
-from armtempo.model import job as jobs
 from armtempo.model import trajectory_file
-from armtempo.model.arm import Arm, default_path, load_arm
+from armtempo.model.arm import Arm
 from armtempo.model.job import Job, Pose
 from armtempo.planning import planner, via_points
 from click.testing import CliRunner
 
-ARM = load_arm(default_path())
+ARM = Arm.paper()
 GEOMETRY = Geometry.of(ARM)
-JOB = jobs.load_job(jobs.default_path(), ARM)
+JOB = Job.paper(ARM)
 ALL_DRIVEN = replace(
     ARM,
     joints=tuple(

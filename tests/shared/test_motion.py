@@ -17,7 +17,7 @@ def packed(
     rng = random.Random(seed)
     angles = [[rng.getrandbits(63) - 2**62 for _ in range(segments + degree)] for _ in range(joints)]
     times = [[rng.getrandbits(60) for _ in range(segments * refine + degree)] for _ in range(axes)]
-    return motion.pack(degree, angles, times, segments, refine, 4711, ARM_CRC)
+    return motion.pack(degree, angles, times, refine, 4711, ARM_CRC)
 
 
 @pytest.mark.parametrize(("joints", "axes"), [(1, 1), (3, 3), (6, 6), (3, 1), (6, 1)])

@@ -5,13 +5,14 @@ from __future__ import annotations
 import subprocess
 from pathlib import Path
 
-from armtempo.model import arm, trajectory_file
+from armtempo.model import trajectory_file
+from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import planner
 
 from tests.system import commandline
 
-ARM = arm.load_arm(arm.default_path())
+ARM = Arm.paper()
 TIMEOUT_S = commandline.SLOW_S
 
 

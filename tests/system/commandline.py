@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-COMMAND = (sys.executable, "-c", "from armtempo.start import main; main()")
+COMMAND = (sys.executable, "-c", "from armtempo.__main__ import main; main()")
 SLOW_S = 120.0
 """Nothing here takes longer, on however loaded a machine."""
 

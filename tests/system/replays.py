@@ -7,16 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from armtempo import pipeline, simulator
-from armtempo.link import open_board
-from armtempo.model import arm as arms
-from armtempo.model import job as jobs
+from armtempo import simulator
 from armtempo.model import trajectory_file
-from armtempo.model.arm import Joint
+from armtempo.model.arm import Arm, DrivenJoint
+from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.planning import planner
-from armtempo.robot import operate
-from armtempo.robot.stop_request import StopRequest
+from armtempo.robot.board import connect
 from armtempo.runs import reader
 from armtempo.simulator import edgelog
 from armtempo.splines.trajectory import JointSpline
@@ -40,15 +37,15 @@ class Replay:
     plan: Plan
     pins: dict[str, edgelog.Edges]
     """Per pin its edges since power-up, in ticks of the motion clock."""
-    samples: reader.Samples
+    samples: reader.RepetitionData
     repetition: dict[str, Any]
     """What run.json says of it."""
 
 
 def plan_file(job: str, folder: Path) -> Path:
     """Plan one of ``JOBS``; gives the trajectory file."""
-    arm = arms.load_arm(arms.default_path())
-    plan = planner.plan(arm, replace(jobs.load_job(jobs.default_path(), arm), **JOBS[job]))
+    arm = Arm.paper()
+    plan = planner.plan(arm, replace(Job.paper(arm), **JOBS[job]))
     path = folder / f"{job}.json"
     trajectory_file.save(refined(plan) if job == "refined" else plan, path)
     return path
@@ -69,35 +66,30 @@ def refined(plan: Plan) -> Plan:
     return replace(plan, trajectory=replace(plan.trajectory, joints=slowed))
 
 
-def _excess(joint: JointSpline, driven: Joint) -> float:
+def _excess(joint: JointSpline, driven: DrivenJoint) -> float:
     """By how much the joint must be slowed to keep its limits."""
     instants = np.linspace(0.0, joint.duration_s, 5000)
-    assert driven.limits is not None
-    limits = (driven.limits.speed_deg_s, driven.limits.acceleration_deg_s2, driven.limits.jerk_deg_s3)
     return max(
         float(np.max(np.abs(joint(instants, order)) / limit) ** (1 / order))
-        for order, limit in enumerate(limits, start=1)
+        for order, limit in enumerate(driven.limits.values, start=1)
     )
 
 
 def replay(trajectory: Path, interpreter: str, folder: Path) -> Replay:
     """Replay a trajectory file on a virtual board under the interpreter of that name."""
-    motion = pipeline.from_file(trajectory, None)
+    plan = Plan.load(trajectory)
     log = folder / "edges.bin"
     starter = interpreters.starter(interpreter)
     with (
-        simulator.launch(edge_log=log, interpreter=starter) as process,  # without an arm: ideal motors
-        open_board(process.port) as board,
-        StopRequest() as stop,
+        simulator.launch(
+            simulator.LaunchOptions(edge_log=log, interpreter=starter)
+        ) as process,  # without an arm: ideal motors
+        connect(process.port) as board,
     ):
-        operate.configure(board, motion.arm, replace=True)
-        pipeline.prepare(board, "sim", motion, stop)
-        run = pipeline.new_run(folder, motion, "sim", board)
-        assert len(list(pipeline.repeat(board, motion, run, 1, stop))) == 1
-    recorded = reader.load(run.path)
-    assert recorded.trajectory_path is not None
+        board.home(plan.arm)
+        run = board.run(plan, out=folder)
+    assert run.plan is not None
     (session,) = edgelog.read(log)
     (zero,) = session.starts  # the arm stood at the start already
     pins = {pin: (ticks - zero, levels) for pin, (ticks, levels) in session.pins.items()}
-    plan = trajectory_file.load(recorded.trajectory_path)
-    return Replay(plan, pins, recorded.repetitions[0], recorded.meta["repetitions"][0])
+    return Replay(run.plan, pins, run.repetitions[0], run.meta["repetitions"][0])

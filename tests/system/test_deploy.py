@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from armtempo.deploy import deploy, firmware, package, remote
 from armtempo.errors import LinkError
-from armtempo.simulator import VirtualBoard, edgelog, launch
+from armtempo.simulator import LaunchOptions, VirtualBoard, edgelog, launch
 
 from tests import interpreters
 from tests.system.boards import armtempo, small_plan
@@ -23,7 +23,11 @@ INTERPRETERS = [name for name in interpreters.AVAILABLE if name != "micropython-
 def board(name: str, flash: Path, power_cut_at: int = 0) -> VirtualBoard:
     blocks = SOURCES_BLOCKS if name == "cpython" else None
     starter = interpreters.starter(name)
-    return launch(flash, interpreter=starter, deployed=True, flash_blocks=blocks, power_cut_at=power_cut_at)
+    return launch(
+        LaunchOptions(
+            flash, interpreter=starter, deployed=True, flash_blocks=blocks, power_cut_at=power_cut_at
+        )
+    )
 
 
 def steps_of_a_run(folder: Path, deployed: bool) -> dict[str, list[int]]:
@@ -31,7 +35,9 @@ def steps_of_a_run(folder: Path, deployed: bool) -> dict[str, list[int]]:
     folder.mkdir()
     log = folder / "edges"
     starter = interpreters.starter(INTERPRETERS[-1])
-    with launch(folder / "flash", interpreter=starter, deployed=deployed, edge_log=log) as found:
+    with launch(
+        LaunchOptions(folder / "flash", interpreter=starter, deployed=deployed, edge_log=log)
+    ) as found:
         if deployed:
             armtempo("deploy", "--port", found.port, cwd=folder)
         armtempo("home", "--port", found.port, cwd=folder)
@@ -112,7 +118,9 @@ def test_program_in_the_firmware_needs_only_start_files(tmp_path: Path) -> None:
     old.parent.mkdir(parents=True)
     old.write_text("an older one\n")
     starter = interpreters.starter(INTERPRETERS[-1])
-    with launch(flash, interpreter=starter, deployed=True, flash_blocks=SOURCES_BLOCKS) as found:
+    with launch(
+        LaunchOptions(flash, interpreter=starter, deployed=True, flash_blocks=SOURCES_BLOCKS)
+    ) as found:
         port = found.port
         assert "part of the board's firmware" in armtempo("deploy", "--port", port, cwd=tmp_path)
         assert not old.exists()

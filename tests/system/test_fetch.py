@@ -8,7 +8,7 @@ import numpy as np
 from armtempo.link import open_board
 from armtempo.model import trajectory_file
 from armtempo.runs import reader
-from armtempo.simulator import Fault, launch
+from armtempo.simulator import InjectedFault, LaunchOptions, launch
 
 from tests.system import boards, commandline
 from tests.system.boards import armtempo
@@ -17,8 +17,8 @@ from tests.system.boards import armtempo
 def test_button_then_fetch(tmp_path: Path) -> None:
     """The press comes 2.5 s after a first motion's time 0: long after it."""
     file = boards.small_plan(tmp_path / "small.json")
-    press = Fault("input", at_s=2.5, name="A0", level=1)
-    with launch(faults=[press]) as process:
+    press = InjectedFault("input", at_s=2.5, name="A0", level=1)
+    with launch(LaunchOptions(faults=[press])) as process:
         port = process.port
 
         def on_board(*arguments: str | Path, code: int = 0) -> str:

@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from armtempo.errors import BoardError, InputError, LinkError
-from armtempo.link import Board, open_board
-from armtempo.model import arm
-from armtempo.robot import homing, operate
+from armtempo.link import Client, open_board
+from armtempo.model import arm_file
+from armtempo.model.arm import Arm
+from armtempo.robot import arm_state, goto, homing
 from armtempo.robot.stop_request import StopRequest
-from armtempo.simulator import launch
+from armtempo.simulator import LaunchOptions, launch
 
-PAPER = arm.load_arm(arm.default_path())
+PAPER = Arm.paper()
 SWITCH = """
 [joint.switches]
 low = 1
@@ -24,20 +25,20 @@ low_deg = {angle}
 """
 
 
-def switched_arm(folder: Path, angle: float = -9.0) -> arm.Arm:
+def switched_arm(folder: Path, angle: float = -9.0) -> Arm:
     """The paper's arm with a switch at the low end of joint 1."""
-    text = arm.default_path().read_text()
+    text = arm_file.default_path().read_text()
     parts = text.split("[[joint]]")
     parts[1] += SWITCH.format(angle=angle)
     (folder / "arm.toml").write_text("[[joint]]".join(parts))
-    return arm.load_arm(folder / "arm.toml")
+    return Arm.load(folder / "arm.toml")
 
 
 @contextmanager
-def unhomed(found: arm.Arm, real: arm.Arm | None = None) -> Iterator[tuple[Board, StopRequest]]:
+def unhomed(found: Arm, real: Arm | None = None) -> Iterator[tuple[Client, StopRequest]]:
     """A virtual board set up for an arm; ``real``: what its motors move instead."""
-    with launch(arm=real or found) as virtual, open_board(virtual.port) as board:
-        operate.configure(board, found, replace=True)
+    with launch(LaunchOptions(arm=real or found)) as virtual, open_board(virtual.port) as board:
+        arm_state.configure(board, found, replace=True)
         with StopRequest() as stop:
             yield board, stop
 
@@ -46,9 +47,9 @@ def unhomed(found: arm.Arm, real: arm.Arm | None = None) -> Iterator[tuple[Board
 def test_homing_run_finds_where_the_arm_stands(tmp_path: Path, angle: float) -> None:
     found = switched_arm(tmp_path, angle)
     with unhomed(found) as (board, stop):
-        operate.home(board, found, np.array([30.0, -60.0, 40.0]))  # wrong: the arm stands at 0
+        arm_state.home(board, found, np.array([30.0, -60.0, 40.0]))  # wrong: the arm stands at 0
         homing.home_to_switches(board, found, stop)
-        stands_deg = operate.posture_deg(board, found)
+        stands_deg = arm_state.posture_deg(board, found)
     back_deg = homing.BACK_DEG + max(0.0, -10.0 - angle)
     assert stands_deg[0] == pytest.approx(angle + back_deg, abs=0.03)
     assert stands_deg[1:] == pytest.approx([-60.0, 40.0], abs=0.01)
@@ -64,12 +65,12 @@ def test_switch_with_a_broken_wire(tmp_path: Path) -> None:
 def test_switch_that_trips_in_a_motion_is_a_fault(tmp_path: Path) -> None:
     found = switched_arm(tmp_path)
     with unhomed(found) as (board, stop):
-        operate.home(board, found, np.array([20.0, -60.0, 40.0]))  # wrong by 20 degrees
+        arm_state.home(board, found, np.array([20.0, -60.0, 40.0]))  # wrong by 20 degrees
         with pytest.raises(BoardError, match="limit switch"):
-            operate.go_to(board, found, np.array([0.0, -60.0, 40.0]), stop)
+            goto.go_to(board, found, np.array([0.0, -60.0, 40.0]), stop)
 
 
 def test_arm_without_switches() -> None:
-    found = arm.load_arm(arm.default_path())
+    found = Arm.paper()
     with unhomed(found) as (board, stop), pytest.raises(InputError, match="no limit switch"):
         homing.home_to_switches(board, PAPER, stop)

@@ -10,7 +10,7 @@ import pytest
 from armtempo.link import open_board
 from armtempo.model import trajectory_file
 from armtempo.runs import reader, run_folder
-from armtempo.simulator import launch
+from armtempo.simulator import LaunchOptions, launch
 
 from tests.system.boards import TIMEOUT_S, armtempo, small_plan, start
 
@@ -18,7 +18,7 @@ from tests.system.boards import TIMEOUT_S, armtempo, small_plan, start
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_interrupted_run(tmp_path: Path, number: signal.Signals) -> None:
     file = small_plan(tmp_path / "small.json", (90.0, -75.0, 50.0))
-    with launch(virtual_time=False) as board:
+    with launch(LaunchOptions(virtual_time=False)) as board:
         armtempo("home", "--port", board.port, cwd=tmp_path)
         process = start("run", file, "--port", board.port, cwd=tmp_path)
         samples = tmp_path / "runs" / "small-001" / "samples-01.csv"
@@ -36,12 +36,12 @@ def test_interrupted_run(tmp_path: Path, number: signal.Signals) -> None:
     assert repetition["state"] == run_folder.INTERRUPTED
     assert len(run.repetitions[0].index) == repetition["samples"] >= 3
     assert repetition["duration_s"] < trajectory_file.load(file).trajectory.duration_s - 0.1
-    assert tuple(repetition["commanded_steps"]) == status.stand.commanded_steps
+    assert tuple(repetition["commanded_steps"]) == status.positions.commanded_steps
 
 
 def test_killed_host_leaves_a_readable_folder_and_a_board_to_talk_to(tmp_path: Path) -> None:
     file = small_plan(tmp_path / "small.json")
-    with launch(virtual_time=False) as board:
+    with launch(LaunchOptions(virtual_time=False)) as board:
         armtempo("home", "--port", board.port, cwd=tmp_path)
         process = start("run", file, "--port", board.port, cwd=tmp_path)
         _wait_for_lines(tmp_path / "runs" / "small-001" / "samples-01.csv", 4)

@@ -9,10 +9,10 @@ from pathlib import Path
 
 from armtempo import simulator
 from armtempo.link import open_board
-from armtempo.model import arm as arms
-from armtempo.robot import operate
+from armtempo.model.arm import Arm
+from armtempo.robot import arm_state
 from armtempo.runs import reader
-from armtempo.simulator import Fault
+from armtempo.simulator import InjectedFault
 
 from tests.system import commandline
 
@@ -21,13 +21,13 @@ ENDS_WITHIN_S = 60.0
 
 
 @contextmanager
-def board_at_home(*faults: Fault) -> Iterator[simulator.VirtualBoard]:
+def board_at_home(*faults: InjectedFault) -> Iterator[simulator.VirtualBoard]:
     """A virtual board in real time whose arm stands where the shipped motion begins."""
-    arm = arms.load_arm(arms.default_path())
-    with simulator.launch(arm=arm, virtual_time=False, faults=faults) as process:
+    arm = Arm.paper()
+    with simulator.launch(simulator.LaunchOptions(arm=arm, virtual_time=False, faults=faults)) as process:
         with open_board(process.port) as board:
-            operate.configure(board, arm, replace=True)
-            operate.home(board, arm)
+            arm_state.configure(board, arm, replace=True)
+            arm_state.home(board, arm)
         yield process
 
 
@@ -39,7 +39,7 @@ def samples_in(folder: Path) -> int:
 def test_sigterm_ends_a_run_whose_board_has_fallen_silent(
     plan_file: Callable[[str], Path], tmp_path: Path
 ) -> None:
-    with board_at_home(Fault("silence", at_s=0.5, ms=1e9)) as process:
+    with board_at_home(InjectedFault("silence", at_s=0.5, ms=1e9)) as process:
         command = commandline.start(
             "run", plan_file("shipped"), "--port", process.port, "--out", tmp_path, folder=tmp_path
         )

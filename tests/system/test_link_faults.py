@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from armtempo.runs import reader, run_folder
-from armtempo.simulator import launch
+from armtempo.simulator import LaunchOptions, launch
 
 from tests.inprocess import Noise, clean
 from tests.system.boards import TIMEOUT_S, armtempo, small_plan, start
@@ -31,7 +31,10 @@ def test_run_over_a_bad_cable_is_complete(tmp_path: Path, kind: str) -> None:
 
 def test_cable_pulled_during_a_run_and_put_back(tmp_path: Path) -> None:
     file = small_plan(tmp_path / "small.json", (90.0, -75.0, 50.0))
-    with launch(virtual_time=False) as board, Relay(board.port, tmp_path / "port", clean, clean) as relay:
+    with (
+        launch(LaunchOptions(virtual_time=False)) as board,
+        Relay(board.port, tmp_path / "port", clean, clean) as relay,
+    ):
         armtempo("home", "--port", relay.port, cwd=tmp_path)
         process = start("run", file, "--port", relay.port, cwd=tmp_path)
         path = tmp_path / "runs" / "small-001" / "samples-01.csv"
@@ -54,7 +57,7 @@ def test_cable_pulled_during_a_run_and_put_back(tmp_path: Path) -> None:
 def test_cable_put_into_another_board_during_a_run(tmp_path: Path) -> None:
     file = small_plan(tmp_path / "small.json", (90.0, -75.0, 50.0))
     path = tmp_path / "runs" / "small-001" / "samples-01.csv"
-    with launch(virtual_time=False) as board, launch(seed=1) as other:
+    with launch(LaunchOptions(virtual_time=False)) as board, launch(LaunchOptions(seed=1)) as other:
         armtempo("home", "--port", other.port, cwd=tmp_path)
         with Relay(board.port, tmp_path / "port", clean, clean) as relay:
             armtempo("home", "--port", relay.port, cwd=tmp_path)
@@ -69,7 +72,10 @@ def test_cable_put_into_another_board_during_a_run(tmp_path: Path) -> None:
 
 def test_interrupt_while_the_cable_is_out(tmp_path: Path) -> None:
     file = small_plan(tmp_path / "small.json", (90.0, -75.0, 50.0))
-    with launch(virtual_time=False) as board, Relay(board.port, tmp_path / "port", clean, clean) as relay:
+    with (
+        launch(LaunchOptions(virtual_time=False)) as board,
+        Relay(board.port, tmp_path / "port", clean, clean) as relay,
+    ):
         armtempo("home", "--port", relay.port, cwd=tmp_path)
         process = start("run", file, "--port", relay.port, cwd=tmp_path)
         path = tmp_path / "runs" / "small-001" / "samples-01.csv"

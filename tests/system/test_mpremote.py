@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from armtempo.errors import LinkError
-from armtempo.link import Board, open_board
+from armtempo.link import Client, open_board
+from armtempo.link.client import Started
 from armtempo.planning import point_to_point
-from armtempo.records import encode
-from armtempo.robot import operate
-from armtempo.simulator import edgelog, launch
+from armtempo.records import encode, encoded_motion
+from armtempo.robot import arm_state
+from armtempo.simulator import LaunchOptions, edgelog, launch
 from mpremote.transport import TransportError
 from mpremote.transport_serial import SerialTransport
 
@@ -22,7 +23,7 @@ from tests import interpreters
 from tests.system import boards, commandline
 
 INTERPRETER = interpreters.starter("micropython" if "micropython" in interpreters.AVAILABLE else "cpython")
-HOME_DEG = operate.home_deg(boards.ARM)
+HOME_DEG = np.array(boards.ARM.home_deg)
 AWAY_DEG = HOME_DEG + np.array([40.0, -10.0, 15.0])
 REPLAY = "import armtempo_board; armtempo_board.replay('go')"
 
@@ -34,7 +35,9 @@ def flash(tmp_path: Path) -> Path:
     folder.mkdir(parents=True)
     (folder / "arm.ata").write_bytes(encode.arm_record(boards.ARM))
     (folder / "go.atm").write_bytes(
-        operate.motion_data(point_to_point.straight("go", HOME_DEG, AWAY_DEG, boards.ARM), boards.ARM)
+        encoded_motion.of_trajectory(
+            point_to_point.straight("go", HOME_DEG, AWAY_DEG, boards.ARM), boards.ARM
+        ).data
     )
     return tmp_path / "flash"
 
@@ -50,8 +53,7 @@ def mpremote(port: str, *arguments: str) -> str:
 def steps(angles_deg: np.ndarray) -> list[int]:
     """Of postures, degrees to steps."""
     return [
-        round(angle * encode.steps_per_deg(joint))
-        for angle, joint in zip(angles_deg, boards.ARM.driven, strict=True)
+        round(angle * joint.steps_per_deg) for angle, joint in zip(angles_deg, boards.ARM.driven, strict=True)
     ]
 
 
@@ -67,9 +69,9 @@ def state(port: str) -> str:
 def test_replay_from_the_prompt(flash: Path, tmp_path: Path) -> None:
     """A soft reset comes first, so the posture is taken for the start; ``resume`` does without, and knows it."""
     log = tmp_path / "edges"
-    with launch(flash, interpreter=INTERPRETER, edge_log=log) as process:
+    with launch(LaunchOptions(flash, interpreter=INTERPRETER, edge_log=log)) as process:
         with open_board(process.port) as board:
-            operate.home(board, boards.ARM)
+            arm_state.home(board, boards.ARM)
         said = mpremote(process.port, "resume", "exec", REPLAY)
         assert said.splitlines() == [f"done at steps {steps(AWAY_DEG)}"]
         assert mpremote(process.port, "resume", "exec", REPLAY).startswith("refused: wrong_start joint 1")
@@ -86,7 +88,7 @@ def test_replay_from_the_prompt(flash: Path, tmp_path: Path) -> None:
 
 
 def test_files_while_the_program_runs(flash: Path) -> None:
-    with launch(flash, interpreter=INTERPRETER) as process:
+    with launch(LaunchOptions(flash, interpreter=INTERPRETER)) as process:
         assert state(process.port) == "unhomed"
         assert "go.atm" in mpremote(process.port, "ls", "armtempo")
         assert mpremote(process.port, "exec", "print(6 * 7)") == "42\n"
@@ -97,31 +99,31 @@ def test_files_while_the_program_runs(flash: Path) -> None:
 
 def test_while_it_moves_nobody_gets_in(flash: Path) -> None:
     """mpremote gives up; the motion comes to its end, where it should; then mpremote is let in."""
-    with launch(flash, interpreter=INTERPRETER, virtual_time=False) as process:
+    with launch(LaunchOptions(flash, interpreter=INTERPRETER, virtual_time=False)) as process:
         with open_board(process.port) as board:
-            operate.home(board, boards.ARM)
-            run, duration_s = _start(board)
+            arm_state.home(board, boards.ARM)
+            started = _start(board)
             begun_s = time.monotonic()
         port = SerialTransport(
             process.port, timeout=0.05
         )  # a pseudo terminal: without one its read waits for ever
         with pytest.raises(TransportError, match="could not enter raw repl"):
-            port.enter_raw_repl(timeout_overall=duration_s / 2)
+            port.enter_raw_repl(timeout_overall=started.duration_s / 2)
         port.close()
         with open_board(process.port) as board:
-            still_moving = time.monotonic() - begun_s < duration_s - 0.2
+            still_moving = time.monotonic() - begun_s < started.duration_s - 0.2
             assert board.status().moving or not still_moving
             commandline.wait_for(lambda: not board.status().moving, "the end of the motion")
             status = board.status()
-        assert (status.state, status.run, list(status.stand.commanded_steps)) == (
+        assert (status.state, status.run, list(status.positions.commanded_steps)) == (
             "idle",
-            run,
+            started.run,
             steps(AWAY_DEG),
         )
         assert mpremote(process.port, "resume", "exec", "print('in')") == "in\n"
 
 
-def _start(board: Board) -> tuple[int, float]:
+def _start(board: Client) -> Started:
     stored = board.find("go")
     assert stored is not None
     return board.start("go", stored.crc)

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from armtempo.simulator import VirtualBoard, launch
+from armtempo.simulator import LaunchOptions, VirtualBoard, launch
 from armtempo.simulator.launcher import _DEPLOYED_BLOCKS
 
 from tests import interpreters
@@ -83,7 +83,9 @@ class Bench:
         if INTERPRETER == "cpython":
             self.hardware.setdefault("flash_blocks", 600)
         starter = interpreters.starter(INTERPRETER)
-        self.board = launch(self.flash, interpreter=starter, deployed=True, **{**self.hardware, **once})
+        self.board = launch(
+            LaunchOptions(self.flash, interpreter=starter, deployed=True, **{**self.hardware, **once})
+        )
 
     def off(self) -> None:
         """Take the power away."""

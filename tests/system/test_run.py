@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.model import arm
+from armtempo.model import arm_file
 from armtempo.runs import reader
-from armtempo.simulator import launch
+from armtempo.simulator import LaunchOptions, launch
 
 from tests.system import commandline
 from tests.system.boards import armtempo, small_plan
@@ -16,7 +16,7 @@ from tests.system.boards import armtempo, small_plan
 
 def test_board_on_a_port(tmp_path: Path) -> None:
     file = small_plan(tmp_path / "small.json")
-    with launch(tmp_path / "flash") as board:
+    with launch(LaunchOptions(tmp_path / "flash")) as board:
 
         def on_board(*arguments: str | Path, code: int = 0) -> str:
             return armtempo(*arguments, "--port", board.port, cwd=tmp_path, code=code)
@@ -34,7 +34,7 @@ def test_board_on_a_port(tmp_path: Path) -> None:
     found = reader.load(tmp_path / "runs" / "small-001")
     first, second = found.repetitions
     np.testing.assert_array_equal(first.commanded_steps, second.commanded_steps)
-    with launch(tmp_path / "flash") as board:
+    with launch(LaunchOptions(tmp_path / "flash")) as board:
         assert "small " in armtempo("list", "--port", board.port, cwd=tmp_path)
         assert "position unknown" in armtempo("status", "--port", board.port, cwd=tmp_path)
 
@@ -46,7 +46,7 @@ def test_stored_motion_keeps_its_place_in_a_sim_folder(tmp_path: Path) -> None:
 
 
 def test_board_set_up_for_another_arm(tmp_path: Path) -> None:
-    text = arm.default_path().read_text().replace("microsteps = 8", "microsteps = 16")
+    text = arm_file.default_path().read_text().replace("microsteps = 8", "microsteps = 16")
     (tmp_path / "other.toml").write_text(text)
     armtempo("home", "--arm", "other.toml", "--port", "sim:flash", cwd=tmp_path)
     assert "--arm" in armtempo("home", "--port", "sim:flash", cwd=tmp_path, code=1)
@@ -63,7 +63,7 @@ def test_live_says_where_there_is_no_display(tmp_path: Path) -> None:
 
 def test_fault_is_named_in_terminal_run_folder_and_report(tmp_path: Path) -> None:
     """A joint far too heavy for its motor: it loses steps, and the encoder's watch ends the run."""
-    heavy = arm.default_path().read_text().replace("\ninertia_kg_m2 = 0.15", "\ninertia_kg_m2 = 6.0")
+    heavy = arm_file.default_path().read_text().replace("\ninertia_kg_m2 = 0.15", "\ninertia_kg_m2 = 6.0")
     (tmp_path / "heavy.toml").write_text(heavy)
     job = 'name = "throw"\nvia_deg = [[0.0, -60.0, 40.0], [30.0, -60.0, 40.0]]\niterations = 20\n'
     (tmp_path / "job.toml").write_text(job)

@@ -13,11 +13,11 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
-from armtempo.robot.stop_request import raised_by_signals
+from armtempo.cli.interrupts import raised_by_signals
 
 from tests.interpreters import ROOT
 
-COMMAND = (sys.executable, "-X", "importtime", "-c", "from armtempo.start import main; main()", "plan")
+COMMAND = (sys.executable, "-X", "importtime", "-c", "from armtempo.__main__ import main; main()", "plan")
 SHORT = ("--iterations", "1", "--population", "4")
 ENDLESS = ("--iterations", "1000000")
 MOMENTS = 8
@@ -27,7 +27,7 @@ SEED = 20266
 class Watched:
     """The command with ``options``, run to its end; ``at(process)`` is called when it has imported ``after`` modules.
 
-    They are counted from the one that follows ``armtempo.start``: only then the command surely minds the signal.
+    They are counted from the one that follows ``armtempo.__main__``: only then the command surely minds the signal.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class Watched:
                 if not line.startswith("import time:"):
                     self.errors += line
                     continue
-                begun = "armtempo.start" in self.first
+                begun = "armtempo.__main__" in self.first
                 (self.imported if begun else self.first).append(line.rsplit("|", 1)[1].strip())
                 if begun and len(self.imported) == after:
                     at(process)
@@ -78,11 +78,12 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Watched:
 
 def test_the_installed_command_begins_there() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    assert project["scripts"] == {"armtempo": "armtempo.start:main"}
+    assert project["scripts"] == {"armtempo": "armtempo.__main__:main"}
 
 
 def test_little_is_imported_before_an_interrupt_is_minded(whole: Watched) -> None:
-    assert [name for name in whole.first if name.startswith("armtempo")] == ["armtempo", "armtempo.start"]
+    ours = [name for name in whole.first if name.startswith("armtempo")]
+    assert ours == ["armtempo", "armtempo.errors", "armtempo.__main__"]
     assert {"click", "numpy", "armtempo.planning.planner"} <= set(whole.imported)
 
 

@@ -13,19 +13,19 @@ import numpy as np
 import pytest
 from armtempo.errors import BoardError
 from armtempo.link import open_board, traffic
-from armtempo.link.messages import Done, Event, Sample
-from armtempo.link.replay import ReplayTransport
+from armtempo.link.board_messages import Done, Event, Sample
 from armtempo.link.session import Session
 from armtempo.link.traffic import FROM_BOARD, TO_BOARD, Chunk
 from armtempo.link.transport import SerialTransport
 from armtempo.planning import point_to_point
 from armtempo.records import encode
-from armtempo.robot import operate
+from armtempo.robot import arm_state, stored_motion
 from armtempo.robot.stop_request import StopRequest
-from armtempo.simulator import launch
+from armtempo.simulator import LaunchOptions, launch
 from armtempo_shared import limits, wire
 
 from tests import interpreters
+from tests.replay_transport import ReplayTransport
 from tests.system import boards
 
 AWAY_DEG = np.array([20.0, -10.0, 15.0])
@@ -61,23 +61,23 @@ class Recording:
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     """Greeting, arm, home, upload, a refusal, a run, status, the store's commands; as ``--log-traffic`` writes it."""
     made = Recording(tmp_path_factory.mktemp("traffic") / "traffic.log")
-    home_deg = operate.home_deg(boards.ARM)
+    home_deg = np.array(boards.ARM.home_deg)
     data = encode.motion_record(
         point_to_point.straight("go", home_deg, home_deg + AWAY_DEG, boards.ARM), boards.ARM
     )
     starter = interpreters.starter(INTERPRETERS[-1])
-    with launch(interpreter=starter) as process, open_board(process.port, made.path) as board:
-        operate.configure(board, boards.ARM, replace=True)
-        operate.home(board, boards.ARM)
-        stored = operate.store(board, "go", data)
+    with launch(LaunchOptions(interpreter=starter)) as process, open_board(process.port, made.path) as board:
+        arm_state.configure(board, boards.ARM, replace=True)
+        arm_state.home(board, boards.ARM)
+        stored = stored_motion.store(board, "go", data)
         with StopRequest() as stop:
-            operate.replay(board, stored, stop, lambda sample, _: made.samples.append(sample))
+            stored_motion.replay(board, stored, stop, lambda sample, _: made.samples.append(sample))
         board.status()
         board.rename("go", "gone")
         assert [entry.name for entry in board.stored()] == ["gone"]
         assert board.fetch("gone") == data
         board.remove("gone")
-        operate.stop_moving(board)  # refused: nothing moves
+        stored_motion.send_stop(board)  # refused: nothing moves
     return made
 
 
@@ -133,7 +133,7 @@ def say_again(chunks: list[Chunk], port: str) -> bytes:
 
 @pytest.mark.parametrize("name", INTERPRETERS)
 def test_a_board_answers_the_host_s_bytes_in_the_same_way(recording: Recording, name: str) -> None:
-    with launch(interpreter=interpreters.starter(name)) as process:
+    with launch(LaunchOptions(interpreter=interpreters.starter(name))) as process:
         answers = say_again(recording.chunks(), process.port)
     recorded, again = (list(frames(data)) for data in (recording.data(FROM_BOARD), answers))
     pairs = zip(
@@ -187,7 +187,7 @@ def test_the_host_takes_the_board_s_bytes_in_the_same_way(recording: Recording) 
     assert session.frames_bad == 0
     assert [event for event in events if isinstance(event, Sample)] == recording.samples
     (done,) = (event for event in events if isinstance(event, Done))
-    assert done.stand == recording.samples[-1].stand
+    assert done.positions == recording.samples[-1].positions
 
 
 def _without_repeats(data: bytes) -> list[tuple[int, int, bytes]]:

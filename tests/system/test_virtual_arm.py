@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 from armtempo.link import open_board
-from armtempo.link.messages import Sample
-from armtempo.model import job as jobs
+from armtempo.link.board_messages import Sample
 from armtempo.model.arm import Arm, JointModel, LimitSwitches
+from armtempo.model.job import Job
 from armtempo.planning import planner
 from armtempo.records import encode
-from armtempo.robot import homing, operate
+from armtempo.robot import arm_state, homing, stored_motion
 from armtempo.robot.stop_request import StopRequest
-from armtempo.simulator import edgelog, launch
+from armtempo.simulator import LaunchOptions, edgelog, launch
 from armtempo_shared.limits import TICK_HZ
 
 from tests import interpreters
@@ -43,16 +43,16 @@ def swing_deg(degree: int) -> float:
     assert encoder is not None
     model = replace(boards.ARM.joints[0].model, backlash_deg=0.0, scatter_deg=0.0)
     arm = first_joint(boards.ARM, encoder=replace(encoder, counts_per_rev=FINE_COUNTS), model=model)
-    job = replace(jobs.load_job(jobs.default_path(), arm), degree=degree, iterations=50)
+    job = replace(Job.paper(arm), degree=degree, iterations=50)
     trajectory = planner.plan(arm, job).trajectory
     samples: list[Sample] = []
-    with launch(arm=arm) as process, open_board(process.port) as board, StopRequest() as stop:
-        operate.configure(board, arm, replace=True)
-        operate.home(board, arm)
-        stored = operate.store(board, "feed", encode.motion_record(trajectory, arm))
-        operate.replay(board, stored, stop, lambda sample, _: samples.append(sample))
+    with launch(LaunchOptions(arm=arm)) as process, open_board(process.port) as board, StopRequest() as stop:
+        arm_state.configure(board, arm, replace=True)
+        arm_state.home(board, arm)
+        stored = stored_motion.store(board, "feed", encode.motion_record(trajectory, arm))
+        stored_motion.replay(board, stored, stop, lambda sample, _: samples.append(sample))
     commanded_deg = trajectory(np.array([sample.ticks / TICK_HZ for sample in samples]))[:, 0]
-    seen_deg = np.array([sample.stand.counts[0] for sample in samples]) * 360 / FINE_COUNTS
+    seen_deg = np.array([sample.positions.counts[0] for sample in samples]) * 360 / FINE_COUNTS
     return float(np.max(np.abs(seen_deg - commanded_deg)[1:7]))
 
 
@@ -69,13 +69,13 @@ def test_homing_by_limit_switch(tmp_path: Path) -> None:
     start_deg = [6.0, -60.0, 40.0]
     log = tmp_path / "edges"
     with (
-        launch(arm=arm, start_deg=start_deg, edge_log=log) as process,
+        launch(LaunchOptions(arm=arm, start_deg=start_deg, edge_log=log)) as process,
         open_board(process.port) as board,
         StopRequest() as stop,
     ):
-        operate.configure(board, arm, replace=True)
+        arm_state.configure(board, arm, replace=True)
         homing.home_to_switches(board, arm, stop)
-        believed = board.status().stand.commanded_steps[0]
+        believed = board.status().positions.commanded_steps[0]
         assert board.status().joint_known(0)
     (session,) = edgelog.read(log)
     steps, directions = session.pins["A15"], session.pins["E7"]
@@ -83,5 +83,5 @@ def test_homing_by_limit_switch(tmp_path: Path) -> None:
     before = np.searchsorted(directions[0], rises) - 1
     forward = np.where(before >= 0, directions[1][before], 0)
     moved = np.sum(np.where(forward == 1, 1, -1))
-    true = start_deg[0] * encode.steps_per_deg(arm.joints[0]) + moved
+    true = start_deg[0] * arm.driven[0].steps_per_deg + moved
     assert abs(believed - true) <= 2, (believed, true)

@@ -13,13 +13,13 @@ import pytest
 import serial
 from armtempo.errors import LinkError
 from armtempo.link.connect import open_board
-from armtempo.simulator import launch, launcher
+from armtempo.simulator import LaunchOptions, launch, launcher
 
 from tests import interpreters
 
 
 def test_answers_on_its_port_again_and_again(interpreter: str) -> None:
-    with launch(interpreter=interpreters.starter(interpreter)) as board:
+    with launch(LaunchOptions(interpreter=interpreters.starter(interpreter))) as board:
         for _ in range(2):
             with open_board(board.port) as link:
                 assert link.status().state == "unconfigured"
@@ -29,8 +29,8 @@ def test_answers_on_its_port_again_and_again(interpreter: str) -> None:
 
 def test_two_at_a_time_are_told_apart() -> None:
     with (
-        launch(seed=1) as one,
-        launch(seed=2) as two,
+        launch(LaunchOptions(seed=1)) as one,
+        launch(LaunchOptions(seed=2)) as two,
         open_board(one.port) as first,
         open_board(two.port) as second,
     ):
@@ -42,7 +42,7 @@ def test_two_at_a_time_are_told_apart() -> None:
 def test_flash_lasts(tmp_path: Path) -> None:
     boots = set()
     for _ in range(2):
-        with launch(tmp_path / "flash") as board, open_board(board.port) as link:
+        with launch(LaunchOptions(tmp_path / "flash")) as board, open_board(board.port) as link:
             assert link.info
             boots.add(link.info.boot)
     assert (tmp_path / "flash" / "armtempo").is_dir()
@@ -89,13 +89,13 @@ def test_no_interpreter(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_something_else_than_an_interpreter() -> None:
-    with pytest.raises(LinkError, match="does not run"), launch(interpreter="/bin/false"):
+    with pytest.raises(LinkError, match="does not run"), launch(LaunchOptions(interpreter="/bin/false")):
         pass
 
 
 def test_a_program_that_fails_is_logged(tmp_path: Path) -> None:
     (tmp_path / "main.py").write_text("raise ValueError('broken')\n")
-    with launch(tmp_path, deployed=True) as board:
+    with launch(LaunchOptions(tmp_path, deployed=True)) as board:
         limit = time.monotonic() + 10
         while "ValueError: broken" not in board.log() and time.monotonic() < limit:
             time.sleep(0.02)

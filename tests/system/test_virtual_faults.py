@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from armtempo.link import open_board
+from armtempo.link.board_messages import Status
 from armtempo.link.follow import RunEnd
-from armtempo.link.messages import Status
 from armtempo.model.arm import Arm, JointModel
 from armtempo.planning import point_to_point
 from armtempo.records import encode
-from armtempo.robot import operate
+from armtempo.robot import arm_state, stored_motion
 from armtempo.robot.stop_request import StopRequest
-from armtempo.simulator import Fault, edgelog, launch
+from armtempo.simulator import InjectedFault, LaunchOptions, edgelog, launch
 from armtempo_shared.wire import ERROR_CODES
 
 from tests.system import boards
@@ -26,40 +26,43 @@ GUARDED = replace(boards.ARM, safety=replace(boards.ARM.safety, estop_fitted=Tru
 
 
 def run(
-    *faults: Fault, arm: Arm = boards.ARM, model: Arm | None = None, log: Path | None = None
+    *faults: InjectedFault, arm: Arm = boards.ARM, model: Arm | None = None, log: Path | None = None
 ) -> tuple[RunEnd, Status]:
     """A short motion from home, and how the board stands after it."""
-    home_deg = operate.home_deg(arm)
+    home_deg = np.array(arm.home_deg)
     data = encode.motion_record(point_to_point.straight("move", home_deg, TARGET_DEG, arm), arm)
-    with launch(faults=faults, arm=model, edge_log=log) as process, open_board(process.port) as board:
-        operate.configure(board, arm, replace=True)
-        operate.home(board, arm)
-        stored = operate.store(board, "move", data)
+    with (
+        launch(LaunchOptions(faults=faults, arm=model, edge_log=log)) as process,
+        open_board(process.port) as board,
+    ):
+        arm_state.configure(board, arm, replace=True)
+        arm_state.home(board, arm)
+        stored = stored_motion.store(board, "move", data)
         with StopRequest() as stop:
-            end = operate.replay(board, stored, stop)
+            end = stored_motion.replay(board, stored, stop)
         return end, board.status()
 
 
 def code(end: RunEnd) -> str:
     """Name of the fault that ended a run."""
-    return operate.fault_name(end.fault)
+    return stored_motion.fault_name(end.fault)
 
 
 def test_nothing() -> None:
     end, status = run()
-    steps = np.array([encode.steps_per_deg(joint) for joint in boards.ARM.driven])
+    steps = np.array([joint.steps_per_deg for joint in boards.ARM.driven])
     assert not end.fault
-    assert np.all(np.abs(np.array(status.stand.commanded_steps) - TARGET_DEG * steps) <= 0.5)
+    assert np.all(np.abs(np.array(status.positions.commanded_steps) - TARGET_DEG * steps) <= 0.5)
 
 
 def test_short_stall_does_no_harm() -> None:
-    end, _ = run(Fault("stall", at_s=0.4, ms=10))
+    end, _ = run(InjectedFault("stall", at_s=0.4, ms=10))
     assert not end.fault
 
 
 @pytest.mark.parametrize("at_s", [0.3, 0.55, 0.8])
 def test_long_stall_is_an_underrun(at_s: float) -> None:
-    end, status = run(Fault("stall", at_s=at_s, ms=1500))
+    end, status = run(InjectedFault("stall", at_s=at_s, ms=1500))
     assert code(end) == "underrun"
     assert status.known == 7
 
@@ -67,7 +70,7 @@ def test_long_stall_is_an_underrun(at_s: float) -> None:
 @pytest.mark.parametrize("at_s", [0.0, 0.41, 0.77])
 def test_estop_freezes_within_20_us(at_s: float, tmp_path: Path) -> None:
     log = tmp_path / "edges"
-    end, _ = run(Fault("input", at_s=at_s, name="E15", level=0), arm=GUARDED, log=log)
+    end, _ = run(InjectedFault("input", at_s=at_s, name="E15", level=0), arm=GUARDED, log=log)
     assert code(end) == "estop"
     pins = edgelog.read(log)[-1].motion()
     (tripped,) = pins["E15"][0]
@@ -79,24 +82,27 @@ def test_estop_freezes_within_20_us(at_s: float, tmp_path: Path) -> None:
 
 
 def test_blocked_joint_is_a_following_error() -> None:
-    end, _ = run(Fault("block", at_s=0.3, joint=1))
+    end, _ = run(InjectedFault("block", at_s=0.3, joint=1))
     assert (code(end), end.fault_joint) == ("following", 1)
 
 
 def test_slipped_coupling_is_a_following_error() -> None:
-    end, _ = run(Fault("slip", at_s=0.5, joint=2, counts=-60))
+    end, _ = run(InjectedFault("slip", at_s=0.5, joint=2, counts=-60))
     assert (code(end), end.fault_joint) == ("following", 2)
 
 
 def test_hang_makes_the_watchdog_bite() -> None:
-    with launch(faults=[Fault("hang", at_s=0.3)]) as process, open_board(process.port) as board:
-        operate.configure(board, boards.ARM, replace=True)
-        operate.home(board, boards.ARM)
-        home_deg = operate.home_deg(boards.ARM)
+    with (
+        launch(LaunchOptions(faults=[InjectedFault("hang", at_s=0.3)])) as process,
+        open_board(process.port) as board,
+    ):
+        arm_state.configure(board, boards.ARM, replace=True)
+        arm_state.home(board, boards.ARM)
+        home_deg = np.array(boards.ARM.home_deg)
         data = encode.motion_record(
             point_to_point.straight("move", home_deg, TARGET_DEG, boards.ARM), boards.ARM
         )
-        stored = operate.store(board, "move", data)
+        stored = stored_motion.store(board, "move", data)
         board.start(stored.name, stored.crc)
         before = board.info
         assert before is not None
@@ -112,7 +118,7 @@ def test_hang_makes_the_watchdog_bite() -> None:
 
 
 def test_crash_is_an_internal_fault() -> None:
-    end, _ = run(Fault("crash", at_s=0.5))
+    end, _ = run(InjectedFault("crash", at_s=0.5))
     assert code(end) == "internal"
     assert "injected crash" in end.notices[0]
 
@@ -127,4 +133,4 @@ def test_motor_driven_beyond_its_torque_loses_steps() -> None:
 def test_without_a_model_the_motors_are_ideal() -> None:
     joints = tuple(replace(joint, model=JointModel()) for joint in boards.ARM.joints)
     ends = [run(model=model)[0] for model in (None, replace(boards.ARM, joints=joints))]
-    assert ends[0].stand == ends[1].stand
+    assert ends[0].positions == ends[1].positions

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 import serial
-from armtempo.simulator import VirtualBoard, launch
+from armtempo.simulator import LaunchOptions, VirtualBoard, launch
 
 from tests import interpreters
 
@@ -20,7 +20,7 @@ def bare(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[VirtualBoar
     """A board with an empty flash, under real MicroPython."""
     flash = tmp_path / "flash"
     with launch(
-        flash, deployed=True, flash_blocks=190, interpreter=interpreters.starter(request.param)
+        LaunchOptions(flash, deployed=True, flash_blocks=190, interpreter=interpreters.starter(request.param))
     ) as board:
         yield board
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 import serial
-from armtempo.simulator import VirtualBoard, edgelog, launch
-from armtempo.simulator.folder import PREFIX
+from armtempo.simulator import LaunchOptions, VirtualBoard, edgelog, launch
+from armtempo.simulator.temporary_folder import PREFIX
 
 from tests import interpreters
 from tests.system.commandline import wait_for
@@ -62,7 +62,9 @@ def test_button_held_at_power_up(
     flash: Path, tmp_path: Path, seconds: float, run: list[str], files: int
 ) -> None:
     log = tmp_path / "edges"
-    with launch(flash, deployed=True, interpreter=starter(), button_s=seconds, edge_log=log) as board:
+    with launch(
+        LaunchOptions(flash, deployed=True, interpreter=starter(), button_s=seconds, edge_log=log)
+    ) as board:
         assert ask(board, RUN) == str(run)
         assert ask(board, "len(os.listdir('/flash'))") == str(files)
     assert len(changes(log, "A0")) == (2 if seconds else 0)
@@ -70,7 +72,9 @@ def test_button_held_at_power_up(
 
 def test_leds_of_safe_mode_and_its_end(flash: Path, tmp_path: Path) -> None:
     log = tmp_path / "edges"
-    with launch(flash, deployed=True, interpreter=starter(), button_s=0.9, edge_log=log) as board:
+    with launch(
+        LaunchOptions(flash, deployed=True, interpreter=starter(), button_s=0.9, edge_log=log)
+    ) as board:
         assert ask(board, "pyb.usb_mode()") == "VCP+MSC"
         assert ask(board, RUN, soft_reset=True) == "['boot']"
     assert changes(log, "D12") == [1, 0]  # green, then orange alone, which flashes six times
@@ -78,7 +82,7 @@ def test_leds_of_safe_mode_and_its_end(flash: Path, tmp_path: Path) -> None:
 
 
 def test_factory_reset_makes_a_fresh_file_system(flash: Path) -> None:
-    with launch(flash, deployed=True, interpreter=starter(), button_s=1.5) as board:
+    with launch(LaunchOptions(flash, deployed=True, interpreter=starter(), button_s=1.5)) as board:
         assert ask(board, RUN) == "[]"
         assert "README.txt" in ask(board, "os.listdir('/flash')")
     assert "was_run" not in (flash / "main.py").read_text()
@@ -90,7 +94,7 @@ def test_exception_at_the_start_flashes_and_ends_it(
 ) -> None:
     (flash / f"{name}.py").write_text("1 / 0\n")
     log = tmp_path / "edges"
-    with launch(flash, deployed=True, interpreter=starter(), edge_log=log) as board:
+    with launch(LaunchOptions(flash, deployed=True, interpreter=starter(), edge_log=log)) as board:
         assert ask(board, RUN) == str({"boot": [], "main": ["boot"]}[name])
     assert changes(log, "D14") == [1, 0] * flashes
 
@@ -100,7 +104,7 @@ def test_card_comes_first_unless_the_flash_says_otherwise(flash: Path, tmp_path:
     card.mkdir()
     (card / "both.py").write_text("place = 'card'\n")
     (flash / "both.py").write_text("place = 'flash'\n")
-    with launch(flash, deployed=True, interpreter=starter(), sd_card=card) as board:
+    with launch(LaunchOptions(flash, deployed=True, interpreter=starter(), sd_card=card)) as board:
         assert ask(board, "(os.getcwd(), sorted(os.listdir('/')))") == "('/sd', ['flash', 'sd'])"
         assert ask(board, "__import__('both').place") == "card"
         assert ask(board, RUN) == "[]"  # a card without boot.py and main.py
@@ -112,7 +116,7 @@ def test_card_comes_first_unless_the_flash_says_otherwise(flash: Path, tmp_path:
 
 
 def test_unreadable_file_system_until_it_is_formatted(flash: Path) -> None:
-    with launch(flash, deployed=True, interpreter=starter(), damage="unreadable") as board:
+    with launch(LaunchOptions(flash, deployed=True, interpreter=starter(), damage="unreadable")) as board:
         assert "EIO" in ask(board, "os.listdir('/flash')")
         assert ask(board, "os.umount('/flash'), os.VfsFat.mkfs(pyb.Flash(start=0))") == "None None"
         assert "ENOENT" in ask(board, "os.listdir('/flash')")

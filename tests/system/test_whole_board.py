@@ -9,12 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.deploy import program
-from armtempo.model import arm as arms
+from armtempo.deploy import program_files
+from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import planner
-from armtempo.records import encode
-from armtempo.robot import operate
+from armtempo.records import encode, encoded_motion
 from armtempo_shared.limits import TICK_HZ
 
 from tests import interpreters
@@ -22,11 +21,9 @@ from tests import interpreters
 SCRIPTS = Path(__file__).parent / "scripts"
 PROGRAM = f"{interpreters.ROOT / 'board'}:{interpreters.ROOT / 'shared'}"
 HEAP = {"cpython": "", "micropython": "16M", "micropython-arm": "6M"}
-ARM = arms.load_arm(arms.default_path())
-HOME_DEG = operate.home_deg(ARM)
-HOME_STEPS = [
-    round(angle * encode.steps_per_deg(joint)) for angle, joint in zip(HOME_DEG, ARM.driven, strict=True)
-]
+ARM = Arm.paper()
+HOME_DEG = np.array(ARM.home_deg)
+HOME_STEPS = [round(angle * joint.steps_per_deg) for angle, joint in zip(HOME_DEG, ARM.driven, strict=True)]
 AWAY_DEG = ([3.0, 2.0, -2.0], [-1.0, 1.0, 2.0])
 FEWER = {"micropython": 3, "cpython": 10, "micropython-arm": 12}
 """What the moments are divided by; each interpreter has others."""
@@ -64,7 +61,9 @@ def flashes(tmp_path_factory: pytest.TempPathFactory) -> Path:
         arm = replace(ARM, safety=replace(ARM.safety, on_link_loss=name))
         (folder / name / "armtempo").mkdir(parents=True)
         (folder / name / "armtempo" / "arm.ata").write_bytes(encode.arm_record(arm))
-        (folder / name / "armtempo" / "go.atm").write_bytes(operate.motion_data(trajectory, arm))
+        (folder / name / "armtempo" / "go.atm").write_bytes(
+            encoded_motion.of_trajectory(trajectory, arm).data
+        )
     (folder / "ticks").write_text(str(round(trajectory.duration_s * TICK_HZ)))
     shutil.copytree(folder / "finish", folder / "broken")
     (folder / "broken" / "main.py").write_text("raise ValueError('broken')\n")
@@ -75,11 +74,11 @@ def flashes(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def compact(tmp_path_factory: pytest.TempPathFactory) -> str:
     """The folder of the program as ``armtempo deploy`` compiles it."""
     folder = tmp_path_factory.mktemp("compact")
-    for name, text in program.compact_files().items():
+    for name, text in program_files.compact_files().items():
         (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_text(text)
-    for path, data in program.start_files().items():
-        (folder / program.PACKAGES[0] / Path(path).name).write_bytes(data)
+    for path, data in program_files.start_files().items():
+        (folder / program_files.PACKAGES[0] / Path(path).name).write_bytes(data)
     return str(folder)
 
 

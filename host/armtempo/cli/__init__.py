@@ -13,9 +13,8 @@ from typing import Any
 import click
 
 from armtempo import __version__
-from armtempo.errors import ArmtempoError
-from armtempo.robot.stop_request import raised_by_signals
-from armtempo.start import INTERRUPTED
+from armtempo.cli.interrupts import raised_by_signals
+from armtempo.errors import INTERRUPTED, ArmtempoError
 
 COMMANDS = (
     "demo",
@@ -63,7 +62,7 @@ class LazyGroup(click.Group):
         return command
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command; what the user can mend is said in one message, without a traceback."""
+        """Run the command; an error that the user can correct is one message, without a traceback."""
         for stream in (sys.stdout, sys.stderr):
             if isinstance(stream, io.TextIOWrapper):
                 stream.reconfigure(errors="replace")  # a ² in a code page that has none ends no command
@@ -88,7 +87,7 @@ class LazyGroup(click.Group):
 
 
 def _of_file(error: OSError) -> str:
-    """What the system says of a file, in words."""
+    """The operating system's reason for an error with a file, and what to check."""
     where = f"{error.filename}: " if error.filename else ""
     return f"{where}{error.strerror or error}; look after the path, its permissions and the room on the disk"
 

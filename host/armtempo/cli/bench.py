@@ -10,15 +10,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from armtempo.cli import options
-from armtempo.cli.progress import Progress
-from armtempo.errors import MissingPackageError
-from armtempo.start import INTERRUPTED
+from armtempo.cli.progress import ProgressBar
+from armtempo.errors import INTERRUPTED, MissingPackageError
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from armtempo.research.bench.cases import Case, Problem
-    from armtempo.research.bench.result_store import Store
+    from armtempo.research.bench.result_store import ResultStore
     from armtempo.research.bench.result_table import Row
 
 
@@ -82,21 +81,20 @@ def command(
     ctx: click.Context, /, out: Path, workers: int | None, scheduler: str | None, plot: bool, **chosen: Any
 ) -> None:
     """Compare the search algorithms as the paper does in Table 4 and Fig. 6."""
-    from armtempo.model import job as jobs
     from armtempo.research.bench import cases, result_table, worker_pool
-    from armtempo.research.bench.result_store import Store
+    from armtempo.research.bench.result_store import ResultStore
 
     arm_path, job_path = chosen["arm_path"], chosen["job_path"]
     arm = options.load_arm(arm_path)
-    job = jobs.load_job(job_path or jobs.default_path(), arm)
+    job = options.load_job(job_path, arm)
     problem = cases.problem_of(arm, job, chosen["joint"], chosen["fitness"], chosen["iterations"])
     wanted = cases.cases(chosen["algorithms"], chosen["populations"], range(1, chosen["seeds"] + 1))
-    store = Store(out, problem)
+    store = ResultStore(out, problem)
     place = worker_pool.cluster(scheduler) if scheduler else worker_pool.local(workers)
     try:
         _run(problem, wanted, store, place)
     except KeyboardInterrupt:
-        kept = Store(out, problem).runs
+        kept = ResultStore(out, problem).runs
         done = sum(case in kept for case in wanted)
         click.echo(
             f"armtempo: interrupted; {done} of {len(wanted)} runs are kept in {store.path}, "
@@ -110,7 +108,7 @@ def command(
 
 
 def _run(
-    problem: Problem, wanted: Sequence[Case], store: Store, place: AbstractContextManager[Executor]
+    problem: Problem, wanted: Sequence[Case], store: ResultStore, place: AbstractContextManager[Executor]
 ) -> None:
     """The runs that are still missing."""
     from armtempo.research.bench import cases
@@ -118,7 +116,7 @@ def _run(
     todo = [case for case in wanted if case not in store.runs]
     if not todo:
         return
-    with Progress("searching") as progress, place as executor:
+    with ProgressBar("searching") as progress, place as executor:
         for number, run in enumerate(cases.execute(problem, todo, executor), 1):
             store.add(run)
             progress(number, len(todo))

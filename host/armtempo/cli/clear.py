@@ -14,7 +14,7 @@ from armtempo.cli import options
 @options.log_traffic
 def command(port: str, log_traffic: Path | None) -> None:
     """Clear the pending fault, once its cause is gone."""
-    from armtempo.robot.operate import fault_name
+    from armtempo.robot.stored_motion import fault_name
 
     with options.board(port, log_traffic) as board:
         before = board.status()

@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 
 from armtempo.cli import options
-from armtempo.cli.progress import Progress
-from armtempo.cli.run import replay
+from armtempo.cli.progress import ProgressBar
+from armtempo.cli.run import run_and_tell
 
 
 @click.command()
@@ -22,22 +22,16 @@ def command(out: Path, port: str, log_traffic: Path | None) -> None:
     """
     from armtempo import pipeline
     from armtempo.errors import MissingPackageError
-    from armtempo.model import arm as arms
-    from armtempo.model import job as jobs
-    from armtempo.planning import planner
-    from armtempo.report import run_report, text_summary
-    from armtempo.robot import operate
+    from armtempo.model.arm import Arm
+    from armtempo.model.job import Job
 
-    arm = arms.load_arm(arms.default_path())
-    with Progress("planning") as progress:
-        plan = planner.plan(arm, jobs.load_job(jobs.default_path(), arm), progress)
-    for line in text_summary.lines(plan):
+    with ProgressBar("planning") as progress:
+        plan = pipeline.plan(Arm.paper(), Job.paper(), progress)
+    for line in pipeline.summary(plan):
         click.echo(line)
-    motion = pipeline.planned(plan)
-    with options.board(port, log_traffic, arm) as board:
-        operate.configure(board, arm, replace=True)
-        folder = replay(board, port, motion, 1, out)
+    with options.board(port, log_traffic, plan.arm) as board:
+        run = run_and_tell(board, plan, 1, out)
     try:
-        click.echo(f"report: {run_report.write(folder)}")
+        click.echo(f"report: {pipeline.report(run)}")
     except MissingPackageError as error:
-        click.echo(f"no report: {error}, then: armtempo report {folder}", err=True)
+        click.echo(f"no report: {error}, then: armtempo report {run.path}", err=True)

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from armtempo.cli import options
-from armtempo.cli.progress import Progress
+from armtempo.cli.progress import ProgressBar
 
 
 @click.command()
@@ -47,6 +47,6 @@ def command(mpy: bool, package: Path | None, firmware: Path | None, port: str) -
             f"written: {firmware}; for MicroPython's make: FROZEN_MANIFEST={firmware.resolve()}/manifest.py"
         )
         return
-    with Progress("copying") as progress:
+    with ProgressBar("copying") as progress:
         deploy(port, mpy, click.echo, progress)
     click.echo("the board runs armtempo")

@@ -29,10 +29,10 @@ import click
 def command(trajectory: Path, kind: str, rate: float, frame_id: str, output: Path | None) -> None:
     """Write the trajectory file TRAJECTORY as CSV or as a ROS JointTrajectory, sampled at any rate."""
     from armtempo.formats.atomic_file import replace_text
-    from armtempo.model import exchange, trajectory_file
+    from armtempo.model.plan import Plan
 
-    plan = trajectory_file.load(trajectory)
-    text = exchange.to_csv(plan, rate) if kind == "csv" else exchange.to_ros(plan, rate, frame_id)
+    plan = Plan.load(trajectory)
+    text = plan.to_csv(rate) if kind == "csv" else plan.to_ros(rate, frame_id)
     if output is None:
         click.echo(text.encode(), nl=False)  # UTF-8 as in a file, whatever the terminal
     else:

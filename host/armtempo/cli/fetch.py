@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from armtempo.cli import options
-
-if TYPE_CHECKING:
-    from armtempo.link import Board
 
 
 @click.command()
@@ -25,25 +21,12 @@ def command(what: str | None, out: Path, arm_path: Path | None, port: str, log_t
     WHAT is what was run: a trajectory file, or the name of a motion on the board; without it the motion that
     the button starts. A run under way is followed to its end. The samples go into a new run folder, once.
     """
-    from armtempo import pipeline
-    from armtempo.cli.run import motion_file, told
-    from armtempo.robot import operate
+    from armtempo.cli.live import repetition_line
 
-    file = motion_file(what) if what else None
-    motion = pipeline.from_file(file, options.load_arm(arm_path) if arm_path else None) if file else None
-    arm = motion.arm if motion else options.load_arm(arm_path)
+    plan = options.load_plan(what, arm_path) if what else None
+    arm = plan.arm if plan else options.load_arm(arm_path)
     with options.board(port, log_traffic, arm) as board:
-        operate.configure(board, arm, replace=False)
-        motion = motion or pipeline.from_board(board, what or _default(board), arm)
-        folder, repetition = pipeline.fetch(board, port, motion, out)
-        click.echo(f"{motion.name}: {folder.path}")
-        click.echo(told(repetition))
-
-
-def _default(board: Board) -> str:
-    from armtempo.errors import InputError
-
-    for entry in board.stored():
-        if entry.default:
-            return entry.name
-    raise InputError("the board's button starts nothing: name the motion that was run")
+        board.configure(arm, replace=False)
+        run = board.fetch(plan or what, out)
+        click.echo(f"{run.name}: {run.path}")
+        click.echo(repetition_line(run.entries[-1]))

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from armtempo.cli import options, posture
-from armtempo.cli.progress import Progress
+from armtempo.cli.progress import ProgressBar
 
 
 @click.command(context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
@@ -24,22 +24,16 @@ def command(
     WHERE: angles such as '0,-60,40', a via point such as P0, or a trajectory file for its start. All
     joints move together, within their limits. The arm must be homed. Ctrl-C brakes.
     """
-    from armtempo.link.ports import is_sim
-    from armtempo.robot import operate
-    from armtempo.robot.stop_request import StopRequest
+    from armtempo.robot.stop_request import Stopped
 
     arm = options.load_arm(arm_path)
     target_deg = posture.parse(where, arm, job_path)
-    with (
-        options.board(port, log_traffic, arm) as board,
-        StopRequest() as stop,
-        Progress("moving") as progress,
-    ):
-        operate.configure(board, arm, replace=arm_path is not None)
-        if is_sim(port):
-            operate.home(board, arm)
-        operate.go_to(board, arm, target_deg, stop, progress)
-        stands_deg = operate.posture_deg(board, arm)
-    click.echo(f"the arm stands at {posture.words(stands_deg)}")
-    if stop.wanted:
-        raise KeyboardInterrupt
+    with options.board(port, log_traffic, arm) as board:
+        board.configure(arm, replace=arm_path is not None)
+        try:
+            with ProgressBar("moving") as progress:
+                board.goto(target_deg, progress)
+        except Stopped:
+            click.echo(posture.where_it_is(board))
+            raise
+        click.echo(posture.where_it_is(board))

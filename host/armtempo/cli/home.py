@@ -30,19 +30,14 @@ def command(
     it: the home posture of the arm file. Nothing moves; afterwards motions may start. With --switches the
     joints that have a switch of known angle move: to it, off it, and slowly to it again.
     """
-    from armtempo.robot import homing, operate
-    from armtempo.robot.stop_request import StopRequest
-
     if switches and where is not None:
         raise click.UsageError("give either WHERE or --switches")
     arm = options.load_arm(arm_path)
-    angles_deg = operate.home_deg(arm) if where is None else posture.parse(where, arm, job_path)
+    angles_deg = None if where is None else posture.parse(where, arm, job_path)
     with options.board(port, log_traffic, arm) as board:
-        operate.configure(board, arm, replace=arm_path is not None)
+        board.configure(arm, replace=arm_path is not None)
         if switches:
-            with StopRequest() as stop:
-                homing.home_to_switches(board, arm, stop)
+            board.home_to_switches(arm)
         else:
-            operate.home(board, arm, angles_deg)
-        stands_deg = operate.posture_deg(board, arm)
-    click.echo(f"the arm stands at {posture.words(stands_deg)}")
+            board.home(arm, angles_deg)
+        click.echo(posture.where_it_is(board))

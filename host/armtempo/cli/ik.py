@@ -12,7 +12,7 @@ from armtempo.cli import options
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from armtempo.kinematics.geometry import Array
+    from armtempo.arrays import Array
     from armtempo.kinematics.listing import Answer
     from armtempo.model.arm import Arm
 

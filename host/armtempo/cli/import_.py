@@ -26,7 +26,7 @@ def command(table: Path, arm_path: Path | None, name: str | None, radians: bool,
     from armtempo.errors import InputError
     from armtempo.formats import toml_table
     from armtempo.formats.atomic_file import replace_text
-    from armtempo.model import exchange, job
+    from armtempo.model import exchange, job_file
 
     arm = options.load_arm(arm_path)
     title = name or table.stem
@@ -34,6 +34,6 @@ def command(table: Path, arm_path: Path | None, name: str | None, radians: bool,
     if target.exists():
         raise InputError(f"{target} exists; choose another place with --output")
     text = exchange.job_text(title, exchange.via_from_csv(table, arm, radians))
-    job.of_table(toml_table.parse(text, str(table)), arm)
+    job_file.of_table(toml_table.parse(text, str(table)), arm)
     replace_text(target, text)
     click.echo(f"written: {target}; plan it with: armtempo plan --job {target}")

@@ -10,7 +10,7 @@ import click
 from armtempo.cli import options
 
 if TYPE_CHECKING:
-    from armtempo.link.messages import Stored
+    from armtempo.link.board_messages import StoredMotion
 
 
 @click.command()
@@ -22,18 +22,14 @@ def command(port: str, log_traffic: Path | None) -> None:
     The one marked * is what the board's button starts.
     """
     with options.board(port, log_traffic) as board:
-        found = board.stored()
+        found = board.list()
     click.echo(f"{'name':<26}{'bytes':>8}{'joints':>8}{'seconds':>10}  checksum")
     for entry in found:
         click.echo(_line(entry))
 
 
-def _line(entry: Stored) -> str:
-    from armtempo_shared.limits import TICK_HZ
-
+def _line(entry: StoredMotion) -> str:
     name = entry.name + (" *" if entry.default else "")
     if not entry.joints:
         return f"{name:<26}{entry.size:>8}  damaged; upload it again or remove it"
-    return (
-        f"{name:<26}{entry.size:>8}{entry.joints:>8}{entry.duration_ticks / TICK_HZ:>10.3f}  {entry.crc:08x}"
-    )
+    return f"{name:<26}{entry.size:>8}{entry.joints:>8}{entry.duration_s:>10.3f}  {entry.crc:08x}"

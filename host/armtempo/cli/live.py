@@ -1,48 +1,42 @@
-"""What a run under way shows: a progress bar with angles and errors, and a window where one is wanted."""
+"""What a run shows while it goes on: a progress bar with angles and errors, and a window where one is wanted."""
 
 from __future__ import annotations
 
 import time
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import click
+import numpy as np
+from armtempo_shared.limits import TICK_HZ
 
-from armtempo.cli.progress import Progress
+from armtempo.arrays import Array
+from armtempo.cli.progress import ProgressBar
 from armtempo.errors import ArmtempoError
+from armtempo.link.board_messages import Sample
+from armtempo.records.encoded_motion import EncodedMotion
+from armtempo.report.live_plot import LivePlot
+from armtempo.robot.recording import Watcher
+from armtempo.runs.run_folder import Repetition, RunFolder
 
-if TYPE_CHECKING:
-    from armtempo.link.messages import Sample
-    from armtempo.pipeline import Motion
-    from armtempo.report.live_plot import LivePlot
-    from armtempo.splines.bspline import Array
 
+class Live(Watcher):
+    """Shows a run on the terminal; used as a context. Without a display it says so and opens no window."""
 
-class Live:
-    """A watcher of samples; used as a context. Without a display it says so and goes on without a window."""
+    def __init__(self, window: bool) -> None:
+        self._window = window
+        self._plot: LivePlot | None = None
+        self._progress = ProgressBar("moving")
 
-    def __init__(self, motion: Motion, window: bool) -> None:
-        from armtempo.runs import run_folder
-
+    def begin(self, motion: EncodedMotion, folder: RunFolder) -> None:
+        """Say what runs and where it is recorded."""
         self._motion = motion
-        self._scales = run_folder.scales(motion.arm)
-        self._progress = Progress("moving")
         self._started_s = time.monotonic()
-        self._plot = self._window() if window else None
+        self._plot = self._open() if self._window else None
+        click.echo(f"{motion.name}: {motion.trajectory.duration_s:.3f} s, into {folder.path}")
 
-    def _window(self) -> LivePlot | None:
-        from armtempo.report.live_plot import LivePlot
-
-        try:
-            return LivePlot(self._motion.trajectory, [scale.name for scale in self._scales])
-        except ArmtempoError as error:
-            click.echo(f"no live plot: {error}", err=True)
-            return None
-
-    def __call__(self, sample: Sample, duration_s: float) -> None:
+    def sample(self, sample: Sample, duration_s: float) -> None:
         """Show one sample."""
-        from armtempo_shared.limits import TICK_HZ
-
         time_s = sample.ticks / TICK_HZ
         angles = self._angles_deg(sample)
         errors = angles - self._motion.trajectory(time_s)
@@ -52,16 +46,25 @@ class Live:
         if self._plot is not None:
             self._plot.add(time_s, angles)
 
+    def end(self, repetition: Repetition) -> None:
+        """Say how it ended."""
+        click.echo(repetition_line(repetition))
+
+    def _open(self) -> LivePlot | None:
+        try:
+            return LivePlot(self._motion.trajectory, [joint.name for joint in self._motion.arm.driven])
+        except ArmtempoError as error:
+            click.echo(f"no live plot: {error}", err=True)
+            return None
+
     def _angles_deg(self, sample: Sample) -> Array:
         """Measured angles (J,); commanded ones where there is no encoder."""
-        import numpy as np
-
-        stand = sample.stand
+        joints, positions = self._motion.arm.driven, sample.positions
         return np.array(
             [
-                counts / scale.counts_per_deg if scale.counts_per_deg else steps / scale.steps_per_deg
-                for scale, steps, counts in zip(
-                    self._scales, stand.commanded_steps, stand.counts, strict=True
+                counts / joint.counts_per_deg if joint.encoder else steps / joint.steps_per_deg
+                for joint, steps, counts in zip(
+                    joints, positions.commanded_steps, positions.counts, strict=True
                 )
             ]
         )
@@ -76,3 +79,11 @@ class Live:
         self._progress.__exit__(kind, value, trace)
         if self._plot is not None:
             self._plot.close()
+
+
+def repetition_line(done: Repetition) -> str:
+    """One line on a repetition: how it ended, how long it took, what of it is missing."""
+    lost = sum(gap.number for gap in done.lost)
+    missing = f", {lost} lost" if lost else ""
+    state = f"{done.state} ({done.fault})" if done.fault else done.state
+    return f"{done.file}: {state}, {done.duration_s:.3f} s, {done.samples} samples{missing}"

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from armtempo.cli import options
+
+if TYPE_CHECKING:
+    from armtempo.link.traffic import Chunk
 
 _EVERY_S = 1.0
 
@@ -27,8 +31,8 @@ def command(file: Path | None, port: str, log_traffic: Path | None) -> None:
     with options.board(port, log_traffic, any_program=True, sink=_show) as board:
         while True:
             board.status()
-            board.session.poll(_EVERY_S)
-            board.session.events.clear()
+            board.client.session.poll(_EVERY_S)
+            board.client.session.events.clear()
 
 
 def _show_file(file: Path) -> None:
@@ -39,9 +43,6 @@ def _show_file(file: Path) -> None:
         _show(chunk, decoder.feed(chunk.direction, chunk.data))
 
 
-def _show(chunk: object, words: list[str]) -> None:
-    from armtempo.link.traffic import Chunk
-
-    assert isinstance(chunk, Chunk)
+def _show(chunk: Chunk, words: list[str]) -> None:
     for line in words:
         click.echo(f"{chunk.time_s:10.4f} {chunk.direction} {line}")

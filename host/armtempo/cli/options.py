@@ -1,18 +1,19 @@
-"""Options that several commands share, and what they open."""
+"""Options that several commands share, and the objects that they name."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 if TYPE_CHECKING:
-    from armtempo.link import Board
     from armtempo.link.traffic import Sink
     from armtempo.model.arm import Arm
+    from armtempo.model.job import Job
+    from armtempo.model.plan import Plan
+    from armtempo.robot.board import Board
 
 FC = TypeVar("FC", bound=Callable[..., Any] | click.Command)
 
@@ -69,22 +70,46 @@ out = click.option(
 
 def load_arm(path: Path | None) -> Arm:
     """The arm of ``--arm``."""
-    from armtempo.model import arm as arms
+    from armtempo.model.arm import Arm
 
-    return arms.load_arm(path or arms.default_path())
+    return Arm.load(path) if path else Arm.paper()
 
 
-@contextmanager
+def load_job(path: Path | None, arm: Arm) -> Job:
+    """The job of ``--job``."""
+    from armtempo.model.job import Job
+
+    return Job.load(path, arm) if path else Job.paper(arm)
+
+
+def load_plan(what: str, arm_path: Path | None) -> Plan | None:
+    """The plan of a trajectory file, which must fit ``--arm``; None where ``what`` names a motion on the board."""
+    path = Path(what)
+    return load_plan_file(path, arm_path) if path.suffix == ".json" or path.is_file() else None
+
+
+def load_plan_file(path: Path, arm_path: Path | None) -> Plan:
+    """The plan of a trajectory file, which must fit ``--arm``."""
+    from armtempo import pipeline
+
+    return pipeline.load(path, load_arm(arm_path) if arm_path else None)
+
+
 def board(
     port: str,
     log_traffic: Path | None = None,
     arm: Arm | None = None,
     any_program: bool = False,
     sink: Sink | None = None,
-) -> Iterator[Board]:
-    """The board of ``--port``, greeted; a virtual one moves ``arm``; ``sink`` takes the traffic."""
-    from armtempo.link import open_board
+) -> Board:
+    """The board of ``--port``; a virtual one moves ``arm``; ``sink`` takes the traffic."""
+    from armtempo.robot.board import connect
 
-    with open_board(port, log_traffic, sink, arm, any_program) as found:
-        found.session.tell = lambda text: click.echo(text, err=True)
-        yield found
+    return connect(
+        port,
+        arm,
+        log_traffic=log_traffic,
+        sink=sink,
+        any_program=any_program,
+        tell=lambda text: click.echo(text, err=True),
+    )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from armtempo.cli.progress import Progress
+from armtempo.cli.progress import ProgressBar
 
 if TYPE_CHECKING:
     from armtempo.research.paper.claims import Claim
@@ -32,9 +32,9 @@ def command(quick: bool, out: Path) -> None:
     from armtempo.research.paper import experiment, motions, postures, searches, sheet
 
     made = motions.plans()
-    with Progress("searching") as progress:
+    with ProgressBar("searching") as progress:
         searched = searches.run(made.arm, made.job, out / "searches", quick, progress)
-    with Progress("replaying") as progress:
+    with ProgressBar("replaying") as progress:
         series = experiment.run(made, out / "runs", quick, progress)
     claims = [
         *postures.claims(made.arm),

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from armtempo.cli import options
-from armtempo.cli.progress import Progress
+from armtempo.cli.progress import ProgressBar
 
 
 @click.command()
@@ -37,23 +37,21 @@ def command(job_path: Path | None, arm_path: Path | None, output: Path | None, *
     """Plan a job and write its trajectory file."""
     from dataclasses import replace
 
+    from armtempo import pipeline
     from armtempo.errors import PlanError
-    from armtempo.model import job as jobs
-    from armtempo.model import trajectory_file
-    from armtempo.planning import checks, planner
-    from armtempo.report import text_summary
+    from armtempo.planning import checks
 
     arm = options.load_arm(arm_path)
-    job = jobs.load_job(job_path or jobs.default_path(), arm)
+    job = options.load_job(job_path, arm)
     given = {name: value for name, value in changes.items() if value is not None}
     if "degree" in given:
         given["degree"] = int(given["degree"])
     job = replace(job, **given)
-    with Progress("planning") as progress:
-        plan = planner.plan(arm, job, progress)
+    with ProgressBar("planning") as progress:
+        plan = pipeline.plan(arm, job, progress)
     target = output or Path(f"{job.name}.json")
-    trajectory_file.save(plan, target)
-    for line in text_summary.lines(plan):
+    plan.save(target)
+    for line in pipeline.summary(plan):
         click.echo(line)
     click.echo(f"written: {target}")
     try:

@@ -1,4 +1,4 @@
-"""Postures as a user writes them: angles, a via point of a job, or a trajectory's start."""
+"""Postures on the command line: angles, a via point of a job, or the start of a trajectory."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ import numpy as np
 from armtempo.errors import InputError
 
 if TYPE_CHECKING:
+    from armtempo.arrays import Array
     from armtempo.model.arm import Arm
-    from armtempo.splines.bspline import Array
+    from armtempo.robot.board import Board
 
 
 def parse(text: str, arm: Arm, job_path: Path | None) -> Array:
@@ -27,7 +28,7 @@ def parse(text: str, arm: Arm, job_path: Path | None) -> Array:
     if text.endswith(".json"):
         from armtempo import pipeline
 
-        return pipeline.from_file(Path(text), arm).start_deg
+        return pipeline.load(text, arm).trajectory(0.0)
     try:
         angles_deg = [float(cell) for cell in text.split(",")]
     except ValueError:
@@ -38,16 +39,21 @@ def parse(text: str, arm: Arm, job_path: Path | None) -> Array:
     return point_to_point.posture(angles_deg, arm)
 
 
+def where_it_is(board: Board) -> str:
+    """Where the arm is, as the commands that place it say in the end."""
+    return f"the arm stands at {words(board.posture_deg())}"
+
+
 def words(angles_deg: Array) -> str:
-    """The posture for people."""
+    """A posture as text: the driven joints' angles in degrees."""
     return ", ".join(f"{round(angle, 2) + 0.0:.2f}" for angle in angles_deg) + " degrees"
 
 
 def _via(index: int, arm: Arm, job_path: Path | None) -> Array:
-    from armtempo.model import job as jobs
+    from armtempo.cli import options
     from armtempo.planning import planner
 
-    job = jobs.load_job(job_path or jobs.default_path(), arm)
+    job = options.load_job(job_path, arm)
     via_deg, _ = planner.via_angles(arm, job)
     if index >= len(via_deg):
         raise InputError(f"job {job.name!r} has the via points P0 to P{len(via_deg) - 1}, not P{index}")

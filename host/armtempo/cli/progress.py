@@ -1,4 +1,4 @@
-"""Progress bars: on a terminal only, and only for what takes longer than a second."""
+"""Progress bars: on a terminal only, and only for work that takes longer than a second."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ import click
 
 _PATIENCE_S = 1.0
 _BAR_COLUMNS = 24
-"""Frame, percentage and remaining time: the note leaves room for them, so that no line wraps."""
+"""Width of frame, percentage and remaining time; the note is cut so that no line wraps."""
 
 
-class Progress:
+class ProgressBar:
     """Call it with (done, whole); a bar appears once a second has passed and work is left."""
 
     def __init__(self, label: str) -> None:

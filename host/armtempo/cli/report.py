@@ -22,17 +22,18 @@ def command(runs: tuple[Path, ...], out: Path | None) -> None:
     With two or more run folders, each gets its page, and one more page compares them. One that cannot be read
     is named there.
     """
+    from armtempo import pipeline
     from armtempo.errors import RunFolderError
-    from armtempo.report import comparison, run_report
+    from armtempo.robot.run import Run
 
     if len(runs) == 1:
         if out is not None:
             raise click.UsageError("--out goes with two or more runs")
-        click.echo(f"wrote {run_report.write(runs[0])}")
+        click.echo(f"wrote {pipeline.report(Run.load(runs[0]))}")
         return
     for run in runs:
         try:
-            click.echo(f"wrote {run_report.write(run)}")
+            click.echo(f"wrote {pipeline.report(Run.load(run))}")
         except RunFolderError as error:
             click.echo(f"armtempo: {error}", err=True)
-    click.echo(f"wrote {comparison.write(runs, out or runs[0].parent / comparison.PAGE)}")
+    click.echo(f"wrote {pipeline.compare(runs, out)}")

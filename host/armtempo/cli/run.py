@@ -10,9 +10,9 @@ import click
 from armtempo.cli import options
 
 if TYPE_CHECKING:
-    from armtempo.link import Board
-    from armtempo.pipeline import Motion
-    from armtempo.runs.run_folder import Repetition
+    from armtempo.model.plan import Plan
+    from armtempo.robot.board import Board
+    from armtempo.robot.run import Run
 
 
 @click.command()
@@ -32,46 +32,20 @@ def command(
     The arm must be homed ('armtempo home') and stand where the motion begins ('armtempo goto'); a virtual
     board sees to that itself. Between repetitions the arm returns along the same path. Ctrl-C brakes.
     """
-    from armtempo import pipeline
-    from armtempo.robot import operate
-
-    file = motion_file(what)
-    motion = pipeline.from_file(file, options.load_arm(arm_path) if arm_path else None) if file else None
-    arm = motion.arm if motion else options.load_arm(arm_path)
+    plan = options.load_plan(what, arm_path)
+    arm = plan.arm if plan else options.load_arm(arm_path)
     with options.board(port, log_traffic, arm) as board:
-        operate.configure(board, arm, replace=motion is not None or arm_path is not None)
-        replay(board, port, motion or pipeline.from_board(board, what, arm), repeat, out, live)
+        board.configure(arm, replace=plan is not None or arm_path is not None)
+        run_and_tell(board, plan or what, repeat, out, live)
 
 
-def motion_file(what: str) -> Path | None:
-    """The trajectory file that is meant; None for a name on the board."""
-    path = Path(what)
-    return path if path.suffix == ".json" or path.is_file() else None
-
-
-def told(done: Repetition) -> str:
-    """One line on a repetition."""
-    lost = sum(count for _, count in done.lost)
-    missing = f", {lost} lost" if lost else ""
-    state = f"{done.state} ({done.fault})" if done.fault else done.state
-    return f"{done.file}: {state}, {done.duration_s:.3f} s, {done.samples} samples{missing}"
-
-
-def replay(board: Board, port: str, motion: Motion, repeat: int, out: Path, live: bool = False) -> Path:
-    """Upload, bring the arm to the start, replay, record, tell; gives the run folder."""
-    from armtempo import pipeline
+def run_and_tell(board: Board, motion: Plan | str, repeat: int, out: Path, live: bool = False) -> Run:
+    """Run a plan, or the motion of that name, and print what happens and what became of each joint."""
     from armtempo.cli.live import Live
-    from armtempo.robot.stop_request import StopRequest
+    from armtempo.report import text_summary
 
-    with StopRequest() as stop:
-        pipeline.prepare(board, port, motion, stop)
-        folder = pipeline.new_run(out, motion, port, board)
-        click.echo(f"{motion.name}: {motion.trajectory.duration_s:.3f} s, into {folder.path}")
-        with Live(motion, window=live) as watch:
-            for done in pipeline.repeat(board, motion, folder, repeat, stop, watch):
-                click.echo(told(done))
-    if stop.wanted:
-        raise KeyboardInterrupt
-    for line in pipeline.results(motion, folder.repetitions[-1]):
+    with Live(window=live) as watcher:
+        run = board.run(motion, repeat, out, watcher=watcher)
+    for line in text_summary.result_lines(run.results):
         click.echo(line)
-    return folder.path
+    return run

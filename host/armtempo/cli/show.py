@@ -11,7 +11,7 @@ from armtempo.cli import options, posture
 from armtempo.formats.text_table import aligned
 
 if TYPE_CHECKING:
-    from armtempo.pipeline import Motion
+    from armtempo.records.encoded_motion import EncodedMotion
 
 
 @click.command()
@@ -21,16 +21,14 @@ if TYPE_CHECKING:
 @options.log_traffic
 def command(name: str, arm_path: Path | None, port: str, log_traffic: Path | None) -> None:
     """Show the stored motion NAME, read back."""
-    from armtempo import pipeline
-
     arm = options.load_arm(arm_path)
     with options.board(port, log_traffic) as board:
-        motion = pipeline.from_board(board, name, arm)
+        motion = board.read(name, arm)
     for line in _lines(motion):
         click.echo(line)
 
 
-def _lines(motion: Motion) -> list[str]:
+def _lines(motion: EncodedMotion) -> list[str]:
     import numpy as np
 
     trajectory = motion.trajectory

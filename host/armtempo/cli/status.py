@@ -10,7 +10,7 @@ import click
 from armtempo.cli import options
 
 if TYPE_CHECKING:
-    from armtempo.link.messages import Hello, Status
+    from armtempo.link.board_messages import Hello, Status
 
 
 @click.command()
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 def command(port: str, log_traffic: Path | None) -> None:
     """Show the board, its state, and where the joints stand."""
     with options.board(port, log_traffic, any_program=True) as board:
-        assert board.info is not None  # greeted
         for line in [*_identity(board.info), *lines(board.status())]:
             click.echo(line)
 
@@ -42,13 +41,13 @@ def _other(info: Hello) -> str:
 
 def lines(status: Status) -> list[str]:
     """State, fault and stand of each joint."""
-    from armtempo.robot.operate import fault_name
+    from armtempo.robot.stored_motion import fault_name
 
     found = [f"state     {status.state}"]
     if status.fault:
         found.append(f"fault     {fault_name(status.fault)}; see 'armtempo clear'")
     for joint, (steps, counts) in enumerate(
-        zip(status.stand.commanded_steps, status.stand.counts, strict=True)
+        zip(status.positions.commanded_steps, status.positions.counts, strict=True)
     ):
         known = "" if status.joint_known(joint) else ", position unknown"
         found.append(f"joint {joint + 1}   {steps} steps, {counts} counts{known}")

@@ -16,9 +16,7 @@ from armtempo.cli.status import lines
 @options.log_traffic
 def command(now: bool, port: str, log_traffic: Path | None) -> None:
     """Brake or freeze, and say where the arm stands."""
-    from armtempo.robot import operate
-
     with options.board(port, log_traffic, any_program=True) as board:
-        operate.stop(board, now)
+        board.stop(now)
         for line in lines(board.status()):
             click.echo(line)

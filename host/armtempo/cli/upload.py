@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from armtempo.cli import options
-from armtempo.cli.progress import Progress
+from armtempo.cli.progress import ProgressBar
 
 
 @click.command()
@@ -21,14 +21,9 @@ def command(
     file: Path, name: str | None, as_default: bool, arm_path: Path | None, port: str, log_traffic: Path | None
 ) -> None:
     """Store a trajectory file on the board."""
-    from armtempo import pipeline
-    from armtempo.robot import operate
+    from armtempo.records import encoded_motion
 
-    arm = options.load_arm(arm_path) if arm_path else None
-    motion = pipeline.from_file(file, arm, name)
-    with options.board(port, log_traffic) as board, Progress("uploading") as progress:
-        operate.configure(board, motion.arm, replace=True)
-        operate.store(board, motion.name, motion.data, progress)
-        if as_default:
-            board.set_default(motion.name)
+    motion = encoded_motion.of_plan(options.load_plan_file(file, arm_path), name)
+    with options.board(port, log_traffic) as board, ProgressBar("uploading") as progress:
+        board.upload(motion, default=as_default, progress=progress)
     click.echo(f"{motion.name}: {len(motion.data)} bytes stored")

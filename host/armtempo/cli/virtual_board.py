@@ -65,9 +65,9 @@ def command(
 
     The port can be opened like a serial device, by armtempo (--port) and by any other program.
     """
-    from armtempo.simulator import launch
+    from armtempo.simulator import LaunchOptions, launch
 
-    with launch(
+    wanted = LaunchOptions(
         flash,
         virtual_time=not real_time,
         edge_log=edge_log,
@@ -77,7 +77,8 @@ def command(
         deployed=deployed,
         button_s=hold_button,
         sd_card=sd_card,
-    ) as board:
+    )
+    with launch(wanted) as board:
         click.echo(board.port)
         while board.running():
             time.sleep(_LOOK_S)

@@ -2,8 +2,8 @@
 
 ::
 
-    remote.py     mpremote as a process, and what stands on the board (``survey``)
-    program.py    what must stand there: the files, as sources or compiled
+    remote.py     mpremote as a process; firmware and files of the board (``survey``)
+    program_files.py  the files that the board needs, as sources or compiled
     changes.py    how the two differ, and whether the board is suitable
     install.py    the steps from one to the other
     package.py    the same files as a folder for ``mpremote mip install``

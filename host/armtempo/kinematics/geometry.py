@@ -5,12 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from armtempo.arrays import Array as Array
 from armtempo.model.arm import Arm
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,9 @@
-"""The link: from a port's name to a ``Board`` with one method a command.
+"""The link: from the name of a port to a ``Client`` with one method for each command of the protocol.
 
-``open_board`` is all that others need; ``session`` holds the protocol's timing, ``follow`` a run's samples.
+``open_board`` is all that most need; ``session`` holds the protocol's timing, ``follow`` receives a run's samples.
 """
 
-from armtempo.link.board import Board
+from armtempo.link.client import Client
 from armtempo.link.connect import greet, open_board
 
-__all__ = ["Board", "greet", "open_board"]
+__all__ = ["Client", "greet", "open_board"]

@@ -7,16 +7,16 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
-from armtempo.errors import BoardError, LinkError
+from armtempo.errors import BoardError, DisturbedError, LinkError, NoAnswerError
 from armtempo.link import diagnose, ports, traffic
-from armtempo.link.board import Board
+from armtempo.link.client import Client
 from armtempo.link.program_version import own_crc
-from armtempo.link.session import NoAnswer, Session
+from armtempo.link.session import Session
 from armtempo.link.transport import SerialTransport, Transport
 from armtempo.model.arm import Arm
 
 _NOISY_TRIES = 10
-"""Where something arrives that may be pieces of frames, ``hello`` is tried so often."""
+"""Attempts at ``hello`` where pieces of frames arrive."""
 
 
 @contextmanager
@@ -26,7 +26,7 @@ def open_board(
     sink: traffic.Sink | None = None,
     arm: Arm | None = None,
     any_program: bool = False,
-) -> Iterator[Board]:
+) -> Iterator[Client]:
     """The board on ``port``, greeted; a sim port starts a virtual one that lives as long as the context.
 
     ``log_traffic``: file for the traffic log; ``sink`` takes the traffic as well; ``arm``: what a virtual
@@ -54,16 +54,15 @@ def open_board(
         yield board
 
 
-def _greeted(stack: ExitStack, transport: Transport) -> Board:
-    """The board behind a transport; the one that is in use at the end is closed with the stack."""
+def _greeted(stack: ExitStack, transport: Transport) -> Client:
+    """The board behind a transport; the transport in use at the end is closed with the stack."""
     first = stack.enter_context(closing(transport))
     board = greet(first)
     stack.callback(lambda: board.session.transport.close())
     return board
 
 
-def _check_program(board: Board) -> None:
-    assert board.info is not None  # greeted
+def _check_program(board: Client) -> None:
     if board.info.program_crc != own_crc():
         raise LinkError(
             f"the board on {board.session.transport.name} runs another version of the board program than the "
@@ -73,26 +72,26 @@ def _check_program(board: Board) -> None:
 
 def greet(
     transport: Transport, session_number: int | None = None, clock: Callable[[], float] = time.monotonic
-) -> Board:
-    """A board that has answered ``hello``; LinkError, saying what is there instead, where none has."""
-    board = Board(Session(transport, clock), session_number)
+) -> Client:
+    """A board that has answered ``hello``; LinkError with a diagnosis where none has."""
+    board = Client(Session(transport, clock), session_number)
     for _ in range(_NOISY_TRIES):
         try:
             board.hello()
             return board
-        except NoAnswer:
+        except NoAnswerError:
             reason = diagnose.explain(transport, bytes(board.session.recent))
-            if not isinstance(reason, diagnose.Garbled):
+            if not isinstance(reason, DisturbedError):
                 break
     raise reason
 
 
 @contextmanager
 def _virtual_port(port: str, arm: Arm | None) -> Iterator[str]:
-    """A virtual board's port; where its program fails, the errors meanwhile end with its last words."""
+    """A virtual board's port; where its program fails, link errors end with the last line of its log."""
     from armtempo import simulator
 
-    with simulator.launch(ports.sim_flash(port), arm=arm) as board:
+    with simulator.launch(simulator.LaunchOptions(ports.sim_flash(port), arm=arm)) as board:
         try:
             yield board.port
         except LinkError as error:

@@ -1,42 +1,34 @@
-"""What sits on a port where nobody answers ``hello``."""
+"""Diagnosis of a port on which no armtempo board answers ``hello``."""
 
 from __future__ import annotations
 
 from armtempo_shared import wire
 from armtempo_shared.messages import SYNC
 
-from armtempo.errors import LinkError
+from armtempo.errors import DisturbedError, LinkError, NoProgramError
 from armtempo.link.transport import Transport
 
 LOOK_S = 0.4
 _REPL_SIGNS = (b">>>", b"raw REPL")
-"""The firmware's name is none: the program's own answer to ``hello`` carries it."""
+"""Bytes by which a REPL is known; not the firmware's name, which the program's answer to ``hello`` has too."""
 _FRAME_SIGNS = (bytes((SYNC,)), bytes((wire.EVENT["ok"][1], wire.COMMAND["hello"][1])))
 """A frame's first byte, or what an answer to ``hello`` begins with."""
 _NUDGE = b"\r\x02\r"
-"""Ends a line, leaves a raw REPL, asks for a prompt; without meaning to the board program."""
-
-
-class Prompt(LinkError):
-    """MicroPython's prompt answers."""
-
-
-class Garbled(LinkError):
-    """Pieces of frames arrive, but none whole: worth another try."""
+"""Ends a line, leaves a raw REPL, asks for a prompt; the board program ignores it."""
 
 
 def explain(transport: Transport, heard: bytes) -> LinkError:
-    """The error to raise: silence, a bare MicroPython REPL, or something else; ``heard`` so far."""
+    """The error to raise, by what the port sends: nothing, a REPL, pieces of frames, or else; ``heard`` so far."""
     transport.write(_NUDGE)
     heard += _listen(transport)
     where = f"the board on {transport.name}"
     if any(sign in heard for sign in _REPL_SIGNS):
-        return Prompt(
+        return NoProgramError(
             f"{where} runs MicroPython but not the armtempo program; install it with 'armtempo deploy'"
         )
     if any(sign in heard for sign in _FRAME_SIGNS):
-        return Garbled(
-            f"{where} is hardly to be understood: pieces of armtempo's messages arrive, too few of them "
+        return DisturbedError(
+            f"{where} is mostly unreadable: pieces of armtempo's messages arrive, too few of them "
             "whole; check cable and plugs"
         )
     if heard:

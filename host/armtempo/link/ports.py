@@ -1,4 +1,4 @@
-"""Serial ports of this machine, and which of them look like a board."""
+"""Serial ports of this machine, and which have the USB ids of a board."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the board's sources stand on this machine, and the hash by which a board is compared with them."""
+"""The board program's sources on this machine, and their hash, with which that of a board is compared."""
 
 from __future__ import annotations
 

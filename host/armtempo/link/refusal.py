@@ -1,4 +1,4 @@
-"""What the board means by a refusal or a fault, in a sentence."""
+"""Error messages for the board's refusals and faults."""
 
 from __future__ import annotations
 

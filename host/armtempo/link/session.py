@@ -14,49 +14,41 @@ from typing import Any
 
 from armtempo_shared import wire
 
-from armtempo.errors import ArmtempoError, LinkError
-from armtempo.link import messages
+from armtempo.errors import ArmtempoError, LinkError, NoAnswerError, OtherBoardError
+from armtempo.link import board_messages
 from armtempo.link.refusal import refusal
 from armtempo.link.transport import Transport
 
 _CTRL_C = 3
-REPEAT_S = 0.2
-"""A command without an answer is sent again after this time."""
-SILENCE_S = 3.0
-"""No byte for so long: the board is not there any more."""
-PATIENCE_S = 20.0
-"""Bytes but no answer for so long: the link is too disturbed."""
-QUIET_S = 0.05
-"""Half a frame, then nothing for so long: its rest is not coming."""
+REPEAT_INTERVAL_S = 0.2
+"""A command is sent again after this time without an answer."""
+SILENCE_TIMEOUT_S = 3.0
+"""After this time without a byte the board counts as gone."""
+ANSWER_TIMEOUT_S = 20.0
+"""After this time with bytes but without an answer the link counts as too disturbed."""
+FRAME_TIMEOUT_S = 0.05
+"""An incomplete frame is dropped after this time without a byte."""
 RECONNECT_S = 60.0
-"""A port that broke is waited for so long."""
-HURRY_S = 5.0
-"""The same where somebody wants an end: long enough to tell the board once the plug is in again."""
-RETRY_S = 0.2
-"""Between two attempts to open it."""
-RECENT = 512
-"""So many of the latest bytes are kept, to tell what sits on a port that does not answer."""
+"""How long a port that broke is tried again."""
+STOPPING_RECONNECT_S = 5.0
+"""The same after a stop request: long enough to tell the board once the plug is in again."""
+REOPEN_INTERVAL_S = 0.2
+"""Time between two attempts to open it."""
+RECENT_BYTES = 512
+"""Number of received bytes that are kept, to diagnose a port that does not answer."""
 
 
 Answer = tuple[tuple[Any, ...], Any]
 """Field values (int) and tail (bytes or str) of an answer."""
 
 
-class NoAnswer(LinkError):
-    """The board did not answer a command in time."""
-
-
-class OtherBoard(LinkError):
-    """The board that answers is not the one that was there before, or was started anew since."""
-
-
 class Session:
     """The host's end of the protocol; ``clock`` gives seconds and is replaced in tests.
 
-    Where the port breaks, ``reopen`` (if set) is tried until it gives a new transport behind which ``greet``
-    finds the same board, and all goes on: the command under way is sent again, and what was lost meanwhile is
-    asked for again by those who need it. The greeting makes the board forget its last answer; where just that
-    was lost, the board may refuse what it has done already.
+    Where the port breaks, ``reopen`` (if set) is called until it gives a new transport on which ``greet`` finds
+    the same board. Then the command under way is sent again; who follows a run asks for the samples that were
+    lost. The greeting makes the board forget its last answer. If just that answer was lost, the board executes
+    the command twice and may refuse it the second time.
     """
 
     def __init__(self, transport: Transport, clock: Callable[[], float] = time.monotonic) -> None:
@@ -64,12 +56,12 @@ class Session:
         self.clock = clock
         self.reopen: Callable[[], Transport] | None = None
         self.greet: Callable[[], None] = lambda: None
-        """Raises OtherBoard where another one answers, or the same one started anew."""
-        self.tell: Callable[[str], None] = lambda text: None
-        """Gets what a user should know while it happens."""
-        self.hurried: Callable[[], bool] = lambda: False
-        """Whether somebody wants an end: then a port that broke is waited for only HURRY_S."""
-        self.events: deque[messages.Event] = deque()
+        """Raises OtherBoardError where another one answers, or the same one started anew."""
+        self.tell: Callable[[str], object] = lambda text: None
+        """Called with messages for the user while other calls wait."""
+        self.stopping: Callable[[], bool] = lambda: False
+        """Whether a stop was asked for: then a broken port is tried again for STOPPING_RECONNECT_S only."""
+        self.events: deque[board_messages.Event] = deque()
         self.recent = bytearray()
         self.repeats = 0
         self.sleep = time.sleep
@@ -79,7 +71,7 @@ class Session:
 
     @property
     def frames_bad(self) -> int:
-        """Stretches of received bytes that were no frame."""
+        """Number of byte sequences received that were no frame."""
         return int(self._parser.bad)
 
     def command(
@@ -88,13 +80,13 @@ class Session:
         values: Sequence[int] = (),
         tail: bytes | str = b"",
         *,
-        silence_s: float = SILENCE_S,
-        patience_s: float = PATIENCE_S,
+        silence_timeout_s: float = SILENCE_TIMEOUT_S,
+        answer_timeout_s: float = ANSWER_TIMEOUT_S,
     ) -> Answer:
         """(fields, tail) of the board's answer.
 
-        Raises BoardError where the board refuses, NoAnswer after ``silence_s`` without a byte or
-        ``patience_s`` without an answer, LinkError where the port breaks.
+        Raises BoardError where the board refuses, NoAnswerError after ``silence_timeout_s`` without a byte or
+        ``answer_timeout_s`` without an answer, LinkError where the port breaks.
         """
         number = wire.COMMAND[name][1]
         sequence = self._next_sequence()
@@ -102,18 +94,18 @@ class Session:
         begin_s = self._heard_s = self.clock()
         while True:
             self._write(data)
-            reply = self._reply(self.clock() + REPEAT_S, sequence, number)
+            reply = self._reply(self.clock() + REPEAT_INTERVAL_S, sequence, number)
             if reply is not None:
-                return _answer(name, *reply)
+                return _answer(name, reply)
             now_s = self.clock()
             silent = (
-                now_s - self._heard_s >= silence_s and not self.frames_bad
-            )  # on a bad line all may be lost
-            if silent or now_s - begin_s >= patience_s:
-                raise NoAnswer(self._no_answer(name, now_s - begin_s))
+                now_s - self._heard_s >= silence_timeout_s and not self.frames_bad
+            )  # on a disturbed line all may be lost
+            if silent or now_s - begin_s >= answer_timeout_s:
+                raise NoAnswerError(self._no_answer(name, now_s - begin_s))
             self.repeats += 1
 
-    def poll(self, timeout_s: float) -> messages.Event | None:
+    def poll(self, timeout_s: float) -> board_messages.Event | None:
         """The oldest event; waits up to ``timeout_s`` for one."""
         deadline_s = self.clock() + timeout_s
         while not self.events:
@@ -136,28 +128,28 @@ class Session:
         self._sequence = (self._sequence + (2 if self._sequence == _CTRL_C - 1 else 1)) % 256
         return self._sequence
 
-    def _reply(self, deadline_s: float, sequence: int, number: int) -> messages.Frame | None:
+    def _reply(self, deadline_s: float, sequence: int, number: int) -> wire.Frame | None:
         while (left_s := deadline_s - self.clock()) > 0:
             frame = self._frame(left_s)
             if frame is None:
                 continue
-            if frame[1] in _REPLY_IDS:
-                if frame[0] == sequence and frame[2][:1] == bytes((number,)):
+            if frame.number in _REPLY_IDS:
+                if frame.sequence == sequence and frame.payload[:1] == bytes((number,)):
                     return frame
             else:
                 self._keep_event(frame)
         return None
 
-    def _frame(self, timeout_s: float) -> messages.Frame | None:
+    def _frame(self, timeout_s: float) -> wire.Frame | None:
         frame = self._next_frame()
         if frame is not None:
             return frame
-        data = self._read(min(timeout_s, QUIET_S))
+        data = self._read(min(timeout_s, FRAME_TIMEOUT_S))
         if data:
             self._heard_s = self.clock()
-            self.recent = (self.recent + data)[-RECENT:]
+            self.recent = (self.recent + data)[-RECENT_BYTES:]
             self._parser.feed(data)
-        elif self._parser.pending() and self.clock() - self._heard_s >= QUIET_S:
+        elif self._parser.pending() and self.clock() - self._heard_s >= FRAME_TIMEOUT_S:
             self._parser.drop()
         return self._next_frame()
 
@@ -177,7 +169,7 @@ class Session:
     def reconnect(self, reason: LinkError) -> None:
         """Close the port and open it again until the board answers, for up to RECONNECT_S.
 
-        Raises ``reason`` where that fails, OtherBoard where another board answers.
+        Raises ``reason`` where that fails, OtherBoardError where another board answers.
         """
         if self.reopen is None:
             raise reason
@@ -185,16 +177,16 @@ class Session:
         self.transport.close()
         limit_s = self.clock() + RECONNECT_S
         while not self._found_again(self.reopen):
-            if self.hurried():
-                limit_s = min(limit_s, self.clock() + HURRY_S)
+            if self.stopping():
+                limit_s = min(limit_s, self.clock() + STOPPING_RECONNECT_S)
             if self.clock() >= limit_s:
                 raise self._gone(reason)
-            self.sleep(RETRY_S)
+            self.sleep(REOPEN_INTERVAL_S)
         self._heard_s = self.clock()
         self.tell(f"connected to {self.transport.name} again")
 
     def _gone(self, reason: LinkError) -> LinkError:
-        if not self.hurried():
+        if not self.stopping():
             return reason
         return LinkError(
             f"{reason}; it could not be told to stop: what was moving may move on, see 'armtempo status' once it is "
@@ -204,12 +196,12 @@ class Session:
     def _found_again(self, reopen: Callable[[], Transport]) -> bool:
         """Open the port and greet the board; False where that fails."""
         self._parser = wire.Parser()
-        self.reopen = None  # what breaks meanwhile is tried again by the caller
+        self.reopen = None  # the caller repeats what fails meanwhile
         try:
             self.transport = reopen()
             self.greet()
             return True
-        except OtherBoard:
+        except OtherBoardError:
             raise
         except ArmtempoError:
             self.transport.close()
@@ -217,13 +209,13 @@ class Session:
         finally:
             self.reopen = reopen
 
-    def _next_frame(self) -> messages.Frame | None:
-        frame: messages.Frame | None = self._parser.next()
+    def _next_frame(self) -> wire.Frame | None:
+        frame: wire.Frame | None = self._parser.next()
         return frame
 
-    def _keep_event(self, frame: messages.Frame) -> None:
+    def _keep_event(self, frame: wire.Frame) -> None:
         try:
-            self.events.append(messages.event(frame[1], frame[2]))
+            self.events.append(board_messages.event(frame.number, frame.payload))
         except wire.WireError:
             return  # a reply to an older command, or a message of a newer protocol
 
@@ -231,10 +223,10 @@ class Session:
 _REPLY_IDS = tuple(wire.EVENT[name][1] for name in ("ok", "error"))
 
 
-def _answer(name: str, sequence: int, number: int, payload: bytes) -> Answer:
+def _answer(name: str, reply: wire.Frame) -> Answer:
     try:
-        values, tail = wire.decode(wire.EVENT_BY_ID[number], payload)
-        if wire.EVENT_BY_ID[number][0] == "error":
+        values, tail = wire.decode(wire.EVENT_BY_ID[reply.number], reply.payload)
+        if wire.EVENT_BY_ID[reply.number][0] == "error":
             raise refusal(f"the board refused '{name}'", *values[1:])
         answer: Answer = wire.decode(wire.ANSWER[name], tail)
     except wire.WireError as error:

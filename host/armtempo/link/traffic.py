@@ -2,7 +2,7 @@
 
 A log is a text file, one line a chunk of bytes, tab-separated::
 
-    seconds since the start | ">" to the board, "<" from it | the bytes in hex | what they say
+    seconds since the start | ">" to the board, "<" from it | the bytes in hex | the frames decoded
 """
 
 from __future__ import annotations
@@ -40,13 +40,13 @@ Sink = Callable[[Chunk, list[str]], None]
 
 
 class Decoder:
-    """Turns the chunks of both directions into words; keeps half frames for the next chunk."""
+    """Decodes the chunks of both directions; keeps incomplete frames for the next chunk."""
 
     def __init__(self) -> None:
         self._parsers = {TO_BOARD: wire.Parser(), FROM_BOARD: wire.Parser()}
 
     def feed(self, direction: str, data: bytes) -> list[str]:
-        """The frames that this chunk completes, one description each, and a word about damaged bytes."""
+        """A description of each frame that this chunk completes, and a note on damaged bytes."""
         parser = self._parsers[direction]
         bad_before = parser.bad
         parser.feed(data)
@@ -59,7 +59,7 @@ class Decoder:
 
 
 def describe(direction: str, sequence: int, number: int, payload: bytes) -> str:
-    """One frame in words: ``12 status``, ``12 ok status state=2 …``."""
+    """One frame as text: ``12 status``, ``12 ok status state=2 …``."""
     table = wire.COMMAND_BY_ID if direction == TO_BOARD else wire.EVENT_BY_ID
     entry = table.get(number)
     if entry is None:
@@ -84,7 +84,7 @@ def _words(entry: tuple[Any, ...], payload: bytes) -> str:
 
 
 class LoggedTransport:
-    """A transport that hands what passes through it to a sink as well."""
+    """A transport that copies its traffic to a sink."""
 
     def __init__(self, inner: Transport, sink: Sink) -> None:
         self.name = inner.name

@@ -8,15 +8,11 @@ from typing import Protocol
 
 import serial
 
-from armtempo.errors import InputError, LinkError
+from armtempo.errors import InputError, LinkError, PortError
 
 BAUD_RATE = 115_200
-"""Without meaning over USB; a plain UART between host and board would use it."""
+"""Has no effect over USB; a UART between host and board would use it."""
 _ADVICE = "'armtempo ports' lists what is there"
-
-
-class NotOpened(LinkError):
-    """The port is there, but it cannot be opened."""
 
 
 class Transport(Protocol):
@@ -37,7 +33,7 @@ class Transport(Protocol):
 class SerialTransport:
     """A transport over pyserial: a device name, or a URL such as ``socket://host:port``.
 
-    Raises InputError where there is no such port, NotOpened where it is in use, LinkError where it breaks.
+    Raises InputError where there is no such port, PortError where it is in use, LinkError where it breaks.
     """
 
     def __init__(self, port: str) -> None:
@@ -79,7 +75,7 @@ def _open(port: str) -> serial.Serial:
     return device
 
 
-def _open_error(port: str, error: Exception) -> LinkError | InputError:
+def _open_error(port: str, error: Exception) -> PortError | InputError:
     number = getattr(error, "errno", None)
     text = str(error)
     if number == errno.ENOENT or "FileNotFoundError" in text:
@@ -87,10 +83,10 @@ def _open_error(port: str, error: Exception) -> LinkError | InputError:
     if number in (errno.EISDIR, errno.ENOTTY) or os.strerror(errno.ENOTTY) in text:
         return InputError(f"{port} is not a serial port; {_ADVICE}")
     if number in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in text:
-        return NotOpened(f"port {port} is in use by another program; close it and try again")
+        return PortError(f"port {port} is in use by another program; close it and try again")
     if number == errno.EACCES or "PermissionError" in text:
-        return NotOpened(
+        return PortError(
             f"no permission to open {port}: another program holds it, or your user may not use serial ports "
             "(on Debian: 'sudo adduser $USER dialout', then log in again)"
         )
-    return NotOpened(f"port {port} cannot be opened: {text}; {_ADVICE}")
+    return PortError(f"port {port} cannot be opened: {text}; {_ADVICE}")

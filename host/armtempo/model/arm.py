@@ -1,18 +1,13 @@
-"""The arm: geometry, limits, drives and encoders, as read from its TOML file."""
+"""The arm: geometry, limits, drives and encoders."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
 from pathlib import Path
 
-from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS
-
 from armtempo.errors import InputError
-from armtempo.formats import toml_table
-from armtempo.formats.toml_table import Table
-
-MAX_LENGTH_MM = 1e6
-"""Longest link that an arm file may describe."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +73,7 @@ class LimitSwitches:
 
 @dataclass(frozen=True)
 class JointModel:
-    """What the virtual arm needs to know of one joint beyond its drive."""
+    """What the virtual arm simulates of one joint beyond its drive."""
 
     holding_torque_nm: float = 0.0
     """Of the motor, at its shaft; 0: an ideal motor, which never lags."""
@@ -94,7 +89,7 @@ class JointModel:
     backlash_deg: float = 0.0
     """Of the joint against its motor."""
     encoder_phase_counts: float = 0.0
-    """How far the encoder stands beyond its last count at power-up, 0 to 1."""
+    """Fraction of a count by which the encoder is beyond its last edge at power-up, 0 to 1."""
     scatter_deg: float = 0.0
     """Standard deviation between repetitions."""
 
@@ -118,8 +113,43 @@ class Joint:
 
 
 @dataclass(frozen=True)
+class DrivenJoint:
+    """A joint with a motor, and therefore with limits: the joints of every motion are of this type."""
+
+    name: str
+    range_deg: tuple[float, float]
+    home_deg: float
+    limits: Limits
+    motor: Motor
+    encoder: Encoder | None
+    switches: LimitSwitches
+    model: JointModel
+
+    @property
+    def steps_per_deg(self) -> float:
+        """Step pulses per degree of the joint."""
+        return self.motor.steps_per_deg
+
+    @property
+    def counts_per_step(self) -> Fraction:
+        """Encoder counts per step pulse, exactly as the arm file's decimals say; 0 without an encoder."""
+        if self.encoder is None:
+            return Fraction(0)
+        gear = Fraction(str(self.motor.gear_ratio))
+        counts = Fraction(self.encoder.counts_per_rev)
+        if self.encoder.on == "motor":
+            counts *= gear
+        return counts / (self.motor.steps_per_rev * self.motor.microsteps * gear)
+
+    @property
+    def counts_per_deg(self) -> float:
+        """Encoder counts per degree of the joint; 0 without an encoder."""
+        return float(self.counts_per_step) * self.steps_per_deg
+
+
+@dataclass(frozen=True)
 class Driver:
-    """What the stepper drivers ask of the signals."""
+    """Timing and polarity of the signals that the stepper drivers need."""
 
     pulse_us: float = 2.0
     low_us: float = 2.0
@@ -130,7 +160,7 @@ class Driver:
 
 @dataclass(frozen=True)
 class Safety:
-    """What the board does when something goes wrong."""
+    """E-stop input, and what the board does when it trips or the host disappears."""
 
     estop_fitted: bool = False
     estop_active: str = "low"
@@ -142,7 +172,7 @@ class Safety:
 
 @dataclass(frozen=True)
 class Arm:
-    """A whole arm; ``source`` names the file it was read from."""
+    """An arm; ``source`` is the file that it was read from."""
 
     name: str
     joints: tuple[Joint, ...]
@@ -150,158 +180,46 @@ class Arm:
     safety: Safety = field(default_factory=Safety)
     source: str = ""
 
+    @classmethod
+    def load(cls, path: Path | str) -> Arm:
+        """The arm described by a TOML file.
+
+        Raises InputError, naming file, key and value, for anything missing, unknown or not allowed.
+        """
+        from armtempo.model import arm_file
+
+        return arm_file.load(path)
+
+    @classmethod
+    def paper(cls) -> Arm:
+        """The arm that ships with armtempo: the paper's 1:5 model, three of its six joints driven."""
+        from armtempo.model import arm_file
+
+        return arm_file.load(arm_file.default_path())
+
+    @cached_property
+    def driven(self) -> tuple[DrivenJoint, ...]:
+        """The joints with a motor, in order. InputError where one of them has no limits."""
+        return tuple(
+            _driven(self.name, joint, joint.motor) for joint in self.joints if joint.motor is not None
+        )
+
     @property
-    def driven(self) -> tuple[Joint, ...]:
-        """The joints with a motor, in order: the joints of every motion."""
-        return tuple(joint for joint in self.joints if joint.motor is not None)
+    def home_deg(self) -> tuple[float, ...]:
+        """The home posture: an angle for each driven joint, degrees (J,)."""
+        return tuple(joint.home_deg for joint in self.driven)
 
 
-def default_path() -> Path:
-    """The arm file that ships with armtempo: the paper's 1:5 arm."""
-    return Path(__file__).parents[1] / "data" / "paper_arm.toml"
-
-
-def load_arm(path: Path | str) -> Arm:
-    """The arm described by a TOML file.
-
-    Raises InputError, naming file, key and value, for anything missing, unknown or not allowed.
-    """
-    top = toml_table.read(path)
-    name = top.text("name")
-    driver = _driver(top.table("driver"))
-    safety = _safety(top.table("safety"))
-    tables = top.tables("joint")
-    joints = tuple(_joint(table, number) for number, table in enumerate(tables, 1))
-    top.done()
-    arm = Arm(name, joints, driver, safety, str(path))
-    _check_channels(arm, path)
-    return arm
-
-
-def _driver(table: Table | None) -> Driver:
-    if table is None:
-        return Driver()
-    times = {
-        key: table.number(key, getattr(Driver, key), least=0.1, most=500.0)
-        for key in ("pulse_us", "low_us", "dir_setup_us", "dir_hold_us")
-    }
-    active = table.choice("enable_active", ("low", "high"), Driver.enable_active)
-    table.done()
-    return Driver(**times, enable_active=active)
-
-
-def _safety(table: Table | None) -> Safety:
-    if table is None:
-        return Safety()
-    safety = Safety(
-        estop_fitted=table.boolean("estop_fitted", Safety.estop_fitted),
-        estop_active=table.choice("estop_active", ("low", "high"), Safety.estop_active),
-        estop_releases_enable=table.boolean("estop_releases_enable", Safety.estop_releases_enable),
-        on_link_loss=table.choice("on_link_loss", ("finish", "stop"), Safety.on_link_loss),
-        link_timeout_ms=table.integer("link_timeout_ms", Safety.link_timeout_ms, least=200, most=60_000),
+def _driven(arm: str, joint: Joint, motor: Motor) -> DrivenJoint:
+    if joint.limits is None:
+        raise InputError(f"arm {arm!r}: {joint.name} has a motor but no limits; add a limits table")
+    return DrivenJoint(
+        joint.name,
+        joint.range_deg,
+        joint.home_deg,
+        joint.limits,
+        motor,
+        joint.encoder,
+        joint.switches,
+        joint.model,
     )
-    table.done()
-    return safety
-
-
-def _joint(table: Table, number: int) -> Joint:
-    low, high = table.numbers("range_deg", 2)
-    if not low < high:
-        raise table.fail("range_deg", "two angles, the smaller first")
-    motor = _motor(table.table("motor"))
-    limits = _limits(table.table("limits"))
-    if motor is not None and limits is None:
-        raise table.fail("limits", "a table with speed_deg_s, acceleration_deg_s2 and jerk_deg_s3")
-    encoder = _encoder(table.table("encoder"))
-    if encoder is not None and motor is None:
-        raise table.fail("motor", "given where there is an encoder")
-    joint = Joint(
-        name=table.text("name", f"joint {number}"),
-        d_mm=table.number("d_mm", least=-MAX_LENGTH_MM, most=MAX_LENGTH_MM),
-        a_mm=table.number("a_mm", least=-MAX_LENGTH_MM, most=MAX_LENGTH_MM),
-        alpha_deg=table.number("alpha_deg", least=-180.0, most=180.0),
-        theta_offset_deg=table.number("theta_offset_deg", 0.0, least=-360.0, most=360.0),
-        range_deg=(low, high),
-        home_deg=table.number("home_deg", min(max(0.0, low), high), least=low, most=high),
-        limits=limits,
-        motor=motor,
-        encoder=encoder,
-        switches=_switches(table.table("switches")),
-        model=_model(table.table("model")),
-    )
-    table.done()
-    return joint
-
-
-def _limits(table: Table | None) -> Limits | None:
-    if table is None:
-        return None
-    limits = Limits(
-        speed_deg_s=table.number("speed_deg_s", above=0.0),
-        acceleration_deg_s2=table.number("acceleration_deg_s2", above=0.0),
-        jerk_deg_s3=table.number("jerk_deg_s3", above=0.0),
-    )
-    table.done()
-    return limits
-
-
-def _motor(table: Table | None) -> Motor | None:
-    if table is None:
-        return None
-    motor = Motor(
-        channel=table.integer("channel", least=1, most=MAX_JOINTS),
-        steps_per_rev=table.integer("steps_per_rev", least=4, most=10_000),
-        microsteps=table.integer("microsteps", least=1, most=256),
-        gear_ratio=table.number("gear_ratio", above=0.0, most=10_000.0),
-        direction=table.choice("direction", (1, -1), 1),
-    )
-    table.done()
-    return motor
-
-
-def _encoder(table: Table | None) -> Encoder | None:
-    if table is None:
-        return None
-    encoder = Encoder(
-        channel=table.integer("channel", least=1, most=MAX_ENCODERS),
-        counts_per_rev=table.integer("counts_per_rev", least=4, most=10_000_000),
-        on=table.choice("on", ("joint", "motor"), "joint"),
-        direction=table.choice("direction", (1, -1), 1),
-        following_error_deg=table.number("following_error_deg", 0.0, least=0.0, most=360.0),
-    )
-    table.done()
-    return encoder
-
-
-def _switches(table: Table | None) -> LimitSwitches:
-    if table is None:
-        return LimitSwitches()
-    switches = LimitSwitches(
-        low=table.integer("low", least=1, most=3) if table.has("low") else None,
-        high=table.integer("high", least=1, most=3) if table.has("high") else None,
-        active=table.choice("active", ("low", "high"), "low"),
-        low_deg=table.number("low_deg") if table.has("low_deg") else None,
-        high_deg=table.number("high_deg") if table.has("high_deg") else None,
-    )
-    table.done()
-    return switches
-
-
-def _model(table: Table | None) -> JointModel:
-    if table is None:
-        return JointModel()
-    values = {key.name: table.number(key.name, 0.0) for key in fields(JointModel)}
-    table.done()
-    return JointModel(**values)
-
-
-def _check_channels(arm: Arm, path: Path | str) -> None:
-    if not arm.driven:
-        raise InputError(f"{path}: no joint has a motor; at least one [joint.motor] is needed")
-    for what, channels in (
-        ("motor.channel", [joint.motor.channel for joint in arm.joints if joint.motor]),
-        ("encoder.channel", [joint.encoder.channel for joint in arm.joints if joint.encoder]),
-    ):
-        for channel in channels:
-            if channels.count(channel) > 1:
-                raise InputError(f"{path}: {what} = {channel} is used by two joints; each needs its own")

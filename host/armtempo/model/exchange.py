@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
+from armtempo.arrays import Array
 from armtempo.errors import InputError
 from armtempo.formats.atomic_file import why
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
-from armtempo.splines.bspline import Array
 
 CSV_COLUMNS = ("angle_deg", "speed_deg_s", "acceleration_deg_s2", "jerk_deg_s3")
 MAX_RATE_HZ = 100_000.0

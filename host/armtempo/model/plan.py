@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
+from armtempo.arrays import Array
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
-from armtempo.splines.bspline import Array
 from armtempo.splines.extremes import Extremes
 from armtempo.splines.trajectory import Trajectory
 
@@ -29,16 +30,19 @@ class Search:
     history_s: Array
     """Best fitness of the first population and after each iteration, (iterations + 1,)."""
     optimum_s: float
-    """Where polished: bound from below on the local optimum with as many intervals; else 0."""
+    """Where polished: lower bound of the local optimum with as many intervals; else 0."""
     floor_s: float
-    """No time law along this path keeps the limits in less (kind "path": to about 1 ms)."""
+    """Lower bound of the motion time of every time law along this path (kind "path": to about 1 ms)."""
     floor_kind: str
-    """How the floor was found, see ``floors.floor``."""
+    """How the lower bound was found, see ``lower_bounds.floor``."""
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A motion for ``arm`` that does ``job`` and keeps every limit; ``versions`` made it."""
+    """A motion for ``arm`` that does ``job`` and keeps every limit.
+
+    ``trajectory(time_s, order)`` gives the angles of the driven joints or their derivatives at any time.
+    """
 
     arm: Arm
     job: Job
@@ -50,5 +54,36 @@ class Plan:
     searches: tuple[Search, ...]
     """One for each joint that moves, or one for the shared time axis."""
     extremes: tuple[Extremes, ...]
-    """For each driven joint."""
+    """Largest speed, acceleration and jerk of each driven joint, as proven bounds."""
     versions: Mapping[str, str]
+    """What the numbers depend on besides arm and job: armtempo, numpy, scipy, Python, processor."""
+
+    @property
+    def total_s(self) -> float:
+        """The motion time: when the last joint arrives, seconds."""
+        return self.trajectory.duration_s
+
+    def save(self, path: Path | str) -> None:
+        """Write the trajectory file, whole or not at all; InputError where it cannot be written."""
+        from armtempo.model import trajectory_file
+
+        trajectory_file.save(self, path)
+
+    def to_csv(self, rate_hz: float = 100.0) -> str:
+        """Angle, speed, acceleration and jerk of each driven joint as CSV, ``rate_hz`` lines a second."""
+        from armtempo.model import exchange
+
+        return exchange.to_csv(self, rate_hz)
+
+    def to_ros(self, rate_hz: float = 100.0, frame_id: str = "") -> str:
+        """A trajectory_msgs/JointTrajectory message in YAML, radians, with ``rate_hz`` points a second."""
+        from armtempo.model import exchange
+
+        return exchange.to_ros(self, rate_hz, frame_id)
+
+    @classmethod
+    def load(cls, path: Path | str) -> Plan:
+        """The plan of a trajectory file; InputError where the file is none, is damaged or does not fit."""
+        from armtempo.model import trajectory_file
+
+        return trajectory_file.load(path)

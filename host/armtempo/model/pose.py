@@ -1,4 +1,4 @@
-"""Poses from what people write: a matrix, or a position with roll-pitch-yaw angles or a quaternion."""
+"""Poses from a matrix, or from a position with roll-pitch-yaw angles or a quaternion."""
 
 from __future__ import annotations
 
@@ -6,14 +6,13 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from armtempo.arrays import Array
 from armtempo.errors import InputError
 
-Array = NDArray[np.float64]
-
 LARGEST = 1e9
-"""Lengths in mm and angles in degrees beyond this are slips of the pen; with them no digit of a result is right."""
+"""Lengths in mm and angles in degrees beyond this are typing errors; no digit of a result would be right."""
 
 ROUNDED = 1e-3
 """How far a rotation or a unit quaternion may be off by rounding of the printed numbers."""

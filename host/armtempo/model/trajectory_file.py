@@ -21,7 +21,7 @@ VERSION = 1
 
 
 def save(plan: Plan, path: Path | str) -> None:
-    """Writes the plan whole or not at all.
+    """Write the plan, whole or not at all.
 
     Raises InputError where the file cannot be written.
     """
@@ -69,41 +69,45 @@ def _refuse(name: str) -> None:
 
 
 def _check(plan: Plan, path: Path | str) -> None:
-    """What the types cannot say: shapes, time that runs forward, one joint for each drive."""
+    """Check what types cannot express: shapes, increasing times, one spline for each driven joint."""
+    for joint in plan.arm.joints:
+        _check_drive(joint, f"{path}: arm: {joint.name}")
     joints, driven = plan.trajectory.joints, plan.arm.driven
     if not joints or len(joints) != len(driven):
         raise InputError(f"{path}: {len(joints)} joints in the trajectory, the arm drives {len(driven)}")
     if plan.via_deg.shape[1:] != (len(driven),) or len(plan.extremes) != len(driven):
         raise InputError(f"{path}: via_deg and extremes must have an entry for each of {len(driven)} joints")
-    for number, (joint, drive) in enumerate(zip(joints, driven, strict=True), 1):
-        _check_joint(joint, len(plan.via_deg) - 1, f"{path}: trajectory joint {number}")
-        _check_drive(drive, f"{path}: arm: {drive.name}")
+    for number, spline in enumerate(joints, 1):
+        _check_spline(spline, len(plan.via_deg) - 1, f"{path}: trajectory joint {number}")
     if plan.trajectory.shared and any(
-        not np.array_equal(joint.time_points_s, joints[0].time_points_s) for joint in joints
+        not np.array_equal(spline.time_points_s, joints[0].time_points_s) for spline in joints
     ):
         raise InputError(f"{path}: shared timing, but the joints' time control points differ")
     if any(not 0 <= index < len(joints) for search in plan.searches for index in search.joints):
         raise InputError(f"{path}: searches name a joint that there is not")
 
 
-def _check_drive(drive: Joint, where: str) -> None:
-    motor, encoder = drive.motor, drive.encoder
-    if drive.limits is None or min(drive.limits.values) <= 0:
+def _check_drive(joint: Joint, where: str) -> None:
+    """A joint with a motor can be driven, and its figures can be divided by."""
+    motor, encoder = joint.motor, joint.encoder
+    if motor is None:
+        return
+    if joint.limits is None or min(joint.limits.values) <= 0:
         raise InputError(f"{where}: has no limits above 0")
-    if motor is None or min(motor.steps_per_rev, motor.microsteps, motor.gear_ratio) <= 0:
+    if min(motor.steps_per_rev, motor.microsteps, motor.gear_ratio) <= 0:
         raise InputError(f"{where}: its motor's figures must be above 0")
     if encoder is not None and encoder.counts_per_rev <= 0:
         raise InputError(f"{where}: its encoder's counts_per_rev must be above 0")
 
 
-def _check_joint(joint: JointSpline, segments: int, where: str) -> None:
-    if joint.degree not in BASIS or joint.refine < 1:
-        raise InputError(f"{where}: degree {joint.degree} with refine {joint.refine} is not known")
+def _check_spline(spline: JointSpline, segments: int, where: str) -> None:
+    if spline.degree not in BASIS or spline.refine < 1:
+        raise InputError(f"{where}: degree {spline.degree} with refine {spline.refine} is not known")
     for what, points, pieces in (
-        ("angle", joint.angle_points_deg, segments),
-        ("time", joint.time_points_s, segments * joint.refine),
+        ("angle", spline.angle_points_deg, segments),
+        ("time", spline.time_points_s, segments * spline.refine),
     ):
-        if points.shape != (pieces + joint.degree,):
+        if points.shape != (pieces + spline.degree,):
             raise InputError(f"{where}: {points.size} {what} control points do not fit {pieces} segments")
-    if not np.all(np.diff(joint.time_points_s) > 0):
+    if not np.all(np.diff(spline.time_points_s) > 0):
         raise InputError(f"{where}: its time control points do not increase")

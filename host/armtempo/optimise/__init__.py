@@ -9,27 +9,42 @@ Each algorithm is a module of this package with
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from importlib import import_module
 from types import ModuleType
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from armtempo.arrays import Array
 from armtempo.errors import InputError
 from armtempo.optimise.parameters import Parameter, Value
-from armtempo.optimise.tracker import Array, Function, Progress, Result, Task
+from armtempo.optimise.tracker import Function, Result, Task
+from armtempo.progress import Progress
 
-__all__ = ["ALGORITHMS", "Function", "Progress", "Result", "minimise", "parameters"]
+__all__ = ["ALGORITHMS", "Function", "Result", "Settings", "minimise", "parameters"]
 
 ALGORITHMS = {
     "acs": "armtempo.optimise.acs",
     "cs": "armtempo.optimise.cs",
     "ga": "armtempo.optimise.ga",
-    "hpso": "armtempo.optimise.hpso",
     "iaga": "armtempo.optimise.iaga",
     "pso": "armtempo.optimise.pso",
+    "hpso": "armtempo.optimise.hpso",
 }
-"""Name of an algorithm: the module that holds it."""
+"""Name of an algorithm (Table 4): the module that holds it."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Which search looks for the smallest value, and how long."""
+
+    algorithm: str = "acs"
+    """A key of ALGORITHMS."""
+    population: int = 10
+    iterations: int = 500
+    parameters: Mapping[str, Value] = field(default_factory=dict)
+    """The algorithm's own parameters that are not to have their defaults."""
 
 
 def parameters(algorithm: str) -> Mapping[str, Parameter]:
@@ -42,30 +57,28 @@ def minimise(
     function: Function,
     bounds: ArrayLike,
     rng: np.random.Generator,
-    population: int,
-    iterations: int,
-    algorithm: str = "acs",
+    settings: Settings | None = None,
     progress: Progress | None = None,
-    **given: Value,
 ) -> Result:
     """Smallest value of ``function`` found inside ``bounds``.
 
     ``function`` takes points (N, d) and returns their values (N,), one call for a whole population;
     a value that is not a number counts as infinitely bad. ``bounds`` is (d, 2): lowest and highest
-    value of each variable. ``progress(done, iterations)`` is called after each iteration; ``given`` are
-    parameters of the algorithm. The same ``rng`` state gives the same result. Raises InputError for an unknown
-    algorithm or parameter, a value out of its range, a population below 4, no iterations, or bounds that are
-    not pairs (lowest, highest).
+    value of each variable. ``progress`` counts iterations. The same ``rng`` state gives the same result. Raises
+    InputError for an unknown algorithm or parameter, a value out of its range, a population below 4, no
+    iterations, or bounds that are not pairs (lowest, highest).
     """
-    known = parameters(algorithm)
+    wanted = settings or Settings()
+    known = parameters(wanted.algorithm)
     box = _checked_bounds(bounds)
-    if population < 4 or iterations < 1:
+    if wanted.population < 4 or wanted.iterations < 1:
         raise InputError(
-            f"optimiser: population {population} must be at least 4, iterations {iterations} at least 1"
+            f"optimiser: population {wanted.population} must be at least 4, iterations {wanted.iterations} at least 1"
         )
-    defaults = {name: parameter.default for name, parameter in known.items()}
-    task = Task(function, box, rng, population, iterations, progress)
-    result: Result = _module(algorithm).search(task, **{**defaults, **_checked(algorithm, known, given)})
+    values = {name: parameter.default for name, parameter in known.items()}
+    values |= _checked(wanted.algorithm, known, wanted.parameters)
+    task = Task(function, box, rng, wanted.population, wanted.iterations, progress)
+    result: Result = _module(wanted.algorithm).search(task, **values)
     return result
 
 

@@ -21,9 +21,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from armtempo.arrays import Array
 from armtempo.optimise.levy import BETA, levy_scale
-from armtempo.optimise.parameters import Choice, Number, Parameter
-from armtempo.optimise.tracker import Array, Result, Task, Tracker
+from armtempo.optimise.parameters import Number, OneOf, Parameter
+from armtempo.optimise.tracker import Result, Task, Tracker
 
 
 class Nests:
@@ -50,7 +51,7 @@ class Nests:
         return np.asarray(self.rng.standard_normal(shape) * self.gamma / tail)
 
     def settle(self, trial: Array, which: NDArray[np.intp] | slice = slice(None)) -> None:
-        """Evaluates ``trial`` for the nests ``which``, inside the bounds, and keeps what is better."""
+        """Evaluate ``trial`` (K, d), clipped to the bounds, for the nests ``which`` (K,), and keep what is better."""
         trial = np.minimum(np.maximum(trial, self.low), self.high)
         values = self.tracker.evaluate(trial)
         better = values < self.values[which]
@@ -59,7 +60,7 @@ class Nests:
 
 
 class Paper(Nests):
-    """As the paper has it."""
+    """The search of the paper."""
 
     def iterate(self, part: float) -> None:
         """Flights of all nests, then of the worst ones again, alpha_A from Eq. (25)."""
@@ -72,7 +73,7 @@ class Paper(Nests):
 
 
 class Differences(Nests):
-    """Steps measured by the population itself."""
+    """The search whose steps are scaled by differences of nests."""
 
     def iterate(self, part: float) -> None:
         """A flight of each nest, then a move of some of its variables."""
@@ -96,7 +97,7 @@ PARAMETERS: dict[str, Parameter] = {
     "b": Number(0.5, -5.0, 5.0),
     "pa": Number(0.25, 0.001, 1.0),
     "beta": BETA,
-    "variant": Choice("differences", tuple(VARIANTS)),
+    "variant": OneOf("differences", tuple(VARIANTS)),
 }
 
 

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from armtempo.arrays import Array
 from armtempo.optimise.levy import BETA, levy_steps
 from armtempo.optimise.parameters import Number, Parameter
-from armtempo.optimise.tracker import Array, Result, Task, Tracker
+from armtempo.optimise.tracker import Result, Task, Tracker
 
 PARAMETERS: dict[str, Parameter] = {
     "alpha": Number(0.01, 0.0, 100.0),

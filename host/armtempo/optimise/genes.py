@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from armtempo.arrays import Array
 from armtempo.optimise.parameters import Number
-from armtempo.optimise.tracker import Array
 
 Bits = NDArray[np.bool_]
 """A population: individuals × variables × bits, the first bit of a variable counting most."""

@@ -1,6 +1,6 @@
 """Hybrid particle swarm: P. J. Angeline, "Using selection to improve particle swarm optimization",
 IEEE International Conference on Evolutionary Computation 1998, pp. 84-89. Before each move the better
-half of the swarm is copied over the other half, whose memories stay: the swarm of ``pso`` with the
+half of the swarm is copied over the other half, which keeps its best positions so far: the swarm of ``pso`` with the
 selection of evolutionary programming, at no further evaluation.
 """
 

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from armtempo.arrays import Array
 from armtempo.optimise.genes import BITS, crossover, decode, merits, mutate, random_bits, roulette
 from armtempo.optimise.parameters import Number, Parameter
-from armtempo.optimise.tracker import Array, Result, Task, Tracker
+from armtempo.optimise.tracker import Result, Task, Tracker
 
 PARAMETERS: dict[str, Parameter] = {
     "bits": BITS,
@@ -28,7 +29,7 @@ def search(
     """Minimises by N evaluations an iteration.
 
     ``k1`` and ``k3`` scale the chance of crossover above and below the mean fitness, ``k2`` and ``k4``
-    that of mutation; ``least_mutation`` is added to the latter for everybody (section IV of the source).
+    that of mutation; ``least_mutation`` is added to the latter for every individual (section IV of the source).
     """
     rng, tracker = task.rng, Tracker(task)
     genes = random_bits(rng, task.population, len(task.bounds), bits)

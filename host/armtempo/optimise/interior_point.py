@@ -15,8 +15,8 @@ from typing import Protocol
 
 import numpy as np
 
+from armtempo.arrays import Array
 from armtempo.optimise.kkt import BandedKkt, Equalities, Factor
-from armtempo.optimise.tracker import Array
 
 
 class Linearised(Protocol):
@@ -55,7 +55,7 @@ class Program(Protocol):
 
 
 @dataclass(frozen=True)
-class Settings:
+class Schedule:
     """How far to go. Barriers are sums over all inequalities: about the distance from the optimum."""
 
     first_barrier: float = 1e-2
@@ -97,9 +97,9 @@ _FAR = -0.5
 """How far beyond the inequalities their curve is still measured."""
 
 
-def minimise(program: Program, x: Array, settings: Settings | None = None) -> Solution:
+def minimise(program: Program, x: Array, settings: Schedule | None = None) -> Solution:
     """The local optimum near ``x``, which must keep the inequalities; none of its iterates breaks one."""
-    return _Solver(program, x, settings or Settings()).run()
+    return _Solver(program, x, settings or Schedule()).run()
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +113,7 @@ class _Step:
 
 
 class _Solver:
-    def __init__(self, program: Program, x: Array, settings: Settings) -> None:
+    def __init__(self, program: Program, x: Array, settings: Schedule) -> None:
         self.program, self.settings, self.x = program, settings, x
         self.g = program.inequalities(x)
         self.count = len(self.g)
@@ -137,9 +137,7 @@ class _Solver:
         return self._solution(self.settings.iterations, False)
 
     def _solution(self, iterations: int, converged: bool) -> Solution:
-        return Solution(
-            self.x, self.program.objective(self.x), self.multipliers, iterations, converged
-        )
+        return Solution(self.x, self.program.objective(self.x), self.multipliers, iterations, converged)
 
     def _step(self) -> _Step:
         """One step of variables and multipliers."""

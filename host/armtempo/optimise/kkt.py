@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armtempo.optimise.tracker import Array
+from armtempo.arrays import Array
 
 Index = NDArray[np.intp]
 
@@ -45,10 +45,6 @@ class Equalities:
         """b - A x: (m,)."""
         reached = np.bincount(self.row, self.value * x[self.column], minlength=self.count)
         return np.asarray(self.right - reached)
-
-    def spread(self, multipliers: Array, size: int) -> Array:
-        """A' times ``multipliers`` (m,): (size,)."""
-        return np.bincount(self.column, self.value * multipliers[self.row], minlength=size)
 
 
 class BandedKkt:

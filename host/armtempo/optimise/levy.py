@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from armtempo.arrays import Array
 from armtempo.optimise.parameters import Number
-from armtempo.optimise.tracker import Array
 
 BETA = Number(1.5, 0.3, 1.99)
 """The index of the distribution, in the range that Mantegna gives for his method (Physical Review E 49 (5),

@@ -1,4 +1,4 @@
-"""What a search may be told by name: numbers within a range, and choices between words."""
+"""Parameters of a search by name: numbers within a range, and choices between words."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Number:
 
 
 @dataclass(frozen=True)
-class Choice:
+class OneOf:
     """One of several words."""
 
     default: str
@@ -47,4 +47,4 @@ class Choice:
         return value in self.words
 
 
-Parameter = Number | Choice
+Parameter = Number | OneOf

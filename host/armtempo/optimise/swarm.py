@@ -1,4 +1,4 @@
-"""A swarm of particles: where they are, how fast, and the best place each has seen."""
+"""A swarm of particles: positions, velocities, and the best position of each so far."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Swarm:
         self.tracker.iteration_done()
 
     def move(self, inertia: float, own: float, common: float) -> None:
-        """One move of everybody and its N evaluations; who hits a bound stops there."""
+        """Move every particle once (N evaluations); one that reaches a bound stops there."""
         own_pull = own * self._rng.random(self.positions.shape) * (self._seen - self.positions)
         common_pull = common * self._rng.random(self.positions.shape) * (self.tracker.x - self.positions)
         velocities = inertia * self.velocities + own_pull + common_pull
@@ -46,9 +46,9 @@ class Swarm:
         self._seen[better], self._seen_values[better] = self.positions[better], self.values[better]
 
     def select(self, rivals: int) -> None:
-        """Copies places and velocities of the better half over the worse one; memories stay.
+        """Copy positions and velocities of the better half over the worse one; best positions so far are kept.
 
-        Better is who beats more of ``rivals`` others drawn at random.
+        A particle is better that beats more of ``rivals`` others drawn at random.
         """
         population = len(self.values)
         drawn = self._rng.integers(0, population, (population, rivals))

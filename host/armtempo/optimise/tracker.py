@@ -1,4 +1,4 @@
-"""What every search is given and keeps: its task, a counted function, the best point so far, its history."""
+"""What all searches share: the task, counted evaluations, the best point so far, the history."""
 
 from __future__ import annotations
 
@@ -6,13 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from armtempo.arrays import Array
+from armtempo.progress import Progress
+
 Function = Callable[[Array], Array]
 """Values (N,) of points (N, d)."""
-Progress = Callable[[int, int], None]
-"""Called with the iterations done and their number."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,5 +79,5 @@ class Tracker:
             self._task.progress(len(self._history) - 1, self._task.iterations)
 
     def result(self) -> Result:
-        """The best point found, with the history as far as it went."""
+        """The best point found, with the history so far."""
         return Result(self._x, self.value, self.evaluations, np.array(self._history))

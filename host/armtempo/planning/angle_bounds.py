@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from armtempo.arrays import Array
 from armtempo.planning.linear_rows import LinearRows
 from armtempo.planning.shape import Index, Shape
 from armtempo.splines import bernstein, bspline
-from armtempo.splines.bspline import Array
 
 
 def coefficients(degree: int) -> Array:
@@ -21,7 +21,7 @@ def coefficients(degree: int) -> Array:
 def of_path(angle_points: Array, degree: int) -> Array:
     """Bernstein coefficients (S, degree + 1, J) of control points (S + degree, J)."""
     windows = np.lib.stride_tricks.sliding_window_view(angle_points, degree + 1, axis=0)
-    return np.einsum("bc,sjc->sbj", coefficients(degree), windows)
+    return np.asarray(np.einsum("bc,sjc->sbj", coefficients(degree), windows))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,7 @@
-"""How long a motion needs to brake to rest anywhere on its path.
+"""The time in which a motion can brake to rest from anywhere on its path.
 
 The board brakes by letting the motion's own time run slower and slower: its rate falls from 1 to 0 as
-1 - (10 x³ - 15 x⁴ + 6 x⁵), x = time since the order / brake time, so the arm stays on its path.
+1 - (10 x³ - 15 x⁴ + 6 x⁵), x = time since the stop command / brake time, so the arm stays on its path.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from armtempo.splines.bspline import Array
 from armtempo.splines.trajectory import Trajectory
 
 EXCESS = 1.25
-"""Part of an acceleration or jerk limit that braking may use. A motion at its limits can brake within them
-only all too slowly: where it turns most sharply, braking adds to what is already the limit."""
+"""Multiple of the acceleration and jerk limits that braking may reach. Within the limits themselves a motion that
+is already at them could only brake very slowly: braking adds to the acceleration and jerk of the path."""
 
 _STARTS = 400
 _PHASES = 40
@@ -25,10 +25,10 @@ _SAMPLES = 4000
 
 
 def brake_time_s(trajectory: Trajectory, limits: Sequence[Limits]) -> float:
-    """Shortest brake time, in seconds, that keeps EXCESS from wherever braking starts.
+    """Shortest brake time, in seconds, that keeps EXCESS times the limits wherever braking starts.
 
     One of ``limits`` for each joint. Speed never rises. Found on a grid of starts and times, to 1 %.
-    Raises InputError where the motion itself does not keep EXCESS.
+    Raises InputError where the motion itself exceeds EXCESS times the limits.
     """
     time = np.linspace(0.0, trajectory.duration_s, _SAMPLES)
     motion = [trajectory(time, order) for order in (1, 2, 3)]

@@ -1,4 +1,4 @@
-"""What a job and an arm must be before planning, and a plan after it."""
+"""Checks of job and arm before planning, and of the plan after it."""
 
 from __future__ import annotations
 
@@ -6,24 +6,31 @@ import math
 
 import numpy as np
 from armtempo_shared import motion
-from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS, MAX_STEP_RATE, MAX_STEP_RATE_SUM, TICK_HZ
+from armtempo_shared.limits import (
+    LONGEST_TICKS,
+    MAX_MOTION_BYTES,
+    MAX_SEGMENTS,
+    MAX_STEP_RATE,
+    MAX_STEP_RATE_SUM,
+    TICK_HZ,
+)
 
 from armtempo import optimise
+from armtempo.arrays import Array
 from armtempo.errors import InputError, PlanError
-from armtempo.model.arm import Arm, Joint, Limits
+from armtempo.model.arm import Arm, DrivenJoint, Limits
 from armtempo.model.job import AUTO, GRADIENT, ITERATIONS, POPULATION, REFINE, STARTS, TIMINGS, Job
 from armtempo.splines import bspline, extremes
-from armtempo.splines.bspline import Array
 from armtempo.splines.extremes import Extremes
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
 TOLERANCE = 1e-9
-"""What rounding may leave: largest excess over a limit, relative, and over a range, in degrees."""
+"""Allowance for rounding: largest excess over a limit, relative, and over a range, in degrees."""
 
-LONGEST_TICKS, LONGEST_SPAN_TICKS = 1 << 38, 1 << 36
+LONGEST_SPAN_TICKS = 1 << 36
 MOST_STEPS, MOST_SPAN_STEPS = 1 << 27, 1 << 24
-"""What the board's evaluator can hold: largest control point, and span of the degree + 1 of one segment
-(the same bounds stand in ``armtempo_board/check.py``; a test compares them)."""
+"""What the board's evaluator can hold besides LONGEST_TICKS: the span of the degree + 1 time control points of a
+segment, the largest angle control point, and the span of those of a segment. A test holds them against the board."""
 
 FITNESS = ("stretched", "penalised")
 """Values of the job's parameter ``fitness``: ``stretched`` scales each candidate until it just keeps its
@@ -37,8 +44,6 @@ def limits_of(arm: Arm) -> list[Limits]:
     """
     limits = []
     for joint in arm.driven:
-        if joint.limits is None:
-            raise InputError(f"arm {arm.name!r}: {joint.name} has a motor but no limits; add a limits table")
         values = joint.limits.values
         if not all(math.isfinite(value) and value > 0 for value in values):
             raise InputError(
@@ -51,9 +56,8 @@ def limits_of(arm: Arm) -> list[Limits]:
     return limits
 
 
-def _check_step_rate(arm: Arm, joint: Joint, speed_deg_s: float) -> None:
-    assert joint.motor is not None
-    rate = speed_deg_s * joint.motor.steps_per_deg
+def _check_step_rate(arm: Arm, joint: DrivenJoint, speed_deg_s: float) -> None:
+    rate = speed_deg_s * joint.steps_per_deg
     if rate > MAX_STEP_RATE:
         raise InputError(
             f"arm {arm.name!r}: {joint.name} at its speed limit of {speed_deg_s:g} deg/s needs {rate:.0f} "
@@ -72,7 +76,9 @@ def check_job(arm: Arm, job: Job) -> None:
     for name, (least, most) in whole.items():
         value = getattr(job, name)
         if not isinstance(value, int) or not least <= value <= most:
-            raise InputError(f"job {job.name!r}: {name} {value} must be a whole number from {least} to {most}")
+            raise InputError(
+                f"job {job.name!r}: {name} {value} must be a whole number from {least} to {most}"
+            )
     refine = 1 if isinstance(job.refine, str) else job.refine
     segments = len(job.via) - 1
     if segments * refine > MAX_SEGMENTS:
@@ -126,14 +132,12 @@ def check_reached(arm: Arm, reached: tuple[Extremes, ...]) -> None:
     """The check that every plan passes: PlanError where a limit or the board's step rate is exceeded."""
     rates = 0.0
     for joint, extreme in zip(arm.driven, reached, strict=True):
-        assert joint.limits is not None
-        assert joint.motor is not None
         if not np.all(extreme.values <= np.array(joint.limits.values) * (1 + TOLERANCE)):
             raise PlanError(
                 f"{joint.name}: no plan was found that keeps its limits {joint.limits.values}, the best one "
                 f"reaches {extreme.values}; angles and limits are too far apart in size to compute with"
             )
-        rates += extreme.speed_deg_s * joint.motor.steps_per_deg
+        rates += extreme.speed_deg_s * joint.steps_per_deg
     if rates > MAX_STEP_RATE_SUM:
         raise PlanError(
             f"the joints together could need {rates:.0f} steps/s, the board does {MAX_STEP_RATE_SUM} at "
@@ -142,12 +146,11 @@ def check_reached(arm: Arm, reached: tuple[Extremes, ...]) -> None:
 
 
 def check_held(trajectory: Trajectory, arm: Arm) -> None:
-    """Raises PlanError where a control point is beyond what the board's evaluator can hold."""
+    """Raises PlanError where a control point exceeds the integers of the board's evaluator."""
     for joint_spline, joint in zip(trajectory.joints, arm.driven, strict=True):
         where = f"trajectory {trajectory.name!r}, {joint.name}"
         _check_times(where, joint_spline)
-        assert joint.motor is not None
-        steps = joint_spline.angle_points_deg * joint.motor.steps_per_deg
+        steps = joint_spline.angle_points_deg * joint.steps_per_deg
         if np.max(np.abs(steps)) >= MOST_STEPS or _span(steps, joint_spline.degree) >= MOST_SPAN_STEPS:
             raise PlanError(f"{where}: more steps than the board can count; use fewer microsteps")
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from armtempo.arrays import Array
 from armtempo.planning.fitness import stretch_of
 from armtempo.planning.shape import Index
 from armtempo.splines import bspline, extremes, time_axis
-from armtempo.splines.bspline import Array
 from armtempo.splines.trajectory import derivatives
 
 _APART = 1e-7
@@ -79,8 +79,10 @@ def peaks(curve: Curve, parts: int, least: float) -> Points:
     ratios = curve.ratios(points.segment, points.u).reshape(3 * len(curve.angle), -1)
     beside = np.pad(ratios, ((0, 0), (1, 1)), constant_values=-1.0)
     high = (ratios >= beside[:, :-2]) & (ratios >= beside[:, 2:]) & (ratios >= least)
-    high[:, parts::parts + 1][:, :-1] |= high[:, parts + 1 :: parts + 1]  # the same point of the next segment
-    high[:, parts + 1 :: parts + 1] |= high[:, parts::parts + 1][:, :-1]
+    high[:, parts :: parts + 1][:, :-1] |= high[
+        :, parts + 1 :: parts + 1
+    ]  # the same point of the next segment
+    high[:, parts + 1 :: parts + 1] |= high[:, parts :: parts + 1][:, :-1]
     which, point = np.nonzero(high)
     segment, u = points.segment[point], points.u[point]
     return _zoomed(curve, which, segment, u, 1.0 / parts)

@@ -1,4 +1,4 @@
-"""What a search minimises: motion time and excess over the limits, for a whole population at once.
+"""The fitness that a search minimises: motion time and excess over the limits, of a whole population at once.
 
 Angles are fixed, only the intervals X vary, so everything of the angle and of the basis is computed once,
 on a grid of u; a population then costs one matrix product and a few array operations.
@@ -15,12 +15,12 @@ from armtempo.splines import bspline, time_axis
 from armtempo.splines.bspline import Array
 
 SAMPLES = 16
-"""Parts of a path segment between the grid points that the search looks at; the finished plan is checked
-without a grid."""
+"""Parts of a path segment between the grid points at which the search evaluates the limits; the finished plan is
+checked without a grid."""
 _PENALTY = 30.0
 """Seconds that the penalty of Eq. (21) charges where a limit is exceeded by as much again."""
 _TINY = 1e-300
-"""Keeps a flat stretch from dividing nothing by nothing."""
+"""Avoids 0 / 0 where a joint does not move."""
 
 
 class Fitness:
@@ -88,7 +88,7 @@ class Fitness:
         return np.asarray(intervals_s.sum(axis=1) * self.stretch(intervals_s))
 
     def stretch(self, intervals_s: Array) -> Array:
-        """The factor on X that brings it just within the limits, as far as the grid sees: (N,)."""
+        """The factor on X that brings it just within the limits, on the grid: (N,)."""
         return stretch_of(self.peaks(intervals_s).max(axis=(1, 2)))
 
 

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from armtempo.arrays import Array
 from armtempo.model.arm import Limits
 from armtempo.optimise import interior_point
-from armtempo.optimise.interior_point import Settings
+from armtempo.optimise.interior_point import Schedule
 from armtempo.optimise.kkt import Equalities
 from armtempo.planning import collocation
 from armtempo.planning.collocation import Curve, Points
@@ -17,7 +18,6 @@ from armtempo.planning.limit_rows import LimitRows
 from armtempo.planning.motion_program import MotionProgram, time_weights
 from armtempo.planning.shape import Shape, time_points
 from armtempo.splines import bspline, time_axis
-from armtempo.splines.bspline import Array
 
 _ROUNDS = 12
 """Solves, each at the peaks that the one before showed between its points."""
@@ -30,7 +30,7 @@ _FINER = 4
 """Peaks are looked for on a grid so many times finer."""
 _AWAY = 1.003
 """Time is stretched by this before each solve, so that it starts within the limits."""
-_COARSE = Settings(first_barrier=1e-2, last_barrier=1e-5)
+_COARSE = Schedule(first_barrier=1e-2, last_barrier=1e-5)
 _AGAIN = 3e-4
 """First barrier of the solves after the first."""
 
@@ -106,10 +106,10 @@ class FixedPath:
                 break
             points += collocation.peaks(curve, _FINER * parts, _WATCHED)
             here = here * stretch
-            settings = Settings(_AGAIN, min(_AGAIN, 0.3 * gap))
+            settings = Schedule(_AGAIN, min(_AGAIN, 0.3 * gap))
         return Optimum(best, self.duration_s(best), min(bound, self.duration_s(best)))
 
-    def _solve(self, differences_s: Array, points: Points, settings: Settings) -> tuple[Array, float]:
+    def _solve(self, differences_s: Array, points: Points, settings: Schedule) -> tuple[Array, float]:
         """The best axis that keeps the limits at these points, and a bound from below on its motion time."""
         unit_s = self.duration_s(differences_s) / self.shape.segments
         limits = self.limits * unit_s ** np.arange(1, 4)

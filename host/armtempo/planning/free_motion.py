@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from armtempo.arrays import Array
 from armtempo.optimise import interior_point
-from armtempo.optimise.interior_point import Settings
+from armtempo.optimise.interior_point import Schedule
 from armtempo.optimise.kkt import BandedKkt, Equalities
 from armtempo.planning import angle_bounds, collocation
 from armtempo.planning.collocation import Curve, Points
@@ -18,7 +19,6 @@ from armtempo.planning.limit_rows import LimitRows
 from armtempo.planning.motion_program import Block, MotionProgram, time_weights
 from armtempo.planning.shape import Shape, time_points
 from armtempo.splines import bspline
-from armtempo.splines.bspline import Array
 
 _PARTS = 4
 """Points in a segment at which limits are watched, besides the peaks found."""
@@ -28,8 +28,8 @@ _AWAY = 1.01
 """Time is stretched by this before each solve, so that it starts within the limits."""
 _SMOOTHING, _SMOOTHED = 0.075, 0.1
 """Weight of steps between time differences in the first solve, for one segment and via point; part of it later."""
-_FIRST = Settings(first_barrier=1e-2, last_barrier=1e-4, curvature=False)
-_AGAIN = Settings(first_barrier=1e-3, last_barrier=1e-4, curvature=False)
+_FIRST = Schedule(first_barrier=1e-2, last_barrier=1e-4, curvature=False)
+_AGAIN = Schedule(first_barrier=1e-3, last_barrier=1e-4, curvature=False)
 _AT_END = 1e-6
 """A via point this near to the end of a range, as a part of what its joint turns, is at it."""
 _NEAR = 1e-5
@@ -187,7 +187,9 @@ class Improver:
 
     def angle_rows(self) -> Block:
         """Inequalities of ranges and corridor, with angles in parts of ``size_deg``."""
-        return angle_bounds.forms(self.shape, self._low / self._size, self._high / self._size).rows(self.shape)
+        return angle_bounds.forms(self.shape, self._low / self._size, self._high / self._size).rows(
+            self.shape
+        )
 
     def _solve(self, motion: FreeMotion, points: Points, first: bool) -> FreeMotion:
         unit_s = motion.total_s / self.layout.segments
@@ -232,6 +234,6 @@ def met(shape: Shape, equalities: Equalities, x: Array, smooth: bool = False) ->
     gradient = np.zeros(shape.size)
     if smooth:
         bent = x[window] @ third
-        gradient = np.bincount(window.ravel(), np.outer(bent, third).ravel(), minlength=shape.size)
+        np.add.at(gradient, window, np.outer(bent, third))
     kkt = BandedKkt(shape.places, rows, columns, equalities)
     return x + kkt.factor(entries).solve(gradient, equalities.residual(x))

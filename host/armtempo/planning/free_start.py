@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from armtempo.arrays import Array
 from armtempo.errors import PlanError
 from armtempo.optimise.kkt import Equalities
 from armtempo.planning import angle_bounds, inside_bounds
@@ -13,7 +14,6 @@ from armtempo.planning.free_motion import Demand, FreeMotion, Improver, bounds, 
 from armtempo.planning.layout import DEGREE, Layout, Vias, uniform
 from armtempo.planning.shape import Shape
 from armtempo.splines import bspline
-from armtempo.splines.bspline import Array
 
 _LEAST_STEP = 1e-3
 """Least difference of time control points, as a part of the largest."""
@@ -87,9 +87,8 @@ def _met(demand: Demand, layout: Layout, points: Array, differences_s: Array, sm
     improver = Improver(demand, layout)
     x = improver.shape.pack(points / demand.size_deg, differences_s)
     x = met(improver.shape, improver.equalities(1.0), x, smooth)
-    motion = FreeMotion(
-        layout, improver.shape.angle_points(x) * demand.size_deg, np.maximum(differences_s, _LEAST_STEP * differences_s.max())
-    )
+    steps = np.maximum(differences_s, _LEAST_STEP * differences_s.max())
+    motion = FreeMotion(layout, improver.shape.angle_points(x) * demand.size_deg, steps)
     return _inside(demand, motion)
 
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from armtempo.arrays import Array
 from armtempo.optimise import interior_point
-from armtempo.optimise.interior_point import Linearised, Settings
+from armtempo.optimise.interior_point import Linearised, Schedule
 from armtempo.optimise.kkt import BandedKkt, Equalities
 from armtempo.planning.angle_bounds import Forms
 from armtempo.planning.linear_rows import LinearRows
-from armtempo.splines.bspline import Array
 
-_CENTRE = Settings(first_barrier=1e3, last_barrier=1e3, iterations=30, curvature=False)
+_CENTRE = Schedule(first_barrier=1e3, last_barrier=1e3, iterations=30, curvature=False)
 """Far from all bounds, however little that is like the path wanted."""
-_NEAR = Settings(first_barrier=10.0, last_barrier=1e-10, curvature=False)
+_NEAR = Schedule(first_barrier=10.0, last_barrier=1e-10, curvature=False)
 _WIDER = 2.0
 """Bounds are widened by so many times what the path is beyond them."""
 _BETTER, _STEPS = 0.99, 60

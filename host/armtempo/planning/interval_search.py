@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from armtempo import optimise
+from armtempo.arrays import Array
 from armtempo.model.arm import Limits
 from armtempo.model.job import Job
 from armtempo.optimise.tracker import Result
 from armtempo.planning import checks
 from armtempo.planning.fitness import Fitness
 from armtempo.planning.fixed_path import FixedPath
+from armtempo.progress import Progress
 from armtempo.splines import bspline
-from armtempo.splines.bspline import Array
 
 _REACH = 6.0
 """Bounds are this factor below and above what an interval would need by itself."""
@@ -26,9 +27,6 @@ _WIDENINGS = 3
 _NEAR = 1.01
 """So near to a bound, as a factor, is at it."""
 _COARSE_GAP = 1e-3
-
-Progress = Callable[[float, float], None]
-"""Called with the work done and the whole of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,14 +78,21 @@ def search(
             )
             break
         if widening < _WIDENINGS:
-            notes.append(f"the search ended at the bounds of interval {named}; they were widened {_WIDER:g} times")
+            notes.append(
+                f"the search ended at the bounds of interval {named}; they were widened {_WIDER:g} times"
+            )
             box = box * np.array([1.0 / _WIDER, _WIDER])
     assert best is not None
     return Found(best, tuple(notes))
 
 
 def _once(
-    points: Array, limits: Sequence[Limits], job: Job, box: Array, rng: np.random.Generator, progress: Progress
+    points: Array,
+    limits: Sequence[Limits],
+    job: Job,
+    box: Array,
+    rng: np.random.Generator,
+    progress: Progress,
 ) -> Result:
     if job.optimiser == "gradient":
         path = FixedPath(points, job.degree, limits, mirrored=True)
@@ -95,9 +100,8 @@ def _once(
     fitness = Fitness(points, job.degree, limits)
     parameters = dict(job.parameters)
     function = getattr(fitness, str(parameters.pop("fitness", checks.FITNESS[0])))
-    return optimise.minimise(
-        function, box, rng, job.population, job.iterations, job.optimiser, progress, **parameters
-    )
+    settings = optimise.Settings(job.optimiser, job.population, job.iterations, parameters)
+    return optimise.minimise(function, box, rng, settings, progress)
 
 
 def gradient(

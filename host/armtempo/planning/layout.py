@@ -9,11 +9,11 @@ from math import factorial
 import numpy as np
 from numpy.typing import NDArray
 
+from armtempo.arrays import Array
 from armtempo.optimise.kkt import Equalities
 from armtempo.planning.motion_program import mean_slopes
 from armtempo.planning.shape import Index, Shape
 from armtempo.splines import bspline
-from armtempo.splines.bspline import Array
 
 DEGREE = 5
 DWELL_SEGMENTS = DEGREE
@@ -69,7 +69,7 @@ class Layout:
     def departures(self) -> Index:
         """Segments before the motion leaves each via point: (n + 1,)."""
         later = np.array([self.stops.get(via, 0.0) > 0.0 for via in range(len(self.pieces) + 1)])
-        return self.arrivals + DWELL_SEGMENTS * later
+        return np.asarray(self.arrivals + DWELL_SEGMENTS * later)
 
     def equalities(self, shape: Shape, vias: Vias, unit_s: float) -> Equalities:
         """Via points, rests, and dwells; ``unit_s``: the program's unit of time."""
@@ -115,7 +115,8 @@ def shared_out(shares: Array, segments: int, stops: Mapping[int, float]) -> Layo
     dwells = DWELL_SEGMENTS * sum(dwell > 0.0 for dwell in stops.values())
     free = max(segments - dwells - LEAST_PIECES * len(shares), 0)
     exact = np.concatenate([[0.0], np.cumsum(shares / shares.sum())]) * free
-    return Layout(LEAST_PIECES + np.diff(np.floor(exact + 0.5).astype(np.intp)), stops)
+    knots = np.floor(exact + 0.5).astype(np.intp)
+    return Layout(LEAST_PIECES + knots[1:] - knots[:-1], stops)
 
 
 def _derivative(order: int) -> Array:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from armtempo.arrays import Array
 from armtempo.planning import limit_ratios
 from armtempo.planning.shape import Index, Shape, angle_basis, time_basis
-from armtempo.splines.bspline import Array
 
 
 class LimitRows:

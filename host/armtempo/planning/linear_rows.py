@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from armtempo.arrays import Array
 from armtempo.planning.shape import Index
-from armtempo.splines.bspline import Array
 
 
 class LinearRows:
@@ -40,7 +40,7 @@ class LinearRows:
         """See there."""
         rows = self._per_row(weights, -1.0)
         values = (rows[:, None] * self._weights).ravel()
-        return np.bincount(self._columns.ravel(), values, minlength=self._size)
+        return np.asarray(np.bincount(self._columns.ravel(), values, minlength=self._size), dtype=float)
 
     def hessian(self, weights: Array, _: Array | None) -> Array:
         """See there; the entries stand at ``rows`` and ``columns``."""

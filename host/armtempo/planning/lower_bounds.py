@@ -1,4 +1,4 @@
-"""Motion times that no time law along a path can beat, to hold a plan against."""
+"""Lower bounds of the motion time of every time law along a path, to compare a plan with."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from armtempo.splines import bspline
 from armtempo.splines.bspline import Array
 
 _WIGGLE = 1e-9
-"""Turns smaller than this part of the joint's way are rounding."""
+"""Turns smaller than this fraction of the joint's travel are rounding errors."""
 
 
 def floor(angle_points_deg: Array, degree: int, limits: Sequence[Limits]) -> tuple[float, str]:
-    """The highest floor known for joints moving together, in seconds, and its name.
+    """The highest known lower bound for joints moving together, in seconds, and its name.
 
     ``angle_points_deg``: (n + degree, J). ``"rests"``: from turn to turn of one joint under its three limits;
     ``"path"``: along the common path under speed and acceleration limits.

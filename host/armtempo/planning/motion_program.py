@@ -7,11 +7,11 @@ from typing import Protocol
 
 import numpy as np
 
+from armtempo.arrays import Array
 from armtempo.optimise.interior_point import Linearised
 from armtempo.optimise.kkt import BandedKkt, Equalities
 from armtempo.planning.linear_rows import LinearRows
 from armtempo.planning.shape import Index, Shape, time_basis
-from armtempo.splines.bspline import Array
 
 
 class LinearisedBlock(Protocol):
@@ -93,9 +93,7 @@ class _Linearised:
 
     def backward(self, weights: Array) -> Array:
         parts = np.split(weights, self._splits)
-        return np.asarray(
-            sum(block.backward(part) for block, part in zip(self._blocks, parts, strict=True))
-        )
+        return np.asarray(sum(block.backward(part) for block, part in zip(self._blocks, parts, strict=True)))
 
     def hessian(self, weights: Array, multipliers: Array | None) -> Array:
         parts = np.split(weights, self._splits)

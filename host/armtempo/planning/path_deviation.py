@@ -1,4 +1,4 @@
-"""What per-joint timing costs: joints pass a via point at different times, so the tool leaves the path."""
+"""Deviation by per-joint timing: joints pass a via point at different times, so the tool leaves the path."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def via_spread_s(trajectory: Trajectory) -> Array:
 def tool_stray_mm(arm: Arm, trajectory: Trajectory) -> float:
     """Largest distance of the tool from the path that shared timing would follow exactly, in mm.
 
-    Joints without a motor stand at home. From 2000 times against 200 chords in each segment.
+    Joints without a motor are at home. From 2000 times against 200 chords in each segment.
     """
     times = np.linspace(0.0, trajectory.duration_s, _TIMES)
     path = _tool(arm, _path_deg(trajectory))

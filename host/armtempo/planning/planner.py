@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import version
 
 import numpy as np
 
 import armtempo
+from armtempo.arrays import Array
 from armtempo.model.arm import Arm, Limits
 from armtempo.model.job import Job, Pose
 from armtempo.model.plan import Plan, Search
 from armtempo.planning import checks, lower_bounds, time_parameterization
 from armtempo.planning.time_parameterization import Group, Timed
+from armtempo.progress import Progress
 from armtempo.splines import bspline, extremes
-from armtempo.splines.bspline import Array
 from armtempo.splines.trajectory import JointSpline, Trajectory
-
-Progress = Callable[[float, float], None]
-"""Called with the work done and the whole of it."""
 
 
 @np.errstate(all="ignore")  # what overflows ends as not a number, which no check passes

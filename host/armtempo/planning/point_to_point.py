@@ -1,4 +1,4 @@
-"""Moves that need no search: straight from posture to posture, and a motion backwards."""
+"""Motions without a search: from posture to posture, and a motion backwards."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armtempo.errors import InputError
-from armtempo.model.arm import Arm, Joint
+from armtempo.model.arm import Arm, DrivenJoint
 from armtempo.splines import bspline, time_axis
 from armtempo.splines.bspline import Array
 from armtempo.splines.trajectory import JointSpline, Trajectory
@@ -39,7 +39,7 @@ def straight(name: str, start_deg: ArrayLike, end_deg: ArrayLike, arm: Arm) -> T
 
 
 def backwards(trajectory: Trajectory, name: str) -> Trajectory:
-    """The same motion from its end to its start; each joint begins at once."""
+    """The same motion from its end to its start; every joint starts at time 0."""
     return Trajectory(name, tuple(_backwards(joint) for joint in trajectory.joints), trajectory.shared)
 
 
@@ -64,11 +64,9 @@ def _backwards(joint: JointSpline) -> JointSpline:
     )
 
 
-def _duration_s(joint: Joint, distance_deg: float) -> float:
-    assert joint.limits is not None  # the loader requires it of driven joints
-    bounds = (joint.limits.speed_deg_s, joint.limits.acceleration_deg_s2, joint.limits.jerk_deg_s3)
+def _duration_s(joint: DrivenJoint, distance_deg: float) -> float:
     needed = [
         (peak * distance_deg / bound) ** (1.0 / order)
-        for order, (peak, bound) in enumerate(zip(_PEAKS, bounds, strict=True), start=1)
+        for order, (peak, bound) in enumerate(zip(_PEAKS, joint.limits.values, strict=True), start=1)
     ]
     return max(SHORTEST_S, _MARGIN * float(max(needed)))

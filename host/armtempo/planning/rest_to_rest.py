@@ -1,6 +1,6 @@
 """Shortest time of one joint between standstills under speed, acceleration and jerk limits, in closed form.
 
-A bound from below for every time law on a path: between two turning points of a joint its speed is zero at
+A lower bound for every time law on a path: between two turning points of a joint its speed is zero at
 both ends, whatever the other joints do.
 """
 
@@ -29,7 +29,7 @@ def floor_s(angles_deg: Array, limits: Limits, at_rest: bool = True) -> float:
 
 
 def _stretch_s(distance: float, limits: Limits, from_rest: bool, to_rest: bool) -> float:
-    """Least time over one monotone stretch: up to some speed, perhaps hold it, and down again."""
+    """Least time over one monotone interval: accelerate, perhaps cruise, decelerate."""
     low, high = 0.0, limits.speed_deg_s
     up, way_up = _ramp(high, limits, from_rest)
     down, way_down = _ramp(high, limits, to_rest)
@@ -44,7 +44,7 @@ def _stretch_s(distance: float, limits: Limits, from_rest: bool, to_rest: bool) 
 
 
 def _ramp(speed: float, limits: Limits, from_rest: bool) -> tuple[float, float]:
-    """Time and way from standstill to ``speed``, where the acceleration is zero.
+    """Time and distance from standstill to ``speed``, where the acceleration is zero.
 
     It starts at zero too if ``from_rest``, else anywhere within its limit.
     """

@@ -12,8 +12,8 @@ from math import perm
 import numpy as np
 from numpy.typing import NDArray
 
+from armtempo.arrays import Array
 from armtempo.splines import bspline
-from armtempo.splines.bspline import Array
 
 Index = NDArray[np.intp]
 
@@ -88,4 +88,4 @@ def time_basis(degree: int, u: Array) -> Array:
 def time_points(differences: Array, degree: int) -> Array:
     """Time control points (m + k,) of their differences, with t = 0 at the start."""
     points = np.concatenate([[0.0], np.cumsum(differences)])
-    return points - points[: degree + 1] @ bspline.basis(degree)[0]
+    return np.asarray(points - points[: degree + 1] @ bspline.basis(degree)[0])

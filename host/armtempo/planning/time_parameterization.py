@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -10,14 +10,15 @@ import numpy as np
 from armtempo_shared import motion
 from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS
 
+from armtempo.arrays import Array
 from armtempo.model.arm import Limits
 from armtempo.model.job import REFINE, Job
 from armtempo.optimise.tracker import Result
 from armtempo.planning import interval_search
 from armtempo.planning.fixed_path import FixedPath, Optimum
 from armtempo.planning.shape import time_points
+from armtempo.progress import Progress
 from armtempo.splines import time_axis
-from armtempo.splines.bspline import Array
 
 MIN_DURATION_S = 0.01
 """No motion is planned shorter: a tenth of the time between two samples."""
@@ -28,9 +29,6 @@ _REFINED_GAP = 1e-4
 _FINER = 4
 _PAYS = 1e-3
 """With ``refine = "auto"`` each axis gets so many times more segments while that saves this part of its time."""
-
-Progress = Callable[[float, float], None]
-"""Called with the work done and the whole of it."""
 
 
 @dataclass(frozen=True, eq=False)

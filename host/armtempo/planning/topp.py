@@ -1,4 +1,4 @@
-"""Fastest time law along a path under speed and acceleration limits alone: a floor under every jerk limit.
+"""Fastest time law along a path under speed and acceleration limits alone: a lower bound for any jerk limit.
 
 Reachability analysis (Pham and Pham, IEEE T-RO 34(3), 2018) on a grid: backwards the highest path speed from
 which the end can still be reached, forwards the greatest path acceleration that stays below it.

@@ -1,1 +1,1 @@
-"""Arm and motion as the board takes them, and back."""
+"""Arm record and motion record: arm and motion in the units of the board, and back."""

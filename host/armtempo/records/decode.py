@@ -1,44 +1,52 @@
-"""From a motion record back to a trajectory in degrees and seconds: the opposite of ``encode``."""
+"""From a motion record back to a trajectory in degrees and seconds: the inverse of ``encode``."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 from armtempo_shared import limits
 from armtempo_shared.motion import Motion, MotionError
 
+from armtempo.arrays import Array
 from armtempo.errors import InputError
-from armtempo.model.arm import Arm
-from armtempo.records.encode import steps_per_deg
-from armtempo.splines.bspline import Array
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
 
-def trajectory(data: bytes, arm: Arm, name: str) -> Trajectory:
-    """The motion that a record holds, to the rounding of its integers.
+class StepScale(Protocol):
+    """Whatever knows a joint's step pulses per degree."""
 
-    Raises InputError where the record is damaged or has another number of joints than the arm drives.
+    @property
+    def steps_per_deg(self) -> float:
+        """Step pulses per degree of the joint."""
+
+
+def trajectory(data: bytes, joints: Sequence[StepScale], name: str, arm: str = "the arm") -> Trajectory:
+    """The motion that a record holds, to the rounding of its integers; ``joints`` are the driven ones.
+
+    Raises InputError where the record is damaged or has another number of joints; ``name`` and ``arm`` are
+    what the message calls motion and arm.
     """
     try:
         motion = Motion(data)
     except MotionError as error:
         raise InputError(f"motion {name!r}: not a motion record ({error}); upload it again") from error
-    if motion.joints != len(arm.driven):
-        raise InputError(
-            f"motion {name!r} has {motion.joints} joints, arm {arm.name!r} drives {len(arm.driven)}"
-        )
-    joints = []
-    for index, joint in enumerate(arm.driven):
+    if motion.joints != len(joints):
+        raise InputError(f"motion {name!r} has {motion.joints} joints, {arm} drives {len(joints)}")
+    splines = []
+    for index, joint in enumerate(joints):
         angles = _points(data, motion.angle_offset(index), motion.segments + motion.degree)
         times = _points(data, motion.time_offset(index), motion.segments * motion.refine + motion.degree)
-        joints.append(
+        splines.append(
             JointSpline(
                 motion.degree,
                 motion.refine,
-                angles / 2.0**limits.STEP_FRACTION_BITS / steps_per_deg(joint),
+                angles / 2.0**limits.STEP_FRACTION_BITS / joint.steps_per_deg,
                 times / 2.0**limits.TICK_FRACTION_BITS / limits.TICK_HZ,
             )
         )
-    return Trajectory(name, tuple(joints), motion.shared)
+    return Trajectory(name, tuple(splines), motion.shared)
 
 
 def _points(data: bytes, offset: int, count: int) -> Array:

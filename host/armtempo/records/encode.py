@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from armtempo_shared import armrecord, limits, motion
+from armtempo_shared.wire import record_crc
 from numpy.typing import NDArray
 
 from armtempo.errors import InputError
-from armtempo.model.arm import Arm, Joint
+from armtempo.model.arm import Arm, DrivenJoint
 from armtempo.planning import checks
 from armtempo.splines.trajectory import Trajectory
 
@@ -18,7 +18,7 @@ _TICKS_PER_US = limits.TICK_HZ / 1e6
 
 
 def arm_record(arm: Arm) -> bytes:
-    """What the board must know of the arm (layout: ``armtempo_shared.armrecord``).
+    """The arm record (layout: ``armtempo_shared.armrecord``).
 
     Raises InputError where a figure does not fit the board.
     """
@@ -26,7 +26,7 @@ def arm_record(arm: Arm) -> bytes:
 
 
 def motion_record(trajectory: Trajectory, arm: Arm, brake_s: float = 0.0) -> bytes:
-    """What the board replays (layout: ``armtempo_shared.motion``), tied to the arm by its crc.
+    """The motion record (layout: ``armtempo_shared.motion``), tied to the arm by the checksum of its record.
 
     ``brake_s``: time in which the motion may brake to rest anywhere (0: not at all).
     Raises InputError where trajectory and arm do not fit each other or the record's number range, PlanError
@@ -38,43 +38,16 @@ def motion_record(trajectory: Trajectory, arm: Arm, brake_s: float = 0.0) -> byt
             f"arm {arm.name!r} drives {len(arm.driven)}; plan it for this arm"
         )
     angles = [
-        _fixed(spline.angle_points_deg * steps_per_deg(joint), limits.STEP_FRACTION_BITS)
+        _fixed(spline.angle_points_deg * joint.steps_per_deg, limits.STEP_FRACTION_BITS)
         for spline, joint in zip(trajectory.joints, arm.driven, strict=True)
     ]
     axes = trajectory.joints[:1] if trajectory.shared else trajectory.joints
     times = [_fixed(spline.time_points_s * limits.TICK_HZ, limits.TICK_FRACTION_BITS) for spline in axes]
     checks.check_held(trajectory, arm)
     first = trajectory.joints[0]
-    segments = len(first.angle_points_deg) - first.degree
     brake_ticks = round(brake_s * limits.TICK_HZ)
-    crc = armrecord.unpack(arm_record(arm))[2]
-    return motion.pack(first.degree, angles, times, segments, first.refine, brake_ticks, crc)
-
-
-def steps_per_deg(joint: Joint) -> float:
-    """Step pulses per degree of a driven joint."""
-    if joint.motor is None:
-        raise InputError(f"{joint.name} has no motor; give it a [joint.motor] table in the arm file")
-    return joint.motor.steps_per_deg
-
-
-def counts_per_deg(joint: Joint) -> float:
-    """Encoder counts per degree of the joint.
-
-    Raises InputError where the joint has no encoder.
-    """
-    return float(counts_per_step(joint)) * steps_per_deg(joint)
-
-
-def counts_per_step(joint: Joint) -> Fraction:
-    """Encoder counts per step pulse, exactly as the arm file's decimals say."""
-    if joint.motor is None or joint.encoder is None:
-        raise InputError(f"{joint.name} has no encoder; give it a [joint.encoder] table in the arm file")
-    gear = Fraction(str(joint.motor.gear_ratio))
-    counts = Fraction(joint.encoder.counts_per_rev)
-    if joint.encoder.on == "motor":
-        counts *= gear
-    return counts / (joint.motor.steps_per_rev * joint.motor.microsteps * gear)
+    crc = record_crc(arm_record(arm))
+    return motion.pack(first.degree, angles, times, first.refine, brake_ticks, crc)
 
 
 def _fixed(points: NDArray[np.float64], bits: int) -> list[int]:
@@ -103,14 +76,13 @@ def _head(arm: Arm) -> dict[str, Any]:
     return {"flags": flags, "link_timeout_ms": safety.link_timeout_ms, **ticks}
 
 
-def _joint(joint: Joint) -> dict[str, Any]:
+def _joint(joint: DrivenJoint) -> dict[str, Any]:
     motor, encoder, switches = joint.motor, joint.encoder, joint.switches
-    assert motor is not None  # arm.driven
-    per_step = counts_per_step(joint) if encoder else Fraction(0)
+    per_step = joint.counts_per_step
     if max(abs(per_step.numerator), per_step.denominator) >= 2**31:
         raise InputError(f"{joint.name}: the ratio of encoder counts to steps is too odd for the board")
-    following = encoder.following_error_deg * counts_per_deg(joint) if encoder else 0.0
-    low, high = (round(angle * motor.steps_per_deg) for angle in joint.range_deg)
+    following = encoder.following_error_deg * joint.counts_per_deg if encoder else 0.0
+    low, high = (round(angle * joint.steps_per_deg) for angle in joint.range_deg)
     if max(abs(low), abs(high)) >= 2**30:
         raise InputError(f"{joint.name}: its range is {high - low} steps, more than the board can count")
     return {
@@ -131,14 +103,12 @@ def _joint(joint: Joint) -> dict[str, Any]:
     }
 
 
-def _max_rate(joint: Joint) -> int:
+def _max_rate(joint: DrivenJoint) -> int:
     """The joint's speed limit in steps/s with a little room for rounding.
 
     Raises InputError where the board cannot step that fast.
     """
-    assert joint.limits is not None  # the loader requires it
-    assert joint.motor is not None
-    rate = joint.limits.speed_deg_s * joint.motor.steps_per_deg
+    rate = joint.limits.speed_deg_s * joint.steps_per_deg
     if rate > limits.MAX_STEP_RATE:
         raise InputError(
             f"{joint.name}: speed_deg_s = {joint.limits.speed_deg_s:g} means {rate:.0f} steps/s; "

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from armtempo.arrays import Array
 from armtempo.errors import RunFolderError
 from armtempo.formats.atomic_file import replace_text
 from armtempo.report import html_page, plots, run_report
@@ -29,7 +30,7 @@ def write(folders: Sequence[Path], path: Path) -> Path:
 
 
 def render(found: dict[str, run_report.Evaluation], complaints: Sequence[str]) -> str:
-    """The page, for evaluations by the name they go under."""
+    """The page, for evaluations by name."""
     sheet = html_page.Page("Runs compared", ", ".join(found))
     if len({replace(evaluation.plan.arm, source="") for evaluation in found.values()}) > 1:
         arms = ", ".join(f"{name} of {evaluation.plan.arm.name}" for name, evaluation in found.items())
@@ -93,9 +94,7 @@ def _table(sheet: html_page.Page, found: dict[str, run_report.Evaluation]) -> No
     sheet.table((*header, "lag at start (ms)", "lag at end (ms)"), rows)
 
 
-def _of_joint(
-    found: dict[str, run_report.Evaluation], joint: int
-) -> dict[str, tuple[plots.Array, plots.Array, plots.Array]]:
+def _of_joint(found: dict[str, run_report.Evaluation], joint: int) -> dict[str, tuple[Array, Array, Array]]:
     """By run: times (K,), mean (3, K) and error of the angle (K,)."""
     return {
         name: (

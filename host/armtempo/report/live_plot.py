@@ -7,25 +7,25 @@ from typing import Any
 
 import numpy as np
 
-from armtempo.errors import ArmtempoError
+from armtempo.arrays import Array
+from armtempo.errors import ArmtempoError, MissingPackageError
 from armtempo.report.plots import COLOURS
-from armtempo.splines.bspline import Array
 from armtempo.splines.trajectory import Trajectory
 
 _WITHOUT_WINDOW = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")
 
 
 class LivePlot:
-    """One field a joint.
+    """A window with one plot for each joint.
 
-    Raises ArmtempoError where matplotlib is missing or has no display to open a window on.
+    Raises MissingPackageError without matplotlib, ArmtempoError where there is no display to open a window on.
     """
 
     def __init__(self, trajectory: Trajectory, names: Sequence[str]) -> None:
         try:
             import matplotlib.pyplot as plt
         except ImportError:
-            raise ArmtempoError("matplotlib is not installed: pip install 'armtempo[plot]'") from None
+            raise MissingPackageError("a live plot", "matplotlib", "plot") from None
         if plt.get_backend().lower() in _WITHOUT_WINDOW:
             raise ArmtempoError("there is no display to open a window on")
         self._plt: Any = plt
@@ -43,7 +43,7 @@ class LivePlot:
         self._figure.show()
 
     def add(self, time_s: float, angles_deg: Array) -> None:
-        """Draw one more sample, angles (J,); a time that goes back begins a new repetition."""
+        """Draw one more sample, angles (J,); a time before the last one begins a new repetition."""
         if self._times and time_s < self._times[-1]:
             self._times, self._angles = [], []
         self._times.append(time_s)

@@ -10,7 +10,7 @@ from armtempo.report import html_page
 
 
 def extremes(sheet: html_page.Page, plan: Plan) -> None:
-    """Motion times with their floors and exact extremes beside the limits; then the planner's notes."""
+    """Motion times with their lower bounds and exact extremes beside the limits; then the planner's notes."""
     rows = [_extremes_row(plan, joint) for joint in range(len(plan.extremes))]
     header = ("joint", "motion time (s)", "floor (s)", "speed (°/s)", "acceleration (°/s²)", "jerk (°/s³)")
     caption = "Motion time, the least that the limits allow, and exact extremes of the plan beside the limits"
@@ -20,7 +20,7 @@ def extremes(sheet: html_page.Page, plan: Plan) -> None:
 
 
 def timing(sheet: html_page.Page, plan: Plan) -> None:
-    """How far apart the joints pass the via points and how far the tool strays; nothing where all are one."""
+    """How far apart the joints pass the via points and how far the tool deviates; nothing with shared timing."""
     if plan.job.timing != "per-joint" or len(plan.searches) < 2:
         return
     sheet.heading("Per-joint timing")
@@ -38,7 +38,7 @@ def timing(sheet: html_page.Page, plan: Plan) -> None:
 
 
 def origin(sheet: html_page.Page, plan: Plan, others: Sequence[tuple[str, object]]) -> None:
-    """What made the plan, and ``others`` about the run."""
+    """Settings and versions that made the plan, and ``others`` about the run."""
     job = plan.job
     rows: list[tuple[str, object]] = [
         ("optimiser", f"{job.optimiser}, population {job.population}, {job.iterations} iterations"),
@@ -52,7 +52,6 @@ def origin(sheet: html_page.Page, plan: Plan, others: Sequence[tuple[str, object
 
 def _extremes_row(plan: Plan, joint: int) -> list[str]:
     limits = plan.arm.driven[joint].limits
-    assert limits is not None  # driven
     floors = [search.floor_s for search in plan.searches if joint in search.joints]
     peaks = zip(plan.extremes[joint].values, limits.values, strict=True)
     return [

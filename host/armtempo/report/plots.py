@@ -1,7 +1,7 @@
 """Figures of plans and runs, drawn with matplotlib (the optional extra ``plot``).
 
 Every function returns a matplotlib Figure; ``save`` writes it as PNG or SVG, ``inline_svg`` gives it as
-text for a page. Colours are legible on white and on black; on a page, axes and text take its own colour.
+text for a page. Colours are legible on white and on black; on a page, axes and text take the colour of the page's text.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from armtempo.arrays import Array
 from armtempo.errors import MissingPackageError
 from armtempo.model.arm import Limits
 from armtempo.runs.analysis import Curves
@@ -25,8 +25,6 @@ from armtempo.splines.trajectory import Trajectory
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 
 COLOURS = ("#1f77b4", "#d95f02", "#1b9e77", "#b0479a", "#8c6d1f", "#6b6ecf")
 LIMIT_COLOUR = "#c0392b"
@@ -44,9 +42,7 @@ def new_figure(rows: int, columns: int, width: float, height: float) -> tuple[Fi
     try:
         from matplotlib.figure import Figure
     except ImportError:
-        raise MissingPackageError(
-            "figures need matplotlib, which is not installed; install it with: pip install 'armtempo[plot]'"
-        ) from None
+        raise MissingPackageError("a figure", "matplotlib", "plot") from None
     figure = Figure(figsize=(width, height), layout="constrained")
     return figure, figure.subplots(rows, columns, squeeze=False)
 
@@ -161,7 +157,7 @@ def inline_svg(figure: Figure, name: str, description: str) -> str:
 
 
 def _lay_out(figure: Figure) -> None:
-    """Place everything once and for all: with a layout engine left, each file would be drawn twice."""
+    """Fix the layout: with a layout engine left, each file would be drawn twice."""
     if figure.get_layout_engine() is not None:
         figure.draw_without_rendering()
         figure.set_layout_engine(None)
@@ -179,7 +175,7 @@ def _svg(figure: Figure) -> str:
 
 
 def _rounded(path: re.Match[str]) -> str:
-    """Coordinates to a hundredth of a point: half the size, nothing to be seen."""
+    """Coordinates to a hundredth of a point: half the size, no visible difference."""
     return re.sub(r"(\.\d\d)\d+", r"\1", path.group())
 
 

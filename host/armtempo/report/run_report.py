@@ -15,7 +15,6 @@ from armtempo.kinematics import chain
 from armtempo.model import trajectory_file
 from armtempo.model.arm import Arm, Limits
 from armtempo.model.plan import Plan
-from armtempo.records.encode import counts_per_deg
 from armtempo.report import html_page, plan_section, plots
 from armtempo.runs import analysis, reader
 from armtempo.runs.run_folder import COMPLETE
@@ -33,7 +32,7 @@ _PATH_POINTS = 300
 class Evaluation:
     """A run with its plan, its curves and what is wrong with it."""
 
-    run: reader.Run
+    run: reader.RunData
     plan: Plan
     curves: analysis.Curves
     complaints: tuple[str, ...]
@@ -46,7 +45,7 @@ class Evaluation:
     @property
     def limits(self) -> list[Limits]:
         """Their limits."""
-        return [joint.limits for joint in self.plan.arm.driven if joint.limits]
+        return [joint.limits for joint in self.plan.arm.driven]
 
 
 def evaluate(folder: Path) -> Evaluation:
@@ -71,13 +70,13 @@ def evaluate(folder: Path) -> Evaluation:
 
 def resolutions_deg(arm: Arm) -> list[float]:
     """Degrees per encoder count of the driven joints; NaN for one without an encoder."""
-    return [1.0 / counts_per_deg(joint) if joint.encoder else np.nan for joint in arm.driven]
+    return [1.0 / joint.counts_per_deg if joint.encoder else np.nan for joint in arm.driven]
 
 
-def complaints(run: reader.Run) -> list[str]:
+def complaints(run: reader.RunData) -> list[str]:
     """What is missing or broken in each repetition, one sentence each."""
     found = []
-    for repetition in run.repetitions:
+    for repetition, entry in zip(run.repetitions, run.entries, strict=True):
         steps = np.diff(repetition.index)
         if not len(repetition.time_s):
             found.append(f"{repetition.file}: {repetition.problem or 'no samples'}")
@@ -91,16 +90,9 @@ def complaints(run: reader.Run) -> list[str]:
             found.append(f"{repetition.file}: the sample count starts again in the middle (a reset?)")
         if repetition.state != COMPLETE:
             end = repetition.time_s[-1]
-            state = _state(run, repetition)
+            state = f"{entry.state} ({entry.fault})" if entry.fault else entry.state
             found.append(f"{repetition.file}: cut short, ended as {state} after {end:.1f} s")
     return found
-
-
-def _state(run: reader.Run, repetition: reader.Samples) -> str:
-    """How a repetition ended, its fault named."""
-    faults = {entry["file"]: entry.get("fault") for entry in run.meta["repetitions"]}
-    fault = faults.get(repetition.file)
-    return f"{repetition.state} ({fault})" if fault else repetition.state
 
 
 def write(folder: Path) -> Path:

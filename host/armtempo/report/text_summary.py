@@ -1,16 +1,20 @@
-"""A plan in a few lines of text: motion times beside their floors, extremes beside their limits."""
+"""Plans and runs in a few lines of text."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 from armtempo.formats.text_table import aligned
 from armtempo.model.plan import Plan, Search
 from armtempo.planning import path_deviation
+from armtempo.runs.results import JointResult
 
 _HEAD = (
     ("joint", "time", "floor", "over", "speed", "acceleration", "jerk"),
     ("", "s", "s", "%", "deg/s", "deg/s²", "deg/s³"),
 )
 _WIDTHS = (12, 8, 8, 7, 16, 16, 17)
+_RESULT_WIDTHS = (11, 11, 12, 12)
 _FLOORS = {
     "rests": "from turn to turn of a joint under its speed, acceleration and jerk limits",
     "path": "along the path under speed and acceleration limits alone",
@@ -19,7 +23,7 @@ _FLOORS = {
 
 
 def lines(plan: Plan) -> list[str]:
-    """The summary, one string a line; each extreme as reached / limit."""
+    """A plan: motion times beside their lower bounds, extremes beside their limits; one string a line."""
     job = plan.job
     made = f"{job.optimiser}, {job.population} x {job.iterations}, seed {job.seed}"
     shape = f"degree {job.degree}, refine {job.refine}"
@@ -34,9 +38,18 @@ def lines(plan: Plan) -> list[str]:
     return text
 
 
+def result_lines(results: Iterable[JointResult]) -> list[str]:
+    """A run: per joint the steps sent, the angle at the end and its error; one string a line."""
+    rows = [["joint", "steps sent", "angle", "error"], ["", "net", "deg", "deg"]]
+    rows += [
+        [joint.name, str(joint.steps_sent), f"{joint.angle_deg:.3f}", f"{joint.error_deg:+.4f}"]
+        for joint in results
+    ]
+    return aligned(rows, _RESULT_WIDTHS)
+
+
 def _row(plan: Plan, joint: int) -> tuple[str, ...]:
     limits = plan.arm.driven[joint].limits
-    assert limits is not None
     time = f"{plan.trajectory.joints[joint].duration_s:.4f}"
     floor, over = "-", "-"
     for search in plan.searches:
@@ -57,7 +70,7 @@ def _polished(search: Search) -> str:
 
 
 def _separation(plan: Plan) -> list[str]:
-    """What the motion loses to shared timing, which keeps the tool on the path."""
+    """How far per-joint timing lets the joints pass the via points apart, and the tool leave the path."""
     spread = ", ".join(f"{value:.2f}" for value in path_deviation.via_spread_s(plan.trajectory))
     stray = path_deviation.tool_stray_mm(plan.arm, plan.trajectory)
     return [

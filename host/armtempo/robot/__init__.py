@@ -1,1 +1,1 @@
-"""What is done with a board: configure, home, move, replay, stop."""
+"""A board in use: configure, home, move, replay, record, stop."""

@@ -6,20 +6,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from armtempo_shared.limits import SAMPLE_TICKS, TICK_HZ
 from numpy.typing import NDArray
 
+from armtempo.arrays import Array
 from armtempo.model.arm import Limits
 from armtempo.runs.differentiation import WINDOW, derivative, noise, quantisation_sigma
+from armtempo.runs.reader import RepetitionData
 from armtempo.runs.run_folder import COMPLETE
-from armtempo.runs.reader import Samples
 from armtempo.splines.trajectory import Trajectory
 
-Array = NDArray[np.float64]
-
-SAMPLE_S = 0.1
+SAMPLE_S = SAMPLE_TICKS / TICK_HZ
+"""Time between two samples, by the board's motion clock."""
 ORDERS = ("angle", "speed", "acceleration")
 EDGE_S = 1.0
-"""Length of the stretch at start and end over which the lag is taken."""
+"""Length of the intervals at start and end over which the lag is estimated."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Curves:
     ``times_s`` (K,); ``each`` (R, 3, K, J) for every repetition, NaN where samples are missing; ``mean``,
     ``sem`` (standard error of the mean; NaN with one repetition), ``theory``, and ``shown``, what the same
     differentiation shows of theory's angles, each (3, K, J). Deviations are taken from ``shown``, so that
-    they speak of the arm and not of the differentiation.
+    they show the arm's errors and not those of the differentiation.
     """
 
     times_s: Array
@@ -46,7 +47,6 @@ class Deviation:
 
     rms: float
     largest: float
-    final: float
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class LimitCheck:
         return "kept within uncertainty" if self.peak <= self.limit + 3.0 * self.sigma else "exceeded"
 
 
-def curves(repetitions: Sequence[Samples], trajectory: Trajectory) -> Curves:
+def curves(repetitions: Sequence[RepetitionData], trajectory: Trajectory) -> Curves:
     """Mean, scatter and theory of the repetitions of one trajectory.
 
     Raises ValueError where there is no sample at all.
@@ -96,7 +96,7 @@ def deviations(found: Curves) -> list[list[Deviation]]:
     return [[_deviation(error[order, :, joint]) for joint in range(error.shape[2])] for order in range(3)]
 
 
-def final_errors(repetition: Samples, trajectory: Trajectory) -> Array:
+def final_errors(repetition: RepetitionData, trajectory: Trajectory) -> Array:
     """Measured minus planned angle (J,) at the last sample, in degrees."""
     planned: Array = trajectory(repetition.time_s[-1], 0)
     return np.asarray(repetition.angle_deg[-1] - planned)
@@ -146,7 +146,7 @@ def lags_s(found: Curves, trajectory: Trajectory) -> Array:
 
 
 def _peak(values: Array) -> float:
-    """Largest magnitude of what was measured; NaN where nothing was."""
+    """Largest magnitude of the measured values; NaN where there are none."""
     known = np.abs(values[~np.isnan(values)])
     return float(known.max()) if known.size else np.nan
 
@@ -154,22 +154,22 @@ def _peak(values: Array) -> float:
 def _deviation(error: Array) -> Deviation:
     known = error[~np.isnan(error)]
     if not len(known):
-        return Deviation(np.nan, np.nan, np.nan)
-    return Deviation(float(np.sqrt(np.mean(known**2))), float(np.abs(known).max()), float(known[-1]))
+        return Deviation(np.nan, np.nan)
+    return Deviation(float(np.sqrt(np.mean(known**2))), float(np.abs(known).max()))
 
 
-def _indices(repetition: Samples) -> NDArray[np.int64]:
+def _indices(repetition: RepetitionData) -> NDArray[np.int64]:
     """Index of each sample on the 0.1 s grid; -1 for the one at the end, which falls between."""
     place = repetition.time_s / SAMPLE_S
     index = np.rint(place).astype(np.int64)
     return np.where(np.abs(place - index) < 1e-3, index, -1)
 
 
-def _grid_size(repetition: Samples) -> int:
+def _grid_size(repetition: RepetitionData) -> int:
     return int(_indices(repetition).max(initial=-1)) + 1
 
 
-def _on_grid(repetition: Samples, count: int) -> Array:
+def _on_grid(repetition: RepetitionData, count: int) -> Array:
     """Measured angles (count, J), NaN where a sample is missing."""
     index = _indices(repetition)
     grid = np.full((count, repetition.angle_deg.shape[1]), np.nan)
@@ -178,9 +178,9 @@ def _on_grid(repetition: Samples, count: int) -> Array:
 
 
 def _differentiated(angles: Array, ended: bool) -> Array:
-    """(3, K, J): angle, speed, acceleration; every stretch without a gap by itself.
+    """(3, K, J): angle, speed, acceleration; each interval without a gap by itself.
 
-    The arm rests before a motion and after one that ``ended``, so there the rest goes into the window.
+    The arm rests before a motion and after one that ``ended``, so there the window is filled with the angle at rest.
     """
     result = np.full((3, *angles.shape), np.nan)
     result[0] = angles

@@ -4,31 +4,31 @@ from __future__ import annotations
 
 import csv
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from armtempo.arrays import Array
 from armtempo.errors import RunFolderError
-from armtempo.runs.run_folder import FORMAT, META, TRAJECTORY, VERSION, JointScale
-
-Array = NDArray[np.float64]
+from armtempo.link.follow import Gap
+from armtempo.runs.run_folder import FORMAT, META, TRAJECTORY, VERSION, JointScale, Repetition
 
 _LARGEST = 2.0**53
-"""Beyond it a column of whole numbers is not exact."""
+"""Integers beyond this are not exact as doubles."""
 _LONGEST_S = 86_400.0
 """A day; no motion lasts that long on the board."""
 
 
 @dataclass(frozen=True)
-class Samples:
+class RepetitionData:
     """One repetition: N samples of J joints."""
 
     file: str
     state: str
-    """How it ended: see the states in ``record``."""
+    """How it ended: a state of ``run_folder``."""
     index: NDArray[np.int64]
     """(N,), from 0; a jump is a gap."""
     time_s: Array
@@ -44,13 +44,15 @@ class Samples:
 
 
 @dataclass(frozen=True)
-class Run:
+class RunData:
     """A run folder's content."""
 
     path: Path
     meta: dict[str, Any]
     joints: tuple[JointScale, ...]
-    repetitions: tuple[Samples, ...]
+    repetitions: tuple[RepetitionData, ...]
+    entries: tuple[Repetition, ...]
+    """What run.json says of each repetition."""
 
     @property
     def trajectory_path(self) -> Path | None:
@@ -59,7 +61,7 @@ class Run:
         return path if path.is_file() else None
 
 
-def load(path: Path) -> Run:
+def load(path: Path) -> RunData:
     """A run folder, whole or cut short; RunFolderError where it is none or contradicts itself.
 
     A repetition whose file is missing or damaged is there without samples and says why in ``problem``.
@@ -67,15 +69,25 @@ def load(path: Path) -> Run:
     meta = _meta(path / META)
     try:
         joints = tuple(_scale(**joint) for joint in meta["joints"])
-        entries = [(str(entry["file"]), str(entry["state"])) for entry in meta["repetitions"]]
+        entries = tuple(_entry(entry) for entry in meta["repetitions"])
         meta |= {key: str(meta[key]) for key in ("name", "started")}
     except (KeyError, TypeError, ValueError) as error:
         raise RunFolderError(f"{path / META}: {error} is missing or wrong; the folder is damaged") from error
-    return Run(path, meta, joints, tuple(_samples(path / file, state, joints) for file, state in entries))
+    repetitions = tuple(_samples(path / entry.file, entry.state, joints) for entry in entries)
+    return RunData(path, meta, joints, repetitions, entries)
 
 
 def _scale(name: str, steps_per_deg: float, counts_per_deg: float) -> JointScale:
     return JointScale(str(name), float(steps_per_deg), float(counts_per_deg))
+
+
+def _entry(values: dict[str, Any]) -> Repetition:
+    """A repetition of run.json; keys that an older or newer program wrote otherwise are left out."""
+    known = {key.name: values[key.name] for key in fields(Repetition) if key.name in values}
+    known |= {"file": str(values["file"]), "state": str(values["state"])}
+    known["lost"] = tuple(Gap(int(first), int(number)) for first, number in known.get("lost", ()))
+    known |= {key: tuple(map(int, known[key])) for key in ("commanded_steps", "counts") if key in known}
+    return Repetition(**known)
 
 
 def _meta(path: Path) -> dict[str, Any]:
@@ -92,7 +104,7 @@ def _meta(path: Path) -> dict[str, Any]:
     return meta
 
 
-def _samples(path: Path, state: str, joints: tuple[JointScale, ...]) -> Samples:
+def _samples(path: Path, state: str, joints: tuple[JointScale, ...]) -> RepetitionData:
     try:
         return _parsed(path, state, joints, _rows(path))
     except OSError as error:
@@ -102,8 +114,10 @@ def _samples(path: Path, state: str, joints: tuple[JointScale, ...]) -> Samples:
     return replace(_parsed(path, state, joints, []), problem=problem)
 
 
-def _parsed(path: Path, state: str, joints: tuple[JointScale, ...], rows: list[dict[str, str]]) -> Samples:
-    """The samples in the rows of a file; ValueError where a value is missing, no number, or beyond reason."""
+def _parsed(
+    path: Path, state: str, joints: tuple[JointScale, ...], rows: list[dict[str, str]]
+) -> RepetitionData:
+    """The samples in the rows of a file; ValueError where a value is missing, no number, or impossible."""
     table = {name: [row[name] or "" for row in rows] for name in (rows[0] if rows else ())}
 
     def column(name: str, largest: float) -> Array:
@@ -122,7 +136,7 @@ def _parsed(path: Path, state: str, joints: tuple[JointScale, ...], rows: list[d
     for number, joint in enumerate(joints):
         if joint.counts_per_deg:
             angle_deg[:, number] = column(f"j{number + 1}_angle_deg", _LARGEST)
-    return Samples(
+    return RepetitionData(
         path.name,
         state,
         column("index", _LARGEST).astype(np.int64),
@@ -134,7 +148,7 @@ def _parsed(path: Path, state: str, joints: tuple[JointScale, ...], rows: list[d
 
 
 def _rows(path: Path) -> list[dict[str, str]]:
-    """The whole lines of a sample file; what an interrupt left of the last one is dropped."""
+    """The whole lines of a sample file; an incomplete last line is dropped."""
     text = path.read_text(encoding="utf-8")
     whole = text[: text.rfind("\n") + 1]
     return list(csv.DictReader(whole.splitlines()))

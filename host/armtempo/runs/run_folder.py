@@ -1,4 +1,4 @@
-"""The run folder: what a run was and what came back, readable at any moment of it.
+"""The run folder: what was run and what was measured, readable at any moment of the run.
 
 ::
 
@@ -26,11 +26,11 @@ from typing import Any, Self
 from armtempo_shared import limits
 
 from armtempo import __version__
-from armtempo.model.arm import Arm
-from armtempo.records.encode import counts_per_deg, steps_per_deg
 from armtempo.errors import InputError, RunFolderError
 from armtempo.formats.atomic_file import replace_text
-from armtempo.link.messages import Sample, Stand
+from armtempo.link.board_messages import Positions, Sample
+from armtempo.link.follow import Gap
+from armtempo.model.arm import Arm
 
 FORMAT = "armtempo run"
 VERSION = 1
@@ -42,7 +42,7 @@ RUNNING, COMPLETE, INTERRUPTED, FAULT, BROKEN = "running", "complete", "interrup
 
 @dataclass(frozen=True)
 class JointScale:
-    """How one joint's steps and counts become degrees; counts 0: it has no encoder."""
+    """Scales of one joint's steps and counts; ``counts_per_deg`` 0: it has no encoder."""
 
     name: str
     steps_per_deg: float
@@ -51,10 +51,7 @@ class JointScale:
 
 def scales(arm: Arm) -> tuple[JointScale, ...]:
     """The scales of an arm's driven joints."""
-    return tuple(
-        JointScale(joint.name, steps_per_deg(joint), counts_per_deg(joint) if joint.encoder else 0.0)
-        for joint in arm.driven
-    )
+    return tuple(JointScale(joint.name, joint.steps_per_deg, joint.counts_per_deg) for joint in arm.driven)
 
 
 def columns(joints: Sequence[JointScale]) -> dict[str, str]:
@@ -80,7 +77,9 @@ def columns(joints: Sequence[JointScale]) -> dict[str, str]:
 def row(sample: Sample, joints: Sequence[JointScale]) -> list[str]:
     """One line of a sample file."""
     cells = [str(sample.index), str(sample.ticks), f"{sample.ticks / limits.TICK_HZ:.9f}"]
-    for joint, steps, counts in zip(joints, sample.stand.commanded_steps, sample.stand.counts, strict=True):
+    for joint, steps, counts in zip(
+        joints, sample.positions.commanded_steps, sample.positions.counts, strict=True
+    ):
         cells += [str(steps), f"{steps / joint.steps_per_deg:.6f}"]
         if joint.counts_per_deg:
             cells += [str(counts), f"{counts / joint.counts_per_deg:.6f}"]
@@ -89,25 +88,25 @@ def row(sample: Sample, joints: Sequence[JointScale]) -> list[str]:
 
 @dataclass
 class Repetition:
-    """How one repetition went; ``lost``: (first index, number) of each gap; ``notices``: words of the board."""
+    """How one repetition went, as run.json tells it."""
 
     file: str
     state: str = RUNNING
     samples: int = 0
-    lost: tuple[tuple[int, int], ...] = ()
+    lost: tuple[Gap, ...] = ()
+    """Samples that never arrived."""
     duration_s: float = 0.0
     fault: str = ""
     commanded_steps: tuple[int, ...] = ()
     counts: tuple[int, ...] = ()
     notices: tuple[str, ...] = ()
+    """Texts from the board."""
 
-    def end(
-        self, state: str, fault: str, ticks: int, stand: Stand, lost: tuple[tuple[int, int], ...]
-    ) -> None:
+    def end(self, state: str, fault: str, ticks: int, positions: Positions, lost: tuple[Gap, ...]) -> None:
         """Note the end of the motion."""
         self.state, self.fault, self.lost = state, fault, lost
         self.duration_s = ticks / limits.TICK_HZ
-        self.commanded_steps, self.counts = stand.commanded_steps, stand.counts
+        self.commanded_steps, self.counts = positions.commanded_steps, positions.counts
 
 
 @dataclass
@@ -118,12 +117,12 @@ class RunFolder:
     name: str
     joints: tuple[JointScale, ...]
     origin: dict[str, Any] = field(default_factory=dict)
-    """What else is known of the run: port, board, arm, stored name."""
+    """Further entries of run.json: port, board, arm, checksum of the motion."""
     started: str = field(default_factory=lambda: _now())
     repetitions: list[Repetition] = field(default_factory=list)
 
     def write(self) -> None:
-        """Replace run.json by what is known now."""
+        """Write run.json anew with what is known now."""
         meta = {
             "format": FORMAT,
             "version": VERSION,

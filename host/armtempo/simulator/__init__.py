@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
+from armtempo.simulator.launch_options import InjectedFault, LaunchOptions
 from armtempo.simulator.launcher import VirtualBoard, launch
-from armtempo.simulator.options import Fault
 
-__all__ = ["Fault", "VirtualBoard", "launch"]
+__all__ = ["InjectedFault", "LaunchOptions", "VirtualBoard", "launch"]

@@ -1,4 +1,4 @@
-"""What the virtual board's process is told of the arm on its pins."""
+"""The description of the arm for the virtual board's process."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any
 from armtempo_shared import armrecord
 
 from armtempo.errors import InputError
-from armtempo.model.arm import Arm, Joint
+from armtempo.model.arm import Arm, DrivenJoint
 from armtempo.records import encode
 
 
 def describe(arm: Arm, start_deg: Sequence[float] | None = None) -> dict[str, Any]:
-    """The arm record's fields and, per joint, where it stands at power-up and how it is built.
+    """The arm record's fields and, per joint, where it is at power-up and its drive's model.
 
     ``start_deg`` (J,): None means the home posture. Raises InputError where a model makes no sense.
     """
@@ -29,9 +29,8 @@ def describe(arm: Arm, start_deg: Sequence[float] | None = None) -> dict[str, An
     }
 
 
-def _joint(joint: Joint) -> dict[str, Any]:
+def _joint(joint: DrivenJoint) -> dict[str, Any]:
     model, motor = joint.model, joint.motor
-    assert motor is not None  # driven
     if model.holding_torque_nm and not (model.inertia_kg_m2 or model.rotor_inertia_kg_m2):
         raise InputError(
             f"{joint.name}: model.holding_torque_nm without an inertia; "

@@ -5,7 +5,7 @@ The file: ``b"ATE1"``, then records of 16 bytes, little endian, ``<BBBBIq``::
     kind  1 edges   pin (16 * port + number), level before, 0, count n, base tick; then n offsets (I):
                     the pin toggles at base + each offset
           2 counter timer number, 1 started or 0 stopped, 0, its counter, tick
-          3 input   as kind 1, with n = 1: the world changed an input pin
+          3 input   as kind 1, with n = 1: an input pin was changed from outside
           4 reset   the board was powered up or reset; ticks count from 0 again
 
 Ticks are of 84 MHz, since the last reset.
@@ -32,7 +32,7 @@ Edges = tuple[NDArray[np.int64], NDArray[np.int8]]
 
 
 @dataclass
-class Session:
+class PowerCycle:
     """What happened between two resets: per pin (``"A15"``) its edges, and the motion clock's starts."""
 
     pins: dict[str, Edges] = field(default_factory=dict)
@@ -61,34 +61,34 @@ class Session:
 _LEAD_TICKS = 8_400_000
 
 
-def read(path: Path) -> list[Session]:
-    """All sessions of a log, oldest first. Raises RunFolderError where the file is none."""
+def read(path: Path) -> list[PowerCycle]:
+    """All power cycles of a log, oldest first. Raises RunFolderError where the file is none."""
     data = path.read_bytes()
     if data[:4] != b"ATE1":
         raise RunFolderError(f"{path} is no edge log of a virtual board")
-    sessions: list[_Collector] = []
+    cycles: list[_Collector] = []
     at = 4
     while at + _RECORD.size <= len(data):
         kind, pin, before, _, count, base = _RECORD.unpack_from(data, at)
         at += _RECORD.size
-        if kind == _RESET or not sessions:
-            sessions.append(_Collector())
+        if kind == _RESET or not cycles:
+            cycles.append(_Collector())
         if kind in (_EDGES, _INPUT):
             offsets = np.frombuffer(data, "<u4", count, at)
             at += 4 * count
-            sessions[-1].edges(pin, before, base + offsets.astype(np.int64))
+            cycles[-1].edges(pin, before, base + offsets.astype(np.int64))
         elif kind == _COUNTER and pin == _MOTION_TIMER:
-            sessions[-1].counter(bool(before), count, base)
-    return [collector.session() for collector in sessions]
+            cycles[-1].counter(bool(before), count, base)
+    return [collector.cycle for collector in cycles]
 
 
 class _Collector:
-    """Gathers the pieces of one session."""
+    """Gathers the pieces of one power cycle."""
 
     def __init__(self) -> None:
         self._ticks: dict[int, list[NDArray[np.int64]]] = {}
         self._levels: dict[int, list[NDArray[np.int8]]] = {}
-        self._session = Session()
+        self._cycle = PowerCycle()
 
     def edges(self, pin: int, before: int, ticks: NDArray[np.int64]) -> None:
         self._ticks.setdefault(pin, []).append(ticks)
@@ -97,12 +97,13 @@ class _Collector:
 
     def counter(self, started: bool, count: int, tick: int) -> None:
         if not started:
-            self._session.ends.append(tick)
+            self._cycle.ends.append(tick)
         elif count >= 1 << 31:  # a motion's clock is started a little before it comes round to 0
-            self._session.starts.append(tick + (1 << 32) - count)
+            self._cycle.starts.append(tick + (1 << 32) - count)
 
-    def session(self) -> Session:
+    @property
+    def cycle(self) -> PowerCycle:
         for pin, pieces in self._ticks.items():
             name = f"{_PORTS[pin >> 4]}{pin & 15}"
-            self._session.pins[name] = (np.concatenate(pieces), np.concatenate(self._levels[pin]))
-        return self._session
+            self._cycle.pins[name] = (np.concatenate(pieces), np.concatenate(self._levels[pin]))
+        return self._cycle

@@ -9,15 +9,13 @@ import subprocess
 import sys
 import time
 import tty
-from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 
 from armtempo.errors import InputError, LinkError
-from armtempo.model.arm import Arm
 from armtempo.simulator.describe import describe
-from armtempo.simulator.folder import Folder
-from armtempo.simulator.options import Fault, Options, unique_id
+from armtempo.simulator.launch_options import LaunchOptions, ProcessOptions, unique_id
+from armtempo.simulator.temporary_folder import TemporaryFolder
 
 INTERPRETER_VARIABLE = "ARMTEMPO_MICROPYTHON"
 _MAIN = Path(__file__).with_name("main.py")
@@ -33,7 +31,7 @@ class VirtualBoard:
     ``port`` can be opened like a serial device, again and again, until then.
     """
 
-    def __init__(self, command: list[str], folder: Folder, flash: Path) -> None:
+    def __init__(self, command: list[str], folder: TemporaryFolder, flash: Path) -> None:
         self.flash_dir = flash
         self.log_path = folder.path / "board.log"
         self._folder = folder
@@ -82,12 +80,12 @@ class VirtualBoard:
             time.sleep(0.005)
 
     def stop(self) -> None:
-        """Pull the plug. The edge log is complete then. Nothing happens the second time."""
+        """End the board as by pulling its plug; the edge log is complete then. A second call does nothing."""
         if self._slave < 0:
             return
         os.close(self._slave)
         self._slave = -1
-        # it ends by itself when the port's last user has gone
+        # it ends by itself when nobody has its port open any more
         for end in (self._process.poll, self._process.terminate, self._process.kill):
             end()
             try:
@@ -111,62 +109,19 @@ class VirtualBoard:
         self._folder.remove()
 
 
-def launch(
-    flash_dir: Path | str | None = None,
-    virtual_time: bool = True,
-    edge_log: Path | str | None = None,
-    interpreter: Path | str | None = None,
-    arm: Arm | None = None,
-    start_deg: Sequence[float] | None = None,
-    seed: int = 0,
-    faults: Sequence[Fault] = (),
-    power_cut_at: int = 0,
-    deployed: bool = False,
-    flash_blocks: int | None = None,
-    button_s: float = 0.0,
-    sd_card: Path | str | None = None,
-    damage: str = "",
-    machine: str = Options.machine,
-) -> VirtualBoard:
+def launch(options: LaunchOptions | None = None) -> VirtualBoard:
     """Start a virtual board; use it as a context manager.
 
-    ``flash_dir``: the folder that is its flash and lasts; None: a new one that goes with the board.
-    ``virtual_time``: motions run as fast as they can; else in real time. ``edge_log``: file for every pin
-    edge. ``interpreter``: MicroPython or CPython; None: $ARMTEMPO_MICROPYTHON, ``micropython`` on PATH, or
-    this Python. ``arm``: gets motors with its ``model``; None: ideal motors for whatever arm the board is set
-    up for. ``start_deg`` (J,): where the arm stands at power-up, else at home. ``deployed``: run the program
-    in the flash (``armtempo deploy`` puts it there) instead of the installed one. ``flash_blocks``: size of
-    the flash; None: the chip's, and with ``deployed`` more, as compiled files for this machine's processor
-    are larger than for the chip's. ``button_s``: how long the user button is held from power-up on: safe mode
-    from 0.6 to 1.2, a fresh file system from 1.2 to 1.8. ``sd_card``: folder that is an SD card in the board.
-    ``damage``: ``"no file system"`` or ``"unreadable"``, what has befallen the flash. ``machine``: what the
-    firmware was built for. Raises InputError where ``flash_dir`` cannot be made, LinkError where the board does
-    not start.
+    Raises InputError where the flash's folder cannot be made, LinkError where the board does not start.
     """
-    folder = Folder()
-    flash = Path(flash_dir).resolve() if flash_dir else folder.path / "flash"
+    wanted = options or LaunchOptions()
+    folder = TemporaryFolder()
+    flash = Path(wanted.flash_dir).resolve() if wanted.flash_dir else folder.path / "flash"
     try:
         _make(flash)
-        options = Options(
-            flash=str(flash),
-            sources=program_folders(),
-            program=[] if deployed else program_folders(),
-            flash_blocks=flash_blocks or (_DEPLOYED_BLOCKS if deployed else Options.flash_blocks),
-            speed=0.0 if virtual_time else 1.0,
-            edge_log=str(Path(edge_log).resolve()) if edge_log else None,
-            unique_id=unique_id(seed),
-            arm=describe(arm, start_deg) if arm else None,
-            power_cut_at=power_cut_at,
-            seed=seed,
-            faults=list(faults),
-            up=str(folder.path / "up"),
-            button_ms=1000 * button_s,
-            sd_card=str(Path(sd_card).resolve()) if sd_card else None,
-            damage=damage,
-            machine=machine,
-        )
-        options.write(folder.path / "options.json")
-        board = VirtualBoard(_command(interpreter, folder.path / "options.json"), folder, flash)
+        _process_options(wanted, flash, folder.path / "up").write(folder.path / "options.json")
+        command = _command(wanted.interpreter, folder.path / "options.json")
+        board = VirtualBoard(command, folder, flash)
     except BaseException:
         folder.remove()
         raise
@@ -176,6 +131,34 @@ def launch(
         board.__exit__(None, None, None)
         raise
     return board
+
+
+def _process_options(wanted: LaunchOptions, flash: Path, up: Path) -> ProcessOptions:
+    """What the process is told; ``up`` is the file that it makes when it has started."""
+    sources = program_folders()
+    blocks = _DEPLOYED_BLOCKS if wanted.deployed else ProcessOptions.flash_blocks
+    return ProcessOptions(
+        flash=str(flash),
+        sources=sources,
+        program=[] if wanted.deployed else sources,
+        flash_blocks=wanted.flash_blocks or blocks,
+        speed=0.0 if wanted.virtual_time else 1.0,
+        edge_log=_absolute(wanted.edge_log),
+        unique_id=unique_id(wanted.seed),
+        arm=describe(wanted.arm, wanted.start_deg) if wanted.arm else None,
+        power_cut_at=wanted.power_cut_at,
+        seed=wanted.seed,
+        faults=list(wanted.faults),
+        up=str(up),
+        button_ms=1000 * wanted.button_s,
+        sd_card=_absolute(wanted.sd_card),
+        damage=wanted.damage,
+        machine=wanted.machine,
+    )
+
+
+def _absolute(path: Path | str | None) -> str | None:
+    return str(Path(path).resolve()) if path else None
 
 
 def _make(flash: Path) -> None:

@@ -2,7 +2,7 @@
 
 Puts the simulated hardware in place of ``pyb``, ``machine``, ``stm``, ``time``, ``os``, … and runs the board
 program on it, again after each reset. The serial port is stdin and stdout; the options are described in
-``options.py``.
+``launch_options.py``.
 """
 
 import json
@@ -12,7 +12,7 @@ HERE = sys.argv[0].rsplit("/", 1)[0]
 
 
 def prepare():
-    """Make the simulated modules importable; returns the simulator's ``session`` module and their folders."""
+    """Make the simulated modules importable; returns the simulator's ``power_cycles`` module and their folders."""
     folders = [HERE + "/hardware"]
     if sys.implementation.name != "micropython":
         folders.append(HERE + "/cpython")
@@ -20,21 +20,21 @@ def prepare():
     sys.path[0:0] = folders
     if sys.implementation.name != "micropython":
         import additions  # noqa: F401
-    from virtual_board import session
+    from virtual_board import power_cycles
     from virtual_board.firmware import builtin_modules
 
     builtin_modules.replace()
     builtin_modules.replace_sys()
     sys.path[:] = path
-    return session, folders
+    return power_cycles, folders
 
 
 def main():
     """Run until the launcher goes."""
     with open(sys.argv[1]) as file:
         options = json.load(file)
-    session, folders = prepare()
-    session.run(options, folders)
+    power_cycles, folders = prepare()
+    power_cycles.run(options, folders)
 
 
 main()

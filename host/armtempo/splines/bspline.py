@@ -9,9 +9,8 @@ import numpy as np
 from armtempo_shared.basis import BASIS, FACTORIAL
 from numpy.typing import ArrayLike, NDArray
 
+from armtempo.arrays import Array as Array
 from armtempo.errors import InputError
-
-Array = NDArray[np.float64]
 
 _REST_ROWS: dict[int, tuple[tuple[float, ...], ...]] = {
     3: ((-1, 0, 1),),

@@ -26,7 +26,7 @@ def case_stop_brakes_or_freezes():
 def case_stop_freezes_what_cannot_brake():
     app, host = connected()
     crc = armrecord.unpack(stand_in.arm())[2]
-    stiff = motion.pack(5, [[0] * 8] * 2, [[0] * 8] * 2, 3, 1, 0, crc)
+    stiff = motion.pack(5, [[0] * 8] * 2, [[0] * 8] * 2, 1, 0, crc)
     host.upload("stiff", stiff)
     host.ask("start", (0, wire.record_crc(stiff)), "stiff")
     host.ask("stop", (0,))

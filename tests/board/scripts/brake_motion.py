@@ -22,7 +22,7 @@ def whole(values, scale):
 def record(brake_ticks):
     angles = [whole(points, 1 << 28) for points in ANGLES]
     times = [whole(TIMES, TICK_HZ << 16)]
-    return motion.Motion(motion.pack(5, angles, times, SEGMENTS, 1, brake_ticks, 0))
+    return motion.Motion(motion.pack(5, angles, times, 1, brake_ticks, 0))
 
 
 def spline(points, segment, u):

@@ -225,7 +225,7 @@ class Rig:
         self.turn_ticks = 84 * turn_us
         self.samples = []
         self.board = standalone.start()
-        self.board.worlds.append(self)
+        self.board.observers.append(self)
         self._zero = 0
         import armtempo_board.check
         import armtempo_board.engine
@@ -237,7 +237,7 @@ class Rig:
             armtempo_board.ends = Evaluator
             armtempo_board.check.check = Evaluator.check
             armtempo_board.engine.forget = lambda: None  # what stands in for the evaluator stays
-        self.arm = machine_state.arm = motors.Arm(self.board, pins, lambda: (self.head, joints), 1, ())
+        self.arm = machine_state.arm = motors.ArmOnPins(self.board, pins, lambda: (self.head, joints), 1, ())
         self.pins = pins
         self.pulses = [
             Pulses(self, joint, pins.STEP[joint["channel"]][0], pins.STEP[joint["channel"]][6])

@@ -262,4 +262,4 @@ def record(arm_record, joints=2, segments=3):
     """A motion record for that arm; its numbers mean nothing."""
     angles = [list(range(segments + 5)) for _ in range(joints)]
     crc = armrecord.unpack(arm_record)[2]
-    return motion.pack(5, angles, angles, segments, 1, 84000, crc)
+    return motion.pack(5, angles, angles, 1, 84000, crc)

@@ -10,12 +10,12 @@ import sys
 if sys.implementation.name != "micropython":
     import additions  # noqa: F401
 from armtempo_shared import armrecord, wire
-from virtual_board import machine_state, pace, session
+from virtual_board import machine_state, pace, power_cycles
 from virtual_board.chip.flash import real_open
 from virtual_board.chip.processor import TICKS_PER_MS, print_exception
 from virtual_board.firmware import builtin_modules
 from virtual_board.firmware.external_interrupts import set_level
-from virtual_board.firmware.usb_serial import Line, Serial
+from virtual_board.firmware.usb_serial import Serial, SilentPort
 from virtual_board.standalone import DEFAULTS
 
 builtin_modules.replace_sys()
@@ -55,7 +55,7 @@ class Counter:
         self.last = origin + times[count - 1]
 
 
-class World(Line):
+class World(SilentPort):
     """The host at the end of the line, and everything else outside of the board."""
 
     def __init__(self, story, boot, flash):
@@ -81,7 +81,7 @@ class World(Line):
                 Counter(machine_state.board, *pins, joint["dir_inverted"])
                 for pins, joint in zip(STEP_AND_DIR, self.arm[1])
             ]
-            machine_state.board.worlds.append(self)
+            machine_state.board.observers.append(self)
             if self._boot:
                 self._boot(self)
 
@@ -260,7 +260,7 @@ def run(story, flash, program, boot=None):
     machine_state.board = machine_state.arm = machine_state.flash = machine_state.edges = None
     machine_state.serial = world = World(story, boot, flash)
     try:
-        session.run(dict(DEFAULTS, flash=flash, sources=SOURCES, program=program), [])
+        power_cycles.run(dict(DEFAULTS, flash=flash, sources=SOURCES, program=program), [])
     finally:
         sys.path[:] = _path
         builtins.print, builtins.open = _stock

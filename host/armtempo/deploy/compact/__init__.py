@@ -3,7 +3,7 @@
 MicroPython keeps every name that a file mentions, and 10 to 20 bytes for each place where a module holds one. So
 constants are put in where they are used (``constants``), the modules that are always needed become one
 (``merge``), the program's own names become short (``shorten``), and those that are used most come first
-(``order``). What the program does stays the same.
+(``order``). The behaviour of the program does not change.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def compact(
 
 
 def _at_run_time(tree: ast.Module) -> ast.Module:
-    """Without what only type checkers read."""
+    """The module without code that only type checkers read."""
     tree.body = [node for node in tree.body if not _is_for_checkers(node)]
     return tree
 

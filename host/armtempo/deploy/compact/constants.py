@@ -42,7 +42,7 @@ def constants(trees: Mapping[str, ast.Module]) -> dict[str, dict[str, Value]]:
 def _known(
     tree: ast.Module, trees: Mapping[str, ast.Module], values: Mapping[str, Mapping[str, Value]]
 ) -> dict[str, object]:
-    """What the imported names are worth."""
+    """Values of the imported names that are constants."""
     found: dict[str, object] = {}
     for name, target in imported(tree.body, trees).items():
         if target.name is None:
@@ -93,7 +93,8 @@ def _is_const(call: ast.Call) -> bool:
 
 
 class _Folder(Scoped):
-    """Puts values in. ``own``: of the module's own constants; ``taken_out``: whose assignments go."""
+    """Replaces names by values. ``own``: values of the module's own constants; ``taken_out``: constants whose
+    assignments are removed."""
 
     def __init__(
         self,

@@ -136,7 +136,7 @@ class _Pruner(Scoped):
 
 
 class _Merger(Scoped):
-    """One module on its way; ``inside``: names in the modules that become ``core``."""
+    """Rewrites one module; ``inside``: names in the modules that become ``core``."""
 
     def __init__(self, module: str, tree: ast.Module, inside: Mapping[str, set[str]], core: str) -> None:
         super().__init__()
@@ -150,7 +150,7 @@ class _Merger(Scoped):
         self._needs_core = False
 
     def run(self) -> list[ast.stmt]:
-        """The statements of the module as they are to be."""
+        """The rewritten statements of the module."""
         body = visit_all(self, self._body)
         if self._needs_core:
             package, name = self._core.rsplit(".", 1)

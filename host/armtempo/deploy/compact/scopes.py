@@ -82,17 +82,17 @@ def _own(node: ast.AST) -> Iterator[ast.AST]:
 
 
 class Scoped(ast.NodeTransformer):
-    """Visits a module and knows at each name whether a function around it hides what the module means by it."""
+    """Visits a module and knows at each name whether an enclosing function hides the module's meaning of it."""
 
     def __init__(self) -> None:
         self._hidden: list[set[str]] = []
 
     def hides(self, name: str) -> bool:
-        """Whether a name is one of the functions around."""
+        """Whether an enclosing function binds the name."""
         return any(name in names for names in self._hidden)
 
     def at_top(self) -> bool:
-        """Whether no function is around."""
+        """Whether no function encloses this place."""
         return not self._hidden
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
@@ -113,5 +113,5 @@ class Scoped(ast.NodeTransformer):
 
 
 def visit_all(visitor: ast.NodeTransformer, nodes: list[ast.stmt]) -> list[ast.stmt]:
-    """The statements as the visitor leaves them, without those that it takes out."""
+    """The statements as the visitor returns them, without those that it removes."""
     return [node for node in map(visitor.visit, nodes) if node is not None]

@@ -33,8 +33,8 @@ _TYPES = (
     BaseException,
 )
 _SHORTEST = 3
-"""Names of fewer letters stay."""
-_THERE = """
+"""Shorter names are kept."""
+_BUILT_IN = """
     abs all any append bool builtins bytearray bytecode bytes callable chr classmethod clear const copy count dict dir
     divmod end endswith eval exec extend find format from_bytes get getattr globals hasattr hash id index insert int
     isalpha isdigit isinstance islower isspace issubclass isupper items iter join key len list little locals lower
@@ -70,7 +70,7 @@ def short_names(trees: Mapping[str, ast.Module], keep: Collection[str], whole: C
     meant = {*keep, *modules, *_imported(nodes, trees), *_keywords(nodes), *_strings(nodes)}
     fixed = meant | set(_built_in())
     mentioned = {name for node in nodes for name in _mentioned(node)}
-    there = [name for name in _THERE.split() if name not in meant | mentioned]
+    there = [name for name in _BUILT_IN.split() if name not in meant | mentioned]
 
     def ours(names: Collection[str]) -> list[str]:
         return sorted(name for name in names if _is_long(name) and name not in fixed)

@@ -10,18 +10,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from armtempo import optimise
+from armtempo.arrays import Array
 from armtempo.errors import InputError
 from armtempo.model.arm import Arm, Limits
 from armtempo.model.job import Job
-from armtempo.planning import planner
+from armtempo.planning import interval_search, planner
 from armtempo.planning.fitness import Fitness
 from armtempo.splines import bspline
-from armtempo.splines.bspline import Array
 
 
 @dataclass(frozen=True)
 class Problem:
-    """What every search gets: the intervals of one joint's path, judged by ``armtempo.fitness``."""
+    """What every search gets: the intervals of one joint's path, judged by ``planning.fitness``."""
 
     joint: str
     via_deg: tuple[float, ...]
@@ -49,8 +49,8 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Run:
-    """What came of a case."""
+class Trial:
+    """The outcome of a case."""
 
     case: Case
     intervals_s: tuple[float, ...]
@@ -75,21 +75,23 @@ class Run:
 def problem_of(arm: Arm, job: Job, joint: int, fitness: str, iterations: int) -> Problem:
     """The search for the intervals of driven joint ``joint``, counted from 1, of a job.
 
-    Raises InputError where there is no such joint, or it has no limits or stands still in this job.
+    Raises InputError where there is no such joint, or it does not move in this job.
     """
     if not 1 <= joint <= len(arm.driven):
         raise InputError(f"joint {joint}: arm {arm.name!r} has the driven joints 1 to {len(arm.driven)}")
     driven = arm.driven[joint - 1]
     angles_deg, _ = planner.via_angles(arm, job)
     via = angles_deg[:, joint - 1]
-    if driven.limits is None:
-        raise InputError(f"arm {arm.name!r}: {driven.name} has no limits; add a limits table")
     if np.ptp(via) == 0.0:
         raise InputError(
             f"job {job.name!r}: {driven.name} does not move, so there is nothing to search; choose another"
         )
     angles = tuple(float(angle) for angle in via)
-    return Problem(driven.name, angles, job.degree, driven.limits, job.bounds_s, fitness, iterations)
+    bounds = job.bounds_s
+    if bounds is None:
+        box = interval_search.bounds_s(bspline.fit(via[:, None], job.degree), job.degree, [driven.limits])
+        bounds = (float(box.min()), float(box.max()))
+    return Problem(driven.name, angles, job.degree, driven.limits, bounds, fitness, iterations)
 
 
 def cases(algorithms: Iterable[str], populations: Iterable[int], seeds: Iterable[int]) -> list[Case]:
@@ -99,20 +101,21 @@ def cases(algorithms: Iterable[str], populations: Iterable[int], seeds: Iterable
     return sorted(chosen, key=lambda case: (-case.population, case.seed, case.algorithm))
 
 
-def solve(problem: Problem, case: Case) -> Run:
-    """Runs one case. The same case gives the same run, but for its seconds, wherever it runs."""
+def solve(problem: Problem, case: Case) -> Trial:
+    """Run one case. The same case gives the same trial on every worker, except for its seconds."""
     function = problem.function()
     bounds = [problem.bounds_s] * (len(problem.via_deg) - 1)
     rng = np.random.default_rng(case.seed)
     start = time.thread_time()
-    found = optimise.minimise(function, bounds, rng, case.population, problem.iterations, case.algorithm)
+    settings = optimise.Settings(case.algorithm, case.population, problem.iterations)
+    found = optimise.minimise(function, bounds, rng, settings)
     seconds = time.thread_time() - start
     better = [0, *(np.flatnonzero(np.diff(found.history) < 0) + 1)]
     improvements = tuple((int(at), float(found.history[at])) for at in better)
-    return Run(case, tuple(float(x) for x in found.x), found.evaluations, seconds, improvements)
+    return Trial(case, tuple(float(x) for x in found.x), found.evaluations, seconds, improvements)
 
 
-def execute(problem: Problem, todo: Iterable[Case], executor: Executor) -> Iterator[Run]:
+def execute(problem: Problem, todo: Iterable[Case], executor: Executor) -> Iterator[Trial]:
     """Runs the cases on the executor's workers, and yields each run as it comes."""
     futures = [executor.submit(solve, problem, case) for case in todo]
     for future in as_completed(futures):

@@ -15,18 +15,18 @@ from typing import Any
 
 import armtempo
 from armtempo.errors import InputError
-from armtempo.research.bench.cases import Case, Problem, Run
+from armtempo.research.bench.cases import Case, Problem, Trial
 
 FILE = "runs.jsonl"
 
 
-class Store:
+class ResultStore:
     """The runs kept in a folder; ``runs`` holds what is there, by case."""
 
     def __init__(self, folder: Path, problem: Problem) -> None:
-        """Opens or starts the file. Raises InputError where it holds runs of another problem."""
+        """Open or create the file. Raises InputError where it holds runs of another problem."""
         self.path = folder / FILE
-        self.runs: dict[Case, Run] = {}
+        self.runs: dict[Case, Trial] = {}
         head = _plain({"armtempo": armtempo.__version__, **asdict(problem)})
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -38,7 +38,7 @@ class Store:
         except OSError as error:
             raise InputError(f"{self.path}: cannot be used: {error.strerror}; choose another --out") from None
 
-    def add(self, run: Run) -> None:
+    def add(self, run: Trial) -> None:
         """Appends a finished run by one write."""
         self._append(asdict(run))
         self.runs[run.case] = run
@@ -74,9 +74,9 @@ class Store:
         self.runs = {run.case: run for run in runs}
 
 
-def _run(content: dict[str, Any]) -> Run:
+def _run(content: dict[str, Any]) -> Trial:
     (first, best), *rest = content["improvements"]
-    return Run(
+    return Trial(
         Case(**content["case"]),
         tuple(content["intervals_s"]),
         int(content["evaluations"]),
@@ -86,6 +86,6 @@ def _run(content: dict[str, Any]) -> Run:
 
 
 def _plain(content: dict[str, Any]) -> dict[str, Any]:
-    """``content`` as it comes back from a file."""
+    """``content`` after a round trip through JSON."""
     plain: dict[str, Any] = json.loads(json.dumps(content))
     return plain

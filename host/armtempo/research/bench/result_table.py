@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from armtempo.research.bench.cases import Run
-from armtempo.splines.bspline import Array
+from armtempo.arrays import Array
+from armtempo.research.bench.cases import Trial
 
 PAPER = {
     "ga": {10: (10.491, 31.2), 50: (8.498, 164.8), 100: (6.766, 318.5), 500: (6.161, 1652.8)},
@@ -52,9 +52,9 @@ class Row:
     curves: Array
 
 
-def rows(runs: Iterable[Run], iterations: int) -> list[Row]:
+def rows(runs: Iterable[Trial], iterations: int) -> list[Row]:
     """One row for each algorithm and population, in the order of Table 4."""
-    groups: dict[tuple[str, int], list[Run]] = {}
+    groups: dict[tuple[str, int], list[Trial]] = {}
     for run in runs:
         groups.setdefault((run.case.algorithm, run.case.population), []).append(run)
     order = list(PAPER)
@@ -62,7 +62,7 @@ def rows(runs: Iterable[Run], iterations: int) -> list[Row]:
     return [_row(*key, groups[key], iterations) for key in keys]
 
 
-def _row(algorithm: str, population: int, runs: Sequence[Run], iterations: int) -> Row:
+def _row(algorithm: str, population: int, runs: Sequence[Trial], iterations: int) -> Row:
     reached = [run.best_s for run in runs]
     return Row(
         algorithm,

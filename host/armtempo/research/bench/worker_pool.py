@@ -49,10 +49,7 @@ def cluster(address: str) -> Iterator[Executor]:
     try:
         distributed: Any = import_module("distributed")
     except ImportError:
-        raise MissingPackageError(
-            "--scheduler needs distributed, which is not installed; "
-            "install it with: pip install 'armtempo[cluster]'"
-        ) from None
+        raise MissingPackageError("--scheduler", "distributed", "cluster") from None
     try:
         client = distributed.Client(address, timeout=_CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:
@@ -63,7 +60,7 @@ def cluster(address: str) -> Iterator[Executor]:
 
 
 def _check_workers(address: str, versions: dict[str, object]) -> None:
-    """``versions``: what each worker says, a version or the exception of not having one."""
+    """``versions``: of each worker its armtempo version, or the exception where it has none."""
     if not versions:
         raise InputError(
             f"--scheduler {address}: the cluster has no workers; start some with: dask worker {address}"
@@ -79,7 +76,7 @@ def _check_workers(address: str, versions: dict[str, object]) -> None:
 
 @contextmanager
 def _one_thread_each() -> Iterator[None]:
-    """Processes started meanwhile keep their linear algebra to one thread: they shall not fight for cores."""
+    """Processes started within compute linear algebra in one thread each, so that they do not compete for cores."""
     before = {name: os.environ.get(name) for name in _THREADS}
     os.environ.update(dict.fromkeys(_THREADS, "1"))
     try:

@@ -9,7 +9,7 @@ SAME, BETTER, DIFFERS = "same", "better", "differs"
 
 @dataclass(frozen=True)
 class Claim:
-    """One value of the paper and what became of it here."""
+    """One value of the paper beside the one found here."""
 
     where: str
     """Table, figure or section."""
@@ -19,7 +19,7 @@ class Claim:
     verdict: str
     """SAME, BETTER or DIFFERS."""
     because: str = ""
-    """Why it differs, the misprint named; or what to know."""
+    """Why it differs, with the misprint where there is one; else a remark."""
 
 
 def compared(where: str, what: str, printed: float, found: float, digits: int, because: str = "") -> Claim:

@@ -1,4 +1,4 @@
-"""Section 4: the motions replayed ten times on the virtual arm, and what Figs. 11 and 12 say of them."""
+"""Section 4: the motions replayed ten times on the virtual arm, and compared with Figs. 11 and 12."""
 
 from __future__ import annotations
 
@@ -10,15 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from armtempo import pipeline
-from armtempo.link import open_board
-from armtempo.link.board import Progress
 from armtempo.link.ports import SIM
 from armtempo.model.plan import Plan
+from armtempo.progress import Progress
 from armtempo.report import run_report
 from armtempo.research.paper import motions, printed
 from armtempo.research.paper.claims import DIFFERS, SAME, Claim
-from armtempo.robot import operate
+from armtempo.robot.board import connect
 from armtempo.robot.stop_request import StopRequest
 from armtempo.runs import analysis
 from armtempo.splines import extremes
@@ -42,24 +40,25 @@ class Series:
 def run(made: motions.Plans, folder: Path, quick: bool, progress: Progress | None) -> list[Series]:
     """Replay the three motions at the same time, on a virtual board each; run folders go below ``folder``.
 
-    Ctrl-C makes all of them brake, and raises KeyboardInterrupt then; so does one that fails, with its error.
+    Ctrl-C makes all of them brake, and raises Stopped then; so does one that fails, with its error.
     """
     plans = {QUINTIC: made.quintic, CUBIC: made.cubic, UNOPTIMISED: _unoptimised(made)}
     times = QUICK_REPETITIONS if quick else REPETITIONS
     shares = dict.fromkeys(plans, 0.0)
-    with StopRequest() as stop, ThreadPoolExecutor(len(plans)) as pool:
-        replays = {
-            name: pool.submit(_replayed, plan, folder / name, times, stop, partial(shares.__setitem__, name))
-            for name, plan in plans.items()
-        }
-        while wait(replays.values(), _LOOK_S, FIRST_EXCEPTION).not_done:
-            stop.wanted = stop.wanted or any(map(_failed, replays.values()))
-            if progress is not None:
-                progress(sum(shares.values()), len(plans))
-    for replay in filter(_failed, replays.values()):
-        replay.result()
-    if stop.wanted:
-        raise KeyboardInterrupt
+    with StopRequest() as stop:
+        with ThreadPoolExecutor(len(plans)) as pool:
+            replays = {
+                name: pool.submit(
+                    _replayed, plan, folder / name, times, stop, partial(shares.__setitem__, name)
+                )
+                for name, plan in plans.items()
+            }
+            while wait(replays.values(), _LOOK_S, FIRST_EXCEPTION).not_done:
+                stop.wanted = stop.wanted or any(map(_failed, replays.values()))
+                if progress is not None:
+                    progress(sum(shares.values()), len(plans))
+        for replay in filter(_failed, replays.values()):
+            replay.result()
     return [Series(name, run_report.evaluate(replay.result())) for name, replay in replays.items()]
 
 
@@ -87,15 +86,9 @@ def _unoptimised(made: motions.Plans) -> Plan:
 
 
 def _replayed(plan: Plan, folder: Path, times: int, stop: StopRequest, tell: Callable[[float], None]) -> Path:
-    """The run folder of one motion; ``tell`` hears the share of the work that is done."""
-    motion = pipeline.planned(plan)
-    with open_board(SIM, arm=motion.arm) as board:
-        operate.configure(board, motion.arm, replace=True)
-        pipeline.prepare(board, SIM, motion, stop)
-        run_folder = pipeline.new_run(folder, motion, SIM, board)
-        for number, _ in enumerate(pipeline.repeat(board, motion, run_folder, times, stop), 1):
-            tell(number / times)
-    return run_folder.path
+    """The run folder of one motion; ``tell`` is called with the fraction of the work that is done."""
+    with connect(SIM, plan.arm) as board:
+        return board.run(plan, times, folder, lambda done, whole: tell(done / whole), stop=stop).path
 
 
 def _failed(replay: Future[Path]) -> bool:
@@ -170,7 +163,7 @@ def _rougher_ends(quintic: run_report.Evaluation, cubic: run_report.Evaluation) 
 def _end_error(found: run_report.Evaluation, order: int) -> float:
     """RMS deviation of joint 1's mean curve from theory near start and end.
 
-    From theory as the same differentiation shows it: what the motor and the arm add, nothing else.
+    From theory as the same differentiation shows it: so only what the motor and the arm add.
     """
     end = found.plan.trajectory.joints[0].duration_s
     times = found.curves.times_s

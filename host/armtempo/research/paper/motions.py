@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from armtempo.model import arm as arms
-from armtempo.model import job
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
@@ -33,8 +31,7 @@ class Plans:
 
 def plans() -> Plans:
     """Plan the shipped job both ways."""
-    arm = arms.load_arm(arms.default_path())
-    feed = job.load_job(job.default_path(), arm)
+    arm, feed = Arm.paper(), Job.paper()
     return Plans(
         arm, feed, planner.plan(arm, feed), planner.plan(arm, replace(feed, name="feed-cubic", degree=3))
     )
@@ -99,7 +96,6 @@ def _total(what: str, total: float, ours: float) -> Claim:
 def _printed_intervals(made: Plans, joint: int) -> Claim:
     """Do the printed intervals keep the limits?"""
     limits = made.arm.driven[joint].limits
-    assert limits is not None  # the shipped arm
     reached = extremes.of_joint(motion(_via(made.job, joint), printed.INTERVALS_S[joint], 5)).values
     share = float(np.max(reached / np.array(limits.values)))
     because = "" if share <= 1.0 else "rounding of the printed intervals"

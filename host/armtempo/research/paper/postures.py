@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from armtempo.kinematics.geometry import Array, Geometry
+from armtempo.arrays import Array
+from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.inverse import inverse
 from armtempo.model.arm import Arm
 from armtempo.research.paper import printed
@@ -39,7 +40,7 @@ def _claim(ours: Array, row: int) -> Claim:
 
 
 def _nearest(ours: Array, wanted: Array) -> tuple[Array, float]:
-    """Our solution nearest to a printed one, turned by whole turns towards it, and how far it is off.
+    """Our solution nearest to a printed one, shifted by whole turns towards it, and the largest difference.
 
     At theta5 = 0 only theta4 + theta6 is defined, so there the sum is compared.
     """

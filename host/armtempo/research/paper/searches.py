@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.progress import Progress
 from armtempo.research.bench import cases, worker_pool
-from armtempo.research.bench.result_store import Store
+from armtempo.research.bench.result_store import ResultStore
 from armtempo.research.bench.result_table import PAPER, Row, rows
 from armtempo.research.paper.claims import BETTER, DIFFERS, SAME, Claim
 
@@ -24,15 +25,13 @@ _BECAUSE = {
     DIFFERS: "printed is one run of a random search, here is the median over seeds",
 }
 
-Progress = Callable[[int, int], None]
-
 
 def run(arm: Arm, job: Job, folder: Path, quick: bool, progress: Progress) -> list[Row]:
     """The comparison, on all cores; runs already in ``folder`` are not repeated."""
     problem = cases.problem_of(arm, job, 1, FITNESS, ITERATIONS)
     seeds = range(1, 4 if quick else 11)
     wanted = cases.cases(PAPER, QUICK_POPULATIONS if quick else POPULATIONS, seeds)
-    store = Store(folder, problem)
+    store = ResultStore(folder, problem)
     todo = [case for case in wanted if case not in store.runs]
     if todo:
         with worker_pool.local() as executor:

@@ -65,7 +65,7 @@ def _figures(
     made: motions.Plans, searched: Sequence[Row], series: Sequence[Series]
 ) -> list[tuple[str, Figure, str]]:
     names = [joint.name for joint in made.arm.driven]
-    limits = [joint.limits for joint in made.arm.driven if joint.limits]
+    limits = [joint.limits for joint in made.arm.driven]
 
     def unoptimised(degree: int, joints: int) -> Figure:
         splines = tuple(motions.unoptimised(made.job, joint, degree) for joint in range(joints))

@@ -23,7 +23,7 @@ class EdgeLog:
         for port in board.pins.ports:
             for line in port.lines:
                 line.sinks.append(self)
-        board.worlds.append(self)
+        board.observers.append(self)
         self._buffer.extend(struct.pack(RECORD, RESET, 0, 0, 0, 0, 0))
 
     def edges(self, line, before, count, times, origin):
@@ -44,7 +44,7 @@ class EdgeLog:
             self._write()
 
     def input_changed(self, line, level, now):
-        """The world changed an input."""
+        """An input was changed from outside."""
         self._record(INPUT, line, 1 - level, 1, now)
         self._buffer.extend(b"\0\0\0\0")
 

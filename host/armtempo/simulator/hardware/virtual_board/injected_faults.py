@@ -9,13 +9,13 @@ _HALF = 1 << 31
 
 
 class Faults:
-    """A world that waits for motions (TIM2 starting) and plants each fault at its time."""
+    """Waits for motions (TIM2 starting) and schedules each fault at its time."""
 
     def __init__(self, board, faults):
         self._board = board
         self._faults = faults
         self._run = 0
-        board.worlds.append(self)
+        board.observers.append(self)
 
     def counting(self, timer, now):
         """A timer started or stopped."""
@@ -25,9 +25,9 @@ class Faults:
         zero = now + timer.modulus - timer.count(0)
         for fault in self._faults:
             if fault["run"] == self._run:
-                self._plant(zero + int(fault["at_s"] * _TICK_HZ), fault)
+                self._schedule(zero + int(fault["at_s"] * _TICK_HZ), fault)
 
-    def _plant(self, tick, fault):
+    def _schedule(self, tick, fault):
         self._board.at(tick, lambda: _KINDS[fault["kind"]](self._board, fault))
 
     def input_changed(self, line, level, now):

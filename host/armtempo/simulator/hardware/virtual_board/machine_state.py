@@ -1,4 +1,4 @@
-"""The one board of this process and what hangs on it; ``setup.power_up`` puts them here."""
+"""The one virtual board of this process and what is connected to it, as ``setup.power_up`` made them."""
 
 board = None
 pace = None

@@ -1,4 +1,4 @@
-"""How virtual time goes beside real time, and the calls that wait.
+"""How virtual time passes relative to real time, and the calls that wait.
 
 While a timer has something to do soon, virtual time runs as fast as this process can, or, with ``speed``, at
 that multiple of real time. It keeps to real time while nothing moves (asleep until input comes), where the
@@ -15,11 +15,11 @@ from virtual_board.chip.reset import PowerOff
 
 _HORIZON_TICKS = 500 * TICKS_PER_MS
 _NAP_MS = 5
-_LAG_US = 20_000  # a delay beyond this is not made up for
+_LAG_US = 20_000  # a longer delay is not caught up
 
 
 class Pace:
-    """Ties the board's time to the world's."""
+    """Ties the board's virtual time to real time."""
 
     def __init__(self, board, serial, speed):
         self._board = board
@@ -39,7 +39,7 @@ class Pace:
         board.run_until(board.next_ms, wake=True)
 
     def _first_millisecond(self):
-        """The program has begun to let time pass: whoever waits for the board may know."""
+        """The program runs: make the file that the launcher waits for."""
         self._board.millisecond = self._millisecond
         if machine_state.options["up"]:
             real_open(machine_state.options["up"], "w").close()
@@ -83,7 +83,7 @@ class Pace:
 
     def _keep_pace(self, speed):
         """Moving in real time: sleep while virtual time is ahead."""
-        if self._free:  # what passed as fast as it could is not to be waited for
+        if self._free:  # virtual time that passed unpaced is not waited for
             self._free = False
             self._elapsed_us()
             self._last_tick = self._board.now

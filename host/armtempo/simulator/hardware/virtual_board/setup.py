@@ -5,7 +5,7 @@ from binascii import unhexlify
 
 from virtual_board import edge_writer, injected_faults, machine_state, pace
 from virtual_board.chip import flash
-from virtual_board.chip.processor import TICKS_PER_MS, Board
+from virtual_board.chip.processor import TICKS_PER_MS, Chip
 from virtual_board.firmware import boot, usb_serial
 
 _ARM_RECORD = "/armtempo/arm.ata"
@@ -19,7 +19,7 @@ def power_up(options, cause):
     first = machine_state.flash is None
     machine_state.options = options
     machine_state.settings = {"reset_cause": cause, "unique_id": unhexlify(options["unique_id"])}
-    board = Board(options["dma_preload"])
+    board = Chip(options["dma_preload"])
     machine_state.board = board
     if options["edge_log"]:
         if machine_state.edges is None:
@@ -34,13 +34,13 @@ def power_up(options, cause):
     cut_at = options["power_cut_at"] if first else 0  # the power fails once
     damage = options["damage"] if first else machine_state.flash.damage
     root, blocks, programs = options["flash"], options["flash_blocks"], options["program"]
-    machine_state.flash = flash.Flash(root, blocks, programs, _stall, cut_at, damage)
+    machine_state.flash = flash.FlashFolder(root, blocks, programs, _stall, cut_at, damage)
     injected_faults.Faults(board, options["faults"])
     return mode
 
 
 def learn(folders):
-    """What the world around the board has to know, from the sources in ``folders``, whatever the board has."""
+    """Load the pin table and the arm record's layout from the sources in ``folders``, whatever the board has."""
     path = list(sys.path)
     sys.path[0:0] = folders
     from armtempo_board import pins
@@ -59,7 +59,7 @@ def connect(pins):
     from virtual_board.arm import motors
 
     angles = [motor.angle_deg() for motor in machine_state.arm.motors] if machine_state.arm else ()
-    machine_state.arm = motors.Arm(
+    machine_state.arm = motors.ArmOnPins(
         machine_state.board, pins, _arm_record, machine_state.options["seed"], angles
     )
     machine_state.flash.renamed = machine_state.arm.connect

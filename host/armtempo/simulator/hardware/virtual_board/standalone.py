@@ -1,7 +1,7 @@
 """A board without a launcher, for tests of hardware code: import this before the code under test.
 
 ``start(edge_log=…)`` powers a new board up and returns it; its time passes in simulated calls, or by
-``board.spend(ticks)``. Options are those of ``options.py`` on the host; with ``flash`` the built-in ``open``
+``board.spend(ticks)``. Options are those of ``ProcessOptions`` on the host; with ``flash`` the built-in ``open``
 sees that folder as ``/flash``.
 """
 
@@ -14,7 +14,7 @@ if sys.implementation.name != "micropython":
 from virtual_board import machine_state, setup
 from virtual_board.chip import flash
 from virtual_board.firmware import builtin_modules
-from virtual_board.firmware.usb_serial import Line
+from virtual_board.firmware.usb_serial import SilentPort
 
 DEFAULTS = {
     "flash": ".",
@@ -38,8 +38,8 @@ DEFAULTS = {
 
 
 def start(cause=1, line=None, **options):
-    """Power up; ``line`` is the serial line, with nobody at the other end by default."""
-    machine_state.serial = line or Line()
+    """Power up; ``line`` is the serial port, with nobody at the other end by default."""
+    machine_state.serial = line or SilentPort()
     machine_state.edges = machine_state.flash = None
     setup.power_up(dict(DEFAULTS, **options), cause)
     builtins.open = machine_state.flash.open if "flash" in options else flash.real_open

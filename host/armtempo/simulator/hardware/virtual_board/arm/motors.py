@@ -7,7 +7,7 @@ from virtual_board.chip import gpio
 from virtual_board.firmware.external_interrupts import set_level
 
 
-class Motor:
+class IdealMotor:
     """One joint's motor and encoder.
 
     ``step``, ``direction``: its lines; ``encoder``: the timer that counts it, or None; ``joint``:
@@ -22,7 +22,7 @@ class Motor:
         self._encoder = encoder
         self._num = -joint["counts_num"] if joint["encoder_inverted"] else joint["counts_num"]
         self._den = joint["counts_den"]
-        self.moved = False  # there is something to follow
+        self.moved = False  # the encoder has to be updated
         self._counts = self._at(0)
         self.position = 0  # steps taken since power-up
         self.blocked = False
@@ -51,14 +51,14 @@ class Motor:
         self.moved = True
 
     def angle_deg(self):
-        """Where the joint stands."""
+        """The joint's angle."""
         return self._start_deg + self.position / self._steps_per_deg
 
     def begin(self, now):
         """A motion begins."""
 
     def follow(self, now):
-        """Turn the encoder to where the motor stands."""
+        """Turn the encoder to the motor's position."""
         self.moved = False
         counts = self._at(self.position)
         if self._encoder and counts != self._counts:
@@ -78,10 +78,10 @@ class Enable:
         return self._line.level == self._active and self._line.mode() == gpio.OUTPUT
 
 
-class Arm:
+class ArmOnPins:
     """All motors, as the arm record in the flash has them.
 
-    ``record()`` gives (head, joints) or None; ``angles``: where the joints stand, else where ``joints`` says.
+    ``record()`` gives (head, joints) or None; ``angles``: the joints' angles, else those in ``joints``.
     """
 
     def __init__(self, board, pins, record, seed, angles):
@@ -95,7 +95,7 @@ class Arm:
         self.motors = []
         self.watches_host = False
         board.follow = self.follow
-        board.worlds.append(self)
+        board.observers.append(self)
         self.connect()
 
     def connect(self):
@@ -130,7 +130,7 @@ class Arm:
             from virtual_board.arm.stepper import Stepper
 
             return Stepper(step, direction, enable, encoder, joint, 100 * self._seed + number)
-        return Motor(step, direction, enable, encoder, joint)
+        return IdealMotor(step, direction, enable, encoder, joint)
 
     def follow(self):
         """Time has passed."""

@@ -15,17 +15,17 @@ swings fast; each step sees the mean of what was commanded in it, so a pulse cou
 
 from math import asin, ceil, cos, pi, sin, sqrt
 
-from virtual_board.arm.motors import Motor
+from virtual_board.arm.motors import IdealMotor
 from virtual_board.arm.noise import Noise
 
 _DT_TICKS = 84_000
 _DT_S = 0.001
 _FINEST = 0.25  # rad that the rotor's free swing may turn in one part of a step
 _REST_STEPS = 0.002
-_SCATTER_LENGTH_DEG = 2.0  # of motion, in which a new repetition's scatter comes up
+_SCATTER_LENGTH_DEG = 2.0  # of motion, over which a new repetition's scatter fades in
 
 
-class Stepper(Motor):
+class Stepper(IdealMotor):
     """``joint``: also what the arm file says of the joint's drive, and its ``model``."""
 
     def __init__(self, step, direction, enable, encoder, joint, seed):
@@ -68,7 +68,7 @@ class Stepper(Motor):
         self.position += way * len(rises)
 
     def angle_deg(self):
-        """Where the joint stands."""
+        """The joint's angle."""
         return self._start_deg + self._joint / self._steps_per_deg
 
     def begin(self, now):
@@ -97,7 +97,7 @@ class Stepper(Motor):
                 x += v * part / 2
                 v = self._kick(mean - x, x, v, speed, part)
                 x += v * part / 2
-        self._come_up(x - self._x)
+        self._fade_in(x - self._x)
         self._x, self._v = x, v
         self._joint = min(max(self._joint, x - self._play), x + self._play)
         if not self._pending and not speed and abs(v) * _DT_S < _REST_STEPS:
@@ -128,19 +128,19 @@ class Stepper(Motor):
         return (v + self._damping * speed * part) / (1 + self._damping * part)
 
     def _weight(self, x):
-        """What gravity asks of the motor at ``x``, in steps/s²."""
+        """Acceleration that gravity's torque gives the rotor at ``x``, in steps/s²."""
         if not self._gravity:
             return 0.0
         return self._gravity * cos((self._start_deg + x / self._steps_per_deg) * pi / 180)
 
-    def _come_up(self, moved):
-        """The scatter of this repetition comes up as the joint moves."""
+    def _fade_in(self, moved):
+        """Fade in the scatter of this repetition as the joint moves."""
         if self._offset != self._wanted:
             share = min(1.0, abs(moved) / (_SCATTER_LENGTH_DEG * self._steps_per_deg))
             self._offset += (self._wanted - self._offset) * share
 
     def _rest(self, near):
-        """Where the rotor rests: on the commanded microstep, or whole slips from it, under its load."""
+        """The rotor's rest position under its load: near the commanded microstep, or cycles of four steps away."""
         cycle = 2 * pi / self._electrical
         aim = self._commanded - self._offset
         aim += round((near - aim) / cycle) * cycle

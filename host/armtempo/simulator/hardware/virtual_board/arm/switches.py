@@ -1,11 +1,11 @@
-"""Limit switches: tripped by the angle at which a joint stands."""
+"""Limit switches, tripped by the angle of a joint."""
 
 from armtempo_shared import armrecord
 
 from virtual_board.firmware.external_interrupts import set_level
 
 
-class Switch:
+class LimitSwitch:
     """One end of a joint: ``side`` 1 trips at and above ``trip_deg``, -1 at and below."""
 
     def __init__(self, motor, side, trip_deg, pin, active_high):
@@ -17,7 +17,7 @@ class Switch:
         self._tripped = None
 
     def look(self):
-        """Bring the input to where the joint stands."""
+        """Set the input by the joint's angle."""
         tripped = self._side * self._motor.angle_deg() >= self._trip
         if tripped != self._tripped:
             self._tripped = tripped
@@ -37,5 +37,5 @@ def fitted(motor, joint, pins):
         if trip_deg is None:
             set_level(pin, 1 - joint["limit_active_high"])
         else:
-            found.append(Switch(motor, side, trip_deg, pin, joint["limit_active_high"]))
+            found.append(LimitSwitch(motor, side, trip_deg, pin, joint["limit_active_high"]))
     return found

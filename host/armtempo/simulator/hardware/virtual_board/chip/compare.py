@@ -1,7 +1,7 @@
 """Compare channels of a timer: matches, fed by DMA or not, and what they do to the output (RM0090 18.3.7).
 
-Between two looks at a timer its channels cannot influence one another, so each runs through all its matches
-of that stretch in one tight loop (``Channel.match``): that loop is what an edge costs.
+Between two updates of a timer its channels cannot influence one another, so each processes all its matches
+of that interval in one tight loop (``Channel.match``): that loop is the cost of an edge.
 """
 
 from virtual_board.chip import memory

@@ -1,6 +1,6 @@
-"""The board's flash: a folder of the host, seen as ``/flash``, with the chip's size, slowness and dangers.
+"""The board's flash: a folder of the host, seen as ``/flash``, with the chip's size, write times and failures.
 
-A second folder may be an SD card, seen as ``/sd``: as large as it needs to be, and safe.
+A second folder may be an SD card, seen as ``/sd``: without limits of size, and without failures.
 
 Each change (a file opened for writing, a piece written, a close, a rename, a removal, a new folder) is one
 flash operation. A power cut can be injected at the n-th of them: it leaves that operation half done (a
@@ -23,7 +23,7 @@ NO_FILE_SYSTEM, UNREADABLE = "no file system", "unreadable"
 """Kinds of damage: the firmware finds no file system; it mounts one in which nothing can be read or written."""
 
 
-class Flash:
+class FlashFolder:
     """The folder ``root`` of ``size`` blocks; ``stall(ms)`` lets time pass while the flash is busy.
 
     ``programs``: folders of the host that hold a program which is not deployed to the flash; read only.
@@ -125,7 +125,7 @@ class Flash:
         return file
 
     def closed(self, file):
-        """A written file is whole."""
+        """A written file was closed."""
         if file in self._writing:
             if self.operation(_CLOSE_MS):
                 self.power_fails()

@@ -20,7 +20,7 @@ INPUT, OUTPUT, ALTERNATE, ANALOG = range(4)
 
 
 class Line:
-    """One pin: what drives it from outside, what level it shows, who listens."""
+    """One pin: the level driven from outside, its own level, and the objects that get its edges."""
 
     def __init__(self, port, number):
         self.port = port
@@ -63,7 +63,7 @@ class Line:
             sink.edges(self, before, count, times, origin)
 
 
-class Port:
+class GpioPort:
     """One GPIO port."""
 
     def __init__(self, index):
@@ -107,7 +107,7 @@ class Pins:
     """All ports, and which timer channel leads to which pin."""
 
     def __init__(self):
-        self.ports = [Port(index) for index in range(len(PORTS))]
+        self.ports = [GpioPort(index) for index in range(len(PORTS))]
 
     def line(self, name):
         """The line of a pin by its name, with or without the leading P: ``PA15``."""
@@ -116,7 +116,7 @@ class Pins:
         return self.ports[PORTS.index(name[0])].lines[int(name[1:])]
 
     def route(self, timers):
-        """Lead each timer's channels to the pins that have been given to them."""
+        """Connect each timer's channels to the pins whose alternate function selects them."""
         for timer in timers:
             for channel in timer.channels:
                 channel.sink = None

@@ -22,10 +22,10 @@ NEVER = timer_registers.NEVER
 _RCC_TIMERS = {1: (17, 0), 8: (17, 1), 2: (16, 0), 3: (16, 1), 4: (16, 2), 5: (16, 3), 6: (16, 4), 7: (16, 5)}
 
 
-class Board:
-    """Everything between the program and the world.
+class Chip:
+    """Everything between the program and what is connected to the pins.
 
-    ``worlds`` are told of timers that start or stop and of inputs that change; ``follow()`` is called after
+    ``observers`` are told of timers that start or stop and of inputs that change; ``follow()`` is called after
     each stretch of time.
     """
 
@@ -38,7 +38,7 @@ class Board:
         self.timers = {}
         for number, bits, rate in ((2, 32, 1), (5, 32, 1), (1, 16, 2), (8, 16, 2), (3, 16, 1), (4, 16, 1),
                                    (6, 16, 1), (7, 16, 1)):  # fmt: skip
-            self.timers[number] = timers.Timer(self, number, bits, rate)
+            self.timers[number] = timers.TimerUnit(self, number, bits, rate)
         self.timers[2].follower = self.timers[5]
         self.counting = []
         self.pending = []
@@ -52,7 +52,7 @@ class Board:
         self.interrupted = False
         self.api = {}
         self.extints = {}
-        self.worlds = []
+        self.observers = []
         self.follow = None
         self.owed = 0
         self.lost_ticks = 0
@@ -177,9 +177,9 @@ class Board:
         return any([timer.next_match() < limit for timer in self.counting])
 
     def input_changed(self, line, level):
-        """The world changed the level of an input pin."""
-        for world in self.worlds:
-            world.input_changed(line, level, self.now)
+        """The level of an input pin was changed from outside."""
+        for observer in self.observers:
+            observer.input_changed(line, level, self.now)
 
     # -- interrupts ------------------------------------------------------------------------------
 

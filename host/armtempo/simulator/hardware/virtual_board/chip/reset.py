@@ -1,4 +1,4 @@
-"""Leaving the program: resets of every kind."""
+"""Exceptions that end the program: resets and power-off."""
 
 
 class Reset(BaseException):
@@ -10,4 +10,4 @@ class Reset(BaseException):
 
 
 class PowerOff(BaseException):
-    """The virtual board is to end: its launcher has gone."""
+    """The virtual board ends because its launcher has ended."""

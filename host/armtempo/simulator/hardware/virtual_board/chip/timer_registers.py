@@ -1,4 +1,4 @@
-"""Offsets of a timer's registers in words (RM0090 18.4.21), and the time that never comes."""
+"""Offsets of a timer's registers in words (RM0090 18.4.21), and the tick that stands for never."""
 
 CR1, CR2, SMCR, DIER, SR, EGR, CCMR1, CCMR2, CCER, CNT, PSC, ARR = range(12)
 CCR1 = 13

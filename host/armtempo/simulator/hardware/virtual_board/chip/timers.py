@@ -7,7 +7,7 @@ from virtual_board.chip.timer_registers import ARR, CNT, CR1, CR2, DIER, EGR, NE
 _REBASE = 1 << 27
 
 
-class Timer:
+class TimerUnit:
     """One timer. ``total`` counts since ``origin`` (in ticks of 84 MHz); CNT follows from it."""
 
     def __init__(self, board, number, bits, rate=1):
@@ -96,8 +96,8 @@ class Timer:
         self._restart(now, memory.words[self.at + CNT])
         self.running = running
         self.board.recount()
-        for world in self.board.worlds:
-            world.counting(self, now)
+        for observer in self.board.observers:
+            observer.counting(self, now)
         if running and self.follower and (memory.words[self.at + CR2] >> 4) & 7 == 1:
             self.follower.triggered(now)
 

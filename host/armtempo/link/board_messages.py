@@ -1,4 +1,4 @@
-"""What the board tells, as dataclasses: the host's view of the message table in ``armtempo_shared.wire``."""
+"""The board's answers and events as dataclasses: the host's view of the message table."""
 
 from __future__ import annotations
 
@@ -7,9 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from armtempo_shared import wire
-
-Frame = tuple[int, int, bytes]
-"""Sequence number, message id, payload."""
+from armtempo_shared.limits import TICK_HZ
 
 
 @dataclass(frozen=True)
@@ -32,8 +30,8 @@ class Hello:
 
 
 @dataclass(frozen=True)
-class Stand:
-    """Where the joints stand: steps commanded so far and encoder counts, one entry a joint."""
+class Positions:
+    """Steps commanded so far and encoder counts, one entry a joint."""
 
     commanded_steps: tuple[int, ...]
     counts: tuple[int, ...]
@@ -52,7 +50,7 @@ class Status:
     samples_kept: int
     samples_lost: int
     frames_bad: int
-    stand: Stand
+    positions: Positions
 
     @property
     def moving(self) -> bool:
@@ -65,8 +63,8 @@ class Status:
 
 
 @dataclass(frozen=True)
-class Stored:
-    """One stored trajectory."""
+class StoredMotion:
+    """One stored motion; ``crc``, ``duration_ticks`` and ``joints`` are 0 where it is damaged."""
 
     name: str
     size: int
@@ -74,6 +72,12 @@ class Stored:
     duration_ticks: int
     joints: int
     default: bool
+    """Whether the board's button starts it."""
+
+    @property
+    def duration_s(self) -> float:
+        """Motion time, seconds."""
+        return self.duration_ticks / TICK_HZ
 
 
 @dataclass(frozen=True)
@@ -84,7 +88,7 @@ class Sample:
     index: int
     ticks: int
     flags: int
-    stand: Stand
+    positions: Positions
 
 
 @dataclass(frozen=True)
@@ -95,7 +99,7 @@ class Done:
     ticks: int
     samples: int
     lost: int
-    stand: Stand
+    positions: Positions
 
 
 @dataclass(frozen=True)
@@ -106,12 +110,12 @@ class Fault:
     code: int
     joint: int
     ticks: int
-    stand: Stand
+    positions: Positions
 
 
 @dataclass(frozen=True)
 class Notice:
-    """Words from the board program."""
+    """A text from the board program, such as a traceback."""
 
     text: str
 
@@ -124,12 +128,12 @@ def state_name(number: int) -> str:
     return wire.STATES[number] if number < len(wire.STATES) else f"state {number}"
 
 
-def stand(tail: bytes) -> Stand:
+def positions(tail: bytes) -> Positions:
     """The tail of status, sample, done and fault: two int32 a joint; WireError where it does not fit."""
     if len(tail) % 8:
         raise wire.WireError("length")
     values = struct.unpack(f"<{len(tail) // 4}i", tail)
-    return Stand(values[0::2], values[1::2])
+    return Positions(values[0::2], values[1::2])
 
 
 def event(number: int, payload: bytes) -> Event:
@@ -147,5 +151,5 @@ def _event(name: str, values: tuple[Any, ...], tail: Any) -> Event:
     kinds: dict[str, type[Sample | Done | Fault]] = {"sample": Sample, "done": Done, "fault": Fault}
     if name not in kinds:
         raise wire.WireError("not an event")
-    fields = [*values, stand(tail)]
+    fields = [*values, positions(tail)]
     return kinds[name](*fields)

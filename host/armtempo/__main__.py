@@ -1,12 +1,11 @@
-"""Where the ``armtempo`` command begins: Ctrl-C ends it quietly from here on, before much is imported."""
+"""The ``armtempo`` command, also as ``python -m armtempo``: Ctrl-C ends it quietly before much is imported."""
 
 from __future__ import annotations
 
 import os
 import signal
 
-INTERRUPTED = 130
-"""Exit code after Ctrl-C."""
+from armtempo.errors import INTERRUPTED
 
 
 def _end(number: int, frame: object) -> None:
@@ -22,3 +21,7 @@ def main() -> None:
     from armtempo.cli import main as command
 
     command(prog_name="armtempo")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,4 +1,4 @@
-"""From power-up to power-up: ``boot.py``, ``main.py``, the prompt, resets."""
+"""Power cycles: ``boot.py``, ``main.py``, the prompt, resets."""
 
 import builtins
 import sys
@@ -13,7 +13,7 @@ _POWER_ON, _SOFT = 1, 0
 
 
 def run(options, hardware):
-    """Run the board until the launcher goes; ``hardware``: the folders of its built-in modules."""
+    """Run the board until the launcher ends; ``hardware``: the folders of its built-in modules."""
     setup.learn(options["sources"])
     path = hardware, options["program"] + sys.path
     before = list(sys.modules)

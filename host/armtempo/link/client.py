@@ -1,0 +1,226 @@
+"""The protocol's commands as methods: one method for each command of the message table."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from armtempo_shared import limits, wire
+from armtempo_shared.messages import MAX_PAYLOAD
+
+from armtempo.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
+from armtempo.link import board_messages
+from armtempo.link.session import ANSWER_TIMEOUT_S, Session
+from armtempo.progress import Progress
+
+FLASH_TIMEOUT_S = 30.0
+"""Time-out of commands for which the board erases flash or checks a whole motion before it answers."""
+HELLO_TIMEOUT_S = 1.2
+"""Time-out of ``hello``; with the diagnosis of what else is on the port, under 2 s."""
+SMALLEST_PIECE = 16
+LARGEST_PIECE = MAX_PAYLOAD - 4
+PIECE_TIMEOUT_S = 0.5
+
+_CTRL_C = 3
+_GREETINGS = 8
+"""Number of a session's first frames that may be ``hello``."""
+
+
+@dataclass(frozen=True)
+class Started:
+    """The board's answer to ``start``."""
+
+    run: int
+    """Number of the run, which its samples and events carry."""
+    duration_s: float
+
+
+@dataclass(frozen=True)
+class KeptSamples:
+    """The board's answer to ``samples``: which samples it still keeps."""
+
+    first: int
+    """Index of the oldest one."""
+    count: int
+
+
+def harmless_number() -> int:
+    """A random session number (32 bits) whose ``hello`` frames hold no byte 3 in number or checksum.
+
+    MicroPython takes byte 3 for Ctrl-C and would interrupt boot.py on a board that is just starting.
+    """
+    entry = wire.COMMAND["hello"]
+    while True:
+        number = secrets.randbits(32)
+        payload = wire.encode(entry, (wire.PROTOCOL_VERSION, number))
+        frames = [wire.frame(sequence, entry[1], payload) for sequence in range(1, _GREETINGS)]
+        if not any(_CTRL_C in frame for frame in frames if frame[3] != _CTRL_C):
+            return number
+
+
+class Client:
+    """The host's end of the protocol, one method a command.
+
+    Every method raises BoardError where the board refuses, LinkError where the connection is lost.
+    """
+
+    def __init__(self, session: Session, session_number: int | None = None) -> None:
+        self.session = session
+        self._number = harmless_number() if session_number is None else session_number
+        self._piece = LARGEST_PIECE
+        self._info: board_messages.Hello | None = None
+        session.greet = self._greet_again
+
+    @property
+    def info(self) -> board_messages.Hello:
+        """The board's answer to ``hello``; LinkError before it."""
+        if self._info is None:
+            raise LinkError("the board has not been greeted yet")
+        return self._info
+
+    def hello(self) -> board_messages.Hello:
+        """Begin a session; NoAnswerError after HELLO_TIMEOUT_S where no armtempo board answers."""
+        values, board_id = self.session.command(
+            "hello",
+            (wire.PROTOCOL_VERSION, self._number),
+            silence_timeout_s=HELLO_TIMEOUT_S,
+            answer_timeout_s=HELLO_TIMEOUT_S,
+        )
+        fields = [*values, board_id]
+        fields[3] = board_messages.state_name(values[3])
+        self._info = board_messages.Hello(*fields)
+        return self._info
+
+    def _greet_again(self) -> None:
+        before = self._info
+        now = self.hello()
+        if before is None or (now.board_id, now.boot) == (before.board_id, before.boot):
+            return
+        self._info = before
+        where = self.session.transport.name
+        if now.board_id != before.board_id:
+            raise OtherBoardError(
+                f"another board is on {where} now ({now.board_id}, before {before.board_id})"
+            )
+        raise OtherBoardError(
+            f"the board on {where} has started anew: positions are unknown, 'armtempo home'"
+        )
+
+    def status(self) -> board_messages.Status:
+        """What the board is doing, and the positions of the joints."""
+        values, tail = self.session.command("status")
+        fields = [board_messages.state_name(values[0]), *values[1:], board_messages.positions(tail)]
+        return board_messages.Status(*fields)
+
+    def upload(self, name: str, data: bytes, progress: Progress | None = None) -> None:
+        """Store a record under a name; the board keeps the old one until all of the new one has arrived."""
+        crc = wire.record_crc(data)
+        self.session.command("put_begin", (len(data), crc), name, silence_timeout_s=FLASH_TIMEOUT_S)
+        offset = 0
+        while offset < len(data):
+            offset = self._put_piece(data, offset)
+            if progress is not None:
+                progress(offset, len(data))
+        self.session.command(
+            "put_commit", (crc,), silence_timeout_s=FLASH_TIMEOUT_S, answer_timeout_s=FLASH_TIMEOUT_S
+        )
+
+    def _put_piece(self, data: bytes, offset: int) -> int:
+        """Send the next piece; pieces are halved while the link loses them, and doubled again."""
+        repeats = self.session.repeats
+        try:
+            values, _ = self.session.command(
+                "put_data",
+                (offset,),
+                data[offset : offset + self._piece],
+                answer_timeout_s=self._piece_timeout_s(),
+            )
+        except NoAnswerError:
+            if self._piece == SMALLEST_PIECE:
+                raise
+            self._piece = max(SMALLEST_PIECE, self._piece // 2)
+            return offset
+        if self.session.repeats == repeats:
+            self._piece = min(LARGEST_PIECE, 2 * self._piece)
+        return int(values[0])
+
+    def _piece_timeout_s(self) -> float:
+        return ANSWER_TIMEOUT_S if self._piece == SMALLEST_PIECE else PIECE_TIMEOUT_S
+
+    def stored(self) -> list[board_messages.StoredMotion]:
+        """All stored motions."""
+        found: list[board_messages.StoredMotion] = []
+        while True:
+            try:
+                (count, size, crc, duration, joints, default), name = self.session.command(
+                    "list", (len(found),)
+                )
+            except BoardError as error:
+                if error.code == wire.ERROR_CODES["not_found"]:
+                    return found
+                raise
+            if not name:
+                return found
+            found.append(board_messages.StoredMotion(name, size, crc, duration, joints, bool(default)))
+            if len(found) >= count:
+                return found
+
+    def find(self, name: str) -> board_messages.StoredMotion | None:
+        """The stored motion of this name, or None."""
+        return next((entry for entry in self.stored() if entry.name == name), None)
+
+    def fetch(self, name: str) -> bytes:
+        """A stored record, read back."""
+        data = b""
+        piece: bytes
+        while True:
+            (size,), piece = self.session.command("get", (len(data), MAX_PAYLOAD - 64), name)
+            data += piece
+            if len(data) >= size or not piece:
+                return data
+
+    def remove(self, name: str) -> None:
+        """Remove a stored motion."""
+        self.session.command("remove", (), name, silence_timeout_s=FLASH_TIMEOUT_S)
+
+    def rename(self, old: str, new: str) -> None:
+        """Rename a stored motion."""
+        self.session.command("rename", (len(old.encode()),), old + new, silence_timeout_s=FLASH_TIMEOUT_S)
+
+    def set_default(self, name: str) -> None:
+        """Choose what the board's button starts; "" for nothing."""
+        self.session.command("set_default", (), name, silence_timeout_s=FLASH_TIMEOUT_S)
+
+    def home(self, steps: Sequence[int | None]) -> None:
+        """Declare the positions of the joints, in steps; None leaves a joint as it is."""
+        mask = sum(1 << joint for joint, value in enumerate(steps) if value is not None)
+        tail = b"".join((value or 0).to_bytes(4, "little", signed=True) for value in steps)
+        self.session.command("home", (mask,), tail)
+
+    def start(self, name: str, crc: int, flags: int = 0) -> Started:
+        """Start a stored motion; ``crc`` is the record's own checksum, ``flags`` START_HOMING or 0."""
+        (run, duration), _ = self.session.command(
+            "start", (flags, crc), name, silence_timeout_s=FLASH_TIMEOUT_S, answer_timeout_s=FLASH_TIMEOUT_S
+        )
+        return Started(run, duration / limits.TICK_HZ)
+
+    def stop(self, now: bool = False) -> None:
+        """Brake along the path, or freeze."""
+        self.session.command("stop", (int(now),))
+
+    def clear(self) -> None:
+        """Clear a fault."""
+        self.session.command("clear")
+
+    def leave(self) -> None:
+        """End the board program; the port becomes MicroPython's REPL."""
+        self.session.command("leave")
+
+    def samples(self, acknowledged: int, wanted: int = 0) -> KeptSamples:
+        """All samples before ``acknowledged`` have arrived; ask for up to ``wanted`` from there on again.
+
+        ``wanted`` is at most what one answer asks for; the samples come as events.
+        """
+        (first, count), _ = self.session.command("samples", (acknowledged, wanted))
+        return KeptSamples(first, count)

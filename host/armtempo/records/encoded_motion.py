@@ -1,0 +1,76 @@
+"""A motion made ready for the board: its record, and the trajectory that the record holds."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from armtempo_shared.limits import MAX_NAME
+from armtempo_shared.wire import record_crc
+
+from armtempo.arrays import Array
+from armtempo.errors import InputError
+from armtempo.model.arm import Arm
+from armtempo.model.plan import Plan
+from armtempo.planning import brake_time
+from armtempo.records import decode, encode
+from armtempo.splines.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class MotionKey:
+    """What the board knows a stored motion by: its name and the checksum of its record."""
+
+    name: str
+    crc: int
+
+
+@dataclass(frozen=True, eq=False)
+class EncodedMotion:
+    """A motion as the board stores and replays it, with all that the host knows of it."""
+
+    name: str
+    """On the board."""
+    arm: Arm
+    trajectory: Trajectory
+    data: bytes
+    """The motion record (layout: ``armtempo_shared.motion``)."""
+    plan: Plan | None = None
+    """How it was planned, where that is known."""
+
+    @property
+    def key(self) -> MotionKey:
+        """What the board knows it by."""
+        return MotionKey(self.name, record_crc(self.data))
+
+    @property
+    def start_deg(self) -> Array:
+        """Where it begins, degrees (J,)."""
+        return self.trajectory(0.0)
+
+
+def of_trajectory(trajectory: Trajectory, arm: Arm) -> EncodedMotion:
+    """A trajectory of ``arm`` with the time in which it can brake to rest anywhere.
+
+    Raises InputError or PlanError where the board could not replay it.
+    """
+    brake_s = brake_time.brake_time_s(trajectory, [joint.limits for joint in arm.driven])
+    return EncodedMotion(trajectory.name, arm, trajectory, encode.motion_record(trajectory, arm, brake_s))
+
+
+def of_plan(plan: Plan, name: str | None = None) -> EncodedMotion:
+    """The motion of a plan under ``name``, else under a name made of the job's.
+
+    Raises InputError for a name that the board does not take, and as ``of_trajectory``.
+    """
+    if name is not None and not re.fullmatch(f"[A-Za-z0-9_-]{{1,{MAX_NAME}}}", name):
+        raise InputError(f"{name!r} is no name for the board: 1 to {MAX_NAME} characters of a-z A-Z 0-9 - _")
+    board_name = name or re.sub(r"[^A-Za-z0-9_-]", "-", plan.job.name)[:MAX_NAME]
+    encoded = of_trajectory(plan.trajectory, plan.arm)
+    return EncodedMotion(board_name, plan.arm, plan.trajectory, encoded.data, plan)
+
+
+def of_record(name: str, data: bytes, arm: Arm) -> EncodedMotion:
+    """The motion that a record from the board holds; InputError where it is damaged or does not fit the arm."""
+    trajectory = decode.trajectory(data, arm.driven, name, f"arm {arm.name!r}")
+    return EncodedMotion(name, arm, trajectory, data)

@@ -1,0 +1,73 @@
+"""The arm as the board knows it: its record, and the positions of the joints."""
+
+from __future__ import annotations
+
+import numpy as np
+from armtempo_shared import wire
+from numpy.typing import ArrayLike
+
+from armtempo.arrays import Array
+from armtempo.errors import LinkError
+from armtempo.link import Client
+from armtempo.model.arm import Arm
+from armtempo.planning import point_to_point
+from armtempo.records import encode
+
+
+def configure(client: Client, arm: Arm, replace: bool) -> None:
+    """Make sure the board has this arm's record; a new one makes all positions unknown.
+
+    Raises LinkError where the board is set up for another arm and ``replace`` is false, BoardError where
+    it is moving.
+    """
+    data = encode.arm_record(arm)
+    if client.info.arm_crc == wire.record_crc(data):
+        return
+    if client.info.arm_crc and not replace:
+        raise LinkError(
+            f"the board is set up for another arm than {arm.name!r} ({arm.source}); "
+            "name its arm file with --arm"
+        )
+    client.upload(wire.ARM_RECORD_NAME, data)
+    client.hello()
+
+
+def home(client: Client, arm: Arm, angles_deg: ArrayLike | None = None) -> None:
+    """Declare that the arm stands at ``angles_deg`` (J,), or at the arm file's home posture.
+
+    Raises InputError for a posture that does not fit the arm, BoardError where the board is moving.
+    """
+    posture = point_to_point.posture(arm.home_deg if angles_deg is None else angles_deg, arm)
+    client.home([round(steps) for steps in posture * _steps_per_deg(arm)])
+
+
+def home_unknown(client: Client, arm: Arm) -> None:
+    """Declare that every joint whose position is unknown stands at home."""
+    status = client.status()
+    steps = [
+        None if status.joint_known(index) else round(joint.home_deg * joint.steps_per_deg)
+        for index, joint in enumerate(arm.driven)
+    ]
+    if any(value is not None for value in steps):
+        client.home(steps)
+
+
+def posture_deg(client: Client, arm: Arm) -> Array:
+    """Where the joints are by the steps commanded, degrees (J,); LinkError where that is unknown."""
+    status = client.status()
+    unknown = [joint.name for index, joint in enumerate(arm.driven) if not status.joint_known(index)]
+    if unknown:
+        raise LinkError(
+            f"the position of {', '.join(unknown)} is unknown; bring the arm to its home posture and run "
+            "'armtempo home'"
+        )
+    return np.array(status.positions.commanded_steps, dtype=float) / _steps_per_deg(arm)
+
+
+def is_at(client: Client, arm: Arm, target_deg: Array) -> bool:
+    """Whether every joint is within half a step of ``target_deg`` (J,); LinkError where that is unknown."""
+    return bool(np.all(np.abs(posture_deg(client, arm) - target_deg) * _steps_per_deg(arm) <= 0.5))
+
+
+def _steps_per_deg(arm: Arm) -> Array:
+    return np.array([joint.steps_per_deg for joint in arm.driven])

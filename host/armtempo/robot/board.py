@@ -1,0 +1,286 @@
+"""A board in use: everything that can be done with it, from its arm to a recorded run."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from numpy.typing import ArrayLike
+
+from armtempo import link
+from armtempo.arrays import Array
+from armtempo.errors import InputError, LinkError
+from armtempo.link import Client
+from armtempo.link.board_messages import Hello, Status, StoredMotion
+from armtempo.link.ports import is_sim
+from armtempo.link.traffic import Sink
+from armtempo.model.arm import Arm
+from armtempo.model.plan import Plan
+from armtempo.planning import point_to_point
+from armtempo.progress import Progress
+from armtempo.records import encoded_motion
+from armtempo.records.encoded_motion import EncodedMotion
+from armtempo.robot import arm_state, goto, homing, recording, stored_motion
+from armtempo.robot.recording import Watcher
+from armtempo.robot.run import Run
+from armtempo.robot.stop_request import StopRequest, stoppable
+
+Where = Plan | EncodedMotion | ArrayLike
+"""A posture: angles of the driven joints in degrees, (J,), or a motion for where it begins."""
+
+
+LOG = logging.getLogger("armtempo")
+
+
+def connect(
+    port: str = "sim",
+    arm: Arm | None = None,
+    *,
+    log_traffic: Path | None = None,
+    sink: Sink | None = None,
+    any_program: bool = False,
+    tell: Callable[[str], object] = LOG.warning,
+) -> Board:
+    """The board on ``port``, which has answered; use it as a context, or ``close`` it.
+
+    ``port``: a serial device or URL; ``"sim"`` starts a virtual board that lives until it is closed,
+    ``"sim:FOLDER"`` one that keeps its flash in FOLDER. ``arm``: what a virtual board's motors move; None:
+    ideal motors. ``log_traffic``: file that gets every byte both ways; ``sink`` takes the same. ``any_program``:
+    also talk to a board whose program is not the one installed here. ``tell`` hears what happens to the
+    connection while other calls wait; by default the logger "armtempo" does. Raises InputError where there is
+    no such port, LinkError where it is in use, silent or runs something else.
+    """
+    stack = ExitStack()
+    client = stack.enter_context(link.open_board(port, log_traffic, sink, arm, any_program))
+    client.session.tell = tell
+    return Board(client, port, stack)
+
+
+class Board:
+    """A board and the arm that it moves; ``connect`` gives one.
+
+    Nothing moves before the arm's position is known (``home``), and a motion only starts from where it begins
+    (``goto``). Every method raises BoardError where the board refuses or a fault ends a motion, LinkError
+    where it cannot be reached. What moves stops at Ctrl-C, and with Stopped at a ``StopRequest``.
+    """
+
+    def __init__(self, client: Client, port: str, stack: ExitStack | None = None) -> None:
+        self.client = client
+        """The protocol's commands one by one."""
+        self.port = port
+        self.arm: Arm | None = None
+        """The arm that the board was last set up for through this object."""
+        self._stack = stack or ExitStack()
+        self._moved = False
+        self._last_folder: Path | None = None
+
+    def close(self) -> None:
+        """Free the port; a virtual board ends."""
+        self._stack.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stack.__exit__(kind, value, trace)
+
+    @property
+    def info(self) -> Hello:
+        """Who the board is: program, protocol, arm record, room, step rates."""
+        return self.client.info
+
+    def status(self) -> Status:
+        """What the board is doing, its fault, and where the joints are in steps and counts."""
+        return self.client.status()
+
+    def configure(self, arm: Arm, replace: bool = True) -> None:
+        """Make sure that the board has this arm's record; a new one makes all positions unknown.
+
+        Raises LinkError where the board is set up for another arm and ``replace`` is false, InputError where a
+        figure of the arm does not fit the board.
+        """
+        arm_state.configure(self.client, arm, replace)
+        self.arm = arm
+
+    # what it keeps
+
+    def upload(
+        self,
+        motion: Plan | EncodedMotion,
+        name: str | None = None,
+        default: bool = False,
+        progress: Progress | None = None,
+    ) -> EncodedMotion:
+        """Store a motion, unless the board has just this one already; ``progress`` counts bytes.
+
+        ``name``: on the board, else made of the job's name. ``default``: let the board's button start it.
+        """
+        encoded = encoded_motion.of_plan(motion, name) if isinstance(motion, Plan) else motion
+        self.configure(encoded.arm)
+        stored_motion.store(self.client, encoded.name, encoded.data, progress)
+        if default:
+            self.client.set_default(encoded.name)
+        return encoded
+
+    def list(self) -> tuple[StoredMotion, ...]:
+        """The stored motions."""
+        return tuple(self.client.stored())
+
+    def read(self, name: str, arm: Arm | None = None) -> EncodedMotion:
+        """A stored motion of ``arm``, else of the arm that the board is set up for, read back.
+
+        InputError where the record is damaged or does not fit the arm.
+        """
+        return encoded_motion.of_record(name, self.client.fetch(name), arm or self._known_arm())
+
+    def remove(self, name: str) -> None:
+        """Remove a stored motion."""
+        self.client.remove(name)
+
+    def rename(self, old: str, new: str) -> None:
+        """Give a stored motion another name."""
+        self.client.rename(old, new)
+
+    def set_default(self, name: str) -> None:
+        """What the board's button starts; "" for nothing."""
+        self.client.set_default(name)
+
+    # where the arm is
+
+    def home(self, arm: Arm, where: Where | None = None) -> None:
+        """Declare that ``arm`` is at ``where``, or at its home posture; nothing moves.
+
+        Raises InputError for a posture that does not fit the arm.
+        """
+        self.configure(arm)
+        arm_state.home(self.client, arm, None if where is None else self._posture(where))
+
+    def home_to_switches(self, arm: Arm, stop: StopRequest | None = None) -> None:
+        """Home the joints that have a limit switch of known angle: they move to it, off it, slowly to it again.
+
+        Raises InputError where no joint has one, LinkError where a switch does not trip.
+        """
+        self.configure(arm)
+        with stoppable(stop) as wanted:
+            self._moved = True
+            homing.home_to_switches(self.client, arm, wanted)
+
+    def posture_deg(self) -> Array:
+        """Where the joints are by the steps commanded, degrees (J,); LinkError where that is unknown."""
+        return arm_state.posture_deg(self.client, self._known_arm())
+
+    # moving
+
+    def goto(self, where: Where, progress: Progress | None = None, stop: StopRequest | None = None) -> None:
+        """Move straight to a posture, all joints together within their limits; ``progress`` counts seconds.
+
+        Raises LinkError where the position is unknown, InputError for a posture that does not fit the arm.
+        """
+        arm, target_deg = self._known_arm(), self._posture(where)
+        with stoppable(stop) as wanted:
+            self._home_virtual_arm(arm)
+            goto.go_to(self.client, arm, target_deg, wanted, progress)
+
+    def run(
+        self,
+        motion: Plan | EncodedMotion | str,
+        repeat: int = 1,
+        out: Path | str = "runs",
+        progress: Progress | None = None,
+        watcher: Watcher | None = None,
+        stop: StopRequest | None = None,
+    ) -> Run:
+        """Replay a motion ``repeat`` times and record what comes back in a new run folder below ``out``.
+
+        ``motion``: a plan, or the name of a motion on the board. The arm must be homed and be where the motion
+        begins, else LinkError; the arm of a virtual board is brought there. Between repetitions it returns along
+        the same path. ``progress`` counts seconds of motion; ``watcher`` sees folder, samples and repetitions.
+        Whatever ends the run early raises, and what was recorded until then is ``last_run``.
+        """
+        encoded = self._encoded(motion)
+        seen = recording.ProgressWatcher(progress, repeat, watcher or Watcher())
+        with stoppable(stop) as wanted:
+            self._bring_to_start(encoded, wanted)
+            folder = recording.new_run(Path(out), encoded, self.port, self.client)
+            self._last_folder = folder.path
+            seen.begin(encoded, folder)
+            for _ in recording.repeat(self.client, encoded, folder, repeat, wanted, seen):
+                pass
+        return Run.load(folder.path)
+
+    @property
+    def last_run(self) -> Run | None:
+        """The last run that this object recorded, however it ended; None before the first."""
+        return Run.load(self._last_folder) if self._last_folder else None
+
+    def fetch(self, motion: Plan | EncodedMotion | str | None = None, out: Path | str = "runs") -> Run:
+        """The samples that the board keeps of its last run, in a new run folder below ``out``.
+
+        ``motion`` is what was run; None: the motion that the button starts. Such a run needs no host; one under
+        way is followed to its end. Raises LinkError where the board keeps no samples.
+        """
+        encoded = self._encoded(self._default() if motion is None else motion, replace=False)
+        folder = recording.fetch(self.client, encoded, Path(out), self.port)
+        self._last_folder = folder.path
+        return Run.load(folder.path)
+
+    def stop(self, now: bool = False) -> None:
+        """Brake along the path, or freeze where ``now``, and wait until the arm rests.
+
+        For motions that this object does not wait for, such as one that the button started; else give ``run``
+        a ``StopRequest``.
+        """
+        stored_motion.stop(self.client, now)
+
+    def clear(self) -> None:
+        """Clear a fault; BoardError while its cause is still there."""
+        self.client.clear()
+
+    def _known_arm(self) -> Arm:
+        if self.arm is None:
+            raise InputError("say first which arm the board moves: home(arm) or configure(arm)")
+        return self.arm
+
+    def _posture(self, where: Where) -> Array:
+        if isinstance(where, Plan):
+            return where.trajectory(0.0)
+        if isinstance(where, EncodedMotion):
+            return where.start_deg
+        return point_to_point.posture(where, self._known_arm())
+
+    def _encoded(self, motion: Plan | EncodedMotion | str, replace: bool = True) -> EncodedMotion:
+        """The motion for a board that is set up for its arm."""
+        if isinstance(motion, str):
+            return self.read(motion)
+        encoded = encoded_motion.of_plan(motion) if isinstance(motion, Plan) else motion
+        self.configure(encoded.arm, replace)
+        return encoded
+
+    def _default(self) -> str:
+        for entry in self.client.stored():
+            if entry.default:
+                return entry.name
+        raise InputError("the board's button starts nothing: name the motion that was run")
+
+    def _bring_to_start(self, motion: EncodedMotion, stop: StopRequest) -> None:
+        """Store the motion; bring a virtual arm to its start, and refuse where a real one is elsewhere."""
+        stored_motion.store(self.client, motion.name, motion.data)
+        if is_sim(self.port):
+            self._home_virtual_arm(motion.arm)
+            goto.go_to(self.client, motion.arm, motion.start_deg, stop)
+        elif not arm_state.is_at(self.client, motion.arm, motion.start_deg):
+            raise LinkError(
+                f"the arm does not stand where {motion.name!r} begins; bring it there with 'armtempo goto'"
+            )
+
+    def _home_virtual_arm(self, arm: Arm) -> None:
+        """A virtual arm that has not moved yet stands at home: nobody needs to look."""
+        if is_sim(self.port) and not self._moved:
+            arm_state.home_unknown(self.client, arm)
+        self._moved = True

@@ -1,0 +1,64 @@
+"""Motions that are not kept on the board: to a posture, and backwards between repetitions."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+from armtempo_shared import limits
+
+from armtempo.arrays import Array
+from armtempo.errors import LinkError
+from armtempo.link import Client
+from armtempo.link.board_messages import Sample
+from armtempo.model.arm import Arm
+from armtempo.planning import point_to_point
+from armtempo.progress import Progress
+from armtempo.records import encoded_motion
+from armtempo.records.encoded_motion import EncodedMotion
+from armtempo.robot import arm_state
+from armtempo.robot.stop_request import StopRequest
+from armtempo.robot.stored_motion import SampleSink, raise_fault, replay, store
+
+TEMPORARY = "tmp-"
+"""Names of motions that are removed after use begin so."""
+
+
+def go_to(
+    client: Client, arm: Arm, target_deg: Array, stop: StopRequest, progress: Progress | None = None
+) -> None:
+    """Move straight to a posture (J,) within the limits; nothing happens where the arm is there already.
+
+    Raises LinkError where the position is unknown, BoardError where the board refuses or a fault ends the move.
+    """
+    if not arm_state.is_at(client, arm, target_deg):
+        here = arm_state.posture_deg(client, arm)
+        trajectory = point_to_point.straight(TEMPORARY + "goto", here, target_deg, arm)
+        move_once(client, encoded_motion.of_trajectory(trajectory, arm), stop, progress)
+
+
+def go_back(client: Client, motion: EncodedMotion, stop: StopRequest) -> None:
+    """Move from the end of a motion along its path to its start."""
+    trajectory = point_to_point.backwards(motion.trajectory, TEMPORARY + "back")
+    move_once(client, encoded_motion.of_trajectory(trajectory, motion.arm), stop)
+
+
+def move_once(
+    client: Client, motion: EncodedMotion, stop: StopRequest, progress: Progress | None = None
+) -> None:
+    """Store a motion, run it and remove it; BoardError where a fault ends it."""
+    key = store(client, motion.name, motion.data)
+    try:
+        raise_fault(replay(client, key, stop, shown(progress)))
+    finally:
+        with suppress(LinkError):  # an earlier error says more
+            client.remove(key.name)
+
+
+def shown(progress: Progress | None) -> SampleSink:
+    """A sink that tells how far the motion is, in seconds of its own time."""
+
+    def show(sample: Sample, duration_s: float) -> None:
+        if progress is not None:
+            progress(sample.ticks / limits.TICK_HZ, duration_s)
+
+    return show

@@ -1,0 +1,141 @@
+"""Runs that are recorded: a run folder, the repetitions into it, and the samples of a run without a host."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from armtempo_shared.limits import TICK_HZ
+
+from armtempo.errors import LinkError
+from armtempo.link import Client
+from armtempo.link.board_messages import Sample
+from armtempo.link.follow import Follower, RunEnd
+from armtempo.model import trajectory_file
+from armtempo.progress import Progress
+from armtempo.records.encoded_motion import EncodedMotion
+from armtempo.robot.goto import go_back
+from armtempo.robot.stop_request import StopRequest
+from armtempo.robot.stored_motion import fault_name, raise_fault, readable, replay
+from armtempo.runs import run_folder
+from armtempo.runs.run_folder import COMPLETE, FAULT, INTERRUPTED, Repetition, RunFolder
+
+_END_S = 1e-3
+"""A run that ended earlier than its motion by more than this was stopped."""
+
+
+class Watcher:
+    """Sees a run while it goes on; override what you want to see."""
+
+    def begin(self, motion: EncodedMotion, folder: RunFolder) -> None:
+        """The run folder is there, and the arm where the motion begins."""
+
+    def sample(self, sample: Sample, duration_s: float) -> None:
+        """One sample of a motion that lasts ``duration_s``."""
+
+    def end(self, repetition: Repetition) -> None:
+        """A repetition has ended, however."""
+
+
+class ProgressWatcher(Watcher):
+    """Tells the progress of a run of several repetitions, in seconds of motion; hands on what it sees."""
+
+    def __init__(self, progress: Progress | None, repetitions: int, inner: Watcher) -> None:
+        self._progress = progress
+        self._repetitions = repetitions
+        self._inner = inner
+        self._ended = 0
+
+    def begin(self, motion: EncodedMotion, folder: RunFolder) -> None:
+        """See Watcher."""
+        self._inner.begin(motion, folder)
+
+    def sample(self, sample: Sample, duration_s: float) -> None:
+        """See Watcher."""
+        if self._progress is not None:
+            before_s = self._ended * duration_s
+            self._progress(before_s + sample.ticks / TICK_HZ, self._repetitions * duration_s)
+        self._inner.sample(sample, duration_s)
+
+    def end(self, repetition: Repetition) -> None:
+        """See Watcher."""
+        self._ended += 1
+        self._inner.end(repetition)
+
+
+def new_run(parent: Path, motion: EncodedMotion, port: str, client: Client) -> RunFolder:
+    """A run folder with everything that is needed to repeat the run."""
+    origin = {
+        "arm": motion.arm.name,
+        "port": port,
+        "board": vars(client.info),
+        "motion_crc": f"{motion.key.crc:08x}",
+    }
+    folder = RunFolder(
+        run_folder.new_folder(parent, motion.name), motion.name, run_folder.scales(motion.arm), origin
+    )
+    folder.write_motion(motion.data)
+    if motion.plan is not None:
+        trajectory_file.save(motion.plan, folder.path / run_folder.TRAJECTORY)
+    folder.write()
+    return folder
+
+
+def repeat(
+    client: Client,
+    motion: EncodedMotion,
+    folder: RunFolder,
+    times: int,
+    stop: StopRequest,
+    watcher: Watcher,
+) -> Iterator[Repetition]:
+    """Replay a stored motion ``times`` times into the run folder, with the motion backwards in between.
+
+    Gives each repetition when it has ended. A stop request ends the series, a fault too: BoardError.
+    """
+    for number in range(times):
+        if number:
+            go_back(client, motion, stop)
+        if stop.wanted:
+            return
+        end = _recorded(client, motion, folder, stop, watcher)
+        watcher.end(folder.repetitions[-1])
+        yield folder.repetitions[-1]
+        raise_fault(end)
+
+
+def _recorded(
+    client: Client, motion: EncodedMotion, folder: RunFolder, stop: StopRequest, watcher: Watcher
+) -> RunEnd:
+    """One repetition into the run folder, however it ends."""
+    with folder.begin_repetition() as file:
+
+        def take(sample: Sample, duration_s: float) -> None:
+            file.append(sample)
+            watcher.sample(sample, duration_s)
+
+        end = replay(client, motion.key, stop, take)
+        state = FAULT if end.fault else INTERRUPTED if stop.wanted else COMPLETE
+        file.repetition.end(state, fault_name(end.fault), end.ticks, end.positions, end.lost)
+        file.repetition.notices = readable(end.notices)
+    return end
+
+
+def fetch(client: Client, motion: EncodedMotion, folder_in: Path, port: str) -> RunFolder:
+    """The samples that the board keeps of its last run, one of ``motion``, in a new run folder.
+
+    A run under way is followed to its end. Raises LinkError where the board keeps no samples.
+    """
+    status = client.status()
+    if not status.run or not (status.moving or status.samples_kept):
+        raise LinkError("the board keeps no samples: nothing was run since it started, or they were fetched")
+    follower = Follower(client, status.run)
+    folder = new_run(folder_in, motion, port, client)
+    with folder.begin_repetition() as file:
+        for sample in follower.samples():
+            file.append(sample)
+        end = follower.end
+        cut = end.ticks < motion.trajectory.duration_s * TICK_HZ - TICK_HZ * _END_S
+        state = FAULT if end.fault else INTERRUPTED if cut else COMPLETE
+        file.repetition.end(state, fault_name(end.fault), end.ticks, end.positions, end.lost)
+    return folder

@@ -1,0 +1,128 @@
+"""A run that was recorded: its samples, its results, its report."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armtempo.errors import RunFolderError
+from armtempo.formats.atomic_file import why
+from armtempo.model import trajectory_file
+from armtempo.model.plan import Plan
+from armtempo.records import decode
+from armtempo.report import run_report
+from armtempo.runs import reader
+from armtempo.runs.results import JointResult, results
+from armtempo.runs.run_folder import COMPLETE, MOTION, Repetition
+from armtempo.splines.trajectory import Trajectory
+
+
+class Run:
+    """A run folder: what was run, and what came back."""
+
+    def __init__(self, content: reader.RunData) -> None:
+        self._content = content
+
+    @classmethod
+    def load(cls, path: Path | str) -> Run:
+        """The run in a folder, whole or cut short; RunFolderError where it is none or contradicts itself."""
+        return cls(reader.load(Path(path)))
+
+    def __repr__(self) -> str:
+        states = ", ".join(repetition.state for repetition in self.repetitions) or "nothing recorded"
+        return f"<Run {self.path}: {states}>"
+
+    @property
+    def path(self) -> Path:
+        """The run folder."""
+        return self._content.path
+
+    @property
+    def name(self) -> str:
+        """The motion's name on the board."""
+        return str(self.meta["name"])
+
+    @property
+    def meta(self) -> dict[str, Any]:
+        """What run.json says: when, on which board, how each repetition ended."""
+        return self._content.meta
+
+    @property
+    def repetitions(self) -> tuple[reader.RepetitionData, ...]:
+        """The samples of each repetition as arrays."""
+        return self._content.repetitions
+
+    @property
+    def entries(self) -> tuple[Repetition, ...]:
+        """What run.json says of each repetition: how it ended, fault, lost samples, last position."""
+        return self._content.entries
+
+    @property
+    def complete(self) -> bool:
+        """Whether every repetition came to its end without a stop, a fault or a broken connection."""
+        return bool(self.repetitions) and all(one.state == COMPLETE for one in self.repetitions)
+
+    @cached_property
+    def plan(self) -> Plan | None:
+        """The plan that was run; None where it is not known, as with a motion that only the board had."""
+        path = self._content.trajectory_path
+        return trajectory_file.load(path) if path else None
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """The motion that was run: as planned, or as the board's record has it.
+
+        Raises RunFolderError where neither can be read.
+        """
+        if self.plan is not None:
+            return self.plan.trajectory
+        try:
+            data = (self.path / MOTION).read_bytes()
+        except OSError as error:
+            raise RunFolderError(f"{self.path / MOTION}: cannot be read: {why(error)}") from error
+        return decode.trajectory(data, self._content.joints, self.name)
+
+    @property
+    def samples(self) -> np.ndarray[Any, np.dtype[np.void]]:
+        """All samples of all repetitions, (N,), as a structured array.
+
+        Its fields: ``repetition`` from 1, ``index`` of the sample in its repetition from 0, ``time_s`` by the
+        board's motion clock; with an entry for each driven joint, (J,): ``commanded_steps``,
+        ``commanded_deg``, and ``angle_deg`` by the encoder, NaN for a joint without one.
+        """
+        joints = len(self._content.joints)
+        kind = np.dtype(
+            [
+                ("repetition", np.int64),
+                ("index", np.int64),
+                ("time_s", np.float64),
+                ("commanded_steps", np.int64, (joints,)),
+                ("commanded_deg", np.float64, (joints,)),
+                ("angle_deg", np.float64, (joints,)),
+            ]
+        )
+        table = np.empty(sum(len(one.index) for one in self.repetitions), kind)
+        begin = 0
+        for number, one in enumerate(self.repetitions, 1):
+            rows = table[begin : begin + len(one.index)]
+            rows["repetition"] = number
+            for name in kind.names[1:] if kind.names else ():
+                rows[name] = getattr(one, name)
+            begin += len(one.index)
+        return table
+
+    @property
+    def results(self) -> tuple[JointResult, ...]:
+        """How each joint ended the last repetition; empty where it is not known how that ended."""
+        return results(self._content, self.trajectory)
+
+    def report(self) -> Path:
+        """Write report.html and its figures into the run folder; gives the page.
+
+        Raises RunFolderError where the plan is not known or there is no sample, MissingPackageError without
+        matplotlib.
+        """
+        return run_report.write(self.path)

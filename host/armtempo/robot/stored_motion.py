@@ -1,0 +1,160 @@
+"""A stored motion from its start to its end: start it, follow it, stop it, say how it ended."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+
+from armtempo_shared import wire
+
+from armtempo.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
+from armtempo.link import Client
+from armtempo.link.board_messages import Sample
+from armtempo.link.follow import CHECK_S, Follower, RunEnd
+from armtempo.link.refusal import refusal
+from armtempo.link.session import RECONNECT_S
+from armtempo.progress import Progress
+from armtempo.records.encoded_motion import MotionKey
+from armtempo.robot.stop_request import StopRequest
+
+SampleSink = Callable[[Sample, float], object]
+"""Gets each sample and the length of the motion in seconds."""
+
+BRAKE_S = 5.0
+"""Braking takes no longer than this; then the board is told to freeze."""
+FREEZE_S = 2.0
+"""Freezing takes no longer than this."""
+
+
+def store(client: Client, name: str, data: bytes, progress: Progress | None = None) -> MotionKey:
+    """Upload a motion record under ``name``, unless the board has just this one already."""
+    key = MotionKey(name, wire.record_crc(data))
+    found = client.find(name)
+    if found is None or found.crc != key.crc:
+        client.upload(name, data, progress)
+    return key
+
+
+def replay(
+    client: Client,
+    motion: MotionKey,
+    stop: StopRequest,
+    sink: SampleSink = lambda *_: None,
+    flags: int = 0,
+) -> RunEnd:
+    """Start a stored motion and follow it to its end; a stop request makes the board brake.
+
+    Whatever fails here stops the board. Raises BoardError where the board refuses to start, LinkError where it
+    cannot be reached any more, Stopped where the stop was asked for before the start.
+    """
+    client.session.stopping = lambda: stop.wanted
+    stop.check()
+    started = client.start(motion.name, motion.crc, flags)
+    follower = Follower(client, started.run)
+    try:
+        return _follow(
+            client, follower, _Brake(client, stop), lambda sample: sink(sample, started.duration_s)
+        )
+    except OtherBoardError as error:
+        raise LinkError(f"{error}; what came after the last sample cannot be known") from error
+
+
+def _follow(client: Client, follower: Follower, brake: _Brake, take: Callable[[Sample], object]) -> RunEnd:
+    heard_s = client.session.clock()
+    while not follower.ended:
+        try:
+            for sample in follower.samples(brake):
+                heard_s = client.session.clock()
+                take(sample)
+        except OtherBoardError:
+            raise
+        except NoAnswerError as error:  # silent, though its port is there: as if the cable were out
+            if not client.session.stopping():  # else the stop goes on, until it is given up
+                if client.session.clock() - heard_s > RECONNECT_S:
+                    raise
+                client.session.reconnect(error)
+        except BaseException as error:
+            _stop_after(client, error)
+            raise
+    return follower.end
+
+
+def _stop_after(client: Client, error: BaseException) -> None:
+    """Stop what is moving because of ``error``, as far as the board can be reached."""
+    if isinstance(error, BoardError) and error.code == wire.ERROR_CODES["no_session"]:
+        raise LinkError(
+            "the board started anew during the motion: where the arm stands and what came after the last "
+            "sample cannot be known; find the cause, then 'armtempo home'"
+        ) from error
+    client.session.reopen = None  # a cable that is out is not waited for
+    with suppress(LinkError):  # the first error says more
+        client.stop(now=isinstance(error, KeyboardInterrupt))
+
+
+class _Brake:
+    """Called between two messages: passes a stop request on; freezes a board that does not come to rest."""
+
+    def __init__(self, client: Client, stop: StopRequest, now: bool = False) -> None:
+        self._client = client
+        self._stop = stop
+        brake_s = 0.0 if now else BRAKE_S
+        self._steps: list[tuple[float, Callable[[], None]]] = [
+            (0.0, lambda: send_stop(client, now)),
+            (brake_s, lambda: send_stop(client, now=True)),
+            (brake_s + FREEZE_S, _does_not_stop),
+        ]
+        self._asked_s = 0.0
+
+    def __call__(self) -> None:
+        if not self._stop.wanted:
+            return
+        now_s = self._client.session.clock()
+        self._asked_s = self._asked_s or now_s
+        if self._steps and now_s - self._asked_s >= self._steps[0][0]:
+            self._steps.pop(0)[1]()
+
+
+def _does_not_stop() -> None:
+    raise LinkError("the board was told to stop and does not; switch off the motors' power")
+
+
+def send_stop(client: Client, now: bool = False) -> None:
+    """Tell the board to brake along the path, or to freeze; nothing happens where nothing moves."""
+    try:
+        client.stop(now)
+    except BoardError as error:
+        if error.code != wire.ERROR_CODES["not_moving"]:
+            raise
+
+
+def stop(client: Client, now: bool) -> None:
+    """Stop and wait until the arm rests; LinkError where it does not come to rest."""
+    request = StopRequest()
+    request.wanted = True
+    brake = _Brake(client, request, now)
+    brake()
+    while client.status().moving:
+        brake()
+        client.session.poll(CHECK_S)
+        client.session.events.clear()
+
+
+def fault_name(code: int) -> str:
+    """Name of a fault code; "" for 0."""
+    return wire.ERRORS.get(code, (f"code {code}",))[0] if code else ""
+
+
+def raise_fault(end: RunEnd) -> None:
+    """Raise BoardError, with the sentence for the fault, where a run ended by one."""
+    if end.fault:
+        said = "".join(f"; the board says: {text.strip()}" for text in readable(end.notices))
+        raise refusal(f"the motion ended by a fault{said}", end.fault, end.fault_joint)
+
+
+def readable(notices: tuple[str, ...]) -> tuple[str, ...]:
+    """Texts of the board with the names of the source, where the board has the compiled program."""
+    if not notices:
+        return ()
+    from armtempo.deploy.program_files import in_full  # reads the whole program: only where it is needed
+
+    return tuple(map(in_full, notices))

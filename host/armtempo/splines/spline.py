@@ -1,0 +1,55 @@
+"""A uniform B-spline as an object: control points, and values and derivatives at any parameter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armtempo.arrays import Array
+from armtempo.errors import InputError
+from armtempo.splines import bspline
+
+
+@dataclass(frozen=True, eq=False)
+class Spline:
+    """A uniform B-spline of degree 3 or 5 over u from 0 to n, with n segments.
+
+    ``control_points`` has the shape (n + degree,) or (n + degree, J).
+    """
+
+    control_points: Array
+    degree: int = 5
+
+    @classmethod
+    def through(cls, points: ArrayLike, degree: int = 5) -> Spline:
+        """The spline through ``points``, (n + 1,) or (n + 1, J): at u = 0, 1, … n; at rest at both ends.
+
+        The cubic rests in its first derivative, the quintic in its second too (Eqs. 13 and 14). Raises
+        InputError for another degree, fewer than two points or values that are not finite.
+        """
+        return cls(bspline.fit(points, degree), degree)
+
+    @property
+    def segments(self) -> int:
+        """Number of polynomial pieces."""
+        return len(self.control_points) - self.degree
+
+    def __call__(self, u: ArrayLike, order: int = 0) -> Array:
+        """Value at ``u``, or its derivative of the given ``order`` with respect to u.
+
+        ``u`` of any shape gives an array of that shape, with J in a last axis where the points have it. Raises
+        InputError for a u outside of 0 to n.
+        """
+        at = np.asarray(u, dtype=float)
+        if not np.all((at >= 0.0) & (at <= self.segments)):
+            raise InputError(
+                f"a spline of {self.segments} segments is defined for u from 0 to {self.segments}"
+            )
+        segment = np.minimum(at.astype(np.intp), self.segments - 1)
+        pieces = bspline.derivative(bspline.polynomials(self.control_points, self.degree), order)
+        powers = (at - segment)[..., None] ** np.arange(pieces.shape[1])
+        return np.asarray(
+            np.einsum("...p,...p->..." if pieces.ndim == 2 else "...p,...pj->...j", powers, pieces[segment])
+        )

@@ -1,0 +1,250 @@
+"""``import armtempo``: what is public, what it costs, and that it does what README and docs say."""
+
+from __future__ import annotations
+
+import inspect
+import pkgutil
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import armtempo
+import numpy as np
+import pytest
+from armtempo import errors
+from armtempo.link.board_messages import Sample
+from armtempo.simulator import LaunchOptions, launch
+from numpy.typing import ArrayLike
+
+START_DEG, END_DEG = (0.0, -60.0, 40.0), (20.0, -75.0, 50.0)
+"""The paper's home posture, and one that is two seconds away."""
+LAZY = ("numpy", "scipy", "matplotlib", "click", "serial", "armtempo.model", "armtempo.link")
+
+
+@pytest.fixture(scope="module")
+def arm() -> armtempo.Arm:
+    """The paper's."""
+    return armtempo.Arm.paper()
+
+
+@pytest.fixture(scope="module")
+def plan(arm: armtempo.Arm) -> armtempo.Plan:
+    """A plan that needs little search."""
+    job = armtempo.Job("small", via_deg=[START_DEG, END_DEG], population=5, iterations=20)
+    return armtempo.plan(arm, job)
+
+
+def modules_after(code: str) -> set[str]:
+    """What a Python of its own has imported after ``code``."""
+    found = subprocess.run(
+        [sys.executable, "-c", f"import sys\n{code}\nprint('\\n'.join(sys.modules))"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return set(found.stdout.split())
+
+
+def test_the_import_alone_loads_nothing_heavy() -> None:
+    assert not modules_after("import armtempo") & set(LAZY)
+
+
+def test_a_plan_is_computed_without_plots_and_ports() -> None:
+    code = (
+        "import armtempo\n"
+        "arm = armtempo.Arm.paper()\n"
+        "job = armtempo.Job('x', via_deg=[[0, -60, 40], [1, -60, 40]], population=4, iterations=1)\n"
+        "armtempo.plan(arm, job)"
+    )
+    assert not modules_after(code) & {"matplotlib", "click"}
+
+
+def test_every_public_name_is_there_and_described() -> None:
+    assert dir(armtempo) == sorted(armtempo.__all__)
+    for name in armtempo.__all__:
+        value = getattr(armtempo, name)
+        assert name == "__version__" or inspect.getdoc(value), name
+        if inspect.isclass(value) and not issubclass(value, BaseException):
+            for method, function in inspect.getmembers(value, inspect.isfunction):
+                assert method.startswith("_") or inspect.getdoc(function), f"{name}.{method}"
+
+
+def test_a_name_that_is_not_public_is_no_attribute() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'planer'"):
+        armtempo.planer  # noqa: B018
+
+
+def test_public_functions_are_typed() -> None:
+    for name in ("plan", "connect", "forward", "inverse", "summary", "compare"):
+        signature = inspect.signature(getattr(armtempo, name))
+        assert signature.return_annotation is not inspect.Signature.empty
+        assert all(one.annotation is not inspect.Parameter.empty for one in signature.parameters.values())
+
+
+def test_the_errors_are_the_tree_that_is_drawn() -> None:
+    for found in pkgutil.walk_packages(armtempo.__path__, "armtempo."):
+        if "simulator." not in found.name and not found.name.endswith("__main__"):
+            import_module(found.name)
+
+    def drawn(kind: type[BaseException], depth: int) -> list[tuple[int, str]]:
+        below = [line for child in kind.__subclasses__() for line in drawn(child, depth + 1)]
+        return [(depth, kind.__name__), *below]
+
+    lines = (inspect.getdoc(errors) or "").split("::")[1].split("Every")[0].splitlines()
+    tree = [(len(line) - len(line.lstrip(" │├└─")), line.strip(" │├└─").split()[0]) for line in lines if line]
+    indents = sorted({indent for indent, _ in tree})
+    assert [(indents.index(indent), name) for indent, name in tree] == drawn(errors.ArmtempoError, 0)
+
+
+def test_a_job_takes_angles_and_refuses_what_is_no_motion(arm: armtempo.Arm) -> None:
+    job = armtempo.Job("mine", via_deg=np.array([START_DEG, END_DEG]).tolist())
+    assert job.via == (START_DEG, END_DEG)
+    for wrong in ([], [START_DEG], [(0.0, -60.0), (1.0, -60.0)]):
+        with pytest.raises(armtempo.InputError, match="mine"):
+            armtempo.plan(arm, armtempo.Job("mine", via_deg=wrong))
+
+
+def test_a_plan_goes_through_its_via_points_and_its_file(plan: armtempo.Plan, tmp_path: Path) -> None:
+    np.testing.assert_allclose(plan.trajectory(0.0), START_DEG, atol=1e-9)
+    np.testing.assert_allclose(plan.trajectory(plan.total_s), END_DEG, atol=1e-9)
+    np.testing.assert_allclose(plan.trajectory(plan.total_s, 1), 0.0, atol=1e-6)
+    plan.save(tmp_path / "small.json")
+    again = armtempo.Plan.load(tmp_path / "small.json")
+    assert again.total_s == plan.total_s
+    assert again.job == plan.job
+
+
+def test_a_plan_goes_to_other_programs_and_comes_back_as_a_job(
+    plan: armtempo.Plan, arm: armtempo.Arm, tmp_path: Path
+) -> None:
+    (tmp_path / "small.csv").write_text(plan.to_csv(1.0))
+    job = armtempo.Job.from_csv(tmp_path / "small.csv", arm)
+    assert job.name == "small"
+    np.testing.assert_allclose(np.array(job.via)[[0, -1]], [START_DEG, END_DEG], atol=1e-6)
+    assert plan.to_ros(10.0, "base").startswith("header:")
+
+
+def test_a_run_on_the_virtual_board(plan: armtempo.Plan, arm: armtempo.Arm, tmp_path: Path) -> None:
+    told: list[tuple[float, float]] = []
+    with armtempo.connect("sim", arm) as board:
+        board.home(arm)
+        run = board.run(plan, repeat=2, out=tmp_path, progress=lambda *done: told.append(done))
+        assert [motion.name for motion in board.list()] == ["small"]
+    assert run.complete
+    assert told == sorted(told)
+    assert told[-1][0] == pytest.approx(2 * plan.total_s, abs=1e-3)
+    samples = run.samples
+    assert set(samples["repetition"]) == {1, 2}
+    assert samples["angle_deg"].shape == (len(samples), 3)
+    planned = plan.trajectory(samples["time_s"])
+    assert np.max(np.abs(samples["commanded_deg"] - planned)) < 0.03  # half a step of joint 1
+    assert all(abs(joint.error_deg) < 0.2 for joint in run.results)
+    assert run.report() == run.path / "report.html"
+    assert armtempo.Run.load(run.path).plan is not None
+
+
+def test_a_second_run_of_the_same_board_starts_where_it_should(
+    plan: armtempo.Plan, arm: armtempo.Arm, tmp_path: Path
+) -> None:
+    """The virtual arm goes back by itself; what it is told of its position stays true."""
+    with armtempo.connect("sim", arm) as board:
+        for _ in range(2):
+            run = board.run(plan, out=tmp_path)
+            assert all(abs(joint.error_deg) < 0.2 for joint in run.results)
+
+
+def test_a_real_arm_does_not_move_by_surprise(plan: armtempo.Plan, arm: armtempo.Arm, tmp_path: Path) -> None:
+    with launch(LaunchOptions(arm=arm)) as process, armtempo.connect(process.port) as board:
+        with pytest.raises(armtempo.InputError, match="which arm"):
+            board.goto(START_DEG)
+        with pytest.raises(armtempo.LinkError, match="position of joint 1"):
+            board.run(plan, out=tmp_path)
+        board.home(arm, END_DEG)
+        with pytest.raises(armtempo.LinkError, match="does not stand where 'small' begins"):
+            board.run(plan, out=tmp_path)
+        assert board.last_run is None
+        assert not list(tmp_path.iterdir())
+        np.testing.assert_allclose(board.posture_deg(), END_DEG, atol=0.03)
+        assert board.status().run == 0  # nothing was ever started
+
+
+def test_the_arm_goes_where_a_motion_begins(plan: armtempo.Plan, arm: armtempo.Arm, tmp_path: Path) -> None:
+    with launch(LaunchOptions(arm=arm)) as process, armtempo.connect(process.port) as board:
+        board.home(arm)
+        board.goto(END_DEG)
+        board.goto(plan)
+        assert board.run(plan, out=tmp_path).complete
+
+
+def test_a_stop_that_is_asked_for_ends_a_run_early(
+    plan: armtempo.Plan, arm: armtempo.Arm, tmp_path: Path
+) -> None:
+    stop = armtempo.StopRequest()
+
+    class Impatient(armtempo.Watcher):
+        def sample(self, sample: Sample, duration_s: float) -> None:
+            stop.wanted = True
+
+    with armtempo.connect("sim", arm) as board:
+        with pytest.raises(armtempo.Stopped):
+            board.run(plan, 2, tmp_path, watcher=Impatient(), stop=stop)
+        assert not board.status().moving
+        assert board.last_run is not None
+    assert [entry.state for entry in board.last_run.entries] == ["interrupted"]
+
+
+def test_a_stored_motion_runs_by_its_name(plan: armtempo.Plan, arm: armtempo.Arm, tmp_path: Path) -> None:
+    with armtempo.connect("sim", arm) as board:
+        board.upload(plan, "kept", default=True)
+        run = board.run("kept", out=tmp_path)
+        assert run.plan is None
+        np.testing.assert_allclose(run.trajectory(1.0), plan.trajectory(1.0), atol=1e-6)
+        assert all(abs(joint.error_deg) < 0.2 for joint in run.results)
+        board.rename("kept", "other")
+        assert [(motion.name, motion.default) for motion in board.list()] == [("other", True)]
+        board.remove("other")
+        assert board.list() == ()
+
+
+@pytest.mark.parametrize("angles", [(0.0, -60.0, 40.0), (0.0, -60.0, 40.0, 10.0, 20.0, 30.0)])
+def test_inverse_finds_what_forward_says(angles: ArrayLike, arm: armtempo.Arm) -> None:
+    pose = armtempo.forward(arm, angles)
+    assert pose.shape == (4, 4)
+    solutions = armtempo.inverse(arm, pose)
+    assert len(solutions) == 8
+    usable = [one.usable for one in solutions]
+    assert usable == sorted(usable, reverse=True)
+    for one in solutions[: sum(usable)]:
+        np.testing.assert_allclose(armtempo.forward(arm, one.angles_deg), pose, atol=1e-6)
+    assert all(one.rejections for one in solutions[sum(usable) :])
+
+
+def test_poses_and_postures_of_the_wrong_shape_are_refused(arm: armtempo.Arm) -> None:
+    with pytest.raises(armtempo.InputError, match="4 angles"):
+        armtempo.forward(arm, [0.0] * 4)
+    with pytest.raises(armtempo.InputError, match="near_deg"):
+        armtempo.inverse(arm, np.eye(4), [0.0])
+    with pytest.raises(armtempo.InputError, match="pose"):
+        armtempo.inverse(arm, np.zeros((4, 4)))
+
+
+@pytest.mark.parametrize("degree", [3, 5])
+@pytest.mark.parametrize("points", [[0.0, 1.0, 4.0, 2.0], [[0.0, 1.0], [1.0, 2.0], [4.0, 3.0]]])
+def test_a_spline_goes_through_its_points_and_rests_at_the_ends(points: ArrayLike, degree: int) -> None:
+    spline = armtempo.Spline.through(points, degree)
+    values = np.asarray(points)
+    np.testing.assert_allclose(spline(np.arange(len(values))), values, atol=1e-9)
+    for end in (0, spline.segments):
+        np.testing.assert_allclose(spline(end, 1), 0.0, atol=1e-9)
+    u, step = np.linspace(0.01, spline.segments - 0.01, 50), 1e-6
+    slope = (spline(u + step) - spline(u - step)) / (2 * step)
+    np.testing.assert_allclose(spline(u, 1), slope, atol=1e-5)
+    with pytest.raises(armtempo.InputError, match="defined for u"):
+        spline(spline.segments + 0.1)
+
+
+def test_minimise_finds_the_bottom_of_a_bowl() -> None:
+    rng = np.random.default_rng(4)
+    found = armtempo.optimise.minimise(lambda x: ((x - 0.5) ** 2).sum(1), [(-2, 2)] * 2, rng)
+    np.testing.assert_allclose(found.x, 0.5, atol=1e-3)

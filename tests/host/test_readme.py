@@ -1,0 +1,74 @@
+"""README: the calls and places that it names exist, and so does what the pages link to."""
+
+from __future__ import annotations
+
+import ast
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+SOURCES = {
+    "host": ROOT / "host" / "armtempo",
+    "shared": ROOT / "shared" / "armtempo_shared",
+    "board": ROOT / "board" / "armtempo_board",
+}
+PAGES = [ROOT / "README.md", *sorted(ROOT.glob("*/docs/*.md"))]
+
+
+@cache
+def names(side: str) -> frozenset[str]:
+    """Modules and classes of a side, and what they define: ``module``, ``module.function``, ``Class.method``."""
+    found = set()
+    for path in SOURCES[side].rglob("*.py"):
+        if "hardware" in path.parts and side == "host":
+            continue
+        module = path.parent.name if path.name == "__init__.py" else path.stem
+        found.add(module)
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                found.add(f"{module}.{node.name}")
+            if isinstance(node, ast.ClassDef):
+                found.add(node.name)
+                found |= {
+                    f"{node.name}.{part.name}" for part in node.body if isinstance(part, ast.FunctionDef)
+                }
+    return frozenset(found)
+
+
+def mentioned() -> list[tuple[str, str]]:
+    """(side, name) of each call or place in the second column of README's tables of the way and of places."""
+    begin = README.index("## The way of the data")
+    rows = [line.split("|") for line in README[begin : README.index("## With a real board")].splitlines()]
+    cells = [row[2] for row in rows if len(row) > 3 and not set(row[1]) <= set("- ")]
+    found = []
+    for text in re.findall(r"`([^`]+)`", " ".join(cells)):
+        side, _, name = text.rpartition(": ")
+        if not name.startswith("["):
+            found.append((side or "host", name))
+    return found
+
+
+def test_the_tables_were_found() -> None:
+    assert {side for side, _ in mentioned()} == set(SOURCES)
+    assert len(set(mentioned())) >= 25
+
+
+@pytest.mark.parametrize(("side", "name"), sorted(set(mentioned())))
+def test_what_the_readme_names_exists(side: str, name: str) -> None:
+    assert name in names(side)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+        assert "://" in target or (page.parent / target).exists(), target
+
+
+def test_the_tour_names_every_package() -> None:
+    tour = README[README.index("host/armtempo/  formats") : README.index("shared/armtempo_shared/   ")]
+    packages = {path.parent.name for path in SOURCES["host"].glob("*/__init__.py")} | {"pipeline"}
+    assert packages <= set(re.findall(r"\w+", tour))

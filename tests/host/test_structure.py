@@ -1,0 +1,153 @@
+"""The shape of ``host/armtempo`` and ``shared/armtempo_shared``: imports point one way, signatures stay short."""
+
+from __future__ import annotations
+
+import ast
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+HOST = ROOT / "host" / "armtempo"
+SHARED = ROOT / "shared" / "armtempo_shared"
+ORDER = (
+    "errors",
+    "arrays",
+    "progress",
+    "formats",  # TOML tables, JSON, text tables, whole files
+    "splines",  # B-splines, the time axis, trajectories, bounds of their extremes
+    "optimise",  # population searches
+    "model",  # arm, job, pose, plan, and their files
+    "kinematics",  # forward, inverse, choice
+    "planning",  # from a job to a plan
+    "records",  # arm and motion as the board takes them
+    "simulator",  # the virtual board
+    "link",  # port, session, commands, samples of a run
+    "deploy",  # the board program onto a board
+    "runs",  # run folders and what the samples say
+    "report",  # pages, plots, tables
+    "robot",  # a board in use: home, go, run, stop
+    "pipeline",  # plan, load, run, report
+    "research",  # comparison of searches, the paper repeated
+    "cli",
+)
+"""Each package or module imports from those before it in this list, never from those behind."""
+LOWEST = ("__init__",)  # the version; its public names are imported when they are used
+HIGHEST = ("__main__",)
+MOST_PARAMETERS = 6
+OWN_PARAMETERS = ("search", "reasons")
+"""``optimise.*.search`` takes an algorithm's own parameters, each by its name in the algorithm's table."""
+SAME_BY_DESIGN = {
+    "Timer",
+    "Pin",
+    "Switch",
+    "Flash",
+    "ExtInt",
+    "WDT",
+    "RTC",
+    "USB_VCP",
+    "Encoder",
+    "Joint",
+    "Store",
+}
+"""Names that MicroPython gives, or that the board program has for its own part of the same thing."""
+
+
+def modules() -> list[Path]:
+    """The host's modules, but for what runs under MicroPython."""
+    return [
+        path
+        for path in sorted(HOST.rglob("*.py"))
+        if "hardware" not in path.parts and path != HOST / "simulator" / "main.py"
+    ]
+
+
+def part(path: Path) -> str:
+    """The package, or module at the top, that a file belongs to."""
+    first = path.relative_to(HOST).parts[0]
+    return first.removesuffix(".py")
+
+
+def imported(tree: ast.AST) -> Iterator[str]:
+    """Packages of armtempo that are imported anywhere in a module, also inside of functions."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module == "armtempo":
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("armtempo."):
+            yield str(node.module).split(".")[1]
+        elif isinstance(node, ast.Import):
+            for alias in node.names:
+                if alias.name.startswith("armtempo."):
+                    yield alias.name.split(".")[1]
+
+
+def functions(path: Path) -> Iterator[ast.FunctionDef]:
+    """All functions and methods of a module."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.FunctionDef):
+            yield node
+
+
+def test_every_part_has_a_place_in_the_order() -> None:
+    assert {part(path) for path in modules()} == {*ORDER, *LOWEST, *HIGHEST}
+
+
+@pytest.mark.parametrize("path", modules(), ids=lambda path: str(path.relative_to(HOST)))
+def test_imports_point_one_way(path: Path) -> None:
+    here = part(path)
+    if here in LOWEST + HIGHEST:
+        return
+    for name in imported(ast.parse(path.read_text(encoding="utf-8"))):
+        if name in ORDER:
+            assert ORDER.index(name) <= ORDER.index(here), f"{here} imports {name}"
+
+
+def test_functions_take_few_parameters() -> None:
+    for path in [*modules(), *SHARED.glob("*.py")]:
+        for function in functions(path):
+            names = [one.arg for one in (*function.args.posonlyargs, *function.args.args)]
+            count = len(names) + len(function.args.kwonlyargs) - (names[:1] in (["self"], ["cls"]))
+            is_command = any("command" in ast.unparse(one) for one in function.decorator_list)
+            if not is_command and function.name not in OWN_PARAMETERS:
+                assert count <= MOST_PARAMETERS, f"{path.relative_to(ROOT)}: {function.name} takes {count}"
+
+
+def test_results_of_three_have_names() -> None:
+    for path in modules():
+        for function in functions(path):
+            if not function.name.startswith("_") and function.name != "values":  # speed, acceleration, jerk
+                assert result_size(function) <= 2, f"{path.relative_to(ROOT)}: {function.name}"
+
+
+def result_size(function: ast.FunctionDef) -> int:
+    """Number of entries of a bare tuple that a function gives; 1 for anything else."""
+    kind = function.returns
+    if not isinstance(kind, ast.Subscript) or ast.unparse(kind.value) != "tuple":
+        return 1
+    entries = kind.slice.elts if isinstance(kind.slice, ast.Tuple) else [kind.slice]
+    return 1 if ast.unparse(entries[-1]) == "..." else len(entries)
+
+
+def test_no_class_name_stands_for_two_things() -> None:
+    places = Counter(
+        node.name
+        for root in (HOST, SHARED)
+        for path in root.rglob("*.py")
+        for node in ast.parse(path.read_text(encoding="utf-8")).body
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
+    )
+    assert {name for name, count in places.items() if count > 1} <= SAME_BY_DESIGN
+
+
+def test_types_of_the_whole_package_have_one_home() -> None:
+    homes = [
+        (target.id, str(path.relative_to(HOST)))
+        for path in modules()
+        for node in ast.parse(path.read_text(encoding="utf-8")).body
+        if isinstance(node, ast.Assign)
+        for target in node.targets
+        if isinstance(target, ast.Name) and target.id in ("Array", "Progress")
+    ]
+    assert sorted(homes) == [("Array", "arrays.py"), ("Progress", "progress.py")]

@@ -1,0 +1,113 @@
+"""Every example of README and host/docs does what it says: Python blocks, and commands on a virtual board.
+
+The commands of host/docs/recovery.md are tried by ``test_recovery``, each on a board that has the trouble.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from armtempo.model import arm_file, job_file
+from armtempo.simulator import LaunchOptions, launch
+
+from tests import interpreters
+from tests.interpreters import ROOT
+from tests.system import commandline
+from tests.system.boards import small_plan
+from tests.system.conftest import FASTEST
+
+PAGES = (ROOT / "README.md", *sorted((ROOT / "host" / "docs").glob("*.md")))
+PORT = "/dev/ttyACM0"
+COMMANDS = ("README.md", "cli.md")
+ONCE = ((r"repeat=\d+", "repeat=1"), (r"--repeat \d+", "--repeat 1"))
+"""Repetitions take time and show nothing new here."""
+
+
+def text_of(page: Path) -> str:
+    """A page whose examples run their motions once."""
+    text = page.read_text(encoding="utf-8")
+    for many, once in ONCE:
+        text = re.sub(many, once, text)
+    return text
+
+
+def python_blocks() -> list[tuple[str, str]]:
+    """(page and number, code) of each Python block."""
+    return [
+        (f"{page.name}-{number}", code)
+        for page in PAGES
+        for number, code in enumerate(
+            re.findall(r"^```python\n(.*?)^```", text_of(page), re.DOTALL | re.MULTILINE),
+            1,
+        )
+    ]
+
+
+def command_lines(page: Path) -> list[list[list[str]]]:
+    """The commands of each block of a page, indented or fenced, as words; ``export`` too."""
+    blocks: list[list[list[str]]] = [[]]
+    for line in text_of(page).splitlines():
+        if line.strip().startswith(("armtempo ", "export ")) and not line.startswith("|"):
+            blocks[-1].append(shlex.split(line, comments=True))
+        elif not line.strip() or line.startswith("```"):
+            blocks.append([])
+    return [block for block in blocks if block]
+
+
+BLOCKS = [(page.name, block) for page in PAGES if page.name in COMMANDS for block in command_lines(page)]
+
+
+@pytest.fixture(scope="module")
+def started(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the files that the examples take for granted: arm, job, and a recorded run."""
+    folder = tmp_path_factory.mktemp("examples")
+    (folder / "my_arm.toml").write_text(arm_file.default_path().read_text())
+    (folder / "my_job.toml").write_text(job_file.default_path().read_text())
+    plan = small_plan(folder / "feed.json")
+    done = commandline.run("run", plan, "--repeat", "2", folder=folder)
+    assert done.exit_code == 0, done.errors
+    (folder / "runs" / "small-001").rename(folder / "runs" / "feed-001")
+    return folder
+
+
+@pytest.fixture
+def port(tmp_path: Path) -> Iterator[str]:
+    """A board with MicroPython alone on it, where the examples say PORT."""
+    options = LaunchOptions(tmp_path / "flash", deployed=True, interpreter=interpreters.starter(FASTEST))
+    with launch(options) as board:
+        yield board.port
+
+
+@pytest.mark.parametrize(("name", "code"), python_blocks(), ids=[name for name, _ in python_blocks()])
+def test_python_example(name: str, code: str, started: Path) -> None:
+    done = subprocess.run([sys.executable, "-c", code], cwd=started, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("page", "block"), BLOCKS, ids=[f"{page}-{number}" for number, (page, _) in enumerate(BLOCKS)]
+)
+def test_commands(page: str, block: list[list[str]], port: str, started: Path, tmp_path: Path) -> None:
+    for name in ("my_arm.toml", "my_job.toml"):
+        (tmp_path / name).write_text((started / name).read_text())
+    environment = {}
+    for words in block:
+        if words[0] == "export":
+            name, value = words[1].split("=")
+            environment[name] = value.replace(PORT, port)
+            continue
+        arguments = [port if word == PORT else word for word in words[1:]]
+        done = commandline.run(*arguments, folder=tmp_path, **environment)
+        assert done.exit_code == 0, f"{' '.join(words)}: {done.output}{done.errors}"
+
+
+def test_the_examples_were_found() -> None:
+    assert {name.split("-")[0] for name, _ in python_blocks()} >= {"README.md", "library.md", "kinematics.md"}
+    assert {page for page, _ in BLOCKS} == set(COMMANDS)
+    assert sum(len(block) for _, block in BLOCKS) >= 15
