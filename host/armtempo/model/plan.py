@@ -28,11 +28,15 @@ class Search:
     evaluations: int
     """Fitness evaluations of the search."""
     history_s: Array
-    """Best fitness of the first population and after each iteration, (iterations + 1,)."""
+    """Best fitness of the first population and after each iteration, (iterations + 1,); of a gradient search the best
+    motion time after each start."""
+    starts_s: Array
+    """Of a gradient search, the motion time that each start led to on few segments; else empty."""
     optimum_s: float
     """Where polished: lower bound of the local optimum with as many intervals; else 0."""
     floor_s: float
-    """Lower bound of the motion time of every time law along this path (kind "path": to about 1 ms)."""
+    """Proven lower bound of the motion time, whatever the time law along this path; for a free path, whatever the path
+    through the via points."""
     floor_kind: str
     """How the lower bound was found, see ``lower_bounds.floor``."""
 

@@ -17,7 +17,7 @@ from armtempo.model.plan import Plan
 from armtempo.splines.trajectory import JointSpline
 
 FORMAT = "armtempo trajectory"
-VERSION = 1
+VERSION = 2
 
 
 def save(plan: Plan, path: Path | str) -> None:

@@ -31,10 +31,11 @@ class Linearised(Protocol):
     def backward(self, weights: Array) -> Array:
         """Sum of the gradients of g with ``weights`` (M,): (n,)."""
 
-    def hessian(self, weights: Array, multipliers: Array | None) -> Array:
+    def hessian(self, weights: Array, multipliers: Array, exact: bool) -> Array:
         """Entries, at the positions of the program's matrix, of the Hessian of f + J' diag(weights) J.
 
-        With ``multipliers`` (M,) also minus the second derivatives of g times those.
+        Minus the second derivatives of g times ``multipliers`` (M,) too, if ``exact``, else what of them is never
+        indefinite.
         """
 
 
@@ -66,7 +67,7 @@ class Schedule:
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class Minimum:
     """Where the method ended."""
 
     x: Array
@@ -97,7 +98,7 @@ _FAR = -0.5
 """How far beyond the inequalities their curve is still measured."""
 
 
-def minimise(program: Program, x: Array, settings: Schedule | None = None) -> Solution:
+def minimise(program: Program, x: Array, settings: Schedule | None = None) -> Minimum:
     """The local optimum near ``x``, which must keep the inequalities; none of its iterates breaks one."""
     return _Solver(program, x, settings or Schedule()).run()
 
@@ -125,7 +126,7 @@ class _Solver:
         self.whole = False
         """Whether the last step was as long as Newton's method asked."""
 
-    def run(self) -> Solution:
+    def run(self) -> Minimum:
         for number in range(1, self.settings.iterations + 1):
             step = self._step()
             size = self.barrier * np.sqrt(self.count)
@@ -136,22 +137,23 @@ class _Solver:
                 self.barrier = max(self.last, lower)
         return self._solution(self.settings.iterations, False)
 
-    def _solution(self, iterations: int, converged: bool) -> Solution:
-        return Solution(self.x, self.program.objective(self.x), self.multipliers, iterations, converged)
+    def _solution(self, iterations: int, converged: bool) -> Minimum:
+        return Minimum(self.x, self.program.objective(self.x), self.multipliers, iterations, converged)
 
     def _step(self) -> _Step:
         """One step of variables and multipliers."""
         at = self.program.linearise(self.x)
         gradient = at.gradient - at.backward(self.barrier / self.g)
-        for multipliers in (self.multipliers, None) if self.exact else (None,):
+        for exact in (True, False) if self.exact else (False,):
+            entries = at.hessian(self.multipliers / self.g, self.multipliers, exact)
             try:
-                factor = self.program.kkt.factor(at.hessian(self.multipliers / self.g, multipliers))
+                factor = self.program.kkt.factor(entries)
             except np.linalg.LinAlgError:
                 continue
             step = factor.solve(gradient, self.program.equalities.residual(self.x))
             found = self._along(at, factor, gradient, step)
             if found.length > 0.0:
-                self.exact = self.settings.curvature and (found.length >= _BENT or multipliers is None)
+                self.exact = self.settings.curvature and (found.length >= _BENT or not exact)
                 self._move(found, at.forward(step))
                 return found
         self.exact = self.settings.curvature

@@ -8,7 +8,7 @@ import numpy as np
 
 from armtempo.arrays import Array
 from armtempo.planning.linear_rows import LinearRows
-from armtempo.planning.shape import Index, Shape
+from armtempo.planning.variables import Index, MotionVariables
 from armtempo.splines import bernstein, bspline
 
 
@@ -33,22 +33,22 @@ class Forms:
     low: Array
     high: Array
 
-    def rows(self, shape: Shape) -> LinearRows:
+    def rows(self, variables: MotionVariables) -> LinearRows:
         """The inequalities."""
-        return LinearRows(shape.size, self.columns, self.weights, self.low, self.high)
+        return LinearRows(variables.size, self.columns, self.weights, self.low, self.high)
 
 
-def forms(shape: Shape, low: Array, high: Array) -> Forms:
+def forms(variables: MotionVariables, low: Array, high: Array) -> Forms:
     """All Bernstein coefficients, between ``low`` and ``high``, each (S, k + 1, J).
 
     A coefficient that two segments share stands there twice; that of the second counts.
     """
-    count = shape.degree + 1
-    segment = np.arange(shape.segments)
+    count = variables.degree + 1
+    segment = np.arange(variables.segments)
     columns, weights, lows, highs = [], [], [], []
-    for joint in range(shape.joints):
-        control = shape.angle_index(joint)[segment[:, None] + np.arange(count)]
-        for number, row in enumerate(coefficients(shape.degree)):
+    for joint in range(variables.joints):
+        control = variables.angle_index(joint)[segment[:, None] + np.arange(count)]
+        for number, row in enumerate(coefficients(variables.degree)):
             own = slice(None) if number < count - 1 else slice(-1, None)
             columns.append(control[own])
             weights.append(np.broadcast_to(row, control[own].shape))

@@ -19,7 +19,18 @@ from armtempo import optimise
 from armtempo.arrays import Array
 from armtempo.errors import InputError, PlanError
 from armtempo.model.arm import Arm, DrivenJoint, Limits
-from armtempo.model.job import AUTO, GRADIENT, ITERATIONS, POPULATION, REFINE, STARTS, TIMINGS, Job
+from armtempo.model.job import (
+    AUTO,
+    GRADIENT,
+    ITERATIONS,
+    PATHS,
+    POPULATION,
+    REFINE,
+    STARTS,
+    TIMINGS,
+    Job,
+    Pose,
+)
 from armtempo.splines import bspline, extremes
 from armtempo.splines.extremes import Extremes
 from armtempo.splines.trajectory import JointSpline, Trajectory
@@ -80,6 +91,14 @@ def check_job(arm: Arm, job: Job) -> None:
                 f"job {job.name!r}: {name} {value} must be a whole number from {least} to {most}"
             )
     refine = 1 if isinstance(job.refine, str) else job.refine
+    _check_path(job)
+    kind = job.parameters.get("fitness", FITNESS[0])
+    if kind not in FITNESS:
+        raise InputError(f"job {job.name!r}: fitness {kind!r} must be one of {', '.join(FITNESS)}")
+    if job.optimiser != GRADIENT:
+        optimise.parameters(job.optimiser)
+    if is_free(job):
+        return
     segments = len(job.via) - 1
     if segments * refine > MAX_SEGMENTS:
         raise InputError(
@@ -92,11 +111,57 @@ def check_job(arm: Arm, job: Job) -> None:
             f"job {job.name!r}: its motion record would have {size} bytes, the board takes "
             f"{MAX_MOTION_BYTES}; lower refine, use shared timing or fewer via points"
         )
-    kind = job.parameters.get("fitness", FITNESS[0])
-    if kind not in FITNESS:
-        raise InputError(f"job {job.name!r}: fitness {kind!r} must be one of {', '.join(FITNESS)}")
-    if job.optimiser != GRADIENT:
-        optimise.parameters(job.optimiser)
+
+
+def is_free(job: Job) -> bool:
+    """Whether the path may leave the spline through the via points; a corridor of 0 leaves it no room."""
+    return job.path == "free" and 0.0 not in (job.corridor_deg, job.corridor_mm)
+
+
+def _check_path(job: Job) -> None:
+    where = f"job {job.name!r}"
+    if job.path not in PATHS:
+        raise InputError(f"{where}: path {job.path!r} must be one of {', '.join(map(repr, PATHS))}")
+    corridors = [name for name in ("corridor_deg", "corridor_mm") if getattr(job, name) is not None]
+    if corridors and job.path != "free":
+        raise InputError(f'{where}: {corridors[0]} bounds a free path; add path = "free" or leave it out')
+    if len(corridors) > 1:
+        raise InputError(f"{where}: give one of corridor_deg and corridor_mm, not both")
+    if corridors and not 0.0 <= getattr(job, corridors[0]) < math.inf:
+        raise InputError(f"{where}: {corridors[0]} must be 0 or more")
+    if job.stops and not is_free(job):
+        raise InputError(
+            f'{where}: the spline through the via points rests at its ends only; a stop needs path = "free", or '
+            "plan the stretches between the stops one by one with --split"
+        )
+    if is_free(job):
+        _check_free(job, where)
+
+
+def _check_free(job: Job, where: str) -> None:
+    if job.degree != 5:
+        raise InputError(f"{where}: a free path has degree 5, not {job.degree}")
+    tolerant = any(
+        isinstance(via, Pose) and max(via.tolerance_mm, via.tolerance_deg) > 0.0 for via in job.via
+    )
+    together = {
+        "a stop": bool(job.stops),
+        "a corridor": job.corridor_deg is not None or job.corridor_mm is not None,
+        "a tolerance at a via point": tolerant,
+    }
+    for what, asked in together.items():
+        if asked and job.timing != "shared":
+            raise InputError(
+                f'{where}: {what} needs timing = "shared", where the joints pass via points together'
+            )
+    inner = range(1, len(job.via) - 1)
+    for stop in job.stops:
+        if stop.via not in inner or not 0.0 <= stop.dwell_s < math.inf:
+            raise InputError(f"{where}: a stop must be at a via point between the ends, for 0 s or more")
+    if len({stop.via for stop in job.stops}) < len(job.stops):
+        raise InputError(f"{where}: two stops at one via point")
+    if together["a corridor"] and any(stop.dwell_s > 0.0 for stop in job.stops):
+        raise InputError(f"{where}: a corridor and a dwell do not go together; give stops without dwell_s")
 
 
 def check_via(arm: Arm, job: Job, via_deg: Array) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from armtempo.arrays import Array
 from armtempo.planning.fitness import stretch_of
-from armtempo.planning.shape import Index
+from armtempo.planning.variables import Index
 from armtempo.splines import bspline, extremes, time_axis
 from armtempo.splines.trajectory import derivatives
 

@@ -16,7 +16,7 @@ from armtempo.planning import collocation
 from armtempo.planning.collocation import Curve, Points
 from armtempo.planning.limit_rows import LimitRows
 from armtempo.planning.motion_program import MotionProgram, time_weights
-from armtempo.planning.shape import Shape, time_points
+from armtempo.planning.variables import MotionVariables, time_points
 from armtempo.splines import bspline, time_axis
 
 _ROUNDS = 12
@@ -59,11 +59,11 @@ class FixedPath:
     ) -> None:  # fmt: skip
         pieces = bspline.subdivide(bspline.polynomials(angle_points_deg, degree), refine)
         self.degree, self.refine = degree, refine
-        self.shape = Shape(len(pieces), degree, 0)
+        self.variables = MotionVariables(len(pieces), degree, 0)
         self.angle = np.ascontiguousarray(np.moveaxis(pieces, 2, 0))
         self.limits = np.array([limit.values for limit in limits])
-        self._weights = time_weights(self.shape)
-        self._equalities = _mirror(self.shape) if mirrored else Equalities.none()
+        self._weights = time_weights(self.variables)
+        self._equalities = _mirror(self.variables) if mirrored else Equalities.none()
 
     def curve(self, differences_s: Array) -> Curve:
         """The motion on this time axis."""
@@ -93,8 +93,8 @@ class FixedPath:
         Ends when it is known to within ``gap`` of it, or further rounds do not help.
         """
         best = self.stretched(differences_s)
-        parts = max(_LEAST_PARTS, min(_PARTS // self.refine, _POINTS // self.shape.segments))
-        points = collocation.grid(self.shape.segments, parts, ends=self.degree == 3)
+        parts = max(_LEAST_PARTS, min(_PARTS // self.refine, _POINTS // self.variables.segments))
+        points = collocation.grid(self.variables.segments, parts, ends=self.degree == 3)
         settings, bound, here = _COARSE, 0.0, best
         for _ in range(_ROUNDS):
             here, bound = self._solve(here, points, settings)
@@ -111,11 +111,11 @@ class FixedPath:
 
     def _solve(self, differences_s: Array, points: Points, settings: Schedule) -> tuple[Array, float]:
         """The best axis that keeps the limits at these points, and a bound from below on its motion time."""
-        unit_s = self.duration_s(differences_s) / self.shape.segments
+        unit_s = self.duration_s(differences_s) / self.variables.segments
         limits = self.limits * unit_s ** np.arange(1, 4)
         angle = np.stack([_at(self.angle, points, order) for order in (1, 2, 3)])
-        rows = LimitRows(self.shape, points.segment, points.u, limits, angle)
-        program = MotionProgram(self.shape, [rows], self._equalities)
+        rows = LimitRows(self.variables, points, limits, angle)
+        program = MotionProgram(self.variables, [rows], self._equalities)
         found = interior_point.minimise(program, differences_s / unit_s * _AWAY, settings)
         here = found.x * unit_s
         bound = self.duration_s(here) * (1.0 - 2.0 * settings.last_barrier) if found.converged else 0.0
@@ -129,13 +129,13 @@ def _at(angle: Array, points: Points, order: int) -> Array:
     return np.asarray(np.einsum("pc,pcj->pj", powers, derived[points.segment]))
 
 
-def _mirror(shape: Shape) -> Equalities:
+def _mirror(variables: MotionVariables) -> Equalities:
     """Differences at both ends are equal in pairs, as those of an axis of intervals are."""
-    edge = (shape.degree - 1) // 2
-    mirrored = time_axis.mirrored(shape.segments, edge) + edge
+    edge = (variables.degree - 1) // 2
+    mirrored = time_axis.mirrored(variables.segments, edge) + edge
     own = np.flatnonzero(mirrored != np.arange(len(mirrored)))
     row = np.arange(len(own))
-    places = shape.places
+    places = variables.places
     return Equalities(
         np.concatenate([row, row]),
         np.concatenate([own, mirrored[own]]),

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from math import comb
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +19,15 @@ from armtempo.planning.collocation import Curve, Points
 from armtempo.planning.layout import DEGREE, DWELL_SEGMENTS, Layout, Vias
 from armtempo.planning.limit_rows import LimitRows
 from armtempo.planning.motion_program import Block, MotionProgram, time_weights
-from armtempo.planning.shape import Shape, time_points
+from armtempo.planning.tool import Tool
+from armtempo.planning.tool_rows import ToolRows, ToolTargets
+from armtempo.planning.variables import MotionVariables, time_points
 from armtempo.splines import bspline
 
 _PARTS = 4
 """Points in a segment at which limits are watched, besides the peaks found."""
+_CORRIDOR_PARTS = 4
+"""Points in a segment at which the tool's corridor is watched."""
 _FINER = 4
 _WATCHED = 0.95
 _AWAY = 1.01
@@ -34,6 +40,13 @@ _AT_END = 1e-6
 """A via point this near to the end of a range, as a part of what its joint turns, is at it."""
 _NEAR = 1e-5
 """Solves end where their points miss no more than this of a limit."""
+
+
+class Tolerance(NamedTuple):
+    """How far the tool may be from a pose."""
+
+    position_mm: float
+    rotation_deg: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +66,12 @@ class Demand:
     """Dwell in seconds by via point where the motion rests, 0 for a rest without one."""
     corridor_deg: float = np.inf
     """How far any joint may leave the spline through the via points."""
+    corridor_mm: float = np.inf
+    """How far the tool may leave it."""
+    tool: Tool | None = None
+    """Of these joints; needed for ``corridor_mm`` and ``tolerances``."""
+    tolerances: Mapping[int, Tolerance] = field(default_factory=dict)
+    """By via point, where the tool need not be exactly where the angles bring it."""
 
     @property
     def size_deg(self) -> Array:
@@ -87,18 +106,24 @@ class FreeMotion:
     @property
     def total_s(self) -> float:
         """Motion time."""
-        return float(time_weights(self.shape) @ self.differences_s)
+        return float(time_weights(self.variables) @ self.differences_s)
 
     @property
-    def shape(self) -> Shape:
+    def variables(self) -> MotionVariables:
         """How its variables are laid out."""
-        return Shape(self.layout.segments, DEGREE, self.angle_points_deg.shape[1])
+        return MotionVariables(self.layout.segments, DEGREE, self.angle_points_deg.shape[1])
 
     @property
     def via_times_s(self) -> Array:
         """When it arrives at each via point: (n + 1,)."""
         times = bspline.polynomials(time_points(self.differences_s, DEGREE), DEGREE)
         return np.append(times[self.layout.arrivals[:-1], 0], times[-1].sum())
+
+    @property
+    def stretch_times_s(self) -> Array:
+        """Time from each via point to the next, without dwells: (n,)."""
+        dwells = [self.layout.stops.get(via, 0.0) for via in range(len(self.layout.pieces))]
+        return np.asarray(np.diff(self.via_times_s) - np.array(dwells))
 
     def stretched(self, limits: Array) -> FreeMotion:
         """The same with time scaled until it just keeps every limit, proven."""
@@ -148,6 +173,36 @@ def through(demand: Demand, layout: Layout) -> Array:
     return np.concatenate(whole)
 
 
+def _targets(demand: Demand, layout: Layout) -> ToolTargets | None:
+    """Where the tool has to be near: at via points with a tolerance, and along a corridor."""
+    if demand.tool is None:
+        return None
+    parts = []
+    if demand.tolerances:
+        vias = sorted(demand.tolerances)
+        allowed = np.array([demand.tolerances[via] for via in vias])
+        knots = layout.arrivals[vias]
+        segment = np.minimum(knots, layout.segments - 1)
+        state = demand.tool.at(demand.via_deg[vias])
+        points = Points(segment, (knots - segment).astype(float))
+        parts.append(ToolTargets(points, state.position_mm, state.rotation, *allowed.T))
+    if np.isfinite(demand.corridor_mm):
+        points = collocation.grid(layout.segments, _CORRIDOR_PARTS, ends=False)
+        inner = Points(points.segment[1:-1], points.u[1:-1])
+        state = demand.tool.at(_at(through(demand, layout), inner))
+        most = np.full(len(inner.u), demand.corridor_mm)
+        parts.append(ToolTargets(inner, state.position_mm, state.rotation, most, np.full(len(most), np.inf)))
+    return sum(parts[1:], parts[0]) if parts else None
+
+
+def _at(pieces: Array, points: Points) -> Array:
+    """Values (P, J) of Bernstein coefficients (S, 6, J) at points."""
+    count = np.arange(DEGREE + 1)
+    u = points.u[:, None]
+    weights = np.array([comb(DEGREE, index) for index in count]) * u**count * (1.0 - u) ** (DEGREE - count)
+    return np.asarray(np.einsum("pb,pbj->pj", weights, pieces[points.segment]))
+
+
 def _bernstein(piece: Array, parts: int) -> Array:
     """Bernstein coefficients (parts, 6, J) of one segment, power coefficients (1, 6, J), cut into parts."""
     from armtempo.splines import bernstein
@@ -161,9 +216,10 @@ class Improver:
 
     def __init__(self, demand: Demand, layout: Layout) -> None:
         self.demand, self.layout = demand, layout
-        self.shape = Shape(layout.segments, DEGREE, len(demand.limits))
+        self.variables = MotionVariables(layout.segments, DEGREE, len(demand.limits))
         self._size = demand.size_deg
         self._low, self._high = bounds(demand, layout)
+        self._targets = _targets(demand, layout)
 
     def improved(self, motion: FreeMotion, rounds: int) -> FreeMotion:
         """After so many solves, each at the peaks that the one before showed; never slower than ``motion``."""
@@ -182,58 +238,62 @@ class Improver:
 
     def equalities(self, unit_s: float) -> Equalities:
         """What must hold exactly, with angles in parts of ``size_deg`` and times in ``unit_s``."""
-        via = Vias(self.demand.via_deg / self._size, self.demand.turning)
-        return self.layout.equalities(self.shape, via, unit_s)
+        via = Vias(self.demand.via_deg / self._size, self.demand.turning, frozenset(self.demand.tolerances))
+        return self.layout.equalities(self.variables, via, unit_s)
 
     def angle_rows(self) -> Block:
         """Inequalities of ranges and corridor, with angles in parts of ``size_deg``."""
-        return angle_bounds.forms(self.shape, self._low / self._size, self._high / self._size).rows(
-            self.shape
+        return angle_bounds.forms(self.variables, self._low / self._size, self._high / self._size).rows(
+            self.variables
         )
 
     def _solve(self, motion: FreeMotion, points: Points, first: bool) -> FreeMotion:
         unit_s = motion.total_s / self.layout.segments
         limits = self.demand.limits * unit_s ** np.arange(1, 4) / self._size[:, None]
-        blocks = [LimitRows(self.shape, points.segment, points.u, limits, None), self.angle_rows()]
+        blocks: list[Block] = [LimitRows(self.variables, points, limits, None), self.angle_rows()]
+        if self._targets is not None and self.demand.tool is not None:
+            blocks.append(ToolRows(self.variables, self.demand.tool, self._targets, self._size))
         smoothing = self._smoothing() * (1.0 if first else _SMOOTHED)
-        program = MotionProgram(self.shape, blocks, self.equalities(unit_s), smoothing)
-        start = self.shape.pack(motion.angle_points_deg / self._size, motion.differences_s / unit_s * _AWAY)
+        program = MotionProgram(self.variables, blocks, self.equalities(unit_s), smoothing)
+        start = self.variables.pack(
+            motion.angle_points_deg / self._size, motion.differences_s / unit_s * _AWAY
+        )
         if not np.all(program.inequalities(start) > 0.0):
             return motion
         x = interior_point.minimise(program, start, _FIRST if first else _AGAIN).x
-        x = met(self.shape, program.equalities, x)
+        x = met(self.variables, program.equalities, x)
         return replace(
             motion,
-            angle_points_deg=self.shape.angle_points(x) * self._size,
-            differences_s=self.shape.time_differences(x) * unit_s,
+            angle_points_deg=self.variables.angle_points(x) * self._size,
+            differences_s=self.variables.time_differences(x) * unit_s,
         )
 
     def _smoothing(self) -> Array:
         """Weights of the steps between time differences; none where a dwell begins and ends."""
         vias = len(self.demand.via_deg) - 1
-        weights = np.full(self.shape.differences - 1, _SMOOTHING * self.layout.segments / vias**2)
+        weights = np.full(self.variables.differences - 1, _SMOOTHING * self.layout.segments / vias**2)
         for knot in self.layout.dwells:
             weights[knot + DWELL_SEGMENTS - 2 : knot + DWELL_SEGMENTS] = 0.0
         return weights
 
 
-def met(shape: Shape, equalities: Equalities, x: Array, smooth: bool = False) -> Array:
+def met(variables: MotionVariables, equalities: Equalities, x: Array, smooth: bool = False) -> Array:
     """``x`` changed so that the equalities hold, with the least third differences of the change.
 
     With ``smooth`` the least of the angles themselves, whatever they were between the via points.
     """
-    control = np.concatenate([shape.angle_index(joint) for joint in range(shape.joints)])
-    starts = np.concatenate([shape.angle_index(joint)[:-3] for joint in range(shape.joints)])
+    control = np.concatenate([variables.angle_index(joint) for joint in range(variables.joints)])
+    starts = np.concatenate([variables.angle_index(joint)[:-3] for joint in range(variables.joints)])
     window = starts[:, None] + np.arange(4)
     third = np.array([-1.0, 3.0, -3.0, 1.0])
-    rows = np.concatenate([np.repeat(window, 4, axis=1).ravel(), np.arange(shape.size)])
-    columns = np.concatenate([np.tile(window, (1, 4)).ravel(), np.arange(shape.size)])
-    steady = np.ones(shape.size)
+    rows = np.concatenate([np.repeat(window, 4, axis=1).ravel(), np.arange(variables.size)])
+    columns = np.concatenate([np.tile(window, (1, 4)).ravel(), np.arange(variables.size)])
+    steady = np.ones(variables.size)
     steady[control] = 1e-9
     entries = np.concatenate([np.tile(np.outer(third, third).ravel(), len(window)), steady])
-    gradient = np.zeros(shape.size)
+    gradient = np.zeros(variables.size)
     if smooth:
         bent = x[window] @ third
         np.add.at(gradient, window, np.outer(bent, third))
-    kkt = BandedKkt(shape.places, rows, columns, equalities)
+    kkt = BandedKkt(variables.places, rows, columns, equalities)
     return x + kkt.factor(entries).solve(gradient, equalities.residual(x))

@@ -12,20 +12,20 @@ from armtempo.optimise.kkt import Equalities
 from armtempo.planning import angle_bounds, inside_bounds
 from armtempo.planning.free_motion import Demand, FreeMotion, Improver, bounds, met
 from armtempo.planning.layout import DEGREE, Layout, Vias, uniform
-from armtempo.planning.shape import Shape
+from armtempo.planning.variables import MotionVariables
 from armtempo.splines import bspline
 
 _LEAST_STEP = 1e-3
 """Least difference of time control points, as a part of the largest."""
 
 
-def along_spline(demand: Demand, pieces: int) -> FreeMotion:
-    """The spline through the via points, with as many segments between any two of them."""
+def along_spline(demand: Demand, pieces: int, times_s: Array) -> FreeMotion:
+    """The spline through the via points, with as many segments between any two of them; for times (n,) there."""
     layout = uniform(len(demand.via_deg), pieces, demand.stops)
     points = bspline.refined(bspline.fit(demand.via_deg, DEGREE), pieces, DEGREE)
     if demand.stops:
-        return smooth(demand, layout, np.ones(len(demand.via_deg) - 1))
-    return _met(demand, layout, points, np.ones(layout.segments + DEGREE - 1), smooth=False)
+        return smooth(demand, layout, times_s)
+    return _met(demand, layout, points, _differences(layout, times_s / pieces), smooth=False)
 
 
 def smooth(demand: Demand, layout: Layout, times_s: Array) -> FreeMotion:
@@ -43,7 +43,7 @@ def resampled(demand: Demand, layout: Layout, motion: FreeMotion) -> FreeMotion:
     curve = motion.curve(demand.limits)
     times = motion.via_times_s
     leaves = times + np.array([motion.layout.stops.get(via, 0.0) for via in range(len(times))])
-    steps_s = (times[1:] - leaves[:-1]) / layout.pieces
+    steps_s = motion.stretch_times_s / layout.pieces
     knots = [np.array([0.0])]
     for via, (step, count) in enumerate(zip(steps_s, layout.pieces, strict=True)):
         if layout.arrivals[via] < layout.departures()[via]:
@@ -56,7 +56,7 @@ def resampled(demand: Demand, layout: Layout, motion: FreeMotion) -> FreeMotion:
 
 def _passing(times_s: Array) -> Array:
     """Differences (S + 4,) of control points whose spline has these times (S + 1,) at its knots."""
-    shape = Shape(len(times_s) - 1, DEGREE, 1)
+    variables = MotionVariables(len(times_s) - 1, DEGREE, 1)
     weights = bspline.basis(DEGREE)[0, :DEGREE]
     columns = np.arange(len(times_s))[:, None] + np.arange(DEGREE)
     rows = Equalities(
@@ -64,10 +64,10 @@ def _passing(times_s: Array) -> Array:
         columns.ravel(),
         np.tile(weights, len(times_s)),
         times_s,
-        np.arange(len(times_s)) + 0.5 * (DEGREE - 1),
+        0.5 * (DEGREE - 1) + np.arange(len(times_s), dtype=np.float64),
     )
-    x = met(shape, rows, np.zeros(shape.size), smooth=True)
-    return np.diff(shape.angle_points(x)[:, 0])
+    x = met(variables, rows, np.zeros(variables.size), smooth=True)
+    return np.diff(variables.angle_points(x)[:, 0])
 
 
 def _differences(layout: Layout, steps_s: Array) -> Array:
@@ -85,10 +85,10 @@ def _differences(layout: Layout, steps_s: Array) -> Array:
 def _met(demand: Demand, layout: Layout, points: Array, differences_s: Array, smooth: bool) -> FreeMotion:
     """The motion with its control points moved so that via points, rests and dwells are met."""
     improver = Improver(demand, layout)
-    x = improver.shape.pack(points / demand.size_deg, differences_s)
-    x = met(improver.shape, improver.equalities(1.0), x, smooth)
+    x = improver.variables.pack(points / demand.size_deg, differences_s)
+    x = met(improver.variables, improver.equalities(1.0), x, smooth)
     steps = np.maximum(differences_s, _LEAST_STEP * differences_s.max())
-    motion = FreeMotion(layout, improver.shape.angle_points(x) * demand.size_deg, steps)
+    motion = FreeMotion(layout, improver.variables.angle_points(x) * demand.size_deg, steps)
     return _inside(demand, motion)
 
 
@@ -97,12 +97,12 @@ def _inside(demand: Demand, motion: FreeMotion) -> FreeMotion:
     layout, size = motion.layout, demand.size_deg
     low, high = bounds(demand, layout)
     points = motion.angle_points_deg.copy()
-    shape = Shape(layout.segments, DEGREE, 1)
+    variables = MotionVariables(layout.segments, DEGREE, 1)
     vias = Vias(demand.via_deg / size, demand.turning)
     for joint, name in enumerate(demand.names):
         one = slice(joint, joint + 1)
-        forms = angle_bounds.forms(shape, low[..., one] / size[joint], high[..., one] / size[joint])
-        fixed = layout.angle_equalities(shape, vias.joint(joint))
+        forms = angle_bounds.forms(variables, low[..., one] / size[joint], high[..., one] / size[joint])
+        fixed = layout.angle_equalities(variables, vias.joint(joint))
         rooms = demand.room_deg[~demand.turning[:, joint], joint]
         room = min(rooms.min(initial=np.inf), demand.corridor_deg) / size[joint]
         found = inside_bounds.nearest(forms, room, fixed, points[:, joint] / size[joint])

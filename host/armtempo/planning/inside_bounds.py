@@ -94,6 +94,6 @@ class _Linearised:
     def backward(self, weights: Array) -> Array:
         return self._bounds.backward(weights)
 
-    def hessian(self, weights: Array, _: Array | None) -> Array:
-        smooth = self._third.hessian(np.full(self._third.count, self._scale), None)
-        return np.concatenate([smooth, self._bounds.hessian(weights, None)])
+    def hessian(self, weights: Array, multipliers: Array, exact: bool) -> Array:
+        smooth = self._third.hessian(np.full(self._third.count, self._scale), multipliers, exact)
+        return np.concatenate([smooth, self._bounds.hessian(weights, multipliers, exact)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from armtempo.arrays import Array
 from armtempo.model.arm import Limits
 from armtempo.model.job import Job
 from armtempo.optimise.tracker import Result
-from armtempo.planning import checks
+from armtempo.planning import checks, rest_to_rest
 from armtempo.planning.fitness import Fitness
 from armtempo.planning.fixed_path import FixedPath
 from armtempo.progress import Progress
@@ -20,8 +20,6 @@ from armtempo.splines import bspline
 
 _REACH = 6.0
 """Bounds are this factor below and above what an interval would need by itself."""
-_LEAST_SHARE = 0.05
-"""An interval whose joints hardly move counts as this part of the mean one."""
 _WIDER = 6.0
 _WIDENINGS = 3
 _NEAR = 1.01
@@ -34,7 +32,9 @@ class Found:
     """What the search found, and what the user must know of it."""
 
     result: Result
-    notes: tuple[str, ...]
+    starts_s: Array
+    """Motion time that each start of a gradient search led to; else empty."""
+    notes: tuple[str, ...] = ()
 
 
 def bounds_s(angle_points_deg: Array, degree: int, limits: Sequence[Limits]) -> Array:
@@ -44,11 +44,7 @@ def bounds_s(angle_points_deg: Array, degree: int, limits: Sequence[Limits]) -> 
     """
     pieces = bspline.polynomials(angle_points_deg, degree)
     via = np.concatenate([pieces[:, 0], pieces[-1:].sum(axis=1)])
-    ways = np.abs(np.diff(via, axis=0))
-    speed, acceleration, jerk = np.array([limit.values for limit in limits]).T
-    needs = np.maximum(ways / speed, np.maximum(np.sqrt(4 * ways / acceleration), np.cbrt(32 * ways / jerk)))
-    needed = needs.max(axis=1)
-    needed = np.maximum(needed, _LEAST_SHARE * needed.mean())
+    needed = rest_to_rest.needed_s(via, np.array([limit.values for limit in limits]))
     return np.stack([needed / _REACH, needed * _REACH], axis=1)
 
 
@@ -64,11 +60,13 @@ def search(
     if job.bounds_s is not None:
         box = np.tile(np.array(job.bounds_s), (len(box), 1))
     notes: list[str] = []
-    best: Result | None = None
+    best: Found | None = None
     for widening in range(_WIDENINGS + 1):
         found = _once(angle_points_deg, limits, job, box, rng, progress)
-        best = found if best is None or found.value < best.value else best
-        held = _held(found.x, box, relative=job.parameters.get("fitness", checks.FITNESS[0]) == "stretched")
+        best = found if best is None or found.result.value < best.result.value else best
+        held = _held(
+            found.result.x, box, relative=job.parameters.get("fitness", checks.FITNESS[0]) == "stretched"
+        )
         if not len(held):
             break
         named = ", ".join(str(number + 1) for number in held)
@@ -83,7 +81,7 @@ def search(
             )
             box = box * np.array([1.0 / _WIDER, _WIDER])
     assert best is not None
-    return Found(best, tuple(notes))
+    return replace(best, notes=tuple(notes))
 
 
 def _once(
@@ -93,7 +91,7 @@ def _once(
     box: Array,
     rng: np.random.Generator,
     progress: Progress,
-) -> Result:
+) -> Found:
     if job.optimiser == "gradient":
         path = FixedPath(points, job.degree, limits, mirrored=True)
         return gradient(path, box, rng, job.starts, progress)
@@ -101,26 +99,26 @@ def _once(
     parameters = dict(job.parameters)
     function = getattr(fitness, str(parameters.pop("fitness", checks.FITNESS[0])))
     settings = optimise.Settings(job.optimiser, job.population, job.iterations, parameters)
-    return optimise.minimise(function, box, rng, settings, progress)
+    return Found(optimise.minimise(function, box, rng, settings, progress), np.empty(0))
 
 
-def gradient(
-    path: FixedPath, box: Array, rng: np.random.Generator, starts: int, progress: Progress
-) -> Result:
+def gradient(path: FixedPath, box: Array, rng: np.random.Generator, starts: int, progress: Progress) -> Found:
     """The best of the local optima that ``starts`` random intervals within ``box`` (n, 2) lead to.
 
     An evaluation is a start; the history is the best motion time after each.
     """
-    best, history, intervals = np.inf, [], box[:, 0]
+    times: list[float] = []
+    intervals = box[:, 0]
     low, high = np.log(box).T
     for number in range(starts):
         start = np.exp(rng.uniform(low, high))
         optimum = path.optimum(path.of_intervals(start), _COARSE_GAP)
-        if optimum.total_s < best or not number:
-            best, intervals = optimum.total_s, path.intervals(optimum.differences_s)
-        history.append(best)
+        if optimum.total_s < min(times, default=np.inf):
+            intervals = path.intervals(optimum.differences_s)
+        times.append(optimum.total_s)
         progress(number + 1, starts)
-    return Result(intervals, best, starts, np.array(history))
+    history = np.minimum.accumulate(times)
+    return Found(Result(intervals, float(history[-1]), starts, history), np.array(times))
 
 
 def _held(x: Array, box: Array, relative: bool) -> np.ndarray:

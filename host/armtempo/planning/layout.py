@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from armtempo.arrays import Array
 from armtempo.optimise.kkt import Equalities
 from armtempo.planning.motion_program import mean_slopes
-from armtempo.planning.shape import Index, Shape
+from armtempo.planning.variables import Index, MotionVariables
 from armtempo.splines import bspline
 
 DEGREE = 5
@@ -71,29 +71,29 @@ class Layout:
         later = np.array([self.stops.get(via, 0.0) > 0.0 for via in range(len(self.pieces) + 1)])
         return np.asarray(self.arrivals + DWELL_SEGMENTS * later)
 
-    def equalities(self, shape: Shape, vias: Vias, unit_s: float) -> Equalities:
+    def equalities(self, variables: MotionVariables, vias: Vias, unit_s: float) -> Equalities:
         """Via points, rests, and dwells; ``unit_s``: the program's unit of time."""
         rows = _Rows()
-        self._add_angles(rows, shape, vias)
+        self._add_angles(rows, variables, vias)
         for knot, dwell in self.dwells.items():
-            index = shape.difference_index[knot : knot + DWELL_SEGMENTS + DEGREE - 1]
+            index = variables.difference_index[knot : knot + DWELL_SEGMENTS + DEGREE - 1]
             weights = np.convolve(np.ones(DWELL_SEGMENTS), mean_slopes(DEGREE))
-            rows.add(index, weights, dwell / unit_s, float(shape.places[index].mean()))
+            rows.add(index, weights, dwell / unit_s, float(variables.places[index].mean()))
         return rows.equalities()
 
-    def angle_equalities(self, shape: Shape, vias: Vias) -> Equalities:
+    def angle_equalities(self, variables: MotionVariables, vias: Vias) -> Equalities:
         """The same without dwells."""
         rows = _Rows()
-        self._add_angles(rows, shape, vias)
+        self._add_angles(rows, variables, vias)
         return rows.equalities()
 
-    def _add_angles(self, rows: _Rows, shape: Shape, vias: Vias) -> None:
+    def _add_angles(self, rows: _Rows, variables: MotionVariables, vias: Vias) -> None:
         last = len(self.pieces)
         for via, knot in enumerate(self.arrivals):
             place = float(knot) + 0.5 * (DEGREE - 1)
             rests = via in (0, last) or via in self.stops
-            for joint in range(shape.joints):
-                control = shape.angle_index(joint)[knot:]
+            for joint in range(variables.joints):
+                control = variables.angle_index(joint)[knot:]
                 angle = float(vias.angles[via, joint])
                 if int(knot) in self.dwells:
                     for offset in range(DWELL_SEGMENTS + DEGREE):

@@ -6,29 +6,33 @@ import numpy as np
 
 from armtempo.arrays import Array
 from armtempo.planning import limit_ratios
-from armtempo.planning.shape import Index, Shape, angle_basis, time_basis
+from armtempo.planning.collocation import Points
+from armtempo.planning.variables import Index, MotionVariables, angle_basis, time_basis
 
 
 class LimitRows:
     """1 - ratio > 0 and 1 + ratio > 0 for speed, acceleration and jerk of each joint at each point.
 
-    ``segment`` and ``u``: (P,), sorted by segment, with a point in every segment; ``limits``: (J, 3);
-    ``angle``: (3, P, J), derivatives of the angles at the points where the path is fixed, else None.
+    ``points``: P of them, at least one in every segment; ``limits``: (J, 3); ``angle``: (3, P, J), derivatives of
+    the angles at the points where the path is fixed, else None.
     """
 
-    def __init__(self, shape: Shape, segment: Index, u: Array, limits: Array, angle: Array | None) -> None:
+    def __init__(
+        self, variables: MotionVariables, points: Points, limits: Array, angle: Array | None
+    ) -> None:
+        segment, u = points.segment, points.u
         self.limits, self._segment, self._angle = limits, segment, angle
-        self._starts = np.searchsorted(segment, np.arange(shape.segments))
-        self._bases = angle_basis(shape.degree, u)
-        self._time_bases = time_basis(shape.degree, u)
-        window = np.arange(shape.segments)[:, None]
-        self._times = shape.difference_index[window + np.arange(shape.degree)]
-        control = window + np.arange(shape.degree + 1)
-        none = np.empty((shape.segments, 0, shape.degree + 1), dtype=np.intp)
-        joints = [shape.angle_index(joint)[control] for joint in range(shape.joints)]
+        self._starts = np.searchsorted(segment, np.arange(variables.segments))
+        self._bases = angle_basis(variables.degree, u)
+        self._time_bases = time_basis(variables.degree, u)
+        window = np.arange(variables.segments)[:, None]
+        self._times = variables.difference_index[window + np.arange(variables.degree)]
+        control = window + np.arange(variables.degree + 1)
+        none = np.empty((variables.segments, 0, variables.degree + 1), dtype=np.intp)
+        joints = [variables.angle_index(joint)[control] for joint in range(variables.joints)]
         self._angles = np.stack(joints, axis=1) if joints else none
         self.rows, self.columns = self._pattern()
-        self.size = shape.size
+        self.size = variables.size
 
     def _pattern(self) -> tuple[Index, Index]:
         """Positions of the entries of ``_Linearised.hessian``."""
@@ -106,13 +110,13 @@ class LinearisedLimits:
             result += np.bincount(rows._angles.ravel(), sums.ravel(), minlength=rows.size)
         return np.asarray(result)
 
-    def hessian(self, weights: Array, multipliers: Array | None) -> Array:
+    def hessian(self, weights: Array, multipliers: Array, exact: bool) -> Array:
         """See there; the entries stand at ``LimitRows.rows`` and ``columns``."""
         rows = self._rows
         shape = (2, 3, *self._angle.shape[1:])
         both = weights.reshape(shape).sum(axis=0)
         local = np.einsum("kapj,kbpj->abpj", self._gradient * both[:, None], self._gradient, optimize=True)
-        if multipliers is not None:
+        if exact:
             upper, lower = multipliers.reshape(shape)
             local += limit_ratios.curvature(self._angle, self._time, rows.limits, upper - lower)
         return rows.assemble(local)

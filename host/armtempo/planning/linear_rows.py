@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from armtempo.arrays import Array
-from armtempo.planning.shape import Index
+from armtempo.planning.variables import Index
 
 
 class LinearRows:
@@ -42,7 +42,7 @@ class LinearRows:
         values = (rows[:, None] * self._weights).ravel()
         return np.asarray(np.bincount(self._columns.ravel(), values, minlength=self._size), dtype=float)
 
-    def hessian(self, weights: Array, _: Array | None) -> Array:
+    def hessian(self, weights: Array, _: Array, __: bool) -> Array:
         """See there; the entries stand at ``rows`` and ``columns``."""
         return np.asarray((self._per_row(weights, 1.0)[:, None] * self._outer).ravel())
 

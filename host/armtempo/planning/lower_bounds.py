@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -23,7 +24,10 @@ def floor(angle_points_deg: Array, degree: int, limits: Sequence[Limits]) -> tup
     """
     joints = range(len(limits))
     found = [
-        (rest_to_rest.floor_s(turns(angle_points_deg[:, j], degree), limits[j], at_rest=degree == 5), "rests")
+        (
+            rest_to_rest.floor_s(turns(angle_points_deg[:, j], degree), limits[j], from_rest=degree == 5),
+            "rests",
+        )
         for j in joints
     ]
     if len(limits) > 1:
@@ -54,3 +58,42 @@ def _stationary(piece: Array) -> Array:
     roots = np.roots(slope) if np.any(slope) else np.empty(0)
     u = np.sort(roots.real[(np.abs(roots.imag) < 1e-7) & (roots.real > 0) & (roots.real < 1)])
     return np.polyval(piece[::-1], np.concatenate([[0.0], u]))
+
+
+def free_floor_s(
+    via_deg: Array, limits: Sequence[Limits], stops: Mapping[int, float], loose: Collection[int] = ()
+) -> float:
+    """No motion through via angles (n + 1, J) takes less, whatever its path.
+
+    From stop to stop (dwells in seconds by via point) the largest over joints of the least time through its turning
+    via angles under its three limits: where a joint's via angles turn it stands still there or beyond. ``loose`` via
+    points, which may be passed at other angles, do not count.
+    """
+    last = len(via_deg) - 1
+    ends = [0, *sorted(set(stops) - set(loose)), last]
+    total = sum(stops.values())
+    for first, end in pairwise(ends):
+        exact = [via for via in range(first, end + 1) if via not in loose]
+        rests = end not in loose
+        times = [
+            rest_to_rest.floor_s(_turning(via_deg[exact, joint], rests), limit, to_rest=rests)
+            for joint, limit in enumerate(limits)
+        ]
+        total += max(times)
+    return total
+
+
+def _turning(angles: Array, rests: bool) -> Array:
+    """First and last of the angles and those between where their direction changes.
+
+    Where the joint does not rest at the last, that is left out.
+    """
+    kept = [float(angles[0])]
+    for angle in angles[1:]:
+        if angle == kept[-1]:
+            continue
+        if len(kept) > 1 and (angle - kept[-1]) * (kept[-1] - kept[-2]) > 0:
+            kept[-1] = float(angle)
+        else:
+            kept.append(float(angle))
+    return np.array(kept if rests or len(kept) == 1 else kept[:-1])

@@ -11,7 +11,7 @@ from armtempo.arrays import Array
 from armtempo.optimise.interior_point import Linearised
 from armtempo.optimise.kkt import BandedKkt, Equalities
 from armtempo.planning.linear_rows import LinearRows
-from armtempo.planning.shape import Index, Shape, time_basis
+from armtempo.planning.variables import Index, MotionVariables, time_basis
 
 
 class LinearisedBlock(Protocol):
@@ -21,7 +21,7 @@ class LinearisedBlock(Protocol):
 
     def backward(self, weights: Array) -> Array: ...
 
-    def hessian(self, weights: Array, multipliers: Array | None) -> Array: ...
+    def hessian(self, weights: Array, multipliers: Array, exact: bool) -> Array: ...
 
 
 class Block(Protocol):
@@ -43,20 +43,24 @@ class MotionProgram:
     """
 
     def __init__(
-        self, shape: Shape, blocks: Sequence[Block], equalities: Equalities, smoothing: Array | None = None
+        self,
+        variables: MotionVariables,
+        blocks: Sequence[Block],
+        equalities: Equalities,
+        smoothing: Array | None = None,
     ) -> None:
-        self.shape, self.equalities = shape, equalities
-        index = shape.difference_index
+        self.variables, self.equalities = variables, equalities
+        index = variables.difference_index
         above = np.zeros(len(index))
-        positive = LinearRows(shape.size, index[:, None], np.ones((len(index), 1)), above, above + np.inf)
+        positive = LinearRows(variables.size, index[:, None], np.ones((len(index), 1)), above, above + np.inf)
         self.blocks: list[Block] = [*blocks, positive]
         self._smoothing = np.zeros(len(index) - 1) if smoothing is None else smoothing
-        self._time = np.zeros(shape.size)
-        self._time[index] = time_weights(shape) / shape.segments
+        self._time = np.zeros(variables.size)
+        self._time[index] = time_weights(variables) / variables.segments
         left, right = index[:-1], index[1:]
         rows = [left, right, left, right, *(block.rows for block in self.blocks)]
         columns = [left, right, right, left, *(block.columns for block in self.blocks)]
-        self.kkt = BandedKkt(shape.places, np.concatenate(rows), np.concatenate(columns), equalities)
+        self.kkt = BandedKkt(variables.places, np.concatenate(rows), np.concatenate(columns), equalities)
 
     def duration(self, x: Array) -> float:
         """Motion time a segment, in the program's unit."""
@@ -64,7 +68,7 @@ class MotionProgram:
 
     def objective(self, x: Array) -> float:
         """See ``optimise.interior_point.Program``."""
-        steps = np.diff(self.shape.time_differences(x))
+        steps = np.diff(self.variables.time_differences(x))
         return self.duration(x) + float(self._smoothing @ steps**2)
 
     def inequalities(self, x: Array) -> Array:
@@ -82,9 +86,9 @@ class _Linearised:
         self._blocks = [block.linearise(x) for block in program.blocks]
         sizes = [len(block.values(x)) for block in program.blocks]
         self._splits = np.cumsum(sizes)[:-1]
-        steps = 2.0 * self._smoothing * np.diff(program.shape.time_differences(x))
+        steps = 2.0 * self._smoothing * np.diff(program.variables.time_differences(x))
         self.gradient = program._time.copy()
-        index = program.shape.difference_index
+        index = program.variables.difference_index
         self.gradient[index[1:]] += steps
         self.gradient[index[:-1]] -= steps
 
@@ -95,13 +99,12 @@ class _Linearised:
         parts = np.split(weights, self._splits)
         return np.asarray(sum(block.backward(part) for block, part in zip(self._blocks, parts, strict=True)))
 
-    def hessian(self, weights: Array, multipliers: Array | None) -> Array:
-        parts = np.split(weights, self._splits)
-        others = [None] * len(parts) if multipliers is None else np.split(multipliers, self._splits)
+    def hessian(self, weights: Array, multipliers: Array, exact: bool) -> Array:
         smooth = 2.0 * self._smoothing
         entries = [smooth, smooth, -smooth, -smooth]
+        parts, others = np.split(weights, self._splits), np.split(multipliers, self._splits)
         for block, part, other in zip(self._blocks, parts, others, strict=True):
-            entries.append(block.hessian(part, other))
+            entries.append(block.hessian(part, other, exact))
         return np.concatenate(entries)
 
 
@@ -111,6 +114,6 @@ def mean_slopes(degree: int) -> Array:
     return np.asarray((weights / 2) @ time_basis(degree, (nodes + 1) / 2)[:, 0])
 
 
-def time_weights(shape: Shape) -> Array:
+def time_weights(variables: MotionVariables) -> Array:
     """Weights of the differences in the motion time: (S + k - 1,)."""
-    return np.convolve(np.ones(shape.segments), mean_slopes(shape.degree))
+    return np.convolve(np.ones(variables.segments), mean_slopes(variables.degree))

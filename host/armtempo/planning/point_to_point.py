@@ -56,11 +56,13 @@ def posture(angles_deg: ArrayLike, arm: Arm) -> Array:
 
 
 def _backwards(joint: JointSpline) -> JointSpline:
+    segments = len(joint.angle_points_deg) - joint.degree
     return JointSpline(
         joint.degree,
         joint.refine,
         joint.angle_points_deg[::-1].copy(),
         joint.duration_s - joint.time_points_s[::-1],
+        None if joint.via_segments is None else tuple(segments - via for via in reversed(joint.via_segments)),
     )
 
 

@@ -16,7 +16,7 @@ from armtempo.model.job import REFINE, Job
 from armtempo.optimise.tracker import Result
 from armtempo.planning import interval_search
 from armtempo.planning.fixed_path import FixedPath, Optimum
-from armtempo.planning.shape import time_points
+from armtempo.planning.variables import time_points
 from armtempo.progress import Progress
 from armtempo.splines import time_axis
 
@@ -55,6 +55,8 @@ class Timed:
     optimum_s: float
     """No axis nearby with as many variables takes less, where gradients were used; else 0."""
     found: Result
+    starts_s: Array
+    """Motion time that each start of a gradient search led to; else empty."""
     notes: tuple[str, ...]
 
 
@@ -118,6 +120,7 @@ def _searched(group: Group, job: Job, stages: _Stages) -> Timed:
         searched,
         optimum.bound_s,
         found.result,
+        found.starts_s,
         found.notes,
     )
 

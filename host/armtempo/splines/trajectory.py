@@ -24,6 +24,8 @@ class JointSpline:
     refine: int
     angle_points_deg: Array
     time_points_s: Array
+    via_segments: tuple[int, ...] | None = None
+    """Path segments before each via point; None: each path segment ends at one."""
 
     @cached_property
     def angle_polynomials(self) -> Array:
@@ -43,7 +45,8 @@ class JointSpline:
     @cached_property
     def via_times_s(self) -> Array:
         """When the joint passes each via point: (n + 1,)."""
-        return np.append(self.time_polynomials[:: self.refine, 0], self.duration_s)
+        knots = np.append(self.time_polynomials[:: self.refine, 0], self.duration_s)
+        return knots if self.via_segments is None else np.asarray(knots[list(self.via_segments)])
 
     def __call__(self, time_s: ArrayLike, order: int = 0) -> Array:
         """Angle (order 0), speed, acceleration or jerk (order 3) in deg, deg/s, deg/s², deg/s³.

@@ -19,7 +19,7 @@ Index = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
-class Shape:
+class MotionVariables:
     """Numbers of segments, degree, and joints whose angles vary (0 for a fixed path)."""
 
     segments: int
