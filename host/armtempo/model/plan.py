@@ -38,7 +38,7 @@ class Search:
     """Proven lower bound of the motion time, whatever the time law along this path; for a free path, whatever the path
     through the via points."""
     floor_kind: str
-    """How the lower bound was found, see ``lower_bounds.floor``."""
+    """How the lower bound was found, see ``lower_bounds.Floor``."""
 
 
 @dataclass(frozen=True, eq=False)

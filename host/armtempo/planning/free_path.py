@@ -23,7 +23,7 @@ _FEW = 5
 """Segments for each stretch where there are so many of them that _MOST would leave less."""
 _EVEN_PIECES = 24
 """Segments for each stretch where all have the same number."""
-_ROUNDS = 4
+_ROUNDS = 3
 _SPREAD = 0.5
 """Random starts share time out by factors of this standard deviation of their logarithm."""
 _INSIDE = 0.998

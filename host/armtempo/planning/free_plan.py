@@ -128,7 +128,7 @@ def _spline(motion: FreeMotion, angle_points_deg: Array) -> JointSpline:
 def _search(arm: Arm, job: Job, via_deg: Array, joints: list[int], found: Shortest) -> Search:
     limits = [arm.driven[joint].limits for joint in joints]
     demand = _demand(arm, job, via_deg, joints)
-    floor_s = lower_bounds.free_floor_s(demand.via_deg, limits, demand.stops, demand.tolerances)
+    floor = lower_bounds.of_vias(demand.via_deg, limits, demand.stops, demand.tolerances)
     return Search(
         joints=tuple(joints),
         intervals_s=found.motion.differences_s,
@@ -138,8 +138,8 @@ def _search(arm: Arm, job: Job, via_deg: Array, joints: list[int], found: Shorte
         history_s=np.minimum.accumulate(found.starts_s),
         starts_s=found.starts_s,
         optimum_s=0.0,
-        floor_s=floor_s,
-        floor_kind="vias",
+        floor_s=floor.time_s,
+        floor_kind=floor.kind,
     )
 
 

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from armtempo.arrays import Array
 from armtempo.planning import limit_ratios
 from armtempo.planning.collocation import Points
 from armtempo.planning.variables import Index, MotionVariables, angle_basis, time_basis
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 
 class LimitRows:
@@ -20,26 +25,23 @@ class LimitRows:
     def __init__(
         self, variables: MotionVariables, points: Points, limits: Array, angle: Array | None
     ) -> None:
-        segment, u = points.segment, points.u
-        self.limits, self._segment, self._angle = limits, segment, angle
-        self._starts = np.searchsorted(segment, np.arange(variables.segments))
-        self._bases = angle_basis(variables.degree, u)
-        self._time_bases = time_basis(variables.degree, u)
-        window = np.arange(variables.segments)[:, None]
-        self._times = variables.difference_index[window + np.arange(variables.degree)]
-        control = window + np.arange(variables.degree + 1)
-        none = np.empty((variables.segments, 0, variables.degree + 1), dtype=np.intp)
-        joints = [variables.angle_index(joint)[control] for joint in range(variables.joints)]
-        self._angles = np.stack(joints, axis=1) if joints else none
+        self.limits, self._angle, self._variables = limits, angle, variables
+        self._starts = np.searchsorted(points.segment, np.arange(variables.segments))
+        self._bases = angle_basis(variables.degree, points.u)
+        self._time_bases = time_basis(variables.degree, points.u)
+        self.by_angle = _derivative_matrix(self._bases, points.segment, variables.angles)
+        self.by_time = _derivative_matrix(self._time_bases, points.segment, variables.differences)
         self.rows, self.columns = self._pattern()
-        self.size = variables.size
 
     def _pattern(self) -> tuple[Index, Index]:
         """Positions of the entries of ``_Linearised.hessian``."""
-        pairs = [(self._times, self._times)]
-        for joint in range(self._angles.shape[1]):
-            own = self._angles[:, joint]
-            pairs.extend([(own, own), (own, self._times), (self._times, own)])
+        variables = self._variables
+        window = np.arange(variables.segments)[:, None]
+        times = variables.difference_index[window + np.arange(variables.degree)]
+        pairs = [(times, times)]
+        for joint in range(variables.joints):
+            own = variables.angle_index(joint)[window + np.arange(variables.degree + 1)]
+            pairs.extend([(own, own), (own, times), (times, own)])
         rows, columns = [], []
         for left, right in pairs:
             full = (len(left), left.shape[1], right.shape[1])
@@ -48,11 +50,19 @@ class LimitRows:
         return np.concatenate(rows), np.concatenate(columns)
 
     def derivatives(self, x: Array) -> tuple[Array, Array]:
-        """q', q'', q''' (3, P, J) and t', t'', t''' (3, P) at the points."""
-        time = np.einsum("pok,pk->op", self._time_bases, x[self._times][self._segment])
+        """q', q'', q''' (3, P, J) and t', t'', t''' (3, P) at the points, or their changes by a step."""
+        time = (self.by_time @ self._variables.time_differences(x)).reshape(3, -1)
         if self._angle is not None:
             return self._angle, time
-        return np.einsum("poc,pjc->opj", self._bases, x[self._angles][self._segment]), time
+        return (self.by_angle @ self._variables.angle_points(x)).reshape(3, time.shape[1], -1), time
+
+    def gradient(self, local: Array) -> Array:
+        """Gradient (n,) of what has the derivatives ``local`` (6, P, J) by the six derivatives at each point."""
+        by_time = self.by_time.T @ local[3:].sum(axis=2).ravel()
+        if self._angle is not None:
+            return np.asarray(by_time)
+        by_angle = self.by_angle.T @ local[:3].reshape(-1, local.shape[2])
+        return self._variables.pack(by_angle, by_time)
 
     def values(self, x: Array) -> Array:
         """All 1 - ratio, then all 1 + ratio: (2 * 3 * P * J,)."""
@@ -75,40 +85,28 @@ class LimitRows:
 
     def linearise(self, x: Array) -> LinearisedLimits:
         """Their derivatives at x."""
-        return LinearisedLimits(self, *self.derivatives(x))
+        return LinearisedLimits(self, *self.derivatives(x), self._angle is not None)
 
 
 class LinearisedLimits:
     """Derivatives of the rows at one point; see ``optimise.interior_point.Linearised``."""
 
-    def __init__(self, rows: LimitRows, angle: Array, time: Array) -> None:
-        self._rows, self._angle, self._time = rows, angle, time
+    def __init__(self, rows: LimitRows, angle: Array, time: Array, fixed: bool) -> None:
+        self._rows, self._angle, self._time, self._fixed = rows, angle, time, fixed
         self._gradient = limit_ratios.gradient(angle, time, rows.limits)
 
     def forward(self, step: Array) -> Array:
         """See there."""
-        rows = self._rows
-        time = np.einsum("pok,pk->op", rows._time_bases, step[rows._times][rows._segment])
+        angle, time = self._rows.derivatives(step)
         change = np.einsum("kopj,op->kpj", self._gradient[:, 3:], time)
-        if rows._angle is None:
-            angle = np.einsum("poc,pjc->opj", rows._bases, step[rows._angles][rows._segment])
+        if not self._fixed:
             change += np.einsum("kopj,opj->kpj", self._gradient[:, :3], angle)
         return np.concatenate([-change.ravel(), change.ravel()])
 
     def backward(self, weights: Array) -> Array:
         """See there."""
-        rows = self._rows
         upper, lower = weights.reshape(2, 3, *self._angle.shape[1:])
-        local = np.einsum("kopj,kpj->opj", self._gradient, lower - upper)
-        by_time = np.einsum("pok,op->pk", rows._time_bases, local[3:].sum(axis=2))
-        result = np.bincount(
-            rows._times.ravel(), np.add.reduceat(by_time, rows._starts).ravel(), minlength=rows.size
-        )
-        if rows._angle is None:
-            by_angle = np.einsum("poc,opj->pjc", rows._bases, local[:3])
-            sums = np.add.reduceat(by_angle, rows._starts)
-            result += np.bincount(rows._angles.ravel(), sums.ravel(), minlength=rows.size)
-        return np.asarray(result)
+        return self._rows.gradient(np.einsum("kopj,kpj->opj", self._gradient, lower - upper))
 
     def hessian(self, weights: Array, multipliers: Array, exact: bool) -> Array:
         """See there; the entries stand at ``LimitRows.rows`` and ``columns``."""
@@ -120,3 +118,13 @@ class LinearisedLimits:
             upper, lower = multipliers.reshape(shape)
             local += limit_ratios.curvature(self._angle, self._time, rows.limits, upper - lower)
         return rows.assemble(local)
+
+
+def _derivative_matrix(bases: Array, segment: Index, count: int) -> csr_array:
+    """First, second and third derivatives at all points, (3 P, count), from ``bases`` (P, 3, w) of their segments."""
+    from scipy.sparse import csr_array  # here, because loading it takes longer than most commands
+
+    points, _, width = bases.shape
+    columns = np.tile(segment[:, None] + np.arange(width), (3, 1)).ravel()
+    starts = np.arange(0, 3 * points * width + 1, width)
+    return csr_array((bases.swapaxes(0, 1).ravel(), columns, starts), shape=(3 * points, count))
