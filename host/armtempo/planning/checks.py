@@ -225,7 +225,7 @@ def _check_times(where: str, joint_spline: JointSpline) -> None:
     if np.max(np.abs(ticks)) >= LONGEST_TICKS:
         raise PlanError(
             f"{where}: lasts {joint_spline.duration_s:.0f} s, the board counts to "
-            f"{LONGEST_TICKS / TICK_HZ:.0f} s; split it"
+            f"{LONGEST_TICKS / TICK_HZ:.0f} s; mark via points with stop = true and plan with --split"
         )
     span = _span(ticks, joint_spline.degree)
     if span >= LONGEST_SPAN_TICKS:

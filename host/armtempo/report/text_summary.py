@@ -35,7 +35,7 @@ def lines(plan: Plan) -> list[str]:
     for kind in sorted({search.floor_kind for search in plan.searches}):
         text.append(f"floor: least time {_FLOORS[kind]}")
     text.extend(_polished(search) for search in plan.searches if search.optimum_s)
-    text.extend(_started(plan, search) for search in plan.searches if len(search.starts_s))
+    text.extend(_started(search) for search in plan.searches if len(search.starts_s))
     if job.timing == "per-joint" and len(plan.searches) > 1:
         text.extend(_separation(plan))
     if job.refine == AUTO:
@@ -75,7 +75,7 @@ def _settings(plan: Plan) -> list[str]:
     return [timing, f"degree {job.degree}", f"refine {first.refine}{auto}", search, f"seed {job.seed}"]
 
 
-def _started(plan: Plan, search: Search) -> str:
+def _started(search: Search) -> str:
     """What the starts of a gradient search led to."""
     joints = ", ".join(str(joint + 1) for joint in search.joints)
     times = search.starts_s
