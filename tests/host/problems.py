@@ -55,7 +55,8 @@ def _problem(entry: dict[str, Any]) -> Problem:
     arm = make_arm(entry.pop("limits"), (low, high), entry.pop("microsteps", 1))
     expect, best_s = entry.pop("expect", "plan"), tuple(entry.pop("best_s", ()))
     via = tuple(tuple(row) for row in entry.pop("via_deg"))
-    return Problem(entry["name"], arm, Job(via=via, **entry), expect, best_s)
+    settings = {"timing": "per-joint", "refine": 1, "polish": False, "bounds_s": (0.1, 3.0), **entry}
+    return Problem(entry["name"], arm, Job(via=via, **settings), expect, best_s)
 
 
 def random_problem(seed: int) -> tuple[Arm, Job]:
@@ -87,8 +88,11 @@ def random_problem(seed: int) -> tuple[Arm, Job]:
         via=tuple(map(tuple, via.tolist())),
         degree=int(rng.choice([3, 5])),
         timing=str(rng.choice(["shared", "per-joint"])),
+        refine=1,
+        polish=False,
         population=4,
         iterations=1,
         seed=seed,
+        bounds_s=(0.1, 3.0),
     )
     return make_arm(limits.tolist()), job

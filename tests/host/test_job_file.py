@@ -83,7 +83,7 @@ def test_what_can_be_wrong_with_a_turned_position(via: str, said: str, tmp_path:
         ("via_deg = [[0, -60, 40], [20, nan, 50]]\n", ["via_deg[2]", "list of 3 numbers"]),
         ("via_deg = [[0, -60, 40], [200, -75, 50]]\n", ["via_deg[2]", "range of joint 1, -10 to 190"]),
         (TWO + "degree = 4\n", ["degree = 4", "3, 5"]),
-        (TWO + 'timing = "fast"\n', ["timing = 'fast'", "'per-joint', 'shared'"]),
+        (TWO + 'timing = "fast"\n', ["timing = 'fast'", "'shared', 'per-joint'"]),
         (TWO + 'optimiser = "magic"\n', ["optimiser = 'magic'", "'acs'"]),
         (TWO + "population = 2\n", ["population = 2", "from 4"]),
         (TWO + "bounds_s = [3.0, 0.1]\n", ["bounds_s", "shorter first"]),

@@ -83,7 +83,16 @@ def edited(path: Path, edit: Callable[[Any], None]) -> Path:
     ("edit", "message"),
     [
         (lambda c: c.update(format="gcode"), "not a trajectory file"),
-        (lambda c: c.update(version=2), "version 2"),
+        (lambda c: c.update(version=1), "version 1"),
+        (lambda c: c["plan"]["job"].update(refine="some"), "a number or 'auto'"),
+        (
+            lambda c: c["plan"]["trajectory"]["joints"][0].update(via_segments=[0, 1, 1, 3, 4, 5, 6]),
+            "do not increase",
+        ),
+        (
+            lambda c: c["plan"]["trajectory"]["joints"][0].update(via_segments=[0, 6]),
+            "must name 7 via points",
+        ),
         (lambda c: c.update(extra=1), "unknown or missing key"),
         (lambda c: c["plan"].update(colour="red"), "plan: unknown key colour"),
         (lambda c: c["plan"]["job"].pop("seed"), "plan.job: missing key seed"),

@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 
 def _names(ctx: click.Context, parameter: click.Parameter, value: str) -> list[str]:
     """Algorithms, separated by commas."""
-    from armtempo.optimise import ALGORITHMS
+    from armtempo.model.job_file import OPTIMISERS
 
     names = [name.strip().lower() for name in value.split(",")]
     for name in names:
-        if name not in ALGORITHMS:
-            raise click.BadParameter(f"{name!r} is not one of {', '.join(sorted(ALGORITHMS))}")
+        if name not in OPTIMISERS:
+            raise click.BadParameter(f"{name!r} is not one of {', '.join(sorted(OPTIMISERS))}")
     return names
 
 

@@ -18,9 +18,11 @@ if TYPE_CHECKING:
 
 def _refine(ctx: click.Context, param: click.Parameter, value: str | None) -> int | str | None:
     """A number of segments, or ``auto``."""
-    if value in (None, "auto"):
+    if value is None or value == "auto":
         return value
-    return click.IntRange(1, 64).convert(value, param, ctx)
+    if not value.isdecimal() or not 1 <= int(value) <= 64:
+        raise click.BadParameter(f"{value!r} must be 'auto' or a whole number from 1 to 64")
+    return int(value)
 
 
 @click.command()

@@ -99,7 +99,10 @@ _FAR = -0.5
 
 
 def minimise(program: Program, x: Array, settings: Schedule | None = None) -> Minimum:
-    """The local optimum near ``x``, which must keep the inequalities; none of its iterates breaks one."""
+    """The local optimum near ``x``; none of the iterates breaks an inequality.
+
+    Where ``x`` itself breaks one it is given back as it is, not converged.
+    """
     return _Solver(program, x, settings or Schedule()).run()
 
 
@@ -120,13 +123,16 @@ class _Solver:
         self.count = len(self.g)
         self.barrier = settings.first_barrier / self.count
         self.last = settings.last_barrier / self.count
-        self.multipliers = self.barrier / self.g
+        with np.errstate(divide="ignore", invalid="ignore"):
+            self.multipliers = self.barrier / self.g
         self.exact = settings.curvature
         """Whether the next step tries the second derivatives of g first."""
         self.whole = False
         """Whether the last step was as long as Newton's method asked."""
 
     def run(self) -> Minimum:
+        if not np.all(self.g > 0.0):
+            return self._solution(0, False)
         for number in range(1, self.settings.iterations + 1):
             step = self._step()
             size = self.barrier * np.sqrt(self.count)

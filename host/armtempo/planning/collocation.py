@@ -84,6 +84,8 @@ def peaks(curve: Curve, parts: int, least: float) -> Points:
     ]  # the same point of the next segment
     high[:, parts + 1 :: parts + 1] |= high[:, parts :: parts + 1][:, :-1]
     which, point = np.nonzero(high)
+    if not len(point):
+        return Points(points.segment[:0], points.u[:0])
     segment, u = points.segment[point], points.u[point]
     return _zoomed(curve, which, segment, u, 1.0 / parts)
 

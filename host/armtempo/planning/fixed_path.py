@@ -97,6 +97,8 @@ class FixedPath:
         points = collocation.grid(self.variables.segments, parts, ends=self.degree == 3)
         settings, bound, here = _COARSE, 0.0, best
         for _ in range(_ROUNDS):
+            if not np.all(np.isfinite(here) & (here > 0.0)):
+                break
             here, bound = self._solve(here, points, settings)
             curve = self.curve(here)
             stretch = curve.stretch()

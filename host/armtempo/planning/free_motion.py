@@ -258,8 +258,6 @@ class Improver:
         start = self.variables.pack(
             motion.angle_points_deg / self._size, motion.differences_s / unit_s * _AWAY
         )
-        if not np.all(program.inequalities(start) > 0.0):
-            return motion
         x = interior_point.minimise(program, start, _FIRST if first else _AGAIN).x
         x = met(self.variables, program.equalities, x)
         return replace(

@@ -38,10 +38,8 @@ def nearest(forms: Forms, room: float, fixed: Equalities, wanted: Array) -> Arra
         before, excess = excess, _excess(forms, x) + room
         if not excess < _BETTER * before:
             return None
-    program = _Alike(forms, 0.0, fixed, wanted)
-    if not np.all(program.inequalities(x) > 0.0):
-        return None
-    return interior_point.minimise(program, x, _NEAR).x
+    found = interior_point.minimise(_Alike(forms, 0.0, fixed, wanted), x, _NEAR)
+    return found.x if found.iterations else None
 
 
 def _excess(forms: Forms, x: Array) -> float:

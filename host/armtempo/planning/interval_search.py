@@ -102,7 +102,9 @@ def _once(
     return Found(optimise.minimise(function, box, rng, settings, progress), np.empty(0))
 
 
-def gradient(path: FixedPath, box: Array, rng: np.random.Generator, starts: int, progress: Progress) -> Found:
+def gradient(
+    path: FixedPath, box: Array, rng: np.random.Generator, starts: int, progress: Progress | None = None
+) -> Found:
     """The best of the local optima that ``starts`` random intervals within ``box`` (n, 2) lead to.
 
     An evaluation is a start; the history is the best motion time after each.
@@ -116,7 +118,8 @@ def gradient(path: FixedPath, box: Array, rng: np.random.Generator, starts: int,
         if optimum.total_s < min(times, default=np.inf):
             intervals = path.intervals(optimum.differences_s)
         times.append(optimum.total_s)
-        progress(number + 1, starts)
+        if progress is not None:
+            progress(number + 1, starts)
     history = np.minimum.accumulate(times)
     return Found(Result(intervals, float(history[-1]), starts, history), np.array(times))
 

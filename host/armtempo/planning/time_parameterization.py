@@ -112,9 +112,10 @@ def _searched(group: Group, job: Job, stages: _Stages) -> Timed:
     if job.polish and job.refine == 1:
         optimum = path.optimum(differences, _POLISHED_GAP)
     stages.done()
+    intervals = path.intervals(optimum.differences_s)
     return Timed(
-        time_points(optimum.differences_s, job.degree),
-        path.intervals(optimum.differences_s),
+        intervals @ time_axis.step_map(len(intervals), job.degree),
+        intervals,
         1,
         optimum.total_s,
         searched,
