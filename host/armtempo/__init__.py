@@ -68,8 +68,9 @@ if TYPE_CHECKING:
     from armtempo.kinematics.of_arm import forward, inverse
     from armtempo.link.ports import find_ports
     from armtempo.model.arm import Arm
-    from armtempo.model.job import Job, Pose
+    from armtempo.model.job import Job
     from armtempo.model.plan import Plan
+    from armtempo.model.tool_pose import Pose
     from armtempo.pipeline import compare, connect, plan, summary
     from armtempo.robot.board import Board
     from armtempo.robot.recording import Watcher
@@ -91,8 +92,9 @@ _HOMES = {
     "armtempo.kinematics.of_arm": ("forward", "inverse"),
     "armtempo.link.ports": ("find_ports",),
     "armtempo.model.arm": ("Arm",),
-    "armtempo.model.job": ("Job", "Pose"),
+    "armtempo.model.job": ("Job",),
     "armtempo.model.plan": ("Plan",),
+    "armtempo.model.tool_pose": ("Pose",),
     "armtempo.pipeline": ("compare", "connect", "plan", "summary"),
     "armtempo.robot.board": ("Board",),
     "armtempo.robot.recording": ("Watcher",),

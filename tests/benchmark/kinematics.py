@@ -1,10 +1,11 @@
-"""Poses per second of the closed-form inverse, beside EAIK and the numerical solver, in one run on one core.
+"""Poses per second of the closed-form inverse, beside EAIK, in one run on one core.
 
     python -m tests.benchmark.kinematics [--poses 100000] [--repeat 5]
 
 EAIK is compared where it is installed (pip install eaik); it is no dependency, not even of the tests. Each
-rate is the best of the repetitions. The errors are of the poses that the solutions lead to, over all poses
-timed: the position relative to the arm's reach, or an element of the rotation, whichever is larger.
+rate is the best of the repetitions, which take turns so that all see the same machine. The errors are of the
+poses that the solutions lead to, over all poses timed: the position relative to the arm's reach, or an element
+of the rotation, whichever is larger. Other arms, and the numerical solver: numerical_inverse.py.
 """
 
 from __future__ import annotations
@@ -17,25 +18,25 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from armtempo.kinematics import Geometry, Ranges, forward, inverse
-from armtempo.kinematics.numerical import solve
+from armtempo.kinematics import Geometry, forward, inverse, inverse_of_pose
 
 from tests.host.published_arms import NAMED
 
 SINGLE_POSES = 2000
-NUMERICAL_POSES = 50
+BATCH, ONE, EAIK_BATCH, EAIK_ONE = "batch", "numbers", "EAIK batch", "EAIK one"
 
 
 @dataclass
-class Row:
-    """One line of the table."""
+class Solver:
+    """A way of solving poses."""
 
-    solver: str
-    poses: int
-    per_second: float
-    error: float
-    solutions: float
-    """Mean number of solutions a pose."""
+    name: str
+    poses: np.ndarray
+    call: Callable[[], Any]
+    angles: Callable[[Any], np.ndarray]
+    """(N, 8, 6) of what the call gives, NaN where there are fewer."""
+    seconds: float = np.inf
+    answer: Any = None
 
 
 def main() -> None:
@@ -47,86 +48,79 @@ def main() -> None:
     for name, geometry in NAMED.items():
         angles = np.random.default_rng(1).uniform(-np.pi, np.pi, (options.poses, 6))
         poses = forward(geometry, angles)
-        rows = [*own(geometry, poses, options.repeat), *eaik(geometry, poses, options.repeat)]
-        rows.append(numerical(geometry, poses, angles))
-        print(f"\n{name}")
-        print(
-            f"  {'solver':<34}{'poses':>8}{'poses/s':>12}{'us/pose':>10}{'worst error':>13}{'solutions':>11}"
-        )
-        for row in rows:
-            print(
-                f"  {row.solver:<34}{row.poses:>8}{row.per_second:>12.0f}{1e6 / row.per_second:>10.2f}"
-                f"{row.error:>13.1e}{row.solutions:>11.2f}"
-            )
+        solvers = own(geometry, poses) | eaik(geometry, poses)
+        for _ in range(options.repeat):
+            for solver in solvers.values():
+                start = time.perf_counter()
+                solver.answer = solver.call()
+                solver.seconds = min(solver.seconds, time.perf_counter() - start)
+        report(name, geometry, solvers)
 
 
-def own(geometry: Geometry, poses: np.ndarray, repeat: int) -> list[Row]:
-    """The closed form, in one batch and pose by pose."""
-    seconds, solutions = timed(lambda: inverse(geometry, poses), repeat)
-    found = solutions.angles_rad
-    count = float(np.isfinite(found[..., 5]).sum(axis=1).mean())
-    batch = Row(
-        "armtempo, all 8, batch", len(poses), len(poses) / seconds, error(geometry, found, poses), count
-    )
+def own(geometry: Geometry, poses: np.ndarray) -> dict[str, Solver]:
+    """The closed form: in one batch, and pose by pose as arrays and as plain numbers."""
     some = poses[:SINGLE_POSES]
-    seconds, _ = timed(lambda: [inverse(geometry, pose) for pose in some], 3)
-    single = Row("armtempo, all 8, one by one", len(some), len(some) / seconds, batch.error, count)
-    return [batch, single]
+    numbers = [pose.ravel().tolist() for pose in some]
+    return {
+        BATCH: Solver(
+            "armtempo, all 8, batch", poses, lambda: inverse(geometry, poses), lambda it: it.angles_rad
+        ),
+        "arrays": Solver(
+            "armtempo, all 8, one by one, arrays",
+            some,
+            lambda: [inverse(geometry, pose) for pose in some],
+            lambda it: np.array([each.angles_rad[0] for each in it]),
+        ),
+        ONE: Solver(
+            "armtempo, all 8, one by one, numbers",
+            some,
+            lambda: [inverse_of_pose(geometry, pose) for pose in numbers],
+            lambda it: np.array([each.angles_rad for each in it]),
+        ),
+    }
 
 
-def eaik(geometry: Geometry, poses: np.ndarray, repeat: int) -> list[Row]:
-    """EAIK, where it is installed and no joint has an offset (its DH constructor takes none)."""
+def eaik(geometry: Geometry, poses: np.ndarray) -> dict[str, Solver]:
+    """EAIK, where it is installed; the joints' offsets are taken off, as its DH constructor takes none."""
     if importlib.util.find_spec("eaik") is None:
         print("EAIK is not installed: left out")
-        return []
+        return {}
     from eaik.IK_DH import DhRobot
 
     robot = DhRobot(*map(np.array, (geometry.alpha, geometry.a, geometry.d)))
     offset = np.array(geometry.offset)
-    rows = []
     some = poses[:SINGLE_POSES]
-    for solver, part, call in (
-        ("EAIK, all, batch, 1 thread", poses, lambda: robot.IK_batched(poses, 1)),
-        ("EAIK, all, one by one", some, lambda: [robot.IK(pose) for pose in some]),
-    ):
-        seconds, answers = timed(call, repeat if part is poses else 3)
-        found = padded(answers) - offset
-        count = float(np.isfinite(found[..., 5]).sum(axis=1).mean())
-        rows.append(Row(solver, len(part), len(part) / seconds, error(geometry, found, part), count))
-    return rows
+    return {
+        EAIK_BATCH: Solver(
+            "EAIK, all, batch, 1 thread",
+            poses,
+            lambda: robot.IK_batched(poses, 1),
+            lambda it: padded(it) - offset,
+        ),
+        EAIK_ONE: Solver(
+            "EAIK, all, one by one",
+            some,
+            lambda: [robot.IK(pose) for pose in some],
+            lambda it: padded(it) - offset,
+        ),
+    }
 
 
-def numerical(geometry: Geometry, poses: np.ndarray, angles: np.ndarray) -> Row:
-    """The numerical solver, started within 0.3 rad of a solution: one solution a pose."""
-    ranges = Ranges(np.full(6, -2 * np.pi), np.full(6, 2 * np.pi))
-    nudge = np.random.default_rng(2).uniform(-0.3, 0.3, (NUMERICAL_POSES, 6))
-    seconds, answers = timed(
-        lambda: [
-            solve(geometry, pose, ranges, start)
-            for pose, start in zip(poses, angles[:NUMERICAL_POSES] + nudge, strict=False)
-        ],
-        1,
-    )
-    found = np.array([answer.angles_rad for answer in answers])[:, None]
-    count = float(np.mean([answer.found for answer in answers]))
-    part = poses[:NUMERICAL_POSES]
-    return Row(
-        "least squares, one near the start",
-        len(part),
-        len(part) / seconds,
-        error(geometry, found, part),
-        count,
-    )
-
-
-def timed(call: Callable[[], Any], repeat: int) -> tuple[float, Any]:
-    """Shortest time of some calls, in s, and the last result."""
-    shortest, result = np.inf, None
-    for _ in range(repeat):
-        start = time.perf_counter()
-        result = call()
-        shortest = min(shortest, time.perf_counter() - start)
-    return float(shortest), result
+def report(name: str, geometry: Geometry, solvers: dict[str, Solver]) -> None:
+    """Print the arm's table and the ratios to EAIK."""
+    print(f"\n{name}")
+    print(f"  {'solver':<38}{'poses':>8}{'poses/s':>12}{'us/pose':>10}{'worst error':>13}{'solutions':>11}")
+    for solver in solvers.values():
+        found, count = solver.angles(solver.answer), len(solver.poses)
+        solutions = float(np.isfinite(found[..., 5]).sum(axis=1).mean())
+        print(
+            f"  {solver.name:<38}{count:>8}{count / solver.seconds:>12.0f}{1e6 * solver.seconds / count:>10.2f}"
+            f"{error(geometry, found, solver.poses):>13.1e}{solutions:>11.2f}"
+        )
+    for mine, theirs in ((BATCH, EAIK_BATCH), (ONE, EAIK_ONE)):
+        if theirs in solvers:
+            ratio = solvers[theirs].seconds / solvers[mine].seconds
+            print(f"  {solvers[mine].name}: {ratio:.2f} times the poses of {solvers[theirs].name}")
 
 
 def padded(answers: Any) -> np.ndarray:

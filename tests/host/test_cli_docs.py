@@ -1,4 +1,4 @@
-"""The page on the command line names every command, and every option that belongs to the board."""
+"""The page on the command line names every command, and every option that belongs to the board or to an arm file."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from armtempo.cli import main
 PAGE = (Path(__file__).parents[2] / "host" / "docs" / "cli.md").read_text(encoding="utf-8")
 STORE = ("upload", "list", "show", "remove", "rename")
 MOTION = ("home", "goto", "run", "fetch", "stop", "status", "clear")
+ARMS = ("check", "import-urdf")
 BOARD = ("monitor", "deploy", "undeploy", "ports", "virtual-board")
 
 
-@pytest.mark.parametrize("name", [*STORE, *MOTION, *BOARD])
-def test_board_command_is_described(name: str) -> None:
+@pytest.mark.parametrize("name", [*STORE, *MOTION, *ARMS, *BOARD])
+def test_command_is_described_with_its_options(name: str) -> None:
     assert f"`{name}" in PAGE
     context = click.Context(main)
     command = main.get_command(context, name)

@@ -14,6 +14,7 @@ from armtempo.model import arm_file
 from click.testing import CliRunner, Result
 
 from tests.host.published_arms import PAPER
+from tests.host.small_arms import FOUR, toml
 
 EQ_16_AT_1_TO_5 = "0 0 -1 -536.404 0 1 0 0 1 0 0 434.698"
 POSITION = ("--position", "-536.404", "0", "434.698")
@@ -33,13 +34,19 @@ def solutions(*arguments: str | Path) -> list[dict[str, Any]]:
 def test_table_shows_all_eight_with_reasons_and_the_choice() -> None:
     result = run("--matrix", EQ_16_AT_1_TO_5)
     assert result.exit_code == 0
-    head, columns, *rows = result.stdout.splitlines()
+    head, columns, *rows, tool, driven = result.stdout.splitlines()
     assert head == "pose 1: region II of Fig. 3: 4 arm postures"
     assert columns.split()[:4] == ["no", "branch", "theta1", "deg"]
     assert len(rows) == 8
     assert [row[0] for row in rows] == ["*"] + [" "] * 7
     assert rows[0].split()[5:8] == ["180.0000", "-37.9997", "-52.0005"]
     assert "rejected: joint 2 at -191.7 deg is 21.66 deg below its range -170 to 10" in rows[6]
+    assert tool == (
+        "tool at -536.404 0 434.698 mm, roll 0, pitch -90, yaw 0 deg: 0 mm and 0 deg from the pose"
+    )
+    assert driven.startswith(
+        "with the joints that have no motor at home the tool is 0.000106 mm and 0.000152 deg"
+    )
 
 
 @pytest.mark.parametrize(
@@ -94,7 +101,10 @@ def test_out_of_reach_ends_with_1_and_the_inequality() -> None:
     assert result.exit_code == 1
     assert "region IV of Fig. 3: 0 arm postures" in result.stdout
     assert result.stdout.count("(Eq. (3), line 1)") == 8
-    assert result.stderr == "armtempo: no solution for pose 1; the reasons are listed with it\n"
+    assert (
+        "rejected: no posture reaches this pose within 0.1 mm and 0.1 deg: the nearest one" in result.stdout
+    )
+    assert result.stderr.startswith("armtempo: no solution for pose 1; the reasons are listed with it; bring")
     unreachable = run("--position", "900", "0", "300", "--rpy", "0", "0", "0", "--json")
     assert unreachable.exit_code == 1
     (answer,) = json.loads(unreachable.stdout)["poses"]
@@ -120,20 +130,97 @@ def test_an_arm_outside_the_class_is_searched_numerically(tmp_path: Path) -> Non
     result = run(*form)
     assert result.exit_code == 0, result.output
     assert "no closed form for this arm: the wrist is not spherical" in result.stdout
-    assert "one solution, in degrees, found numerically: theta1" in result.stdout
+    assert "pose 1: whole pose: " in result.stdout
+    assert "postures found numerically from " in result.stdout
+    assert "0 mm and 0 deg from the pose" in result.stdout
     (answer,) = solutions(*form)
-    assert answer["numerical"]["found"]
-    assert answer["numerical"]["position_error_mm"] < 1e-6
+    assert (answer["method"], answer["chosen"]) == ("numerical", 1)
+    assert answer["miss"]["position_mm"] < 1e-6
 
 
-def test_numerical_agrees_with_one_of_the_eight() -> None:
+@pytest.fixture
+def four(tmp_path: Path) -> Path:
+    """The arm file of a four-joint arm."""
+    file = tmp_path / "four.toml"
+    file.write_text(toml(FOUR))
+    return file
+
+
+def test_a_four_joint_arm_takes_a_pose_whose_yaw_is_typed_with_three_digits(four: Path) -> None:
+    form = ("--arm", four, "--position", "345", "120", "60", "--rpy", "90", "0", "19.179")
+    result = run(*form)
+    assert result.exit_code == 0, result.output
+    first, *_, last = result.stdout.splitlines()
+    assert first == "no closed form for this arm: it has 4 joints, not 6"
+    assert last.startswith("tool at 345 120 60 mm, roll 90, pitch 0, yaw 19.179 deg: ")
+    (answer,) = solutions(*form)
+    assert 0.0 < answer["miss"]["position_mm"] < 1e-3
+    assert 0.0 < answer["miss"]["rotation_deg"] < 1e-3
+    assert (answer["tolerance_mm"], answer["tolerance_deg"]) == (0.1, 0.1)
+
+
+def test_a_miss_has_units_and_tolerances_can_be_given(four: Path) -> None:
+    form = ("--arm", four, "--position", "345", "120", "60", "--rpy", "90", "0", "20")
+    refused = run(*form)
+    assert refused.exit_code == 1
+    assert (
+        "rejected: no posture reaches this pose within 0.1 mm and 0.1 deg: the nearest one" in refused.stdout
+    )
+    assert "as it asks for 6 numbers and 4 joints move, ask for less: position and pitch" in refused.stdout
+    assert "nearest posture found, deg:" in refused.stdout
+    assert "allow more by --tolerance-mm and --tolerance-deg" in refused.stderr
+    (answer,) = solutions(*form, "--tolerance-mm", "0.5", "--tolerance-deg", "1")
+    assert answer["miss"]["position_mm"] <= 0.5
+    assert 0.5 < answer["miss"]["rotation_deg"] <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("orientation", "words", "asked"),
+    [
+        ((), "position only: ", []),
+        (("--pitch", "90"), "position and pitch: ", ["pitch"]),
+        (("--roll", "0", "--pitch", "90"), "position and roll and pitch: ", ["roll", "pitch"]),
+        (("--approach", "0.6", "-0.8", "0"), "position and approach: ", ["approach"]),
+    ],
+)
+def test_a_pose_may_ask_for_less(
+    four: Path, orientation: tuple[str, ...], words: str, asked: list[str]
+) -> None:
+    form = ("--arm", four, "--position", "240", "180", "80", *orientation)
+    result = run(*form)
+    assert result.exit_code == 0, result.output
+    assert f"pose 1: {words}" in result.stdout
+    (answer,) = solutions(*form)
+    assert answer["asked"] == ["position", *asked]
+    np.testing.assert_allclose(answer["tool"]["position_mm"], [240, 180, 80], atol=1e-6)
+    if "pitch" in asked:
+        assert answer["tool"]["rpy_deg"][1] == pytest.approx(90.0, abs=1e-5)
+    if asked == ["approach"]:
+        np.testing.assert_allclose(np.array(answer["tool"]["matrix"])[:3, 2], [0.6, -0.8, 0.0], atol=1e-9)
+
+
+def test_a_position_moves_only_the_joints_with_a_motor() -> None:
+    (answer,) = solutions("--position", "-536.404", "0", "434.698")
+    assert len(answer["solutions"]) == 4
+    assert {tuple(each["angles_deg"][3:]) for each in answer["solutions"]} == {(0.0, 0.0, 0.0)}
+    assert answer["chosen"] == 1
+    assert [each["usable"] for each in answer["solutions"]] == [True, True, True, False]
+
+
+def test_a_file_of_poses_may_leave_angles_free(four: Path, tmp_path: Path) -> None:
+    file = tmp_path / "poses.txt"
+    file.write_text("240 180 80\n240 180 80 - 90 -\n")
+    both = solutions("--arm", four, "--poses", file, "--tolerance-mm", "0.2")
+    assert [answer["asked"] for answer in both] == [["position"], ["position", "pitch"]]
+    assert {answer["tolerance_mm"] for answer in both} == {0.2}
+
+
+def test_numerical_finds_the_eight_too() -> None:
     form = ("--position", "300", "200", "300", "--rpy", "10", "20", "30")
     (closed,), (searched,) = solutions(*form), solutions(*form, "--numerical")
-    apart = [
-        np.abs(np.subtract(one["angles_deg"], searched["numerical"]["angles_deg"])).max()
-        for one in closed["solutions"]
-    ]
-    assert min(apart) < 1e-5
+    assert len(searched["solutions"]) == len(closed["solutions"]) == 8
+    chosen = closed["solutions"][closed["chosen"] - 1]
+    np.testing.assert_allclose(searched["angles_deg"], chosen["angles_deg"], atol=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -141,12 +228,19 @@ def test_numerical_agrees_with_one_of_the_eight() -> None:
     [
         ((), "give one of --matrix, --position or --poses"),
         (("--matrix", EQ_16_AT_1_TO_5, *POSITION, "--rpy", "0", "0", "0"), "give one of"),
-        (POSITION, "--position goes with one of --rpy and --quaternion"),
-        (("--matrix", EQ_16_AT_1_TO_5, "--rpy", "0", "0", "0"), "--position goes with one of"),
+        (("--matrix", EQ_16_AT_1_TO_5, "--rpy", "0", "0", "0"), "--position goes alone or with one of"),
+        (("--matrix", EQ_16_AT_1_TO_5, "--pitch", "0"), "--position goes alone or with one of"),
+        (("--pitch", "0"), "give one of --matrix, --position or --poses"),
         (
             (*POSITION, "--rpy", "0", "0", "0", "--quaternion", "1", "0", "0", "0"),
-            "--position goes with one of",
+            "--position goes alone or with one of",
         ),
+        ((*POSITION, "--rpy", "0", "0", "0", "--pitch", "0"), "--position goes alone or with one of"),
+        ((*POSITION, "--roll", "0", "--yaw", "0"), "roll and yaw without pitch leave too much open"),
+        ((*POSITION, "--approach", "0", "0", "0"), "--approach: the approach is a direction such as 0 0 -1"),
+        ((*POSITION, "--pitch", "nan"), "must be finite"),
+        ((*POSITION, "--tolerance-mm", "0"), "--tolerance-mm"),
+        ((*POSITION, "--tolerance-deg", "181"), "--tolerance-deg"),
         (("--matrix", "1 2 3"), "--matrix: 3 numbers are no pose; give 12 (3 rows of a matrix), 16"),
         (("--matrix", "1 0 0 0 0 1 0 0 0 0 x 0"), "--matrix: 'x' is not a number"),
         (("--matrix", "2 0 0 0 0 1 0 0 0 0 1 0"), "--matrix: the 3 x 3 part is not a rotation"),

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from armtempo.errors import InputError
 from armtempo.model.arm import Arm
-from armtempo.model.job import Job, Pose
+from armtempo.model.job import Job
+from armtempo.model.tool_pose import Pose
 
 ARM = Arm.paper()
 TWO = "via_deg = [[0, -60, 40], [20, -75, 50]]\n"
@@ -55,9 +56,52 @@ def test_poses_may_be_positions_that_are_turned(turned: str, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(
+    ("keys", "fixed"),
+    [
+        ("", ()),
+        ("pitch_deg = -90", ("pitch",)),
+        ("yaw_deg = 20", ("yaw",)),
+        ("roll_deg = 20", ("roll",)),
+        ("roll_deg = 0\npitch_deg = -90", ("roll", "pitch")),
+        ("pitch_deg = 5\nyaw_deg = -90", ("pitch", "yaw")),
+        ("roll_deg = 1\npitch_deg = 5\nyaw_deg = -90", ("roll", "pitch", "yaw")),
+        ("approach = [0, 0, -2]", ("approach",)),
+    ],
+)
+def test_a_position_may_ask_for_a_part_of_the_orientation(
+    keys: str, fixed: tuple[str, ...], tmp_path: Path
+) -> None:
+    text = f"[[via]]\nangles_deg = [0, -60, 40]\n[[via]]\nposition_mm = [300, 0, 60]\n{keys}\n"
+    via = Job.load(written(tmp_path, text), ARM).via[1]
+    assert isinstance(via, Pose)
+    assert via.fixed == fixed
+    assert (via.tolerance_mm, via.tolerance_deg) == (0.1, 0.1)
+    assert [row[3] for row in via.matrix] == [300, 0, 60, 1]
+    wider = Job.load(written(tmp_path, text + "tolerance_mm = 2\ntolerance_deg = 3.5\n"), ARM).via[1]
+    assert isinstance(wider, Pose)
+    assert (wider.tolerance_mm, wider.tolerance_deg) == (2.0, 3.5)
+
+
+@pytest.mark.parametrize(
     ("via", "said"),
     [
-        ("position_mm = [1, 2, 3]", "via[1]: position_mm goes with one of rpy_deg and quaternion"),
+        (
+            "position_mm = [1, 2, 3]\nrpy_deg = [0, 0, 0]\npitch_deg = 3",
+            "position_mm goes alone or with one of",
+        ),
+        (
+            "position_mm = [1, 2, 3]\napproach = [0, 0, 1]\nyaw_deg = 3",
+            "position_mm goes alone or with one of",
+        ),
+        (
+            "position_mm = [1, 2, 3]\nroll_deg = 0\nyaw_deg = 3",
+            "roll and yaw without pitch leave too much open",
+        ),
+        ("position_mm = [1, 2, 3]\napproach = [0, 0, 0]", "a direction such as 0 0 -1"),
+        ("position_mm = [1, 2, 3]\npitch_deg = nan", "via[1].pitch_deg"),
+        ("position_mm = [1, 2, 3]\ntolerance_mm = 0", "via[1].tolerance_mm = 0 is not allowed"),
+        ("position_mm = [1, 2, 3]\ntolerance_deg = 200", "via[1].tolerance_deg = 200 is not allowed"),
+        ("angles_deg = [0, 0, 0]\ntolerance_deg = 2", "via[1].tolerance_deg: unknown key"),
         ("position_mm = [1, 2]\nrpy_deg = [0, 0, 0]", "via[1].position_mm = [1, 2]"),
         ("position_mm = [1, 2, 3]\nrpy_deg = [0, 0, nan]", "via[1].rpy_deg"),
         ("position_mm = [1, 2, 3]\nquaternion = [1, 1, 0, 0]", "length 1.41421"),

@@ -42,13 +42,13 @@ def ranges_deg(*ends: tuple[float, float]) -> Ranges:
 def test_whole_turns_bring_an_angle_into_range_nearest_to_the_previous(
     angle: float, previous: float, ends: tuple[float, float], placed: float
 ) -> None:
-    found = ranges_deg(ends).place(np.radians([angle]), np.radians([previous]))
-    assert np.degrees(found[0]) == pytest.approx(placed, abs=1e-10)
+    (found,) = ranges_deg(ends).placed(np.radians([angle]).tolist(), np.radians([previous]).tolist())
+    assert np.degrees(found) == pytest.approx(placed, abs=1e-10)
 
 
 def test_excess_says_how_far_and_on_which_side() -> None:
     ranges = ranges_deg((-10.0, 20.0), (-10.0, 20.0), (-10.0, 20.0))
-    found = np.degrees(ranges.excess(np.radians([-12.0, 5.0, 25.0])))
+    found = np.degrees(ranges.excess(np.radians([-12.0, 5.0, 25.0]).tolist()))
     np.testing.assert_allclose(found, [-2.0, 0.0, 5.0], atol=1e-12)
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from armtempo.errors import InputError
 from armtempo.kinematics import BRANCHES, Geometry, branch_of, forward, inverse, refusals
-from armtempo.kinematics.inverse import CHUNK, OK, WRIST_STRAIGHT
+from armtempo.kinematics.inverse import CHUNK
+from armtempo.kinematics.solutions import OK, WRIST_STRAIGHT
 
 from tests.host.published_arms import NAMED, PAPER, PAPER_FULL_SIZE, drawn
 from tests.host.test_kinematics_forward import EQ_16, TABLE_2

@@ -1,71 +1,239 @@
-"""The numerical inverse: for arms that the closed form does not serve."""
+"""The numerical inverse: all postures that a seeded search finds, for any arm and any target."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from armtempo.kinematics import Geometry, Ranges, forward, inverse, refusals
-from armtempo.kinematics.numerical import solve
+from armtempo.kinematics import Geometry, Ranges, forward, inverse
+from armtempo.kinematics.constraint import Constraint
+from armtempo.kinematics.forward import frames
+from armtempo.kinematics.numerical import MovingArm, NumericalSolutions, search
+from armtempo.kinematics.solver import PoseSolver
 from armtempo.model.arm import Arm
+from armtempo.model.tool_pose import WHOLE, Pose
 
-from tests.host.published_arms import PAPER
+from tests.host.published_arms import NAMED
+from tests.host.small_arms import (
+    FITTING,
+    FIVE,
+    FOUR,
+    OFFSET_WRIST,
+    ONE,
+    PAPER_ARM,
+    PLANAR_2,
+    PLANAR_3,
+    SCARA,
+    SIX,
+    asked,
+    drawn_posture,
+)
+from tests.host.test_kinematics_inverse import turned
 
-RANGES = Ranges.of(Arm.paper())
-OFFSET_WRIST = replace(PAPER, a=(*PAPER.a[:3], 15.0, 0.0, 0.0))
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_an_arm_with_an_offset_wrist_is_served(seed: int) -> None:
-    assert refusals(OFFSET_WRIST)
-    rng = np.random.default_rng(seed)
-    angles = rng.uniform(RANGES.low * 0.8, RANGES.high * 0.8)
-    pose = forward(OFFSET_WRIST, angles)
-    found = solve(OFFSET_WRIST, pose, RANGES, angles + rng.uniform(-0.3, 0.3, 6))
-    assert found.found, found.reason
-    assert found.reason == ""
-    assert (found.angles_rad >= RANGES.low).all()
-    assert (found.angles_rad <= RANGES.high).all()
-    difference = forward(OFFSET_WRIST, found.angles_rad) - pose
-    assert np.abs(difference[:3, :3]).max() < 1e-9
-    assert np.abs(difference[:3, 3]).max() < 1e-9 * OFFSET_WRIST.reach
-
-
-def test_agrees_with_the_closed_form() -> None:
-    angles = np.radians([30.0, -70.0, 20.0, 40.0, 50.0, 60.0])
-    pose = forward(PAPER, angles)
-    found = solve(PAPER, pose, RANGES, angles + 0.1)
-    apart = np.abs(inverse(PAPER, pose).angles_rad[0] - found.angles_rad).max(axis=1)
-    assert apart.min() < 1e-7
+WIDE = 2 * np.pi
 
 
-def test_a_pose_out_of_reach_says_how_far_the_best_posture_stays_away() -> None:
-    pose = np.eye(4)
-    pose[:3, 3] = 2000.0, 0.0, 130.0
-    found = solve(OFFSET_WRIST, pose, RANGES, np.zeros(6))
-    assert not found.found
-    assert "no posture found from 20 starts" in found.reason
-    assert found.position_error > 1000.0
+def checked(found: NumericalSolutions) -> np.ndarray:
+    """The angles (S, joints) of an answer that keeps what it promises."""
+    constraint = Constraint.of(found.target)
+    angles = np.array([solution.angles_rad for solution in found.solutions])
+    for i, solution in enumerate(found.solutions):
+        miss = constraint.miss(frames(found.arm.geometry, solution.angles_rad)[-1])
+        np.testing.assert_allclose(miss, solution.miss, atol=1e-9)
+        assert constraint.reached(miss)
+        outside = [joint for joint in found.arm.moving if found.arm.ranges.excess(solution.angles_rad)[joint]]
+        assert [each.joint for each in solution.rejections] == [joint + 1 for joint in outside]
+        others = turned(np.delete(angles, i, axis=0) - angles[i])
+        assert not len(others) or others.max(axis=1).min() > 1e-5
+    usable = [solution.distance_rad for solution in found.solutions if not solution.rejections]
+    assert usable == sorted(usable)
+    return angles
+
+
+@pytest.mark.parametrize(("arm", "fixed"), FITTING, ids=lambda value: getattr(value, "name", None))
+def test_every_arm_finds_the_posture_that_made_the_pose(arm: Arm, fixed: tuple[str, ...]) -> None:
+    rng = np.random.default_rng(31)
+    solver = PoseSolver(arm)
+    for _ in range(5):
+        angles = drawn_posture(solver, rng)
+        wanted = asked(forward(solver.geometry, angles), fixed)
+        found = search(solver.moving, wanted, solver.home_rad)
+        postures = checked(found)
+        assert found.chosen is not None, found.reason
+        assert turned(postures - angles).max(axis=1).min() < 1e-6, f"{arm.name}, seed 31"
+        assert found.chosen.miss.position_mm < 1e-7
+        assert found.chosen.miss.rotation_deg < 1e-7
+
+
+@pytest.mark.parametrize("name", ["paper", "abb_irb_140"])
+def test_all_solutions_of_the_closed_form_are_found(name: str) -> None:
+    rng = np.random.default_rng(32)
+    in_mm = NAMED[name] if name == "paper" else scaled(NAMED[name], 1000.0)
+    arm = MovingArm(in_mm, Ranges(np.full(6, -WIDE), np.full(6, WIDE)), tuple(range(6)))
+    for _ in range(4):
+        pose = forward(in_mm, rng.uniform(-np.pi, np.pi, 6))
+        solutions = inverse(in_mm, pose)
+        closed = solutions.angles_rad[0][solutions.outcome[0] == 0]
+        found = checked(search(arm, Pose.of_matrix(pose), np.zeros(6)))
+        assert len(found) == len(closed)
+        for angles in closed:
+            assert turned(found - angles).max(axis=1).min() < 1e-6
+
+
+def scaled(geometry: Geometry, factor: float) -> Geometry:
+    lengths = (tuple(factor * length for length in row) for row in (geometry.d, geometry.a))
+    return Geometry(*lengths, geometry.alpha, geometry.offset)
+
+
+def test_planar_and_scara_arms_have_their_two_elbows() -> None:
+    for arm in (PLANAR_2, SCARA):
+        solver = PoseSolver(arm)
+        angles = np.radians([20.0, 70.0, 30.0][: len(arm.joints)])
+        pose = forward(solver.geometry, angles)
+        found = search(solver.moving, asked(pose, () if arm is PLANAR_2 else ("yaw",)), solver.home_rad)
+        np.testing.assert_allclose(sorted(checked(found)[:, 1]), np.radians([-70.0, 70.0]), atol=1e-8)
+
+
+@pytest.mark.parametrize("pitch", [90.0, -90.0, 89.9, -89.999, 0.0])
+def test_a_tool_that_points_straight_down_is_no_special_case(pitch: float) -> None:
+    solver = PoseSolver(
+        replace(FOUR, joints=tuple(replace(each, range_deg=(-180, 180)) for each in FOUR.joints))
+    )
+    position = (150.0, 120.0, 60.0)
+    found = search(solver.moving, Pose.of_angles(position, {"pitch": pitch}), solver.home_rad)
+    assert found.chosen is not None, found.reason
+    tool = forward(solver.geometry, found.chosen.angles_rad)
+    np.testing.assert_allclose(tool[:3, 3], position, atol=1e-6)
+    assert math.degrees(math.asin(max(-1.0, min(1.0, -tool[2, 0])))) == pytest.approx(pitch, abs=2e-5)
+    checked(found)
+
+
+def test_a_pose_typed_with_a_few_digits_is_not_refused() -> None:
+    """A four-joint arm cannot choose its yaw: 19.179 instead of 19.17900808."""
+    solver = PoseSolver(FOUR)
+    exact = math.atan2(120.0, 345.0)
+    position = (345.0, 120.0, 60.0)
+    rounded = round(math.degrees(exact), 3)
+    assert rounded == 19.179
+    wanted = Pose.of_angles(position, {"roll": 90.0, "pitch": 0.0, "yaw": rounded})
+    found = search(solver.moving, wanted, solver.home_rad)
+    assert found.chosen is not None, found.reason
+    assert 0.0 < found.chosen.miss.position_mm < 1e-3
+    assert 0.0 < found.chosen.miss.rotation_deg < 1e-3
+
+
+def test_tolerances_decide_and_the_reason_has_units_and_a_next_step() -> None:
+    solver = PoseSolver(FOUR)
+    yaw = math.degrees(math.atan2(120.0, 345.0)) + 1.0
+    wanted = Pose.of_angles((345.0, 120.0, 60.0), {"roll": 90.0, "pitch": 0.0, "yaw": yaw})
+    refused = search(solver.moving, wanted, solver.home_rad)
+    assert refused.chosen is None
+    assert "no posture reaches this pose within 0.1 mm and 0.1 deg" in refused.reason
+    assert f"misses it by {refused.nearest.miss}" in refused.reason
+    assert " mm and " in refused.reason
+    assert "as it asks for 6 numbers and 4 joints move, ask for less: position and pitch" in refused.reason
+    wider = replace(wanted, tolerance_deg=1.01)
+    assert search(solver.moving, wider, solver.home_rad).chosen is not None
+    # What is allowed more is given up first.
+    assert search(solver.moving, wider, solver.home_rad).nearest.miss.position_mm < 0.1
+
+
+def test_the_nearest_posture_to_a_pose_out_of_reach_is_the_stretched_arm() -> None:
+    solver = PoseSolver(PLANAR_2)
+    found = search(solver.moving, Pose.of_angles((320.0, 240.0, 0.0), {}), solver.home_rad)
+    assert found.chosen is None
+    assert found.nearest.miss.position_mm == pytest.approx(50.0, abs=1e-6)
+    np.testing.assert_allclose(found.nearest.angles_rad, [math.atan2(240.0, 320.0), 0.0], atol=1e-4)
+    assert "bring the pose nearer to the arm" in found.reason
+    within = Pose.of_angles((320.0, 240.0, 0.0), {})
+    allowed = search(solver.moving, replace(within, tolerance_mm=50.5), solver.home_rad)
+    assert allowed.chosen is not None
+
+
+def test_postures_out_of_range_are_listed_with_the_joint() -> None:
+    ranges = (
+        replace(PLANAR_2.joints[0], range_deg=(-90.0, 90.0)),
+        replace(PLANAR_2.joints[1], range_deg=(10, 170)),
+    )
+    solver = PoseSolver(replace(PLANAR_2, joints=ranges))
+    pose = forward(solver.geometry, np.radians([20.0, 70.0]))
+    found = search(solver.moving, asked(pose, ()), solver.home_rad)
+    first, second = found.solutions
+    assert first.rejections == ()
+    (reason,) = second.rejections
+    assert (reason.kind, reason.joint) == ("range", 2)
+    assert reason.text == "joint 2 at -70 deg is 80 deg below its range 10 to 170"
+    behind = forward(solver.geometry, np.radians([170.0, 70.0]))
+    none = search(solver.moving, asked(behind, ()), solver.home_rad)
+    assert none.chosen is None
+    assert len(none.solutions) == 2
+    assert "no posture within the joint ranges" in none.reason
+    assert "\n  2         joint 1 at 170 deg is 80 deg above its range -90 to 90" in none.reason
+    assert not any(solver.ranges.excess(none.nearest.angles_rad))
+
+
+def test_more_joints_than_the_pose_asks_for_give_the_nearest_posture_within_the_ranges() -> None:
+    rng = np.random.default_rng(33)
+    solver = PoseSolver(SIX)
+    for _ in range(10):
+        start, there = drawn_posture(solver, rng), drawn_posture(solver, rng)
+        wanted = asked(forward(solver.geometry, there), ())
+        found = search(solver.moving, wanted, start)
+        assert found.chosen is not None, f"seed 33: {found.reason}"
+        assert found.leaves_free
+        assert not any(solver.ranges.excess(found.chosen.angles_rad))
+    beside = start + rng.uniform(-0.02, 0.02, 6)
+    near = search(solver.moving, asked(forward(solver.geometry, beside), ()), start)
+    # No farther than the posture that the pose was made of.
+    assert near.nearest.distance_rad <= 1.05 * np.linalg.norm(beside - start)
+    assert near.starts == 1
+
+
+def test_an_axis_that_turns_nothing_leaves_a_joint_free() -> None:
+    solver = PoseSolver(FIVE)
+    pose = forward(solver.geometry, np.radians([20.0, 80.0, -60.0, 40.0, 10.0]))
+    found = search(solver.moving, asked(pose, ("approach",)), solver.home_rad)
+    assert found.leaves_free
+    assert len(checked(found)) == 16
+    start = np.radians([22.0, 78.0, -61.0, 41.0, -70.0])
+    near = solver.nearest(asked(pose, ("approach",)), start)
+    assert near.success
+    assert near.angles_rad[4] == pytest.approx(start[4], abs=1e-9)
+
+
+def test_joints_without_a_motor_stay() -> None:
+    solver = PoseSolver(PAPER_ARM)
+    wanted = Pose.of_angles((-536.404, 0.0, 434.698), {})
+    found = search(solver.moving, wanted, solver.home_rad)
+    assert len(found.solutions) == 4
+    np.testing.assert_array_equal(checked(found)[:, 3:], np.zeros((4, 3)))
 
 
 def test_the_same_seed_gives_the_same_answer() -> None:
-    pose = forward(OFFSET_WRIST, np.radians([150.0, -20.0, -100.0, 90.0, -80.0, 200.0]))
-    first, second = (solve(OFFSET_WRIST, pose, RANGES, np.zeros(6), seed=3) for _ in range(2))
-    np.testing.assert_array_equal(first.angles_rad, second.angles_rad)
+    solver = PoseSolver(OFFSET_WRIST)
+    wanted = asked(forward(solver.geometry, np.radians([150.0, -20.0, -100.0, 90.0, -80.0, 200.0])), WHOLE)
+    first, second = (search(solver.moving, wanted, solver.home_rad, seed=3) for _ in range(2))
+    assert [each.angles_rad for each in first.solutions] == [each.angles_rad for each in second.solutions]
+    assert first.starts == second.starts
 
 
 def test_an_arm_without_any_length_only_turns() -> None:
     point = Geometry((5.0,), (0.0,), (0.0,), (0.0,))
-    ranges = Ranges(np.full(1, -np.pi), np.full(1, np.pi))
-    assert solve(point, forward(point, [0.5]), ranges, np.zeros(1)).angles_rad == pytest.approx([0.5])
-    away = solve(point, np.eye(4), ranges, np.zeros(1))
-    assert (away.found, away.position_error) == (False, 5.0)
+    arm = MovingArm(point, Ranges(np.full(1, -np.pi), np.full(1, np.pi)), (0,))
+    found = search(arm, Pose.of_matrix(forward(point, [0.5])), [0.0])
+    assert found.nearest.angles_rad == pytest.approx([0.5])
+    away = search(arm, Pose.of_matrix(np.eye(4)), [0.0])
+    assert away.chosen is None
+    assert away.nearest.miss.position_mm == 5.0
 
 
-def test_arms_with_fewer_joints_than_the_pose_needs() -> None:
-    planar = Geometry((0.0, 0.0), (3.0, 4.0), (0.0, 0.0), (0.0, 0.0))
-    ranges = Ranges(np.full(2, -np.pi), np.full(2, np.pi))
-    found = solve(planar, forward(planar, [0.5, 0.7]), ranges, np.zeros(2))
-    assert found.found
-    np.testing.assert_allclose(found.angles_rad, [0.5, 0.7], atol=1e-8)
+def test_one_joint_and_three_planar_ones_take_a_position_they_can_reach() -> None:
+    one = PoseSolver(ONE)
+    pose = forward(one.geometry, [1.0])
+    assert search(one.moving, asked(pose, ()), [0.0]).nearest.angles_rad == pytest.approx([1.0])
+    planar = PoseSolver(PLANAR_3)
+    found = search(planar.moving, Pose.of_angles((100.0, 50.0, 5.0), {}), planar.home_rad)
+    assert found.chosen is None  # 5 mm above the plane
+    assert found.nearest.miss.position_mm == pytest.approx(5.0, abs=1e-3)

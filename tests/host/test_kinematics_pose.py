@@ -9,6 +9,7 @@ import pytest
 from armtempo.errors import InputError
 from armtempo.kinematics import pose_file
 from armtempo.model import pose
+from armtempo.model.tool_pose import WHOLE
 from scipy.spatial.transform import Rotation
 
 TURN = Rotation.from_euler("xyz", [10.0, -20.0, 130.0], degrees=True)
@@ -78,6 +79,25 @@ def test_angles_must_be_finite(angle: float) -> None:
         pose.from_rpy((0, 0, 0), (angle, 0, 0))
 
 
+@pytest.mark.parametrize("pitch", [-90.0, -89.0, 0.0, 30.0, 90.0])
+def test_roll_pitch_yaw_and_quaternion_are_read_back(pitch: float) -> None:
+    rng = np.random.default_rng(1)
+    for roll, yaw in rng.uniform(-180.0, 180.0, (50, 2)):
+        matrix = pose.from_rpy((1, 2, 3), (roll, pitch, yaw))
+        np.testing.assert_allclose(pose.from_rpy((1, 2, 3), pose.to_rpy_deg(matrix)), matrix, atol=1e-9)
+        quaternion = pose.to_quaternion(matrix)
+        assert quaternion[0] >= 0.0
+        np.testing.assert_allclose(pose.from_quaternion((1, 2, 3), quaternion), matrix, atol=1e-14)
+        if abs(pitch) < 89.5:
+            np.testing.assert_allclose(pose.to_rpy_deg(matrix), (roll, pitch, yaw), atol=1e-9)
+
+
+def test_half_turns_and_zeros_are_read_back_as_people_write_them() -> None:
+    assert str(tuple(pose.to_rpy_deg(pose.from_rpy((0, 0, 0), (180, 0, -180))))) == "(180.0, 0.0, 180.0)"
+    assert str(tuple(pose.to_rpy_deg(pose.from_rpy((0, 0, 0), (0, -90, 0))))) == "(0.0, -90.0, 0.0)"
+    assert str(tuple(pose.to_quaternion(pose.from_rpy((0, 0, 0), (180, 0, 0))))) == "(0.0, 1.0, 0.0, 0.0)"
+
+
 def test_file_of_poses_in_every_form(tmp_path: Path) -> None:
     x, y, z, w = TURN.as_quat()
     file = tmp_path / "poses.txt"
@@ -91,13 +111,29 @@ def test_file_of_poses_in_every_form(tmp_path: Path) -> None:
     poses = pose_file.read(file)
     assert len(poses) == 4
     for found in poses:
-        np.testing.assert_allclose(found, MATRIX, atol=1e-14)
+        np.testing.assert_allclose(found.matrix, MATRIX, atol=1e-14)
+        assert found.fixed == WHOLE
+
+
+def test_a_line_may_leave_angles_free(tmp_path: Path) -> None:
+    file = tmp_path / "poses.txt"
+    file.write_text("1 2 3\n1 2 3 - -90 -\n1, 2, 3, 5, -90, -\n1 2 3 - - 20\n1 2 3 - - -\n")
+    poses = pose_file.read(file)
+    assert [each.fixed for each in poses] == [(), ("pitch",), ("roll", "pitch"), ("yaw",), ()]
+    assert [each.constraints for each in poses] == [3, 4, 5, 4, 3]
+    np.testing.assert_allclose(poses[1].matrix, pose.from_rpy((1, 2, 3), (0, -90, 0)))
+    np.testing.assert_allclose(poses[2].matrix, pose.from_rpy((1, 2, 3), (5, -90, 0)))
 
 
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"1 2 3 0 0 0\n1 2 3\n", "line 2: 3 numbers are no pose; give 6 (x y z roll pitch yaw)"),
+        (
+            b"1 2 3 0 0 0\n1 2\n",
+            "line 2: 2 numbers are no pose; give 3 (x y z: position only), 6 (x y z roll",
+        ),
+        (b"1 2 - 0 0 0\n", "line 1: '-' is not a number"),
+        (b"1 2 3 10 - 20\n", "line 1: roll and yaw without pitch leave too much open"),
         (b"1 2 three 0 0 0\n", "line 1: 'three' is not a number"),
         (b"\n1 2 nan 0 0 0\n", "line 2: 'nan' is not a finite number"),
         (b"# nothing\n", "no pose in it"),

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from armtempo.kinematics import forward, inverse
-from armtempo.kinematics.inverse import (
+from armtempo.kinematics.shape import Shape
+from armtempo.kinematics.solutions import (
     DUPLICATE,
     ELBOW_STRETCHED,
     IN_OFFSET,
@@ -17,7 +18,6 @@ from armtempo.kinematics.inverse import (
     TOO_NEAR,
     WRIST_STRAIGHT,
 )
-from armtempo.kinematics.shape import Shape
 
 from tests.host.published_arms import NAMED, PAPER
 from tests.host.test_kinematics_inverse import turned, worst_error

@@ -13,7 +13,10 @@ import armtempo
 import numpy as np
 import pytest
 from armtempo import errors
+from armtempo.kinematics import PoseSolver
+from armtempo.kinematics.chain import chains_mm
 from armtempo.link.board_messages import Sample
+from armtempo.model import shipped
 from armtempo.simulator import LaunchOptions, launch
 from numpy.typing import ArrayLike
 
@@ -220,11 +223,60 @@ def test_inverse_finds_what_forward_says(angles: ArrayLike, arm: armtempo.Arm) -
     assert all(one.rejections for one in solutions[sum(usable) :])
 
 
+@pytest.mark.parametrize("name", shipped.files())
+def test_every_shipped_arm_gets_back_the_posture_that_made_a_pose(name: str) -> None:
+    arm = armtempo.Arm.load(name)
+    rng = np.random.default_rng(41)
+    low, high = np.array([joint.range_deg for joint in arm.driven]).T
+    for _ in range(3):
+        angles = rng.uniform(0.9 * low + 0.1 * high, 0.1 * low + 0.9 * high)
+        pose = armtempo.forward(arm, angles)
+        first, *_ = armtempo.inverse(arm, pose, near_deg=angles)
+        assert first.usable, f"{name}, seed 41: {first.rejections}"
+        np.testing.assert_allclose(armtempo.forward(arm, first.angles_deg), pose, atol=1e-4)
+        assert (first.branch == "") == bool(PoseSolver(arm).refusals)
+
+
+def test_inverse_serves_poses_that_ask_for_less() -> None:
+    arm = armtempo.Arm.load("moveo")
+    home = armtempo.forward(arm, arm.home_deg)
+    wanted = armtempo.Pose.of_angles(home[:3, 3] + (5.0, 5.0, -5.0), {})
+    (solution,) = armtempo.inverse(arm, wanted)
+    assert (solution.usable, solution.branch) == (True, "")
+    assert solution.miss_mm < wanted.tolerance_mm
+    assert (
+        np.linalg.norm(armtempo.forward(arm, solution.angles_deg)[:3, 3] - (home[:3, 3] + (5, 5, -5))) < 0.1
+    )
+    assert armtempo.inverse(arm, armtempo.Pose.of_angles((5000.0, 0.0, 0.0), {})) == ()
+
+
+def test_a_pose_just_out_of_reach_is_taken_within_its_tolerance(arm: armtempo.Arm) -> None:
+    """0.02 mm beyond the stretched elbow the closed form has nothing; 0.1 mm are allowed."""
+    elbows = np.linspace(*arm.joints[2].range_deg, 20_001)
+    angles = np.column_stack([np.full_like(elbows, fixed) for fixed in (20.0, -40.0)] + [elbows])
+    links = chains_mm(arm, angles)
+    reach = np.linalg.norm(links[:, 4] - links[:, 1], axis=1)  # wrist centre from the shoulder
+    _, shoulder, _, _, wrist, *_ = links[np.argmax(reach)]
+    pose = armtempo.forward(arm, [*angles[np.argmax(reach)], 0.0, 0.0, 0.0])
+    assert armtempo.inverse(arm, pose)[0].branch
+    pose[:3, 3] += 0.02 * (wrist - shoulder) / reach.max()
+    first, *_ = armtempo.inverse(arm, pose)
+    assert (first.usable, first.branch) == (True, "")
+    assert 0.0 < first.miss_mm < 0.1
+    pose[:3, 3] += 2.0 * (wrist - shoulder) / reach.max()
+    refused = armtempo.inverse(arm, pose)
+    assert len(refused) == 8
+    assert not any(one.usable for one in refused)
+    assert any("out of reach by 2.02 mm" in one.rejections[0] for one in refused)
+
+
 def test_poses_and_postures_of_the_wrong_shape_are_refused(arm: armtempo.Arm) -> None:
     with pytest.raises(armtempo.InputError, match="4 angles"):
         armtempo.forward(arm, [0.0] * 4)
     with pytest.raises(armtempo.InputError, match="near_deg"):
         armtempo.inverse(arm, np.eye(4), [0.0])
+    with pytest.raises(armtempo.InputError, match="near_deg"):
+        armtempo.inverse(arm, np.eye(4), [[0.0] * 6])
     with pytest.raises(armtempo.InputError, match="pose"):
         armtempo.inverse(arm, np.zeros((4, 4)))
 

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 from armtempo.cli import main
-from armtempo.model import trajectory_file
+from armtempo.model import shipped, trajectory_file
+from armtempo.model.arm import Arm
 from armtempo.planning import planner
 from click.testing import CliRunner, Result
 
@@ -34,6 +35,35 @@ def test_plans_the_shipped_job_without_options() -> None:
     assert "joint 3" in result.output
     assert "written: feed.json" in result.output
     assert trajectory_file.load("feed.json").job.iterations == 20
+
+
+COARSE_JOINT_2 = ("microsteps = 8, gear_ratio = 20.0", "microsteps = 1, gear_ratio = 0.5")
+
+
+def test_coarse_steps_are_told_with_what_to_do() -> None:
+    fine = run("--job", "move.toml", "--arm", "paper")
+    assert "warning" not in fine.output
+    text = shipped.files()[shipped.PAPER].read_text()
+    assert COARSE_JOINT_2[0] in text
+    Path("coarse.toml").write_text(text.replace(*COARSE_JOINT_2))
+    result = run("--job", "move.toml", "--arm", "coarse.toml")
+    assert result.exit_code == 0, result.output
+    told = [line for line in result.output.splitlines() if line.startswith("warning: ")]
+    assert len(told) == 2
+    assert told[0].startswith(
+        "warning: joint 2: its smallest step, 3.6 deg, is more than its following_error_deg of 2"
+    )
+    assert told[1].startswith("warning: joint 2: its smallest step, 3.6 deg, moves the tool by up to")
+    assert all("use more microsteps or a larger gear ratio" in line for line in told)
+    assert trajectory_file.load("move.json").arm.joints[1].motor is not None
+
+
+def test_an_arm_that_ships_is_taken_by_its_name() -> None:
+    Path("ar4.toml").write_text('name = "lift"\nvia_deg = [[0,0,0,0,0,0],[10,5,5,0,5,0]]\niterations = 5\n')
+    result = run("--job", "ar4.toml", "--arm", "ar4")
+    assert result.exit_code == 0, result.output
+    assert "arm: ar4, as it ships with armtempo" in result.stderr
+    assert trajectory_file.load("lift.json").arm == Arm.load("ar4")
 
 
 def test_options_go_before_the_file() -> None:

@@ -68,6 +68,17 @@ def test_links_lead_somewhere(page: Path) -> None:
         assert "://" in target or (page.parent / target).exists(), target
 
 
+def test_the_pages_on_arms_and_kinematics_name_modules_that_exist() -> None:
+    for name in ("arms.md", "kinematics.md"):
+        text = (ROOT / "host" / "docs" / name).read_text(encoding="utf-8")
+        rows = "".join(line for line in text.splitlines() if line.startswith("|"))
+        modules = set(re.findall(r"`(?:\.\./)?([\w/]+\.py)", rows))
+        assert len(modules) >= 8
+        places = (SOURCES["host"], SOURCES["host"] / "kinematics", ROOT / "shared")
+        for module in modules:
+            assert any((place / module).is_file() for place in places), f"{name}: {module}"
+
+
 def test_the_tour_names_every_package() -> None:
     tour = README[README.index("host/armtempo/  formats") : README.index("shared/armtempo_shared/   ")]
     packages = {path.parent.name for path in SOURCES["host"].glob("*/__init__.py")} | {"pipeline"}

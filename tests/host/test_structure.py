@@ -21,8 +21,10 @@ ORDER = (
     "optimise",  # population searches
     "model",  # arm, job, pose, plan, and their files
     "kinematics",  # forward, inverse, choice
+    "urdf",  # from a robot description to an arm file
     "planning",  # from a job to a plan
     "records",  # arm and motion as the board takes them
+    "arm_check",  # what looks wrong about an arm and a job
     "simulator",  # the virtual board
     "link",  # port, session, commands, samples of a run
     "deploy",  # the board program onto a board
@@ -37,7 +39,7 @@ ORDER = (
 LOWEST = ("__init__",)  # the version; its public names are imported when they are used
 HIGHEST = ("__main__",)
 MOST_PARAMETERS = 6
-OWN_PARAMETERS = ("search", "reasons")
+OWN_PARAMETERS = ("search",)
 """``optimise.*.search`` takes an algorithm's own parameters, each by its name in the algorithm's table."""
 SAME_BY_DESIGN = {
     "Timer",

@@ -13,8 +13,9 @@ import pytest
 from armtempo.errors import InputError
 from armtempo.model import trajectory_file
 from armtempo.model.arm import Arm
-from armtempo.model.job import Job, Pose
+from armtempo.model.job import Job
 from armtempo.model.plan import Plan
+from armtempo.model.tool_pose import Pose
 from armtempo.planning import planner
 
 ARM = Arm.paper()
@@ -54,12 +55,24 @@ def test_is_enough_to_plan_again(path: Path) -> None:
 
 
 def test_keeps_poses(plan: Plan, tmp_path: Path) -> None:
-    pose = Pose(
-        ((1.0, 0.0, 0.0, 5.0), (0.0, 1.0, 0.0, 6.0), (0.0, 0.0, 1.0, 7.0), (0.0, 0.0, 0.0, 1.0)), None
-    )
+    pose = Pose.of_angles((5.0, 6.0, 7.0), {"pitch": 20.0})
     posed = replace(plan, job=replace(plan.job, via=(plan.job.via[0], pose)))
     trajectory_file.save(posed, tmp_path / "posed.json")
     assert trajectory_file.load(tmp_path / "posed.json").job == posed.job
+
+
+def test_reads_files_from_before_poses_had_tolerances_and_joints_linkages() -> None:
+    """Written by ``armtempo plan`` of commit c418049."""
+    old = Path(__file__).parents[1] / "data" / "trajectory_before_tolerances.json"
+    content = json.loads(old.read_text(encoding="utf-8"))["plan"]
+    assert set(content["job"]["via"][1]) == {"matrix", "posture_deg"}
+    loaded = trajectory_file.load(old)
+    assert replace(loaded.arm, source=ARM.source) == ARM
+    _, pose, _ = loaded.job.via
+    assert pose == Pose(tuple(map(tuple, content["job"]["via"][1]["matrix"])))
+    assert (pose.fixed, pose.tolerance_mm, pose.tolerance_deg) == (("roll", "pitch", "yaw"), 0.1, 0.1)
+    again = planner.plan(loaded.arm, loaded.job)
+    np.testing.assert_allclose(again.via_deg, loaded.via_deg, atol=1e-9)
 
 
 def test_refuses_every_cut_of_the_file(path: Path, tmp_path: Path) -> None:
@@ -83,7 +96,7 @@ def edited(path: Path, edit: Callable[[Any], None]) -> Path:
     ("edit", "message"),
     [
         (lambda c: c.update(format="gcode"), "not a trajectory file"),
-        (lambda c: c.update(version=1), "version 1"),
+        (lambda c: c.update(version=2), "version 2"),
         (lambda c: c["plan"]["job"].update(refine="some"), "a number or 'auto'"),
         (
             lambda c: c["plan"]["trajectory"]["joints"][0].update(via_segments=[0, 1, 1, 3, 4, 5, 6]),
@@ -96,6 +109,7 @@ def edited(path: Path, edit: Callable[[Any], None]) -> Path:
         (lambda c: c.update(extra=1), "unknown or missing key"),
         (lambda c: c["plan"].update(colour="red"), "plan: unknown key colour"),
         (lambda c: c["plan"]["job"].pop("seed"), "plan.job: missing key seed"),
+        (lambda c: c["plan"]["arm"]["joints"][0].pop("home_deg"), "missing key home_deg"),
         (lambda c: c["plan"]["job"].update(seed="one"), "plan.job.seed"),
         (lambda c: c["plan"]["job"].update(seed=True), "plan.job.seed"),
         (lambda c: c["plan"]["job"].update(polish=1), "plan.job.polish"),

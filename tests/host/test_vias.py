@@ -12,9 +12,13 @@ from armtempo.errors import InputError, PlanError
 from armtempo.kinematics import Geometry, forward
 from armtempo.model import trajectory_file
 from armtempo.model.arm import Arm
-from armtempo.model.job import Job, Pose
+from armtempo.model.job import Job
+from armtempo.model.pose import from_rpy
+from armtempo.model.tool_pose import Pose
 from armtempo.planning import planner, via_points
 from click.testing import CliRunner
+
+from tests.host.small_arms import FOUR, asked
 
 ARM = Arm.paper()
 GEOMETRY = Geometry.of(ARM)
@@ -28,10 +32,10 @@ ALL_DRIVEN = replace(
 )
 
 
-def pose(*angles_deg: float, arm: Arm = ARM, posture_deg: tuple[float, ...] | None = None) -> Pose:
+def pose_of(*angles_deg: float, arm: Arm = ARM, posture_deg: tuple[float, ...] | None = None) -> Pose:
     """The pose of these joint angles; the wrist at home if only three are given."""
     angles = np.radians([*angles_deg, 0.0, 0.0, 0.0][:6])
-    return Pose(tuple(map(tuple, forward(Geometry.of(arm), angles))), posture_deg)
+    return replace(Pose.of_matrix(forward(Geometry.of(arm), angles)), posture_deg=posture_deg)
 
 
 def job(*via: tuple[float, ...] | Pose) -> Job:
@@ -39,7 +43,7 @@ def job(*via: tuple[float, ...] | Pose) -> Job:
 
 
 def test_the_paper_s_motion_given_as_poses_comes_out_as_its_angles() -> None:
-    poses = job(*(pose(*angles) for angles in JOB.via))
+    poses = job(*(pose_of(*angles) for angles in JOB.via))
     resolved = via_points.resolve(ARM, poses)
     np.testing.assert_allclose(resolved.via_deg, JOB.via, atol=1e-9)
     assert resolved.notes == ()
@@ -48,7 +52,7 @@ def test_the_paper_s_motion_given_as_poses_comes_out_as_its_angles() -> None:
 
 
 def test_angles_and_poses_may_be_mixed() -> None:
-    mixed = job(*(pose(*angles) if number % 2 else angles for number, angles in enumerate(JOB.via)))
+    mixed = job(*(pose_of(*angles) if number % 2 else angles for number, angles in enumerate(JOB.via)))
     resolved = via_points.resolve(ARM, mixed)
     np.testing.assert_allclose(resolved.via_deg, JOB.via, atol=1e-9)
     assert resolved.notes == ()
@@ -60,7 +64,7 @@ def test_angles_alone_stay_to_the_last_bit() -> None:
 
 def test_all_six_joints_driven() -> None:
     angles = ((10.0, -60.0, 40.0, 20.0, 30.0, 40.0), (60.0, -80.0, 50.0, 60.0, 20.0, 300.0))
-    resolved = via_points.resolve(ALL_DRIVEN, job(angles[0], pose(*angles[1], arm=ALL_DRIVEN)))
+    resolved = via_points.resolve(ALL_DRIVEN, job(angles[0], pose_of(*angles[1], arm=ALL_DRIVEN)))
     # Joint 6 is at -60, the turn nearer to where it was.
     np.testing.assert_allclose(
         resolved.via_deg, [angles[0], (60.0, -80.0, 50.0, 60.0, 20.0, -60.0)], atol=1e-9
@@ -69,7 +73,7 @@ def test_all_six_joints_driven() -> None:
 
 
 def test_a_pose_that_needs_undriven_joints_is_reported_with_the_miss() -> None:
-    resolved = via_points.resolve(ARM, job(JOB.via[0], pose(20.0, -75.0, 50.0, 0.0, 30.0, 0.0)))
+    resolved = via_points.resolve(ARM, job(JOB.via[0], pose_of(20.0, -75.0, 50.0, 0.0, 30.0, 0.0)))
     np.testing.assert_allclose(resolved.via_deg[1], [20.0, -75.0, 50.0], atol=1e-9)
     (note,) = resolved.notes
     assert (note.kind, note.via) == ("undriven", 2)
@@ -82,24 +86,24 @@ def test_a_pose_that_needs_undriven_joints_is_reported_with_the_miss() -> None:
 
 def test_a_solution_with_the_undriven_joints_at_home_comes_before_a_nearer_one() -> None:
     """Rear, elbow up reaches it with the wrist at home; front would be nearer to where the arm stands."""
-    target = pose(0.0, -93.0, -140.0)
-    assert via_points.resolve(ARM, job((5.0, -93.0, -140.0), target)).notes == ()
-    far = via_points.resolve(ARM, job((180.0, -38.0, -52.0), target))
+    wished = pose_of(0.0, -93.0, -140.0)
+    assert via_points.resolve(ARM, job((5.0, -93.0, -140.0), wished)).notes == ()
+    far = via_points.resolve(ARM, job((180.0, -38.0, -52.0), wished))
     np.testing.assert_allclose(far.via_deg[1], [0.0, -93.0, -140.0], atol=1e-9)
     assert "undriven" not in {note.kind for note in far.notes}
 
 
 def test_posture_deg_decides() -> None:
     wished = (0.0, -93.0, -157.0, 0.0, -19.0, 180.0)  # row 5 of Table 2
-    target = pose(180.0, -38.0, -52.0, posture_deg=wished)
-    resolved = via_points.resolve(ARM, job(JOB.via[0], target))
+    via = pose_of(180.0, -38.0, -52.0, posture_deg=wished)
+    resolved = via_points.resolve(ARM, job(JOB.via[0], via))
     np.testing.assert_allclose(resolved.via_deg[1], [0.0, -93.242, -157.541], atol=1e-3)
     assert {note.kind for note in resolved.notes} == {"undriven", "branch"}
 
 
 def test_a_branch_change_is_reported_with_the_reason() -> None:
     resolved = via_points.resolve(
-        ARM, job((40.0, -110.0, 70.0), pose(150.0, -93.0, -140.0), (40.0, -110.0, 70.0))
+        ARM, job((40.0, -110.0, 70.0), pose_of(150.0, -93.0, -140.0), (40.0, -110.0, 70.0))
     )
     first, second = resolved.notes
     assert (first.kind, first.via, second.kind, second.via) == ("branch", 2, "branch", 3)
@@ -110,7 +114,7 @@ def test_a_branch_change_is_reported_with_the_reason() -> None:
 
 def test_a_branch_change_by_way_of_a_straight_wrist_is_reported() -> None:
     bends = (20.0, 0.0, -20.0)
-    poses = (pose(0.0, -60.0, 40.0, 10.0, bend, 30.0, arm=ALL_DRIVEN) for bend in bends)
+    poses = (pose_of(0.0, -60.0, 40.0, 10.0, bend, 30.0, arm=ALL_DRIVEN) for bend in bends)
     postures = ((0.0, -60.0, 40.0, 10.0, bend, 30.0) for bend in bends)
     vias_given = [replace(each, posture_deg=posture) for each, posture in zip(poses, postures, strict=True)]
     resolved = via_points.resolve(ALL_DRIVEN, job(*vias_given))
@@ -125,16 +129,20 @@ def test_a_branch_change_between_angles_the_user_gave_is_his_own() -> None:
 
 
 def test_a_pose_out_of_reach_is_refused_with_every_reason() -> None:
-    far = Pose(((1.0, 0.0, 0.0, 3000.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0)))
-    with pytest.raises(
-        PlanError, match=r"via 2: no posture reaches this pose: out of reach by .*; out of reach by"
-    ):
+    far = Pose.of_angles((3000.0, 0.0, 0.0), {"roll": 0.0, "pitch": 0.0, "yaw": 0.0})
+    with pytest.raises(PlanError, match="via 2: no posture reaches this pose within") as caught:
         via_points.resolve(ARM, job(JOB.via[0], far))
+    first, columns, front, rear = str(caught.value).splitlines()
+    assert "misses it by 2193 mm and" in first
+    assert "bring the pose nearer to the arm" in first
+    assert columns.split() == ["solution", "why", "not"]
+    assert front.startswith("  1, 2, 3, 4  out of reach by 2425.18 mm:")
+    assert rear.startswith("  5, 6, 7, 8  out of reach by 2225.51 mm:")
 
 
 def test_a_pose_out_of_the_driven_ranges_is_refused_with_the_joint() -> None:
     with pytest.raises(PlanError, match=r"joint 1 at -60 deg is 50 deg below its range -10 to 190"):
-        via_points.resolve(ARM, job(JOB.via[0], pose(-60.0, 0.0, 0.0)))
+        via_points.resolve(ARM, job(JOB.via[0], pose_of(-60.0, 0.0, 0.0)))
 
 
 @pytest.mark.parametrize(
@@ -142,20 +150,20 @@ def test_a_pose_out_of_the_driven_ranges_is_refused_with_the_joint() -> None:
     [
         ((1.0, 2.0), "via 2: 2 angles, but 3 joints have a motor"),
         (
-            Pose(((2.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))),
+            Pose.of_matrix(np.diag((2.0, 1.0, 1.0, 1.0))),
             "not a rot",
         ),
-        (pose(0.0, -60.0, 40.0, posture_deg=(1.0, 2.0)), "posture_deg has 2 angles, not 6"),
+        (pose_of(0.0, -60.0, 40.0, posture_deg=(1.0, 2.0)), "posture_deg has 2 angles, not 6"),
     ],
 )
 def test_wrong_via_points_are_named(via: tuple[float, ...] | Pose, words: str) -> None:
     with pytest.raises(InputError, match="via 2") as caught:
-        via_points.resolve(ARM, job(pose(0.0, -60.0, 40.0), via))
+        via_points.resolve(ARM, job(pose_of(0.0, -60.0, 40.0), via))
     assert words in str(caught.value)
 
 
 def test_plan_prints_the_notes(tmp_path: Path) -> None:
-    rows = pose(20.0, -75.0, 50.0, 0.0, 30.0, 0.0).matrix
+    rows = pose_of(20.0, -75.0, 50.0, 0.0, 30.0, 0.0).matrix
     file = tmp_path / "job.toml"
     file.write_text(
         'name = "posed"\npopulation = 4\niterations = 5\n'
@@ -170,6 +178,46 @@ def test_plan_prints_the_notes(tmp_path: Path) -> None:
     np.testing.assert_allclose(plan.via_deg, [[0.0, -60.0, 40.0], [20.0, -75.0, 50.0]], atol=1e-9)
 
 
+def test_a_position_alone_is_reached_by_the_joints_with_a_motor() -> None:
+    wanted = Pose.of_angles((300.0, 200.0, 60.0), {})
+    resolved = via_points.resolve(ARM, job(JOB.via[0], wanted))
+    tool = forward(GEOMETRY, np.radians([*resolved.via_deg[1], 0.0, 0.0, 0.0]))
+    np.testing.assert_allclose(tool[:3, 3], (300.0, 200.0, 60.0), atol=1e-6)
+    assert resolved.notes == ()
+
+
+def test_four_joints_take_position_and_pitch_near_to_the_via_point_before() -> None:
+    angles = ((10.0, 60.0, -80.0, -50.0), (30.0, 70.0, -90.0, -60.0), (60.0, 80.0, -100.0, -40.0))
+    poses = (asked(forward(Geometry.of(FOUR), np.radians(each)), ("pitch",)) for each in angles[1:])
+    resolved = via_points.resolve(FOUR, job(angles[0], *poses))
+    np.testing.assert_allclose(resolved.via_deg, angles, atol=1e-6)
+    assert resolved.notes == ()
+
+
+def test_a_pose_within_its_tolerance_is_taken_with_a_note_of_the_miss() -> None:
+    off = from_rpy((345.0, 120.0, 60.0), (90.0, 0.0, 19.9))
+    refused = Pose.of_matrix(off)
+    with pytest.raises(
+        PlanError, match=r"via 2: .* 0\.1 mm and 0\.1 deg: the nearest one that was found misses it by"
+    ):
+        via_points.resolve(FOUR, job((0.0, 60.0, -80.0, -50.0), refused))
+    wider = replace(Pose.of_matrix(off), tolerance_deg=1.0)
+    resolved = via_points.resolve(FOUR, job((0.0, 60.0, -80.0, -50.0), wider))
+    (note,) = resolved.notes
+    assert (note.kind, note.via) == ("miss", 2)
+    assert note.text.startswith("via 2: the tool misses the pose by ")
+    assert note.text.endswith(" deg (0.1 mm and 1 deg allowed)")
+
+
+def test_a_tolerance_decides_whether_undriven_joints_are_missed() -> None:
+    nearly = pose_of(20.0, -75.0, 50.0, 0.0, 0.05, 0.0)
+    (note,) = via_points.resolve(ARM, job(JOB.via[0], nearly)).notes
+    assert note.kind == "miss"
+    narrow = replace(nearly, tolerance_deg=0.02)
+    (note,) = via_points.resolve(ARM, job(JOB.via[0], narrow)).notes
+    assert note.kind == "undriven"
+
+
 def test_an_arm_outside_the_class_is_served_numerically() -> None:
     bent = tuple(
         replace(joint, a_mm=10.0) if number == 3 else joint for number, joint in enumerate(ARM.joints)
@@ -177,8 +225,10 @@ def test_an_arm_outside_the_class_is_served_numerically() -> None:
     arm = replace(ARM, joints=bent)
     angles = JOB.via[0]
     assert not isinstance(angles, Pose)
-    resolved = via_points.resolve(arm, job(angles, pose(10.0, -70.0, 45.0, arm=arm)))
+    resolved = via_points.resolve(arm, job(angles, pose_of(10.0, -70.0, 45.0, arm=arm)))
     np.testing.assert_allclose(resolved.via_deg[1], [10.0, -70.0, 45.0], atol=1e-5)
-    far = Pose(((1.0, 0.0, 0.0, 3000.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0)))
-    with pytest.raises(PlanError, match="no posture found from 20 starts"):
+    far = Pose.of_angles((3000.0, 0.0, 0.0), {"roll": 0.0, "pitch": 0.0, "yaw": 0.0})
+    with pytest.raises(
+        PlanError, match=r"no posture reaches this pose within .* mm and .* deg: the nearest one"
+    ):
         via_points.resolve(arm, job(angles, far))

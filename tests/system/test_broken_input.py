@@ -27,7 +27,7 @@ WRONG_FILES = {
         "speed_deg_s = 40.0",
         "speed_deg_s = -40.0",
         "speed_deg_s = -40.0 is not allowed",
-        "above 0",
+        "at least 0.001",
     ),
 }
 

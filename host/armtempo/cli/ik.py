@@ -2,35 +2,78 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from armtempo.cli import options
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from armtempo.arrays import Array
-    from armtempo.kinematics.listing import Answer
-    from armtempo.model.arm import Arm
+    from armtempo.kinematics.listing import Listing
+    from armtempo.kinematics.solver import PoseSolver
+    from armtempo.model.tool_pose import Pose
 
 Three = tuple[float, float, float]
 Four = tuple[float, float, float, float]
 
 
+@dataclass(frozen=True)
+class _Given:
+    """What the options say of the pose."""
+
+    matrix: str | None
+    position: Three | None
+    rpy: Three | None
+    quaternion: Four | None
+    roll: float | None
+    pitch: float | None
+    yaw: float | None
+    approach: Three | None
+    poses: Path | None
+
+
 @click.command()
 @options.arm
 @click.option("--matrix", metavar="NUMBERS", help="12 or 16 numbers in quotes: its rows, lengths in mm.")
-@click.option("--position", type=float, nargs=3, metavar="X Y Z", help="Tool position in mm.")
-@click.option("--rpy", type=float, nargs=3, metavar="R P Y", help="Roll, pitch, yaw in deg.")
-@click.option("--quaternion", type=float, nargs=4, metavar="W X Y Z", help="Orientation instead of --rpy.")
+@click.option(
+    "--position",
+    type=float,
+    nargs=3,
+    metavar="X Y Z",
+    help="Tool position in mm; alone, or with what is asked of the orientation.",
+)
+@click.option(
+    "--rpy", type=float, nargs=3, metavar="R P Y", help="Roll, pitch, yaw in deg: the whole orientation."
+)
+@click.option("--quaternion", type=float, nargs=4, metavar="W X Y Z", help="The same as a quaternion.")
+@click.option("--roll", type=float, metavar="DEG", help="Only the roll is asked for, or roll and pitch.")
+@click.option(
+    "--pitch", type=float, metavar="DEG", help="Only the pitch is asked for, or one more of the three."
+)
+@click.option("--yaw", type=float, metavar="DEG", help="Only the yaw is asked for, or pitch and yaw.")
+@click.option(
+    "--approach", type=float, nargs=3, metavar="X Y Z", help="Only the direction of the tool's z axis."
+)
 @click.option(
     "--poses",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="One pose a line: x y z and roll pitch yaw or a quaternion, or 12 or 16 numbers of a matrix.",
+    help="One pose a line: x y z alone, with roll pitch yaw (- for a free one) or a quaternion, or 12 or 16 "
+    "numbers of a matrix.",
+)
+@click.option(
+    "--tolerance-mm",
+    type=click.FloatRange(1e-6, 1000.0),
+    help="A tool this near to its position has reached it.  [default: 0.1]",
+)
+@click.option(
+    "--tolerance-deg",
+    type=click.FloatRange(1e-6, 180.0),
+    help="The same for what is asked of its orientation.  [default: 0.1]",
 )
 @click.option(
     "--previous",
@@ -38,94 +81,115 @@ Four = tuple[float, float, float, float]
     help="Posture to stay near to, all joints in deg, in quotes; without it the arm's home. "
     "With --poses each pose follows the one before.",
 )
-@click.option("--numerical", is_flag=True, help="Search one solution numerically, whatever the arm.")
+@click.option("--numerical", is_flag=True, help="Search numerically, whatever the arm.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def command(
     arm_path: Path | None,
-    matrix: str | None,
-    position: Three | None,
-    rpy: Three | None,
-    quaternion: Four | None,
-    poses: Path | None,
     previous: str | None,
     numerical: bool,
     as_json: bool,
+    tolerance_mm: float | None,
+    tolerance_deg: float | None,
+    **given: Any,
 ) -> None:
     """Print all solutions of the inverse kinematics for a pose, or for each pose of a file.
 
-    The solution marked * is the one nearest to the previous posture within the joint ranges. An arm outside
-    the class of the closed form gets the one solution that a numerical search finds. Exit code 1 if a pose
-    has no solution.
+    The solution marked * is the one nearest to the previous posture within the joint ranges. A pose that leaves
+    something open, and an arm outside the class of the closed form, get the solutions that a numerical search
+    finds with the joints that have a motor. Exit code 1 if a pose has no solution.
     """
-    from armtempo.kinematics import Geometry, Ranges
-    from armtempo.kinematics.listing import answers
-    from armtempo.kinematics.shape import refusals
+    from armtempo.kinematics.listing import listings
+    from armtempo.kinematics.solver import PoseSolver
 
-    targets = _targets(matrix, position, rpy, quaternion, poses)
-    arm = options.load_arm(arm_path)
-    geometry = Geometry.of(arm)
-    reasons = refusals(geometry)
-    found = answers(geometry, Ranges.of(arm), targets, _posture(previous, arm), numerical or bool(reasons))
+    wanted = [_within(pose, tolerance_mm, tolerance_deg) for pose in _poses(_Given(**given))]
+    solver = PoseSolver(options.load_arm(arm_path))
+    found = listings(solver, wanted, _posture(previous, solver), numerical)
     show = _print_json if as_json else _print_text
-    show(arm.name, reasons, found)
+    show(solver, found)
 
 
-def _targets(
-    matrix: str | None, position: Three | None, rpy: Three | None, quaternion: Four | None, poses: Path | None
-) -> list[Array]:
+def _within(pose: Pose, tolerance_mm: float | None, tolerance_deg: float | None) -> Pose:
+    """The pose with the tolerances that were given."""
+    if tolerance_mm is not None:
+        pose = replace(pose, tolerance_mm=tolerance_mm)
+    return pose if tolerance_deg is None else replace(pose, tolerance_deg=tolerance_deg)
+
+
+def _poses(given: _Given) -> list[Pose]:
     """The poses of the options; UsageError where they do not make exactly one of the three forms."""
     from armtempo.kinematics import pose_file
-    from armtempo.model import pose
 
-    forms = [matrix is not None, position is not None, poses is not None]
-    if sum(forms) != 1:
+    if sum(form is not None for form in (given.matrix, given.position, given.poses)) != 1:
         raise click.UsageError("give one of --matrix, --position or --poses")
-    if (rpy is not None) + (quaternion is not None) != (position is not None):
-        raise click.UsageError("--position goes with one of --rpy and --quaternion, and they with it")
-    if poses is not None:
-        return pose_file.read(poses)
-    if matrix is not None:
-        return [pose_file.parse(matrix, "--matrix", (12, 16))]
-    assert position is not None
-    if quaternion is not None:
-        return [pose.from_quaternion(position, quaternion, "--position --quaternion")]
-    assert rpy is not None
-    return [pose.from_rpy(position, rpy, "--position --rpy")]
+    angles = {
+        name: getattr(given, name) for name in ("roll", "pitch", "yaw") if getattr(given, name) is not None
+    }
+    orientations = sum(form is not None for form in (given.rpy, given.quaternion, given.approach)) + bool(
+        angles
+    )
+    if orientations > (given.position is not None):
+        raise click.UsageError(
+            "--position goes alone or with one of --rpy, --quaternion, --approach, or any of --roll, --pitch and "
+            "--yaw; and they go with it"
+        )
+    if given.poses is not None:
+        return pose_file.read(given.poses)
+    if given.matrix is not None:
+        return [pose_file.parse(given.matrix, "--matrix", (12, 16))]
+    return [_positioned(given, angles)]
 
 
-def _posture(previous: str | None, arm: Arm) -> Array:
+def _positioned(given: _Given, angles: dict[str, float]) -> Pose:
+    """The pose of --position and what goes with it."""
+    from armtempo.model.pose import from_quaternion
+    from armtempo.model.tool_pose import Pose
+
+    assert given.position is not None
+    if given.quaternion is not None:
+        matrix = from_quaternion(given.position, given.quaternion, "--position --quaternion")
+        return Pose.of_matrix(matrix)
+    if given.approach is not None:
+        return Pose.of_approach(given.position, given.approach, "--approach")
+    if given.rpy is not None:
+        angles = dict(zip(("roll", "pitch", "yaw"), given.rpy, strict=True))
+    return Pose.of_angles(given.position, angles, " ".join(("--position", *(f"--{name}" for name in angles))))
+
+
+def _posture(previous: str | None, solver: PoseSolver) -> Sequence[float]:
     """The posture to stay near to, in rad: (joints,)."""
-    import numpy as np
-
     from armtempo.errors import InputError
     from armtempo.kinematics.pose_file import numbers
 
     if previous is None:
-        return np.radians([joint.home_deg for joint in arm.joints])
+        return solver.home_rad
     angles = numbers(previous, "--previous")
-    if len(angles) != len(arm.joints):
-        raise InputError(f"--previous: {len(angles)} angles given, the arm has {len(arm.joints)} joints")
-    return np.radians(angles)
+    if len(angles) != len(solver.home_rad):
+        raise InputError(f"--previous: {len(angles)} angles given, the arm has {len(solver.home_rad)} joints")
+    return [math.radians(angle) for angle in angles]
 
 
-def _print_text(_: str, reasons: list[str], found: Iterable[Answer]) -> None:
-    if reasons:
-        click.echo(f"no closed form for this arm: {'; '.join(reasons)}")
+def _print_text(solver: PoseSolver, found: Iterable[Listing]) -> None:
+    if solver.refusals:
+        click.echo(f"no closed form for this arm: {'; '.join(solver.refusals)}")
     without = []
-    for number, answer in enumerate(found, 1):
-        click.echo("\n".join((f"pose {number}: {answer.text[0]}", *answer.text[1:])))
-        if answer.angles_rad is None:
+    for number, listing in enumerate(found, 1):
+        click.echo("\n".join((f"pose {number}: {listing.text[0]}", *listing.text[1:])))
+        if not listing.success:
             without.append(number)
     _fail(without)
 
 
-def _print_json(name: str, reasons: list[str], found: Iterable[Answer]) -> None:
+def _print_json(solver: PoseSolver, found: Iterable[Listing]) -> None:
     import json
 
     results = list(found)
-    values = {"arm": name, "no_closed_form": reasons, "poses": [answer.values for answer in results]}
+    values = {
+        "arm": solver.arm.name,
+        "no_closed_form": solver.refusals,
+        "poses": [listing.values for listing in results],
+    }
     click.echo(json.dumps(values, indent=1))
-    _fail([number for number, answer in enumerate(results, 1) if answer.angles_rad is None])
+    _fail([number for number, listing in enumerate(results, 1) if not listing.success])
 
 
 def _fail(without: list[int]) -> None:
@@ -134,4 +198,7 @@ def _fail(without: list[int]) -> None:
 
     if without:
         which = ", ".join(map(str, without))
-        raise PlanError(f"no solution for pose {which}; the reasons are listed with it")
+        raise PlanError(
+            f"no solution for pose {which}; the reasons are listed with it; bring it nearer to the arm, ask for less "
+            "of its orientation, or allow more by --tolerance-mm and --tolerance-deg"
+        )

@@ -42,14 +42,17 @@ def _arm_option(text: str) -> Callable[[FC], FC]:
         envvar="ARMTEMPO_ARM",
         show_envvar=True,
         type=click.Path(path_type=Path),
-        metavar="FILE",
+        metavar="ARM",
         help=text,
     )
 
 
-arm = _arm_option("Arm file (TOML); without it the paper's 1:5 arm.")
+arm = _arm_option(
+    "Arm file (TOML), or the name of an arm that ships, such as ar4; without it the paper's 1:5 arm."
+)
 arm_of_file = _arm_option(
-    "Arm file (TOML), which a trajectory file must fit; without it the one in that file, else the paper's 1:5 arm."
+    "Arm file (TOML) or name of an arm that ships, which a trajectory file must fit; without it the one in that "
+    "file, else the paper's 1:5 arm."
 )
 job = click.option(
     "--job",
@@ -68,11 +71,24 @@ out = click.option(
 )
 
 
-def load_arm(path: Path | None) -> Arm:
+def load_arm(given: Path | None) -> Arm:
     """The arm of ``--arm``."""
-    from armtempo.model.arm import Arm
+    from armtempo.model import arm_file as reader
 
-    return Arm.load(path) if path else Arm.paper()
+    return reader.load(arm_file(given))
+
+
+def arm_file(given: Path | None) -> Path:
+    """The file of ``--arm``, a path or the name of an arm that ships; which one ships is said aloud."""
+    from armtempo.model import arm_file as reader
+    from armtempo.model import shipped
+
+    if given is None:
+        return reader.default_path()
+    found = shipped.find(given)
+    if found.ships:
+        click.echo(f"arm: {given}, as it ships with armtempo ({found.path})", err=True)
+    return found.path
 
 
 def load_job(path: Path | None, arm: Arm) -> Job:

@@ -15,6 +15,13 @@ if TYPE_CHECKING:
     from armtempo.model.arm import Arm
     from armtempo.robot.board import Board
 
+_VIA = re.compile(r"[Pp]\d+")
+
+
+def is_named(text: str) -> bool:
+    """Whether the text means a via point or a trajectory file, and no angles."""
+    return bool(_VIA.fullmatch(text)) or text.endswith(".json")
+
 
 def parse(text: str, arm: Arm, job_path: Path | None) -> Array:
     """Angles in degrees (J,): of '0,-60,40', of 'P3' in the job, or of the start of 'file.json'.
@@ -23,7 +30,7 @@ def parse(text: str, arm: Arm, job_path: Path | None) -> Array:
     """
     from armtempo.planning import point_to_point
 
-    if re.fullmatch(r"[Pp]\d+", text):
+    if _VIA.fullmatch(text):
         return _via(int(text[1:]), arm, job_path)
     if text.endswith(".json"):
         from armtempo import pipeline

@@ -1,4 +1,8 @@
-"""Dataclasses to JSON values and back; reading refuses what the types do not describe."""
+"""Dataclasses to JSON values and back; reading refuses what the types do not describe.
+
+A key that is missing is refused too, but for a field marked ``ADDED``: files from before it was there are read with
+its default.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +16,9 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from armtempo.errors import InputError
+
+ADDED = {"added": True}
+"""Metadata of a dataclass field that older files do not have; its default is what they meant."""
 
 
 def encode(value: Any) -> Any:
@@ -96,12 +103,15 @@ def _array(value: Any, where: str) -> Any:
 def _dataclass(kind: Any, value: Any, where: str) -> Any:
     if not isinstance(value, dict):
         raise InputError(f"{where}: {_short(value)} should be a table")
-    names = [field.name for field in dataclasses.fields(kind)]
-    for what, keys in (("unknown", value.keys() - set(names)), ("missing", set(names) - value.keys())):
+    fields = {field.name: field.metadata.get("added", False) for field in dataclasses.fields(kind)}
+    missing = {name for name, added in fields.items() if name not in value and not added}
+    for what, keys in (("unknown", value.keys() - fields.keys()), ("missing", missing)):
         if keys:
             raise InputError(f"{where}: {what} key {', '.join(sorted(keys))}")
     hints = _hints(kind)
-    return kind(**{name: decode(hints[name], value[name], f"{where}.{name}") for name in names})
+    return kind(
+        **{name: decode(hints[name], value[name], f"{where}.{name}") for name in fields if name in value}
+    )
 
 
 _hints: Callable[[Any], dict[str, Any]] = get_type_hints

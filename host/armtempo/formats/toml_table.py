@@ -73,14 +73,13 @@ class Table:
         key: str,
         default: float = _REQUIRED,
         *,
-        above: float = -math.inf,
         least: float = -math.inf,
         most: float = math.inf,
     ) -> float:
-        """A finite number with ``above`` < value, ``least`` <= value <= ``most``."""
-        allowed = "a number" + _range_text(above, least, most)
+        """A finite number with ``least`` <= value <= ``most``."""
+        allowed = "a number" + _range_text(least, most)
         value = self._get(key, default, allowed)
-        if not _is_number(value) or not (value > above and least <= value <= most):
+        if not _is_number(value) or not (least <= value <= most):
             raise self.fail(key, allowed)
         return float(value)
 
@@ -167,10 +166,8 @@ def _is_number(value: Any) -> bool:
     return abs(value) <= sys.float_info.max
 
 
-def _range_text(above: float, least: float, most: float) -> str:
+def _range_text(least: float, most: float) -> str:
     parts = []
-    if above > -math.inf:
-        parts.append(f"above {above:g}")
     if least > -math.inf:
         parts.append(f"of at least {least:g}")
     if most < math.inf:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from armtempo.arrays import Array
 from armtempo.kinematics.branches import BRANCHES, Branch
-from armtempo.kinematics.geometry import Array, Geometry
-from armtempo.kinematics.inverse import inverse, wrist_centre
+from armtempo.kinematics.geometry import Geometry
+from armtempo.kinematics.inverse import inverse_of_pose, wrist_centre
 from armtempo.kinematics.ranges import Ranges
 from armtempo.kinematics.regions import classify
-from armtempo.kinematics.rejection import Rejection, reasons
+from armtempo.kinematics.rejection import Rejection, WristCentre, reasons
 from armtempo.kinematics.shape import Shape
 
 
@@ -58,18 +60,17 @@ def choose(
     """
     shape = Shape.of(geometry)
     matrix = np.asarray(pose, dtype=np.float64)
-    previous = np.asarray(previous_rad, dtype=np.float64)
-    solutions = inverse(geometry, matrix, previous)
-    wrist = wrist_centre(shape, matrix.reshape(16, 1))[:, 0]
-    placed = ranges.place(solutions.angles_rad[0], previous)
-    distances = np.sqrt(np.sum(np.square(placed - previous), axis=-1))
+    previous = np.asarray(previous_rad, dtype=np.float64).tolist()
+    solutions = inverse_of_pose(geometry, matrix.ravel().tolist(), previous)
+    wrist = WristCentre(shape, wrist_centre(shape, matrix.reshape(16, 1))[:, 0], unit)
     candidates = []
     for i, branch in enumerate(BRANCHES):
-        outcome, singular = int(solutions.outcome[0, i]), int(solutions.singular[0, i])
-        why = reasons(shape, wrist, i, outcome, singular, ranges, placed[i], unit)
-        candidates.append(Candidate(i + 1, branch, placed[i], why, singular, float(distances[i])))
+        placed = ranges.placed(solutions.angles_rad[i], previous)
+        why = reasons(wrist, solutions, i, ranges, placed)
+        distance = math.dist(placed, previous)
+        candidates.append(Candidate(i + 1, branch, np.array(placed), why, solutions.singular[i], distance))
     usable = [candidate for candidate in candidates if not candidate.rejections]
-    region = classify(shape, wrist)
+    region = classify(shape, wrist.position)
     return Choice(
         tuple(candidates),
         min(usable, key=lambda candidate: candidate.distance_rad, default=None),

@@ -1,56 +1,98 @@
-"""Forward kinematics: from joint angles to the tool's pose and to the origins of all frames."""
+"""Forward kinematics: from joint angles to the tool's pose and to all frames."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import NamedTuple
+import math
+from collections.abc import Sequence
+from typing import Any, Generic, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armtempo.kinematics.geometry import Array, Geometry, twist
+from armtempo.arrays import Array
+from armtempo.kinematics.geometry import Geometry, Link, T
+
+Triple = tuple[T, T, T]
 
 
-class Frame(NamedTuple):
-    """A coordinate frame in the base frame: three axes and the origin, each of shape (3, ...)."""
+class Frame(NamedTuple, Generic[T]):
+    """A coordinate frame in the base frame: three axes and the origin; elements are floats or arrays (N...)."""
 
-    x: Array
-    y: Array
-    z: Array
-    origin: Array
-
-
-def frames(geometry: Geometry, angles_rad: ArrayLike) -> Iterator[Frame]:
-    """Yield the base frame and the frame after each joint, for angles of shape (..., joints).
-
-    One array a matrix element, no products of 4 x 4 matrices: many postures cost little more than one.
-    """
-    angles = np.asarray(angles_rad, dtype=np.float64)
-    batch = angles.shape[:-1]
-    x, y, z = (np.broadcast_to(unit.reshape(3, *(1,) * len(batch)), (3, *batch)) for unit in np.eye(3))
-    origin = np.zeros((3, *batch))
-    yield Frame(x, y, z, origin)
-    for i in range(geometry.joints):
-        turn = angles[..., i] + geometry.offset[i]
-        cos, sin = np.cos(turn), np.sin(turn)
-        cos_alpha, sin_alpha = twist(geometry.alpha[i])
-        x, level = cos * x + sin * y, cos * y - sin * x
-        origin = origin + geometry.d[i] * z + geometry.a[i] * x
-        y, z = cos_alpha * level + sin_alpha * z, cos_alpha * z - sin_alpha * level
-        yield Frame(x, y, z, origin)
+    x: Triple[T]
+    y: Triple[T]
+    z: Triple[T]
+    origin: Triple[T]
 
 
 def forward(geometry: Geometry, angles_rad: ArrayLike) -> Array:
     """Return the tool's pose, Eq. (1): shape (..., 4, 4) for angles of shape (..., joints), in rad."""
-    *_, tool = frames(geometry, angles_rad)
-    pose = np.zeros((*tool.origin.shape[1:], 4, 4))
-    for column, axis in enumerate(tool):
-        pose[..., :3, column] = np.moveaxis(axis, 0, -1)
+    angles = np.asarray(angles_rad, dtype=np.float64)
+    pose = np.zeros((*angles.shape[:-1], 4, 4))
     pose[..., 3, 3] = 1.0
+    one = angles.ndim == 1
+    tool: Frame[Any] = (frames(geometry, angles.tolist()) if one else array_frames(geometry, angles))[-1]
+    for column, axis in enumerate(tool):
+        for row, element in enumerate(axis):
+            pose[..., row, column] = element
     return pose
+
+
+def all_frames(geometry: Geometry, angles_rad: Sequence[float]) -> Array:
+    """Return the poses of the base frame and of the frame after each joint, (joints + 1, 4, 4); the last: tool."""
+    poses = np.tile(np.eye(4), (geometry.joints + 1, 1, 1))
+    poses[:, :3] = np.swapaxes(np.array(frames(geometry, angles_rad)), 1, 2)
+    return poses
 
 
 def postures(geometry: Geometry, angles_rad: ArrayLike) -> Array:
     """Return the origins of the base and of every frame: shape (..., joints + 1, 3), for drawing the arm."""
-    origins = [np.moveaxis(frame.origin, 0, -1) for frame in frames(geometry, angles_rad)]
-    return np.stack(origins, axis=-2)
+    found = array_frames(geometry, np.asarray(angles_rad, dtype=np.float64))
+    return np.stack([np.stack(frame.origin, axis=-1) for frame in found], axis=-2)
+
+
+def frames(geometry: Geometry, angles_rad: Sequence[float]) -> list[Frame[float]]:
+    """The base frame and the frame after each joint, with floats: one posture, ten times as fast as by arrays."""
+    turns = [
+        angle + link.offset for angle, link in zip(geometry.turns(angles_rad), geometry.links, strict=True)
+    ]
+    return _chain(geometry, [math.cos(turn) for turn in turns], [math.sin(turn) for turn in turns], 0.0, 1.0)
+
+
+def array_frames(geometry: Geometry, angles_rad: Array) -> list[Frame[Array]]:
+    """The same with arrays, for angles of shape (..., joints): many postures cost little more than one."""
+    columns = np.stack(geometry.turns(list(np.moveaxis(angles_rad, -1, 0))))
+    turns = [column + link.offset for column, link in zip(columns, geometry.links, strict=True)]
+    zero = np.zeros(angles_rad.shape[:-1])
+    return _chain(
+        geometry, [np.cos(turn) for turn in turns], [np.sin(turn) for turn in turns], zero, zero + 1.0
+    )
+
+
+def _chain(geometry: Geometry, cosines: Sequence[T], sines: Sequence[T], zero: T, one: T) -> list[Frame[T]]:
+    base = Frame((one, zero, zero), (zero, one, zero), (zero, zero, one), (zero, zero, zero))
+    found = [base]
+    for link, cos, sin in zip(geometry.links, cosines, sines, strict=True):
+        found.append(_next(link, found[-1], cos, sin))
+    return found
+
+
+def _next(link: Link, frame: Frame[T], cos: T, sin: T) -> Frame[T]:
+    """The frame after a joint: Rz(angle + offset) Tz(d) Tx(a) Rx(alpha), element by element."""
+    d, a, cos_alpha, sin_alpha, _ = link
+    (x0, x1, x2), (y0, y1, y2), (z0, z1, z2), (p0, p1, p2) = frame
+    level0, level1, level2 = cos * y0 - sin * x0, cos * y1 - sin * x1, cos * y2 - sin * x2
+    x0, x1, x2 = cos * x0 + sin * y0, cos * x1 + sin * y1, cos * x2 + sin * y2
+    return Frame(
+        (x0, x1, x2),
+        (
+            cos_alpha * level0 + sin_alpha * z0,
+            cos_alpha * level1 + sin_alpha * z1,
+            cos_alpha * level2 + sin_alpha * z2,
+        ),
+        (
+            cos_alpha * z0 - sin_alpha * level0,
+            cos_alpha * z1 - sin_alpha * level1,
+            cos_alpha * z2 - sin_alpha * level2,
+        ),
+        (p0 + d * z0 + a * x0, p1 + d * z1 + a * x1, p2 + d * z2 + a * x2),
+    )

@@ -1,4 +1,4 @@
-"""Joints 1 to 3 from the wrist centre: the geometric half of section 2.1, Eqs. (3) to (7)."""
+"""Joints 1 to 3 from many wrist centres: the geometric half of section 2.1, Eqs. (3) to (7)."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armtempo.kinematics.geometry import Array
+from armtempo.arrays import Array
+from armtempo.kinematics import formulas
+from armtempo.kinematics.formulas import ARRAYS
 from armtempo.kinematics.regions import Mask, Radii, radii
 from armtempo.kinematics.shape import Shape
 
 
 class ArmPart(NamedTuple):
-    """Joints 1 to 3 as Denavit-Hartenberg angles, not wrapped; NaN where out of reach.
+    """Joints 1 to 3 as Denavit-Hartenberg angles, theta3 not wrapped; NaN where out of reach.
 
     Axes of the arrays: base (front, rear), elbow (up, down), pose.
     """
@@ -24,8 +26,10 @@ class ArmPart(NamedTuple):
     """(2, 2, N)"""
     theta3: Array
     """(2, 2, N)"""
-    fore: Array
-    """(2, 2, N): theta2 + sign2 * theta3, the direction of x3 in the arm's plane."""
+    turn1: tuple[Array, Array]
+    """Cosine and sine of theta1, (2, N) each."""
+    fore: tuple[Array, Array]
+    """As ``formulas.forearm``, (2, 2, N) each."""
     radii: Radii
 
 
@@ -37,43 +41,37 @@ def solve_arm(shape: Shape, wrist: Array, previous: Array) -> ArmPart:
     """
     x, y, z = wrist
     measured = radii(shape, x, y, z)
-    theta1 = _base(shape, x, y, measured, previous[..., 0])
     forward = np.stack((measured.forward, -measured.forward))
-    theta2, stretch = _triangle(shape, forward - shape.shoulder, shape.sign1 * (z - shape.height), measured)
-    folded = measured.shoulder <= shape.near
+    turn1 = _base(shape, x, y, forward, measured.axis, previous[..., 0])
+    out, up = formulas.to_shoulder(shape, forward[:, None], z)
+    r, sign = measured.shoulder, elbow_signs(shape)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        elbow, sine = (sign * part[:, None] for part in formulas.triangle(ARRAYS, shape, r))
+        square = np.square(r)[:, None]
+        theta2 = formulas.upper_arm(ARRAYS, shape, out, up, square, sine)
+        fore = formulas.forearm(shape, out, up, square, sine)
+    bent = formulas.bent(shape, elbow)
+    folded = r <= shape.near
     if folded.any():
-        free = np.broadcast_to(previous[..., 1], folded.shape)
-        np.copyto(theta2, free[:, None], where=folded[:, None])
-    bent = stretch - shape.bend
-    return ArmPart(theta1, theta2, shape.sign2 * bent, theta2 + bent, measured)
+        where = np.broadcast_to(folded[:, None], bent.shape)
+        np.copyto(theta2, previous[..., 1], where=where)
+        np.copyto(fore[0], np.cos(theta2 + bent), where=where)
+        np.copyto(fore[1], shape.sign1 * np.sin(theta2 + bent), where=where)
+    theta1 = np.arctan2(turn1[1], turn1[0])
+    return ArmPart(theta1, theta2, shape.sign2 * bent, turn1, fore, measured)
 
 
-def _base(shape: Shape, x: Array, y: Array, measured: Radii, previous: Array) -> Array:
-    """Eq. (5), widened by the shoulder offset: front and rear, (2, N)."""
-    sideways = -shape.sign1 * shape.offset
-    forward = np.stack((measured.forward, -measured.forward))
-    theta1: Array = np.arctan2(y, x) - np.arctan2(sideways, forward)
-    on_axis = measured.axis & (shape.offset == 0.0)
-    if on_axis.any():
-        theta1[:, on_axis] = np.broadcast_to(previous, x.shape)[on_axis] + np.array([[0.0], [np.pi]])
-    return theta1
-
-
-def _triangle(shape: Shape, out: Array, up: Array, measured: Radii) -> tuple[Array, Array]:
-    """Solve the triangle shoulder, elbow, wrist, Eqs. (6) and (7): theta2 and theta3 + bend, (2, 2, N).
-
-    The half-angle form keeps the full accuracy where the elbow is stretched or folded, where the arc cosines
-    of the paper lose half the digits.
-    """
-    r, upper, fore = measured.shoulder, shape.upper, shape.fore
-    with np.errstate(invalid="ignore"):
-        opened = np.sqrt((shape.farthest - r) * (shape.farthest + r))
-        folded = np.sqrt((r - shape.nearest) * (r + shape.nearest))
-    elbow = np.arctan2(opened, folded) * 2.0
-    lift = np.arctan2(opened * folded, r * r + (upper - fore) * (upper + fore))
-    sign = elbow_signs(shape)
-    direction = np.arctan2(up, out) + shape.turn2
-    return direction[:, None] - sign * lift[:, None], sign * elbow[:, None]
+def _base(
+    shape: Shape, x: Array, y: Array, forward: Array, axis: Mask, previous: Array
+) -> tuple[Array, Array]:
+    """Cosine and sine of theta1: front and rear, (2, N) each."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        cos, sin = formulas.base_turn(shape, x, y, forward)
+    if not shape.offset and axis.any():
+        kept = np.broadcast_to(previous, x.shape)[axis]
+        cos[:, axis] = np.array([[1.0], [-1.0]]) * np.cos(kept)
+        sin[:, axis] = np.array([[1.0], [-1.0]]) * np.sin(kept)
+    return cos, sin
 
 
 def elbow_signs(shape: Shape) -> NDArray[np.float64]:

@@ -3,10 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple, TypeVar
 
-from armtempo.arrays import Array as Array
+from armtempo.arrays import Array
 from armtempo.model.arm import Arm
+
+T = TypeVar("T", float, Array)
+"""For formulas that serve floats and arrays alike, element by element."""
+
+
+class Link(NamedTuple):
+    """One Denavit-Hartenberg row, ready to use."""
+
+    d: float
+    a: float
+    cos_alpha: float
+    sin_alpha: float
+    offset: float
 
 
 @dataclass(frozen=True)
@@ -22,6 +38,9 @@ class Geometry:
     alpha: tuple[float, ...]
     offset: tuple[float, ...]
     """Added to each joint's angle."""
+    linked: tuple[int, ...] = ()
+    """Indices of the joints that a parallel linkage turns: their angle less that of the joint before is what the
+    row turns by."""
 
     @classmethod
     def of(cls, arm: Arm) -> Geometry:
@@ -31,7 +50,23 @@ class Geometry:
             a=tuple(joint.a_mm for joint in arm.joints),
             alpha=tuple(math.radians(joint.alpha_deg) for joint in arm.joints),
             offset=tuple(math.radians(joint.theta_offset_deg) for joint in arm.joints),
+            linked=tuple(i for i, joint in enumerate(arm.joints) if joint.parallel_linkage),
         )
+
+    @cached_property
+    def links(self) -> tuple[Link, ...]:
+        """The rows."""
+        rows = zip(self.d, self.a, self.alpha, self.offset, strict=True)
+        return tuple(Link(d, a, *twist(alpha), offset) for d, a, alpha, offset in rows)
+
+    def turns(self, angles: Sequence[T]) -> Sequence[T]:
+        """What each row turns by beyond its offset, for each joint's angle: floats or arrays, as many as joints."""
+        if not self.linked:
+            return angles
+        turns = list(angles)
+        for joint in self.linked:
+            turns[joint] = angles[joint] - angles[joint - 1]
+        return turns
 
     @property
     def joints(self) -> int:

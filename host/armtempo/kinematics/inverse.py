@@ -1,42 +1,34 @@
-"""The hybrid inverse of section 2.1: all eight solutions for many poses at once."""
+"""The hybrid inverse of section 2.1: all eight solutions, for one pose or many at once."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armtempo.arrays import Array
+from armtempo.kinematics import formulas
+from armtempo.kinematics.formulas import ARRAYS
 from armtempo.kinematics.geometric import ArmPart, duplicates, on_border, solve_arm
-from armtempo.kinematics.geometry import Array, Geometry
+from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.shape import Shape
+from armtempo.kinematics.single import solve_pose
+from armtempo.kinematics.solutions import (
+    DUPLICATE,
+    ELBOW_STRETCHED,
+    IN_OFFSET,
+    ON_AXIS_1,
+    TOO_FAR,
+    TOO_NEAR,
+    WRIST_STRAIGHT,
+    PoseSolutions,
+    Solutions,
+)
 from armtempo.kinematics.wrist import WristPart, solve_wrist
 
 CHUNK = 8192
 """Poses solved at once: many enough to hide the cost of a call, few enough to stay in the caches."""
-
-OK, TOO_FAR, TOO_NEAR, IN_OFFSET, DUPLICATE = range(5)
-"""What became of a solution: there, or Eq. (3) violated at the outer or inner border, or the wrist centre
-nearer to axis 1 than the shoulder offset, or equal to an earlier solution."""
-
-ON_AXIS_1, ELBOW_STRETCHED, WRIST_STRAIGHT = 1, 2, 4
-"""Bits of ``Solutions.singular``."""
-
-
-@dataclass(frozen=True)
-class Solutions:
-    """Eight solutions for each of N poses.
-
-    Solution 4 * base + 2 * elbow + wrist: base 0 front, 1 rear; elbow 0 up, 1 down; wrist 0 with
-    theta5 >= 0, 1 flipped. The arrays are views: copy them if memory order matters.
-    """
-
-    angles_rad: Array
-    """(N, 8, 6): joint angles in [-pi, pi]; NaN where out of reach."""
-    outcome: NDArray[np.uint8]
-    """(N, 8): OK, TOO_FAR, TOO_NEAR, IN_OFFSET or DUPLICATE."""
-    singular: NDArray[np.uint8]
-    """(N, 8): bits ON_AXIS_1, ELBOW_STRETCHED (or folded), WRIST_STRAIGHT (theta5 = 0)."""
 
 
 def inverse(geometry: Geometry, poses: ArrayLike, previous_rad: ArrayLike | None = None) -> Solutions:
@@ -46,8 +38,11 @@ def inverse(geometry: Geometry, poses: ArrayLike, previous_rad: ArrayLike | None
     part must be a rotation, see ``pose.checked``. Raises InputError for an arm outside the class.
     """
     shape = Shape.of(geometry)
-    matrices = np.asarray(poses, dtype=np.float64).reshape(-1, 16)
+    matrices = np.asarray(poses, dtype=np.float64)
     previous = np.zeros(6) if previous_rad is None else np.asarray(previous_rad, dtype=np.float64)
+    if matrices.shape == (4, 4) and previous.shape == (6,):
+        return _of_one(inverse_of_pose(geometry, matrices.ravel().tolist(), previous.tolist()))
+    matrices = matrices.reshape(-1, 16)
     previous = previous + np.array(shape.joint_offset)
     total = len(matrices)
     angles = np.empty((6, 2, 2, 2, total))
@@ -67,20 +62,37 @@ def inverse(geometry: Geometry, poses: ArrayLike, previous_rad: ArrayLike | None
     )
 
 
+def inverse_of_pose(
+    geometry: Geometry, pose: Sequence[float], previous_rad: Sequence[float] = (0.0,) * 6
+) -> PoseSolutions:
+    """Return all solutions for one pose with plain numbers alone, several times as fast as by arrays.
+
+    ``pose``: its 12 or 16 elements in row order; ``previous_rad``: 6 angles. Otherwise as ``inverse``.
+    """
+    shape = Shape.of(geometry)
+    previous = [angle + offset for angle, offset in zip(previous_rad, shape.joint_offset, strict=True)]
+    return solve_pose(shape, pose, previous)
+
+
+def _of_one(found: PoseSolutions) -> Solutions:
+    return Solutions(
+        np.array([found.angles_rad]),
+        np.array([found.outcome], dtype=np.uint8),
+        np.array([found.singular], dtype=np.uint8),
+    )
+
+
 def wrist_centre(shape: Shape, pose: Array) -> Array:
     """Eq. (2) for poses as (12 or 16, N) elements in row order: the wrist centre, (3, N)."""
-    along, out = shape.flange
-    cos, sin = shape.flange_twist
-    centre: Array = pose[3:12:4] - along * (cos * pose[2:12:4] + sin * pose[1:12:4])
-    return centre - out * pose[0:12:4] if out else centre
+    n, o, a, position = (pose[column:12:4] for column in range(4))
+    return formulas.wrist_centre(shape, n, o, a, position)
 
 
 def _solve(shape: Shape, matrices: Array, previous: Array) -> tuple[ArmPart, WristPart]:
     pose = np.ascontiguousarray(matrices.T)
     arm = solve_arm(shape, wrist_centre(shape, pose), previous)
-    cos, sin = shape.flange_twist
-    n, o, a = pose[0:12:4], pose[1:12:4], pose[2:12:4]
-    axes = np.stack((n, o, a) if sin == 0.0 and cos == 1.0 else (n, cos * o - sin * a, cos * a + sin * o))
+    n, o, a = (pose[column:12:4] for column in range(3))
+    axes = np.stack((n, *formulas.before_flange(shape, o, a)))
     return arm, solve_wrist(shape, arm, axes, previous[..., 3])
 
 
@@ -90,19 +102,15 @@ def _angles_into(out: Array, shape: Shape, arm: ArmPart, wrist: WristPart) -> No
     half_turn6 = np.copysign(np.pi, wrist.theta6)
     wide = (arm.theta1[:, None], arm.theta2, arm.theta3)
     for joint, theta in enumerate(wide):
-        out[joint] = _wrapped(theta - shape.joint_offset[joint])[:, :, None]
+        offset = shape.joint_offset[joint]
+        turned = ARRAYS.wrapped(theta - offset) if offset or joint == 2 else theta
+        out[joint] = turned[:, :, None]
     np.copyto(out[0], np.nan, where=np.isnan(out[1]))
     flipped = (wrist.theta4 - half_turn4, -wrist.theta5, wrist.theta6 - half_turn6)
     for joint, (plain, turned) in enumerate(zip(wrist[:3], flipped, strict=True), start=3):
         out[joint, :, :, 0], out[joint, :, :, 1] = plain, turned
         if shape.joint_offset[joint]:
-            out[joint] = _wrapped(out[joint] - shape.joint_offset[joint])
-
-
-def _wrapped(angle: Array) -> Array:
-    """Bring angles into [-pi, pi]."""
-    wrapped: Array = angle - 2 * np.pi * np.rint(angle * (0.5 / np.pi))
-    return wrapped
+            out[joint] = ARRAYS.wrapped(out[joint] - shape.joint_offset[joint])
 
 
 def _outcome_into(out: NDArray[np.uint8], shape: Shape, arm: ArmPart) -> None:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import math
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-import numpy as np
-
-from armtempo.kinematics import numerical
-from armtempo.kinematics.choice import Candidate, Choice, choose
-from armtempo.kinematics.geometry import Array, Geometry
-from armtempo.kinematics.inverse import ELBOW_STRETCHED, ON_AXIS_1, WRIST_STRAIGHT
-from armtempo.kinematics.numerical import NumericalSolution
-from armtempo.kinematics.ranges import Ranges
+from armtempo.arrays import Array
+from armtempo.kinematics.choice import Candidate, Choice
+from armtempo.kinematics.constraint import Miss
+from armtempo.kinematics.numerical import NumericalSolution, NumericalSolutions
+from armtempo.kinematics.rejection import Rejection
+from armtempo.kinematics.solutions import ELBOW_STRETCHED, ON_AXIS_1, WRIST_STRAIGHT
+from armtempo.kinematics.solver import CLOSED_FORM, NUMERICAL, Answer, PoseSolver
+from armtempo.model.pose import to_rpy_deg
+from armtempo.model.tool_pose import Pose
 
 SINGULAR = {
     ON_AXIS_1: "wrist centre on axis 1: joint 1 kept as before",
@@ -22,72 +24,133 @@ SINGULAR = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Answer:
-    """The answer for one pose."""
+@dataclass(frozen=True)
+class Listing:
+    """The answer for one pose, in words and as JSON values."""
 
     text: tuple[str, ...]
     values: dict[str, Any]
-    """JSON values."""
-    angles_rad: Array | None
-    """The posture chosen; None: there is none."""
+    success: bool
 
 
-def answers(
-    geometry: Geometry, ranges: Ranges, poses: Iterable[Array], previous_rad: Array, numerically: bool
-) -> Iterator[Answer]:
-    """Solve poses, (4, 4) each, one after the other, each nearest to the posture chosen before."""
-    for pose in poses:
-        solve = _searched if numerically else _chosen
-        answer = solve(geometry, ranges, pose, previous_rad)
-        if answer.angles_rad is not None:
+def listings(
+    solver: PoseSolver, targets: Iterable[Pose], previous_rad: Sequence[float], numerically: bool
+) -> Iterator[Listing]:
+    """Solve targets one after the other, each nearest to the posture chosen before."""
+    for target in targets:
+        answer = solver.solve(target, previous_rad, numerically)
+        if answer.success:
             previous_rad = answer.angles_rad
-        yield answer
+        yield Listing(tuple(lines(answer)), values(answer), answer.success)
 
 
-def _chosen(geometry: Geometry, ranges: Ranges, pose: Array, previous: Array) -> Answer:
-    choice = choose(geometry, pose, ranges, previous)
-    angles = choice.chosen.angles_rad if choice.chosen else None
-    return Answer(tuple(lines(choice)), {"pose": pose.tolist(), **values(choice)}, angles)
+def lines(answer: Answer) -> Iterator[str]:
+    """Write the table, the chosen solution marked by ``*``, angles in degrees, and where the tool comes to stand."""
+    if answer.choice:
+        yield from _closed_form_lines(answer.choice)
+    if answer.search and (answer.success or not answer.choice):
+        yield from _numerical_lines(answer.search)
+    if answer.reason:
+        yield f"rejected: {answer.reason.splitlines()[0]}"  # the table above has the reasons one by one
+    yield from _tool_lines(answer)
 
 
-def _searched(geometry: Geometry, ranges: Ranges, pose: Array, previous: Array) -> Answer:
-    found = numerical.solve(geometry, pose, ranges, previous)
-    angles = found.angles_rad if found.found else None
-    return Answer(
-        tuple(numerical_lines(found)), {"pose": pose.tolist(), "numerical": numerical_values(found)}, angles
-    )
-
-
-def lines(choice: Choice) -> Iterator[str]:
-    """Write the table, the chosen solution marked by ``*``, angles in degrees."""
+def _closed_form_lines(choice: Choice) -> Iterator[str]:
     yield (
         f"region {choice.region} of Fig. 3: "
         + ("any angle of joint 1, and " if choice.on_axis else "")
         + f"{choice.postures} arm posture{'' if choice.postures == 1 else 's'}"
     )
-    heads = "".join(f"{f'theta{i} deg':>12}" for i in range(1, 7))
-    yield f"  no  {'branch':<19}{heads}  "
+    yield f"  no  {'branch':<19}{_heads(6)}"
     for candidate in choice.candidates:
-        mark = "*" if candidate is choice.chosen else " "
-        angles = np.round(_degrees(candidate), 4) + 0.0
-        row = "".join(f"{angle:12.4f}" if np.isfinite(angle) else f"{'-':>12}" for angle in angles)
-        yield f"{mark} {candidate.number:2d}  {candidate.branch!s:<19}{row}  {_verdict(choice, candidate)}"
+        chosen = candidate is choice.chosen
+        singular = [SINGULAR[bit] for bit in SINGULAR if candidate.singular & bit]
+        words = ". ".join((_verdict(candidate, chosen), *singular))
+        yield f"{_mark(chosen, candidate.number)}{candidate.branch!s:<19}{_row(candidate.angles_rad)}  {words}"
 
 
-def _verdict(choice: Choice, candidate: Candidate) -> str:
-    words = [SINGULAR[bit] for bit in SINGULAR if candidate.singular & bit]
-    if candidate.rejections:
-        words.insert(0, "rejected: " + "; ".join(reason.text for reason in candidate.rejections))
-    else:
-        distance = f"{np.degrees(candidate.distance_rad):.1f} deg from the previous posture"
-        words.insert(0, f"chosen, {distance}" if candidate is choice.chosen else f"usable, {distance}")
-    return ". ".join(words)
+def _numerical_lines(search: NumericalSolutions) -> Iterator[str]:
+    count = len(search.solutions)
+    yield (
+        f"{search.target.words}: {count} posture{'' if count == 1 else 's'} found numerically from "
+        f"{search.starts} start{'' if search.starts == 1 else 's'}"
+        + (", of many: it leaves joints free" if search.leaves_free else "")
+    )
+    if search.solutions:
+        yield f"  no  {_heads(len(search.nearest.angles_rad))}"
+    for number, solution in enumerate(search.solutions, 1):
+        chosen = solution is search.chosen
+        yield f"{_mark(chosen, number)}{_row(solution.angles_rad)}  {_verdict(solution, chosen)}"
 
 
-def values(choice: Choice) -> dict[str, Any]:
+def _tool_lines(answer: Answer) -> Iterator[str]:
+    """Where the tool comes to stand, and how far from the pose."""
+    if not answer.success:
+        yield f"nearest posture found, deg:{_row(answer.angles_rad)}"
+    position = " ".join(_short(value, 4) for value in answer.tool[:3, 3])
+    roll, pitch, yaw = (_short(value, 4) for value in to_rpy_deg(answer.tool))
+    yield (
+        f"tool at {position} mm, roll {roll}, pitch {pitch}, yaw {yaw} deg: {_words(answer.miss)} from the pose"
+    )
+    if _words(answer.miss_driven) != _words(answer.miss):
+        yield f"with the joints that have no motor at home the tool is {_words(answer.miss_driven)} from the pose"
+
+
+def _heads(joints: int) -> str:
+    return "".join(f"{f'theta{i} deg':>12}" for i in range(1, joints + 1))
+
+
+def _mark(chosen: bool, number: int) -> str:
+    return f"{'*' if chosen else ' '} {number:2d}  "
+
+
+def _row(angles_rad: Iterable[float]) -> str:
+    degrees = (round(math.degrees(angle), 4) + 0.0 for angle in angles_rad)
+    return "".join(f"{angle:12.4f}" if math.isfinite(angle) else f"{'-':>12}" for angle in degrees)
+
+
+def _verdict(solution: Candidate | NumericalSolution, chosen: bool) -> str:
+    if solution.rejections:
+        return "rejected: " + "; ".join(reason.text for reason in solution.rejections)
+    distance = f"{math.degrees(solution.distance_rad):.1f} deg from the previous posture"
+    return f"chosen, {distance}" if chosen else f"usable, {distance}"
+
+
+def _short(value: float, digits: int) -> str:
+    """The number without trailing zeros, and never -0."""
+    return f"{round(value, digits) + 0.0:.{digits}f}".rstrip("0").rstrip(".")
+
+
+def _words(miss: Miss) -> str:
+    """Rounding is no miss."""
+    position, rotation = (0.0 if value < 1e-6 else value for value in miss)
+    return f"{position:.3g} mm and {rotation:.3g} deg"
+
+
+def values(answer: Answer) -> dict[str, Any]:
     """Give the same as JSON values; angles that do not exist are null."""
+    target = answer.target
+    found: dict[str, Any] = {
+        "pose": [list(row) for row in target.matrix],
+        "asked": ["position", *target.fixed],
+        "tolerance_mm": target.tolerance_mm,
+        "tolerance_deg": target.tolerance_deg,
+        "success": answer.success,
+        "reason": answer.reason,
+        "angles_deg": _degrees(answer.angles_rad),
+        "tool": tool_values(answer.tool),
+        "miss": answer.miss._asdict(),
+        "miss_driven": answer.miss_driven._asdict(),
+    }
+    if answer.search and (answer.success or not answer.choice):
+        return found | _numerical_values(answer.search)
+    assert answer.choice is not None
+    return found | _closed_form_values(answer.choice)
+
+
+def _closed_form_values(choice: Choice) -> dict[str, Any]:
     return {
+        "method": CLOSED_FORM,
         "region": choice.region,
         "postures": choice.postures,
         "on_axis_1": choice.on_axis,
@@ -96,9 +159,11 @@ def values(choice: Choice) -> dict[str, Any]:
             {
                 "number": candidate.number,
                 "branch": candidate.branch._asdict(),
-                "angles_deg": _degrees(candidate).tolist() if np.isfinite(candidate.distance_rad) else None,
+                "angles_deg": _degrees(candidate.angles_rad)
+                if math.isfinite(candidate.distance_rad)
+                else None,
                 "usable": not candidate.rejections,
-                "rejections": [asdict(reason) for reason in candidate.rejections],
+                "rejections": _rejections(candidate.rejections),
                 "singular": [SINGULAR[bit] for bit in SINGULAR if candidate.singular & bit],
             }
             for candidate in choice.candidates
@@ -106,32 +171,38 @@ def values(choice: Choice) -> dict[str, Any]:
     }
 
 
-def numerical_lines(solution: NumericalSolution) -> Iterator[str]:
-    """Write the one solution of the numerical solver, or why there is none."""
-    if not solution.found:
-        yield f"rejected: {solution.reason}"
-        return
-    angles = "  ".join(f"theta{i} {angle:.4f}" for i, angle in enumerate(_clean(solution.angles_rad), 1))
-    yield f"one solution, in degrees, found numerically: {angles}"
-
-
-def numerical_values(solution: NumericalSolution) -> dict[str, Any]:
-    """Give the same as JSON values."""
+def _numerical_values(search: NumericalSolutions) -> dict[str, Any]:
     return {
-        "found": solution.found,
-        "angles_deg": _clean(solution.angles_rad).tolist(),
-        "position_error_mm": solution.position_error,
-        "rotation_error_deg": float(np.degrees(solution.rotation_error_rad)),
-        "starts": solution.starts,
-        "reason": solution.reason,
+        "method": NUMERICAL,
+        "starts": search.starts,
+        "leaves_joints_free": search.leaves_free,
+        "chosen": 1 if search.chosen else None,
+        "solutions": [
+            {
+                "number": number,
+                "angles_deg": _degrees(solution.angles_rad),
+                "usable": not solution.rejections,
+                "rejections": _rejections(solution.rejections),
+                "miss": solution.miss._asdict(),
+            }
+            for number, solution in enumerate(search.solutions, 1)
+        ],
     }
 
 
-def _degrees(candidate: Candidate) -> Array:
-    return _clean(candidate.angles_rad)
+def tool_values(tool: Array) -> dict[str, Any]:
+    """A pose (4, 4), lengths in mm, as JSON values."""
+    return {
+        "position_mm": [value + 0.0 for value in tool[:3, 3].tolist()],
+        "rpy_deg": list(to_rpy_deg(tool)),
+        "matrix": [[value + 0.0 for value in row] for row in tool.tolist()],
+    }
 
 
-def _clean(angles_rad: Array) -> Array:
+def _rejections(reasons: Iterable[Rejection]) -> list[dict[str, Any]]:
+    return [asdict(reason) for reason in reasons]
+
+
+def _degrees(angles_rad: Iterable[float]) -> list[float]:
     """Degrees without negative zeros."""
-    degrees: Array = np.degrees(angles_rad) + 0.0
-    return degrees
+    return [math.degrees(angle) + 0.0 for angle in angles_rad]

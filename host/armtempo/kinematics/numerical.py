@@ -1,122 +1,214 @@
-"""A numerical inverse for arms outside the closed form's class: one solution, searched from a posture."""
+"""The numerical inverse, for any arm of revolute joints and any target: all postures that a seeded search finds."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
-from scipy.optimize import least_squares
 
-from armtempo.kinematics.forward import frames
-from armtempo.kinematics.geometry import Array, Geometry
+from armtempo.kinematics.constraint import Constraint, Miss
+from armtempo.kinematics.descent import PoseProblem, Posture, descend
+from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.ranges import Ranges
+from armtempo.kinematics.rejection import Rejection, out_of_range, table
+from armtempo.model.arm import Arm
+from armtempo.model.tool_pose import Pose
 
-ACCURACY = 1e-9
-"""Error of a solution that counts as found: position relative to the reach, and orientation in rad."""
+LEAST_STARTS, MOST_STARTS = 40, 240
+STARTS_PER_SOLUTION = 12
+"""The search goes on until it has started this often for each solution that it found, and once more."""
 
-STARTS = 20
-"""Postures to start from, the previous one first, before the search gives up."""
+SAME_RAD = 1e-4
+"""Postures with all joints this near to each other, whole turns aside, are one."""
 
-EVALUATIONS = 60
-"""Steps from one start."""
+BOUNDED_STARTS = 12
+"""Starts within the ranges for the posture that misses a target by least."""
+
+MOST_SOLUTIONS = 16
+"""No arm of six revolute joints meets a whole pose in more isolated postures; what has more leaves joints free."""
 
 
 @dataclass(frozen=True)
-class NumericalSolution:
-    """The best posture found."""
+class MovingArm:
+    """An arm as the numerical solver sees it."""
 
-    angles_rad: Array
-    """(joints,): within the ranges."""
-    found: bool
-    position_error: float
-    """Distance from the pose, in the geometry's unit."""
-    rotation_error_rad: float
+    geometry: Geometry
+    """In mm."""
+    ranges: Ranges
+    moving: tuple[int, ...]
+    """Indices of the joints that move; the others stay where the search starts."""
+
+    @classmethod
+    def of(cls, arm: Arm) -> MovingArm:
+        """The joints with a motor move."""
+        return cls(Geometry.of(arm), Ranges.of(arm), arm.driven_indices)
+
+    @property
+    def with_all(self) -> MovingArm:
+        """The same arm with every joint moving."""
+        return replace(self, moving=tuple(range(self.geometry.joints)))
+
+    @cached_property
+    def bounds(self) -> tuple[tuple[float, float], ...]:
+        """Ranges of the moving joints."""
+        return tuple(self.ranges.ends[joint] for joint in self.moving)
+
+    def problem(self, constraint: Constraint, within: bool) -> PoseProblem:
+        """To meet the constraint, ``within`` the ranges or by any angle."""
+        return PoseProblem(self.geometry, constraint, self.moving, self.bounds if within else None)
+
+    def placed(self, angles_rad: Sequence[float], previous_rad: Sequence[float]) -> list[float]:
+        """The angles with whole turns added to those of the moving joints, as by ``Ranges.placed``."""
+        placed = self.ranges.placed(angles_rad, previous_rad)
+        return [placed[i] if i in self.moving else angle for i, angle in enumerate(angles_rad)]
+
+    def underdetermined(self, target: Pose) -> bool:
+        """Whether more joints move than the target asks numbers for: then it leaves a choice of postures."""
+        return len(self.moving) > target.constraints
+
+
+@dataclass(frozen=True, eq=False)
+class NumericalSolution:
+    """A posture that the search found."""
+
+    angles_rad: list[float]
+    """(joints,): whole turns added to lie in the ranges, nearest to the previous posture."""
+    miss: Miss
+    rejections: tuple[Rejection, ...]
+    """Why it cannot be used: joints out of range; empty if it can."""
+    distance_rad: float
+    """Root of the sum of squares of the joints' ways from the previous posture."""
+
+
+@dataclass(frozen=True)
+class NumericalSolutions:
+    """What the search found for one target."""
+
+    arm: MovingArm
+    target: Pose
+    solutions: tuple[NumericalSolution, ...]
+    """Each meets the target within its tolerances; those that can be used first, nearest first."""
+    nearest: NumericalSolution
+    """The chosen one; where none can be used, the posture within the ranges that misses the target by least."""
     starts: int
     """Postures started from."""
 
     @property
+    def chosen(self) -> NumericalSolution | None:
+        """Of the solutions that can be used, the nearest to the previous posture."""
+        usable = self.solutions and not self.solutions[0].rejections
+        return self.solutions[0] if usable else None
+
+    @property
+    def leaves_free(self) -> bool:
+        """Whether there are more postures than can be listed, one turning into the next."""
+        return self.arm.underdetermined(self.target) or len(self.solutions) >= MOST_SOLUTIONS
+
+    @property
     def reason(self) -> str:
-        """Why there is no solution; empty if there is one."""
-        if self.found:
+        """Why no posture can be used, and what to do; empty if one can."""
+        if self.chosen:
             return ""
-        return (
-            f"no posture found from {self.starts} starts; the nearest one misses the pose by "
-            f"{self.position_error:.4g} in position and by {np.degrees(self.rotation_error_rad):.4g} deg"
-        )
+        return why_not(self) + (table(each.rejections for each in self.solutions) if self.solutions else "")
 
 
-def solve(
-    geometry: Geometry, pose: ArrayLike, ranges: Ranges, previous_rad: ArrayLike, seed: int = 0
-) -> NumericalSolution:
-    """Search joint angles that reach ``pose``, shape (4, 4), within ``ranges``, starting at ``previous_rad``.
+def search(arm: MovingArm, target: Pose, previous_rad: Sequence[float], seed: int = 0) -> NumericalSolutions:
+    """Search the postures that meet ``target``, from ``previous_rad``, (joints,), and from random postures.
 
-    Any number of revolute joints. Bounded least squares (scipy's trust region method) with the exact
-    Jacobian; if the previous posture leads nowhere, random ones drawn from ``seed`` follow.
+    The same ``seed`` gives the same answer. A target that leaves joints free gets the one posture that the
+    descent from ``previous_rad`` leads to, or the first one found.
     """
-    target = np.asarray(pose, dtype=np.float64)
+    previous = [float(angle) for angle in previous_rad]
+    problem = arm.problem(Constraint.of(target), arm.underdetermined(target))
+    found: list[NumericalSolution] = []
+    starts = 0
+    for start in _starts(arm, previous, seed):
+        solution = _solution(arm, problem, descend(problem, start), previous)
+        starts += 1
+        if problem.constraint.reached(solution.miss) and not any(_same(solution, other) for other in found):
+            found.append(solution)
+        if _enough(arm, target, found, starts):
+            break
+    ordered = sorted(found, key=lambda solution: (bool(solution.rejections), solution.distance_rad))
+    nearest = (
+        ordered[0] if ordered and not ordered[0].rejections else _least_miss(arm, target, previous, seed)
+    )
+    if problem.constraint.reached(nearest.miss) and nearest not in ordered:
+        ordered.insert(0, nearest)
+    return NumericalSolutions(arm, target, tuple(ordered[:MOST_SOLUTIONS]), nearest, starts)
+
+
+def _starts(arm: MovingArm, previous: list[float], seed: int) -> Iterator[list[float]]:
+    """The previous posture, then random ones: within the ranges, or within a turn where a range is wider."""
+    yield previous
     rng = np.random.default_rng(seed)
-    start = np.clip(np.asarray(previous_rad, dtype=np.float64), ranges.low, ranges.high)
-    best: NumericalSolution | None = None
-    for attempt in range(1, STARTS + 1):
-        fit = least_squares(
-            lambda q: _miss(geometry, target, q),
-            start,
-            jac=lambda q: _jacobian(geometry, q),
-            bounds=(ranges.low, ranges.high),
-            xtol=1e-15,
-            ftol=1e-15,
-            gtol=1e-15,
-            max_nfev=EVALUATIONS,
-        )
-        result = _judged(geometry, target, fit.x, attempt)
-        if result.found:
-            return result
-        if best is None or _error(geometry, result) < _error(geometry, best):
-            best = result
-        start = rng.uniform(ranges.low, ranges.high)
-    assert best is not None
-    return NumericalSolution(best.angles_rad, False, best.position_error, best.rotation_error_rad, STARTS)
+    ends = [(low, min(high, low + math.tau)) for low, high in arm.bounds]
+    for _ in range(MOST_STARTS - 1):
+        start = previous.copy()
+        for joint, (low, high) in zip(arm.moving, ends, strict=True):
+            start[joint] = rng.uniform(low, high)
+        yield start
 
 
-def _unit(geometry: Geometry) -> float:
-    """Length that errors of position are measured by: the reach, or 1 for an arm that has none."""
-    return geometry.reach or 1.0
+def _enough(arm: MovingArm, target: Pose, found: list[NumericalSolution], starts: int) -> bool:
+    if arm.underdetermined(target) and found:
+        return True
+    return starts >= max(LEAST_STARTS, STARTS_PER_SOLUTION * (len(found) + 1)) or len(found) > MOST_SOLUTIONS
 
 
-def _miss(geometry: Geometry, target: Array, angles: Array) -> Array:
-    """Differences of the axes n, o, a and of the position in units of the reach: (12,)."""
-    *_, tool = frames(geometry, angles)
-    position = (tool.origin - target[:3, 3]) / _unit(geometry)
-    return np.concatenate((tool.x - target[:3, 0], tool.y - target[:3, 1], tool.z - target[:3, 2], position))
+def _solution(
+    arm: MovingArm, problem: PoseProblem, posture: Posture, previous: list[float]
+) -> NumericalSolution:
+    angles = arm.placed(posture.angles_rad, previous)
+    rejections = tuple(
+        each for each in out_of_range(arm.ranges, angles) if (each.joint or 0) - 1 in arm.moving
+    )
+    miss = problem.constraint.miss(posture.frames[-1])
+    return NumericalSolution(angles, miss, rejections, math.dist(angles, previous))
 
 
-def _jacobian(geometry: Geometry, angles: Array) -> Array:
-    """Derivative of ``_miss`` by the angles, (12, joints): a joint turns all that follows about its axis."""
-    *before, tool = frames(geometry, angles)
-    columns = [
-        np.concatenate(
-            (
-                np.cross(frame.z, tool.x),
-                np.cross(frame.z, tool.y),
-                np.cross(frame.z, tool.z),
-                np.cross(frame.z, tool.origin - frame.origin) / _unit(geometry),
-            )
-        )
-        for frame in before
-    ]
-    return np.column_stack(columns)
+def _same(one: NumericalSolution, other: NumericalSolution) -> bool:
+    return all(
+        abs(math.remainder(a - b, math.tau)) < SAME_RAD
+        for a, b in zip(one.angles_rad, other.angles_rad, strict=True)
+    )
 
 
-def _judged(geometry: Geometry, target: Array, angles: Array, starts: int) -> NumericalSolution:
-    miss = _miss(geometry, target, angles)
-    position = float(np.linalg.norm(miss[9:])) * _unit(geometry)
-    # The chord of all three axes: 2 sqrt(2) sin(angle / 2).
-    chord = float(np.linalg.norm(miss[:9]))
-    rotation = 2.0 * float(np.arcsin(min(chord / np.sqrt(8.0), 1.0)))
-    found = position <= ACCURACY * _unit(geometry) and rotation <= ACCURACY
-    return NumericalSolution(angles, found, position, rotation, starts)
+def _least_miss(arm: MovingArm, target: Pose, previous: list[float], seed: int) -> NumericalSolution:
+    """The posture within the ranges that misses the target by least, of those that a few starts lead to."""
+    problem = arm.problem(Constraint.of(target), within=True)
+    best = descend(problem, previous)
+    for _, start in zip(range(BOUNDED_STARTS), _starts(arm, previous, seed), strict=False):
+        if problem.constraint.reached(problem.constraint.miss(best.frames[-1])):
+            break
+        best = min(best, descend(problem, start), key=lambda posture: posture.cost)
+    return _solution(arm, problem, best, previous)
 
 
-def _error(geometry: Geometry, solution: NumericalSolution) -> float:
-    return solution.position_error / _unit(geometry) + solution.rotation_error_rad
+def why_not(answer: NumericalSolutions) -> str:
+    """Say why no posture can be used, and what to do."""
+    target, miss = answer.target, answer.nearest.miss
+    where = " within the joint ranges" if answer.solutions else ""
+    return (
+        f"no posture{where} reaches this pose within {target.tolerance_mm:g} mm and {target.tolerance_deg:g} deg: the "
+        f"nearest one that was found misses it by {miss}; {_next_step(answer)}"
+    )
+
+
+def _next_step(answer: NumericalSolutions) -> str:
+    target, joints = answer.target, len(answer.arm.moving)
+    step = "bring the pose nearer to the arm, or allow more by tolerance_mm and tolerance_deg"
+    if target.constraints <= joints or not target.fixed:
+        return step
+    moving = f"{joints} joints move" if joints > 1 else "1 joint moves"
+    return (
+        f"{step}; as it asks for {target.constraints} numbers and {moving}, ask for less: "
+        f"{FITTING.get(joints, 'the position only')}"
+    )
+
+
+FITTING = {4: "position and pitch", 5: "position and approach, or position, roll and pitch"}
+"""Poses that ask for as many numbers as so many joints can give."""

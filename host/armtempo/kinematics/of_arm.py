@@ -9,16 +9,16 @@ from numpy.typing import ArrayLike
 
 from armtempo.arrays import Array
 from armtempo.errors import InputError
-from armtempo.kinematics import numerical
-from armtempo.kinematics.chain import all_angles_deg
-from armtempo.kinematics.choice import choose
+from armtempo.kinematics.chain import spread_deg
+from armtempo.kinematics.choice import Candidate
+from armtempo.kinematics.constraint import Miss
 from armtempo.kinematics.forward import forward as forward_rad
 from armtempo.kinematics.geometry import Geometry
-from armtempo.kinematics.ranges import Ranges
-from armtempo.kinematics.shape import refusals
+from armtempo.kinematics.numerical import NumericalSolution
+from armtempo.kinematics.solver import Answer, PoseSolver
 from armtempo.model.arm import Arm
-from armtempo.model.job import Pose
 from armtempo.model.pose import checked
+from armtempo.model.tool_pose import Pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +33,10 @@ class Solution:
     """Why it cannot be used: out of reach, out of a joint's range; empty for one that can."""
     distance_deg: float
     """From the posture to stay near to: root of the sum of squares over the joints."""
+    miss_mm: float
+    """How far the tool then is from the pose, within its tolerance; 0 with the closed form."""
+    miss_deg: float
+    """The same for what the pose asks of the orientation."""
 
     @property
     def usable(self) -> bool:
@@ -46,44 +50,48 @@ def forward(arm: Arm, angles_deg: ArrayLike) -> Array:
     ``angles_deg``: of all joints, (..., joints), or of the driven ones, (..., J), with the others at home.
     Raises InputError for another number of angles.
     """
-    angles = np.asarray(angles_deg, dtype=float)
-    count = angles.shape[-1] if angles.ndim else 0
-    if count not in (len(arm.joints), len(arm.driven)):
-        raise InputError(
-            f"{count} angles; arm {arm.name!r} has {len(arm.joints)} joints, {len(arm.driven)} of them driven"
-        )
-    if count != len(arm.joints):
-        angles = all_angles_deg(arm, angles)
-    return forward_rad(Geometry.of(arm), np.radians(angles))
+    return forward_rad(Geometry.of(arm), np.radians(spread_deg(arm, angles_deg)))
 
 
 def inverse(arm: Arm, pose: Pose | ArrayLike, near_deg: ArrayLike | None = None) -> tuple[Solution, ...]:
     """All solutions for a pose of the tool: those that can be used first, the nearest to ``near_deg`` first.
 
-    ``pose``: (4, 4) or (3, 4), lengths in mm, or a Pose. ``near_deg``, (joints,), is the posture to stay near to;
-    None: home. An arm of the class of the closed form has eight solutions, some perhaps rejected; any other gets
-    the one that a numerical search finds, or none. Raises InputError for a matrix that is no pose.
+    ``pose``: (4, 4) or (3, 4), lengths in mm, or a Pose, which may ask for less than the whole orientation.
+    ``near_deg``, (joints,) or (J,), is the posture to stay near to; None: home. A whole pose of an arm of the
+    closed form's class has eight solutions, some perhaps rejected. Any other arm or pose gets what a numerical
+    search finds with the joints that have a motor, perhaps nothing; a pose that leaves joints free gets the one
+    solution that the search comes to first. Raises InputError for a matrix that is no pose.
     """
-    target = checked(pose.matrix if isinstance(pose, Pose) else np.asarray(pose, dtype=float))
-    near = [joint.home_deg for joint in arm.joints] if near_deg is None else near_deg
-    previous = np.radians(np.asarray(near, dtype=float))
-    if previous.shape != (len(arm.joints),):
-        raise InputError(f"near_deg must have an angle for each of the {len(arm.joints)} joints")
-    geometry, ranges = Geometry.of(arm), Ranges.of(arm)
-    if refusals(geometry):
-        found = numerical.solve(geometry, target, ranges, previous)
-        distance = float(np.linalg.norm(np.degrees(found.angles_rad - previous)))
-        return (Solution(np.degrees(found.angles_rad), "", (), distance),) if found.found else ()
-    choice = choose(geometry, target, ranges, previous)
-    solutions = (
-        Solution(
-            np.degrees(candidate.angles_rad),
-            str(candidate.branch),
-            tuple(reason.text for reason in candidate.rejections),
-            float(np.degrees(candidate.distance_rad)),
-        )
-        for candidate in choice.candidates
-    )
+    near = PoseSolver(arm).home_rad if near_deg is None else _posture(arm, near_deg)
+    target = pose.exact() if isinstance(pose, Pose) else Pose.of_matrix(checked(pose))
+    solutions = _solutions(PoseSolver(arm).solve(target, tuple(near)))
     return tuple(
         sorted(solutions, key=lambda one: (not one.usable, np.nan_to_num(one.distance_deg, nan=np.inf)))
+    )
+
+
+def _posture(arm: Arm, near_deg: ArrayLike) -> Array:
+    """All joints, (joints,), in rad."""
+    near = np.asarray(near_deg, dtype=float)
+    if near.ndim != 1:
+        raise InputError("near_deg must be one posture: an angle for each joint")
+    return np.radians(spread_deg(arm, near, "near_deg: "))
+
+
+def _solutions(answer: Answer) -> list[Solution]:
+    """The eight of the closed form where they settle the matter, else those of the search."""
+    choice, search = answer.choice, answer.search
+    if choice and (choice.chosen or not answer.success):
+        return [_solution(each, str(each.branch), Miss(0.0, 0.0)) for each in choice.candidates]
+    return [_solution(each, "", each.miss) for each in search.solutions] if search else []
+
+
+def _solution(found: Candidate | NumericalSolution, branch: str, miss: Miss) -> Solution:
+    return Solution(
+        np.degrees(found.angles_rad),
+        branch,
+        tuple(reason.text for reason in found.rejections),
+        float(np.degrees(found.distance_rad)),
+        miss.position_mm,
+        miss.rotation_deg,
     )

@@ -1,4 +1,4 @@
-"""A text file of poses: one pose a line, numbers separated by blanks or commas, ``#`` starts a comment."""
+"""A text file of poses: one a line, numbers separated by blanks or commas, ``-`` for what is free, ``#`` a comment."""
 
 from __future__ import annotations
 
@@ -8,20 +8,23 @@ import numpy as np
 
 from armtempo.errors import InputError
 from armtempo.formats.atomic_file import why
-from armtempo.kinematics.geometry import Array
-from armtempo.model.pose import LARGEST, checked, from_quaternion, from_rpy
+from armtempo.model.pose import LARGEST, checked, from_quaternion
+from armtempo.model.tool_pose import WHOLE, Pose
 
 FORMS = {
-    6: "x y z roll pitch yaw",
+    3: "x y z: position only",
+    6: "x y z roll pitch yaw, with - for an angle that is free",
     7: "x y z and quaternion w x y z",
     12: "3 rows of a matrix",
     16: "4 rows of a matrix",
 }
 """How many numbers make a pose."""
 
+FREE = "-"
 
-def read(path: Path | str) -> list[Array]:
-    """Return the poses of a file, (4, 4) each; InputError names the file and the line that is wrong."""
+
+def read(path: Path | str) -> list[Pose]:
+    """Return the poses of a file; InputError names the file and the line that is wrong."""
     try:
         text = Path(path).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
@@ -36,17 +39,21 @@ def read(path: Path | str) -> list[Array]:
     return poses
 
 
-def parse(text: str, what: str, counts: tuple[int, ...] = (6, 7, 12, 16)) -> Array:
+def parse(text: str, what: str, counts: tuple[int, ...] = tuple(FORMS)) -> Pose:
     """Return the pose that ``text`` writes in as many numbers as ``counts`` allows."""
-    found = numbers(text, what)
-    if len(found) not in counts:
+    words = text.replace(",", " ").split()
+    if len(words) not in counts:
         allowed = ", ".join(f"{count} ({FORMS[count]})" for count in counts)
-        raise InputError(f"{what}: {len(found)} numbers are no pose; give {allowed}")
-    if len(found) == 6:
-        return from_rpy(found[:3], found[3:], what)
-    if len(found) == 7:
-        return from_quaternion(found[:3], found[3:], what)
-    return checked(np.reshape(found, (-1, 4)), what)
+        raise InputError(f"{what}: {len(words)} numbers are no pose; give {allowed}")
+    if len(words) in (3, 6):
+        position = numbers(" ".join(words[:3]), what)
+        fixed = {name: word for name, word in zip(WHOLE, words[3:], strict=False) if word != FREE}
+        angles = dict(zip(fixed, numbers(" ".join(fixed.values()), what), strict=True))
+        return Pose.of_angles(position, angles, what)
+    found = numbers(text, what)
+    if len(words) == 7:
+        return Pose.of_matrix(from_quaternion(found[:3], found[3:], what))
+    return Pose.of_matrix(checked(np.reshape(found, (-1, 4)), what))
 
 
 def numbers(text: str, what: str) -> list[float]:

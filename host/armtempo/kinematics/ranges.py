@@ -2,15 +2,34 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from armtempo.kinematics.geometry import Array
+from armtempo.arrays import Array
 from armtempo.model.arm import Arm
 
 TOLERANCE_RAD = 1e-9
 """An angle this little outside its range is set onto the end of the range."""
+
+
+def placed(angle: float, low: float, high: float, previous: float) -> float:
+    """Add whole turns to an angle: into the range, there nearest to ``previous``; if none fits, nearest to the range.
+
+    All in rad; NaN stays NaN.
+    """
+    if math.isnan(angle):
+        return angle
+    least = math.ceil((low - TOLERANCE_RAD - angle) / math.tau)
+    most = math.floor((high + TOLERANCE_RAD - angle) / math.tau)
+    if least <= most:
+        turns = min(max(round((previous - angle) / math.tau), least), most)
+        return min(max(angle + math.tau * turns, low), high)
+    below, above = angle + math.tau * (least - 1), angle + math.tau * least
+    return below if low - below < above - high else above
 
 
 @dataclass(frozen=True)
@@ -26,20 +45,21 @@ class Ranges:
         low, high = np.radians([joint.range_deg for joint in arm.joints]).T
         return cls(low, high)
 
-    def place(self, angles: Array, previous: Array) -> Array:
-        """Add whole turns: into the range, there nearest to ``previous``; if none fits, nearest to the range.
+    @cached_property
+    def ends(self) -> tuple[tuple[float, float], ...]:
+        """(low, high) of each joint."""
+        return tuple(zip(self.low.tolist(), self.high.tolist(), strict=True))
 
-        ``angles`` and ``previous`` have shape (..., joints), in rad; so has the result.
-        """
-        turn = 2 * np.pi
-        least = np.ceil((self.low - TOLERANCE_RAD - angles) / turn)
-        most = np.floor((self.high + TOLERANCE_RAD - angles) / turn)
-        nearest = angles + turn * np.clip(np.rint((previous - angles) / turn), least, most)
-        inside = np.clip(nearest, self.low, self.high)
-        below, above = angles + turn * (least - 1), angles + turn * least
-        outside = np.where(self.low - below < above - self.high, below, above)
-        return np.where(least <= most, inside, outside)
+    def placed(self, angles: Sequence[float], previous: Sequence[float]) -> list[float]:
+        """``placed`` for each joint of one posture."""
+        return [
+            placed(angle, low, high, before)
+            for angle, (low, high), before in zip(angles, self.ends, previous, strict=True)
+        ]
 
-    def excess(self, angles: Array) -> Array:
+    def excess(self, angles: Sequence[float]) -> list[float]:
         """How far angles lie outside: negative below the range, positive above it, 0 inside."""
-        return np.minimum(angles - self.low, 0.0) + np.maximum(angles - self.high, 0.0)
+        return [
+            min(angle - low, 0.0) + max(angle - high, 0.0)
+            for angle, (low, high) in zip(angles, self.ends, strict=True)
+        ]

@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armtempo.kinematics.geometry import Array
+from armtempo.arrays import Array
+from armtempo.kinematics import formulas
 from armtempo.kinematics.shape import Shape
 
 Mask = NDArray[np.bool_]
@@ -33,15 +34,14 @@ class Radii(NamedTuple):
 def radii(shape: Shape, x: Array, y: Array, z: Array) -> Radii:
     """Measure wrist centres given as three arrays of shape (N,)."""
     planar = np.sqrt(x * x + y * y)
-    offset = abs(shape.offset)
-    axis = np.abs(planar - offset) <= shape.near
+    axis = formulas.on_axis(shape, planar)
     with np.errstate(invalid="ignore"):
-        forward = np.sqrt((planar - offset) * (planar + offset))
+        forward = np.sqrt(formulas.square_of_forward(shape, planar))
     forward[axis] = 0.0
-    inward = np.stack((forward - shape.shoulder, forward + shape.shoulder))
-    shoulder = np.sqrt(inward * inward + np.square(z - shape.height))
-    for border in (shape.farthest, shape.nearest):
-        np.copyto(shoulder, border, where=np.abs(shoulder - border) <= shape.near)
+    out, up = formulas.to_shoulder(shape, np.stack((forward, -forward)), z)
+    shoulder = np.sqrt(out * out + up * up)
+    np.copyto(shoulder, shape.farthest, where=formulas.on_outer_border(shape, shoulder))
+    np.copyto(shoulder, shape.nearest, where=formulas.on_inner_border(shape, shoulder))
     return Radii(forward, shoulder, axis)
 
 

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from armtempo.kinematics.geometry import Array
-from armtempo.kinematics.inverse import DUPLICATE, ELBOW_STRETCHED, IN_OFFSET, TOO_FAR, TOO_NEAR
+from armtempo.arrays import Array
 from armtempo.kinematics.ranges import Ranges
 from armtempo.kinematics.regions import radii
 from armtempo.kinematics.shape import Shape
+from armtempo.kinematics.solutions import (
+    DUPLICATE,
+    ELBOW_STRETCHED,
+    IN_OFFSET,
+    TOO_FAR,
+    TOO_NEAR,
+    PoseSolutions,
+)
 
 
 @dataclass(frozen=True)
@@ -31,25 +37,36 @@ class Rejection:
     """For "duplicate": the solution it equals, 1 to 8."""
 
 
-def unreachable(shape: Shape, wrist: Array, index: int, outcome: int, unit: str) -> Rejection:
-    """Say which inequality of Eq. (3) the wrist centre, shape (3,), violates for solution ``index``."""
-    x, y, z = wrist[:, None]
-    if outcome == IN_OFFSET:
-        return _in_offset(shape, math.hypot(x[0], y[0]), unit)
-    r = float(radii(shape, x, y, z).shoulder[index // 4, 0])
-    if outcome == TOO_NEAR:
+@dataclass(frozen=True)
+class WristCentre:
+    """The wrist centre that a pose asks for, as the regions of Fig. 3 see it."""
+
+    shape: Shape
+    position: Array
+    """(3,): x, y, z from the base."""
+    unit: str
+    """Of the lengths, for the texts."""
+
+    def unreachable(self, index: int, outcome: int) -> Rejection:
+        """Say which inequality of Eq. (3) it violates for solution ``index``."""
+        shape, unit = self.shape, self.unit
+        x, y, z = self.position[:, None]
+        if outcome == IN_OFFSET:
+            return _in_offset(shape, math.hypot(x[0], y[0]), unit)
+        r = float(radii(shape, x, y, z).shoulder[index // 4, 0])
+        if outcome == TOO_NEAR:
+            text = (
+                f"out of reach by {shape.nearest - r:.6g} {unit}: wrist centre {r:.6g} {unit} from the shoulder "
+                f"axis, at least |L2 - L34| = {shape.nearest:.6g} {unit} needed (Eq. (3), line 4)"
+            )
+            return Rejection("unreachable", text, shape.nearest - r, inequality=4)
+        assert outcome == TOO_FAR
+        line = _outer_line(shape, float(z[0]))
         text = (
-            f"out of reach by {shape.nearest - r:.6g} {unit}: wrist centre {r:.6g} {unit} from the shoulder "
-            f"axis, at least |L2 - L34| = {shape.nearest:.6g} {unit} needed (Eq. (3), line 4)"
+            f"out of reach by {r - shape.farthest:.6g} {unit}: wrist centre {r:.6g} {unit} from the shoulder "
+            f"axis, at most L2 + L34 = {shape.farthest:.6g} {unit} allowed (Eq. (3), line {line})"
         )
-        return Rejection("unreachable", text, shape.nearest - r, inequality=4)
-    assert outcome == TOO_FAR
-    line = _outer_line(shape, float(z[0]))
-    text = (
-        f"out of reach by {r - shape.farthest:.6g} {unit}: wrist centre {r:.6g} {unit} from the shoulder "
-        f"axis, at most L2 + L34 = {shape.farthest:.6g} {unit} allowed (Eq. (3), line {line})"
-    )
-    return Rejection("unreachable", text, r - shape.farthest, inequality=line)
+        return Rejection("unreachable", text, r - shape.farthest, inequality=line)
 
 
 def _in_offset(shape: Shape, planar: float, unit: str) -> Rejection:
@@ -78,8 +95,8 @@ def duplicate(index: int, singular: int) -> Rejection:
     return Rejection("duplicate", f"equals solution {twin + 1}: {why}", twin=twin + 1)
 
 
-def out_of_range(ranges: Ranges, angles: Array) -> tuple[Rejection, ...]:
-    """Say which joints are outside their ranges and by how much; ``angles`` (6,) from ``Ranges.place``."""
+def out_of_range(ranges: Ranges, angles: Sequence[float]) -> tuple[Rejection, ...]:
+    """Say which joints are outside their ranges and by how much; ``angles`` (joints,) from ``Ranges.placed``."""
     return tuple(
         Rejection("range", _range_text(ranges, joint, angles[joint]), math.degrees(excess), joint=joint + 1)
         for joint, excess in enumerate(ranges.excess(angles))
@@ -88,23 +105,28 @@ def out_of_range(ranges: Ranges, angles: Array) -> tuple[Rejection, ...]:
 
 
 def _range_text(ranges: Ranges, joint: int, angle: float) -> str:
-    low, high, at = np.degrees((ranges.low[joint], ranges.high[joint], angle))
+    low, high, at = map(math.degrees, (*ranges.ends[joint], angle))
     side, by = ("below", low - at) if at < low else ("above", at - high)
     return f"joint {joint + 1} at {at:.4g} deg is {by:.4g} deg {side} its range {low:g} to {high:g}"
 
 
 def reasons(
-    shape: Shape,
-    wrist: Array,
-    index: int,
-    outcome: int,
-    singular: int,
-    ranges: Ranges,
-    angles: Array,
-    unit: str,
+    wrist: WristCentre, solutions: PoseSolutions, index: int, ranges: Ranges, placed: Sequence[float]
 ) -> tuple[Rejection, ...]:
-    """Collect everything against solution ``index``, 0 to 7; empty if nothing is."""
+    """Collect everything against solution ``index``, 0 to 7, with angles (6,) from ``Ranges.placed``."""
+    outcome = solutions.outcome[index]
     if outcome in (TOO_FAR, TOO_NEAR, IN_OFFSET):
-        return (unreachable(shape, wrist, index, outcome, unit),)
-    found = out_of_range(ranges, angles)
-    return (duplicate(index, singular), *found) if outcome == DUPLICATE else found
+        return (wrist.unreachable(index, outcome),)
+    outside = out_of_range(ranges, placed)
+    return (duplicate(index, solutions.singular[index]), *outside) if outcome == DUPLICATE else outside
+
+
+def table(rejections: Iterable[Sequence[Rejection]]) -> str:
+    """The reasons against solutions 1, 2, ..., equal ones together, as lines to hang under a message."""
+    numbers: dict[str, list[str]] = {}
+    for number, reasons_of_one in enumerate(rejections, 1):
+        text = "; ".join(reason.text for reason in reasons_of_one)
+        numbers.setdefault(text, []).append(str(number))
+    rows = [("solution", "why not"), *((", ".join(which), text) for text, which in numbers.items())]
+    width = max(len(which) for which, _ in rows)
+    return "".join(f"\n  {which:<{width}}  {text}" for which, text in rows)

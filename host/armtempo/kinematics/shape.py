@@ -9,13 +9,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 from armtempo.errors import InputError
 from armtempo.kinematics.geometry import Geometry, twist
 
 TOLERANCE = 1e-12
-"""Lengths closer than this times the reach count as equal: a wrist centre that near to a border of Eq. (3)
-or to axis 1 is taken to lie on it."""
+"""Lengths closer than this times the reach count as equal: a wrist centre that little beyond a border of
+Eq. (3), or that near to axis 1, is taken to lie on it."""
+
+ROUNDING = 1e-14
+"""The same for a wrist centre within a border: just above what rounding makes of a pose. Elbow up and down
+are two solutions farther in: from about 4e-7 rad of the elbow on."""
+
+
+STRAIGHT_WRIST = 1e-10
+"""Sine of theta5 up to which theta4 is taken from the previous posture, and the error of orientation, in rad,
+that this allows."""
 
 
 @dataclass(frozen=True)
@@ -45,25 +55,49 @@ class Shape:
     sign3: float
     sign4: float
     sign5: float
-    flange: tuple[float, float]
-    """d6 and a6."""
+    flange: tuple[float, float, float]
+    """The tool from the wrist centre, along the axes n, o, a of Eq. (1)."""
     flange_twist: tuple[float, float]
     """Cosine and sine of alpha6."""
     joint_offset: tuple[float, ...]
     near: float
     """Lengths below this count as zero."""
+    blur: float
+    """How far within a border a wrist centre still counts as on it."""
 
-    @property
+    @cached_property
     def farthest(self) -> float:
         """L2 + L34: radius of the wrist centre about the shoulder, elbow stretched."""
         return self.upper + self.fore
 
-    @property
+    @cached_property
     def nearest(self) -> float:
         """|L2 - L34|: the same, elbow folded."""
         return abs(self.upper - self.fore)
 
+    @cached_property
+    def excess(self) -> float:
+        """L2² - L34²."""
+        return (self.upper - self.fore) * (self.upper + self.fore)
+
+    @cached_property
+    def fore_turn(self) -> tuple[float, float]:
+        """Cosine and sine of the angle from L34 to the elbow's x axis."""
+        turn = self.turn2 - self.bend
+        return math.cos(turn), math.sin(turn)
+
+    @cached_property
+    def turn2_sign(self) -> float:
+        """-1 where a2 is negative, else 1."""
+        return -1.0 if self.turn2 else 1.0
+
+    @cached_property
+    def hand(self) -> float:
+        """sign1 * sign2 * sign3."""
+        return self.sign1 * self.sign2 * self.sign3
+
     @classmethod
+    @lru_cache(maxsize=64)
     def of(cls, geometry: Geometry) -> Shape:
         """Take the constants of ``geometry``; InputError with all reasons if it is outside the class."""
         reasons = refusals(geometry)
@@ -73,6 +107,7 @@ class Shape:
             )
         cosines, sines = zip(*map(twist, geometry.alpha), strict=True)
         sign2 = cosines[1]
+        cos6, sin6 = cosines[5], sines[5]
         near = TOLERANCE * geometry.reach
         offset = geometry.d[1] + sign2 * geometry.d[2]
         backwards = geometry.a[1] < 0.0
@@ -89,10 +124,11 @@ class Shape:
             sign3=sines[2],
             sign4=sines[3],
             sign5=sines[4],
-            flange=(geometry.d[5], geometry.a[5]),
-            flange_twist=(cosines[5], sines[5]),
+            flange=(geometry.a[5], geometry.d[5] * sin6, geometry.d[5] * cos6),
+            flange_twist=(cos6, sin6),
             joint_offset=geometry.offset,
             near=near,
+            blur=ROUNDING * geometry.reach,
         )
 
 
@@ -100,6 +136,8 @@ def refusals(geometry: Geometry) -> list[str]:
     """Say why the closed form does not serve ``geometry``, one reason a line; empty if it does."""
     if geometry.joints != 6:
         return [f"it has {geometry.joints} joints, not 6"]
+    if geometry.linked:
+        return [f"a parallel linkage turns joint {geometry.linked[0] + 1}"]
     return [*_twist_refusals(geometry), *_length_refusals(geometry)]
 
 

@@ -1,4 +1,4 @@
-"""Joints 4 to 6 from the orientation: the algebraic half of section 2.1, Eqs. (8) to (11).
+"""Joints 4 to 6 from many orientations: the algebraic half of section 2.1, Eqs. (8) to (11).
 
 Where the paper divides by sin(theta4) or sin(theta5), this takes both sine and cosine of each angle from
 Eq. (8) and their arctan2: no quadrant to guess and nothing to divide by near zero.
@@ -10,14 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from armtempo.arrays import Array
+from armtempo.kinematics import formulas
+from armtempo.kinematics.formulas import ARRAYS
 from armtempo.kinematics.geometric import ArmPart
-from armtempo.kinematics.geometry import Array
 from armtempo.kinematics.regions import Mask
-from armtempo.kinematics.shape import Shape
-
-SINGULAR = 1e-10
-"""Sine of theta5 up to which theta4 is taken from the previous posture, and the error of orientation, in rad,
-that this allows."""
+from armtempo.kinematics.shape import STRAIGHT_WRIST, Shape
 
 
 class WristPart(NamedTuple):
@@ -37,34 +35,22 @@ def solve_wrist(shape: Shape, arm: ArmPart, axes: Array, previous4: Array) -> Wr
 
     ``previous4``, (N,) or (), is the Denavit-Hartenberg angle theta4 to keep where theta5 = 0.
     """
-    along, across = _in_arm_plane(arm.theta1, axes)
-    height = axes[:, 2]
-    cos, sin = np.cos(arm.fore), np.sin(arm.fore)
-    sin_up = shape.sign1 * sin
-    # Components along the axes x3, y3, z3 of the forearm's frame.
-    n_x, o_x, a_x = (cos * along[i][:, None] + sin_up * height[i] for i in range(3))
-    n_y, o_y, a_y = (-shape.sign1 * shape.sign2 * shape.sign3 * across[i][:, None] for i in range(3))
-    a_z = shape.sign2 * shape.sign3 * (sin * along[2][:, None] - shape.sign1 * cos * height[2])
+    fore = arm.fore
+    in_plane = [formulas.in_arm_plane(*arm.turn1, x, y) for x, y, _ in axes]
+    along, heights = [part[:, None] for part, _ in in_plane], axes[:, 2]
+    n_x, o_x, a_x = (formulas.along_x3(*fore, part, z) for part, z in zip(along, heights, strict=True))
+    n_y, o_y, a_y = (formulas.along_y3(shape, across)[:, None] for _, across in in_plane)
+    a_z = formulas.along_z3(shape, *fore, along[2], heights[2])
 
     sin5 = np.sqrt(a_x * a_x + a_y * a_y)
-    theta4 = np.arctan2(shape.sign5 * a_y, shape.sign5 * a_x)
-    singular = sin5 <= SINGULAR
-    with np.errstate(invalid="ignore", divide="ignore"):
-        scale = shape.sign5 / sin5
-        cos4, sin4 = scale * a_x, scale * a_y
+    singular = sin5 <= STRAIGHT_WRIST
     if singular.any():
-        np.copyto(theta4, np.broadcast_to(previous4, theta4.shape), where=singular)
-        np.copyto(cos4, np.cos(theta4), where=singular)
-        np.copyto(sin4, np.sin(theta4), where=singular)
-    theta5 = np.arctan2(sin5, -shape.sign4 * shape.sign5 * a_z)
-    turn = shape.sign4 * shape.sign5
-    theta6 = np.arctan2(turn * (sin4 * n_x - cos4 * n_y), turn * (sin4 * o_x - cos4 * o_y))
-    return WristPart(theta4, theta5, theta6, singular)
-
-
-def _in_arm_plane(theta1: Array, axes: Array) -> tuple[list[Array], list[Array]]:
-    """Components of n, o, a along the arm's plane and across it: three arrays (2, N) each."""
-    cos, sin = np.cos(theta1), np.sin(theta1)
-    along = [cos * axes[i, 0] + sin * axes[i, 1] for i in range(3)]
-    across = [cos * axes[i, 1] - sin * axes[i, 0] for i in range(3)]
-    return along, across
+        a_y = np.broadcast_to(a_y, a_x.shape).copy()
+        np.copyto(a_x, shape.sign5 * np.cos(previous4), where=singular)
+        np.copyto(a_y, shape.sign5 * np.sin(previous4), where=singular)
+    return WristPart(
+        formulas.theta4(ARRAYS, shape, a_x, a_y),
+        formulas.theta5(ARRAYS, shape, sin5, a_z),
+        formulas.theta6(ARRAYS, shape, (a_x, a_y), (n_x, n_y), (o_x, o_y)),
+        singular,
+    )

@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 
 from armtempo.errors import InputError
+from armtempo.formats import json_codec
 
 
 @dataclass(frozen=True)
@@ -110,6 +111,9 @@ class Joint:
     encoder: Encoder | None = None
     switches: LimitSwitches = field(default_factory=LimitSwitches)
     model: JointModel = field(default_factory=JointModel)
+    parallel_linkage: bool = field(default=False, metadata=json_codec.ADDED)
+    """The drive stands on the link before the previous one and turns this link by a parallelogram: the angle
+    is counted from that link, so it stays when the previous joint turns. The row turns by the difference."""
 
 
 @dataclass(frozen=True)
@@ -182,13 +186,14 @@ class Arm:
 
     @classmethod
     def load(cls, path: Path | str) -> Arm:
-        """The arm described by a TOML file.
+        """The arm described by a TOML file, or the one of that name that ships, such as ``"ar4"``; a file wins.
 
-        Raises InputError, naming file, key and value, for anything missing, unknown or not allowed.
+        Raises InputError, naming file, key and value, for anything missing, unknown or not allowed; naming the arms
+        that ship where there is neither file nor arm.
         """
-        from armtempo.model import arm_file
+        from armtempo.model import arm_file, shipped
 
-        return arm_file.load(path)
+        return arm_file.load(shipped.find(path).path)
 
     @classmethod
     def paper(cls) -> Arm:
@@ -203,6 +208,16 @@ class Arm:
         return tuple(
             _driven(self.name, joint, joint.motor) for joint in self.joints if joint.motor is not None
         )
+
+    @cached_property
+    def driven_indices(self) -> tuple[int, ...]:
+        """Where the joints with a motor stand among all joints, from 0."""
+        return tuple(index for index, joint in enumerate(self.joints) if joint.motor is not None)
+
+    @property
+    def all_home_deg(self) -> tuple[float, ...]:
+        """The home posture with the joints that have no motor: degrees, (joints,)."""
+        return tuple(joint.home_deg for joint in self.joints)
 
     @property
     def home_deg(self) -> tuple[float, ...]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from collections import defaultdict
 from pathlib import Path
+from typing import NamedTuple
 
 from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS
 
@@ -22,8 +23,27 @@ from armtempo.model.arm import (
     Safety,
 )
 
+MAX_ANGLE_DEG = 36_000.0
+"""Largest angle, either way, that an arm file may give: a hundred turns."""
+
 MAX_LENGTH_MM = 1e6
 """Longest link that an arm file may describe."""
+
+_GEAR_RATIO = (0.1, 10_000.0)
+_LIMITS = {"speed_deg_s": 1e5, "acceleration_deg_s2": 1e7, "jerk_deg_s3": 1e9}
+_LEAST_LIMIT = 0.001
+_MODEL = {
+    "holding_torque_nm": (0.0, 1e3),
+    "rotor_inertia_kg_m2": (0.0, 1.0),
+    "inertia_kg_m2": (0.0, 1e4),
+    "damping_nm_s": (0.0, 1e3),
+    "corner_speed_rad_s": (0.0, 1e5),
+    "gravity_torque_nm": (-1e4, 1e4),
+    "backlash_deg": (0.0, 90.0),
+    "encoder_phase_counts": (0.0, 1.0),
+    "scatter_deg": (0.0, 90.0),
+}
+"""Bounds that no small arm comes near: what is beyond them is a slip of the unit or of the point."""
 
 
 def default_path() -> Path:
@@ -32,20 +52,32 @@ def default_path() -> Path:
 
 
 def load(path: Path | str) -> Arm:
-    """The arm described by a TOML file.
+    """The arm described by a TOML file, ready to be driven.
 
     Raises InputError, naming file, key and value, for anything missing, unknown or not allowed.
     """
-    top = toml_table.read(path)
+    arm = read(path)
+    _check_channels(arm, path)
+    return arm
+
+
+def read(path: Path | str) -> Arm:
+    """The arm as its file stands, even if no joint has a motor yet or two have the same channel.
+
+    Raises InputError as ``load`` does for all else.
+    """
+    return of_table(toml_table.read(path))
+
+
+def of_table(top: Table) -> Arm:
+    """The arm in the top table of a file, as ``read`` gives it."""
     name = top.text("name")
     driver = _driver(top.table("driver"))
     safety = _safety(top.table("safety"))
     tables = top.tables("joint")
     joints = tuple(_joint(table, number) for number, table in enumerate(tables, 1))
     top.done()
-    arm = Arm(name, joints, driver, safety, str(path))
-    _check_channels(arm, path)
-    return arm
+    return Arm(name, joints, driver, safety, top.file)
 
 
 def _driver(table: Table | None) -> Driver:
@@ -76,8 +108,13 @@ def _safety(table: Table | None) -> Safety:
 
 def _joint(table: Table, number: int) -> Joint:
     low, high = table.numbers("range_deg", 2)
-    if not low < high:
-        raise table.fail("range_deg", "two angles, the smaller first")
+    if not -MAX_ANGLE_DEG <= low < high <= MAX_ANGLE_DEG:
+        raise table.fail(
+            "range_deg", f"two angles, the smaller first, of at most {MAX_ANGLE_DEG:g} either way"
+        )
+    linkage = table.boolean("parallel_linkage", Joint.parallel_linkage)
+    if linkage and number == 1:
+        raise table.fail("parallel_linkage", "false for joint 1, which has no joint before it")
     motor = _motor(table.table("motor"))
     limits = _limits(table.table("limits"))
     if motor is not None and limits is None:
@@ -98,6 +135,7 @@ def _joint(table: Table, number: int) -> Joint:
         encoder=encoder,
         switches=_switches(table.table("switches")),
         model=_model(table.table("model")),
+        parallel_linkage=linkage,
     )
     table.done()
     return joint
@@ -107,9 +145,7 @@ def _limits(table: Table | None) -> Limits | None:
     if table is None:
         return None
     limits = Limits(
-        speed_deg_s=table.number("speed_deg_s", above=0.0),
-        acceleration_deg_s2=table.number("acceleration_deg_s2", above=0.0),
-        jerk_deg_s3=table.number("jerk_deg_s3", above=0.0),
+        **{key: table.number(key, least=_LEAST_LIMIT, most=most) for key, most in _LIMITS.items()}
     )
     table.done()
     return limits
@@ -122,7 +158,7 @@ def _motor(table: Table | None) -> Motor | None:
         channel=table.integer("channel", least=1, most=MAX_JOINTS),
         steps_per_rev=table.integer("steps_per_rev", least=4, most=10_000),
         microsteps=table.integer("microsteps", least=1, most=256),
-        gear_ratio=table.number("gear_ratio", above=0.0, most=10_000.0),
+        gear_ratio=table.number("gear_ratio", least=_GEAR_RATIO[0], most=_GEAR_RATIO[1]),
         direction=table.choice("direction", (1, -1), 1),
     )
     table.done()
@@ -150,28 +186,48 @@ def _switches(table: Table | None) -> LimitSwitches:
         low=table.integer("low", least=1, most=3) if table.has("low") else None,
         high=table.integer("high", least=1, most=3) if table.has("high") else None,
         active=table.choice("active", ("low", "high"), "low"),
-        low_deg=table.number("low_deg") if table.has("low_deg") else None,
-        high_deg=table.number("high_deg") if table.has("high_deg") else None,
+        low_deg=_angle(table, "low_deg"),
+        high_deg=_angle(table, "high_deg"),
     )
     table.done()
     return switches
 
 
+def _angle(table: Table, key: str) -> float | None:
+    return table.number(key, least=-MAX_ANGLE_DEG, most=MAX_ANGLE_DEG) if table.has(key) else None
+
+
 def _model(table: Table | None) -> JointModel:
     if table is None:
         return JointModel()
-    values = {key.name: table.number(key.name, 0.0) for key in fields(JointModel)}
+    values = {key: table.number(key, 0.0, least=least, most=most) for key, (least, most) in _MODEL.items()}
     table.done()
     return JointModel(**values)
+
+
+class SharedChannel(NamedTuple):
+    """A channel of the board that more than one joint has."""
+
+    key: str
+    """``"motor"`` or ``"encoder"``."""
+    channel: int
+    joints: tuple[str, ...]
+
+
+def shared_channels(arm: Arm) -> list[SharedChannel]:
+    """Channels that more than one joint has; empty for an arm that can be wired."""
+    users: dict[tuple[str, int], list[str]] = defaultdict(list)
+    for joint in arm.joints:
+        for key, part in (("motor", joint.motor), ("encoder", joint.encoder)):
+            if part is not None:
+                users[key, part.channel].append(joint.name)
+    return [SharedChannel(*place, tuple(names)) for place, names in users.items() if len(names) > 1]
 
 
 def _check_channels(arm: Arm, path: Path | str) -> None:
     if not arm.driven:
         raise InputError(f"{path}: no joint has a motor; at least one [joint.motor] is needed")
-    for what, channels in (
-        ("motor.channel", [joint.motor.channel for joint in arm.driven]),
-        ("encoder.channel", [joint.encoder.channel for joint in arm.driven if joint.encoder]),
-    ):
-        for channel in channels:
-            if channels.count(channel) > 1:
-                raise InputError(f"{path}: {what} = {channel} is used by two joints; each needs its own")
+    for key, channel, joints in shared_channels(arm):
+        raise InputError(
+            f"{path}: {key}.channel = {channel} is used by {' and '.join(joints)}; each needs its own"
+        )

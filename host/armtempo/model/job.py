@@ -6,7 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, InitVar, dataclass, field
 from pathlib import Path
 
+from armtempo.formats import json_codec
 from armtempo.model.arm import Arm
+from armtempo.model.tool_pose import Pose
 
 GRADIENT = "gradient"
 """The optimiser that is no population search: gradients from several starts."""
@@ -17,20 +19,6 @@ AUTO = "auto"
 
 REFINE, POPULATION, ITERATIONS, STARTS = (1, 64), (4, 100_000), (1, 1_000_000), (1, 1000)
 """Least and largest values of these settings."""
-
-Rows = tuple[tuple[float, ...], ...]
-
-
-@dataclass(frozen=True)
-class Pose:
-    """A tool pose to pass: 4 x 4 homogeneous matrix rows, lengths in mm."""
-
-    matrix: Rows
-    posture_deg: tuple[float, ...] | None = None
-    """Which solution to prefer; None: nearest to the one before."""
-    tolerance_mm: float = 0.0
-    tolerance_deg: float = 0.0
-    """How far a free path may pass from it."""
 
 
 @dataclass(frozen=True)
@@ -51,12 +39,12 @@ class Job:
     name: str
     via: tuple[tuple[float, ...] | Pose, ...] = ()
     """Each entry: the driven joints' angles in degrees, (J,), or a pose."""
-    stops: tuple[Stop, ...] = ()
+    stops: tuple[Stop, ...] = field(default=(), metadata=json_codec.ADDED)
     """Via points between the ends where the motion comes to rest, in order."""
-    path: str = "through"
+    path: str = field(default="through", metadata=json_codec.ADDED)
     """``"through"``: the spline of Eqs. (13) and (14); ``"free"``: it may bend between the via points."""
-    corridor_deg: float | None = None
-    corridor_mm: float | None = None
+    corridor_deg: float | None = field(default=None, metadata=json_codec.ADDED)
+    corridor_mm: float | None = field(default=None, metadata=json_codec.ADDED)
     """How far a free path may leave the one through the via points: any joint, or the tool; None: at will."""
     degree: int = 5
     timing: str = "shared"
@@ -69,7 +57,7 @@ class Job:
     iterations: int = 500
     parameters: Mapping[str, float | str | bool] = field(default_factory=dict)
     """Further parameters of the optimiser, by its own names."""
-    starts: int = 3
+    starts: int = field(default=3, metadata=json_codec.ADDED)
     """Starts of the gradient solver, where it searches."""
     seed: int = 1
     bounds_s: tuple[float, float] | None = None

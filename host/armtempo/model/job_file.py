@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import string
+from dataclasses import replace
 from pathlib import Path
 
 from armtempo_shared.limits import MAX_NAME, MAX_SEGMENTS
@@ -10,7 +11,7 @@ from armtempo_shared.limits import MAX_NAME, MAX_SEGMENTS
 from armtempo.errors import InputError
 from armtempo.formats import toml_table
 from armtempo.formats.toml_table import Table
-from armtempo.model import pose
+from armtempo.model import pose_table
 from armtempo.model.arm import Arm
 from armtempo.model.job import (
     AUTO,
@@ -22,10 +23,9 @@ from armtempo.model.job import (
     STARTS,
     TIMINGS,
     Job,
-    Pose,
-    Rows,
     Stop,
 )
+from armtempo.model.tool_pose import Pose
 from armtempo.optimise import ALGORITHMS
 
 MOST_DWELL_S = 600.0
@@ -152,31 +152,9 @@ def _via(table: Table, where: str, arm: Arm) -> tuple[float, ...] | Pose:
         table.done()
         return angles
     posture = table.numbers("posture_deg", len(arm.joints)) if table.has("posture_deg") else None
-    matrix = _matrix(table) if forms == ["matrix"] else _turned(table, where)
-    tolerance_mm = table.number("tolerance_mm", 0.0, least=0.0)
-    tolerance_deg = table.number("tolerance_deg", 0.0, least=0.0, most=90.0)
+    pose = pose_table.read(table, where)
     table.done()
-    return Pose(matrix, posture, tolerance_mm, tolerance_deg)
-
-
-def _matrix(table: Table) -> Rows:
-    given = table.array("matrix", "the 4 rows of a pose, lengths in mm")
-    if len(given) != 4:
-        raise table.fail("matrix", "4 rows of 4 numbers")
-    rows = Table({f"row {n}": row for n, row in enumerate(given, 1)}, table.file, "matrix ")
-    return tuple(rows.numbers(f"row {n}", 4) for n in range(1, 5))
-
-
-def _turned(table: Table, where: str) -> Rows:
-    """A pose given as a position with roll, pitch and yaw or with a quaternion."""
-    position = table.numbers("position_mm", 3)
-    if table.has("rpy_deg") == table.has("quaternion"):
-        raise InputError(f"{where}: position_mm goes with one of rpy_deg and quaternion")
-    if table.has("rpy_deg"):
-        found = pose.from_rpy(position, table.numbers("rpy_deg", 3), where)
-    else:
-        found = pose.from_quaternion(position, table.numbers("quaternion", 4), f"{where}.quaternion")
-    return tuple(tuple(row) for row in found.tolist())
+    return replace(pose, posture_deg=posture)
 
 
 def _angles(table: Table, key: str, arm: Arm) -> tuple[float, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +17,23 @@ LARGEST = 1e9
 
 ROUNDED = 1e-3
 """How far a rotation or a unit quaternion may be off by rounding of the printed numbers."""
+
+
+class RollPitchYaw(NamedTuple):
+    """Angles in degrees about the x, then the y, then the z axis of the base."""
+
+    roll_deg: float
+    pitch_deg: float
+    yaw_deg: float
+
+
+class Quaternion(NamedTuple):
+    """A unit quaternion, its real part first."""
+
+    w: float
+    x: float
+    y: float
+    z: float
 
 
 def checked(matrix: ArrayLike, what: str = "the pose") -> Array:
@@ -80,6 +98,38 @@ def from_quaternion(position: Sequence[float], wxyz: Sequence[float], what: str 
         (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
     )
     return _joined(rotation, position, what)
+
+
+def to_rpy_deg(matrix: ArrayLike) -> RollPitchYaw:
+    """Roll, pitch and yaw of a pose (4, 4) or rotation (3, 3); roll is 0 where the x axis stands upright."""
+    r = np.asarray(matrix, dtype=np.float64)
+    level = math.hypot(r[0, 0], r[1, 0])
+    pitch = math.atan2(-r[2, 0], level)
+    if level < 1e-9:
+        return RollPitchYaw(0.0, _degrees(pitch), _degrees(math.atan2(-r[0, 1], r[1, 1])))
+    roll, yaw = math.atan2(r[2, 1], r[2, 2]), math.atan2(r[1, 0], r[0, 0])
+    return RollPitchYaw(_degrees(roll), _degrees(pitch), _degrees(yaw))
+
+
+def _degrees(angle_rad: float) -> float:
+    """From above -180 to 180, and never -0; rounding makes no -180 of a half turn."""
+    angle_deg = math.degrees(angle_rad)
+    return 180.0 if angle_deg < -180.0 + 1e-9 else angle_deg + 0.0
+
+
+def to_quaternion(matrix: ArrayLike) -> Quaternion:
+    """Unit quaternion w x y z of a pose (4, 4) or rotation (3, 3), with w not below 0."""
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = np.asarray(matrix, dtype=np.float64)[:3, :3].tolist()
+    # Four times the products of the quaternion's elements; the row of the largest square has the most digits.
+    rows = (
+        (1 + xx + yy + zz, zy - yz, xz - zx, yx - xy),
+        (zy - yz, 1 + xx - yy - zz, xy + yx, xz + zx),
+        (xz - zx, xy + yx, 1 - xx + yy - zz, yz + zy),
+        (yx - xy, xz + zx, yz + zy, 1 - xx - yy + zz),
+    )
+    best = max(rows, key=lambda row: math.hypot(*row))
+    length = math.hypot(*best) * (-1.0 if best[0] < 0.0 else 1.0)
+    return Quaternion(*(element / length + 0.0 for element in best))
 
 
 def _joined(rotation: ArrayLike, position: Sequence[float], what: str) -> Array:

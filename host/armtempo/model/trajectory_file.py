@@ -18,7 +18,7 @@ from armtempo.model.plan import Plan
 from armtempo.splines.trajectory import JointSpline
 
 FORMAT = "armtempo trajectory"
-VERSION = 2
+VERSION = 1
 
 
 def save(plan: Plan, path: Path | str) -> None:

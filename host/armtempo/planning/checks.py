@@ -29,8 +29,8 @@ from armtempo.model.job import (
     STARTS,
     TIMINGS,
     Job,
-    Pose,
 )
+from armtempo.model.tool_pose import TOLERANCE_DEG, TOLERANCE_MM, WHOLE, Pose
 from armtempo.splines import bspline, extremes
 from armtempo.splines.extremes import Extremes
 from armtempo.splines.trajectory import JointSpline, Trajectory
@@ -138,16 +138,25 @@ def _check_path(job: Job) -> None:
         _check_free(job, where)
 
 
+def is_wide(via: tuple[float, ...] | Pose) -> bool:
+    """Whether a free path may pass beside it: a pose with more tolerance than counts as reached anyway.
+
+    Only where nothing or all is asked of the orientation; other poses are passed where the inverse puts them.
+    """
+    return (
+        isinstance(via, Pose)
+        and via.fixed in ((), WHOLE)
+        and (via.tolerance_mm > TOLERANCE_MM or via.tolerance_deg > TOLERANCE_DEG)
+    )
+
+
 def _check_free(job: Job, where: str) -> None:
     if job.degree != 5:
         raise InputError(f"{where}: a free path has degree 5, not {job.degree}")
-    tolerant = any(
-        isinstance(via, Pose) and max(via.tolerance_mm, via.tolerance_deg) > 0.0 for via in job.via
-    )
     together = {
         "a stop": bool(job.stops),
         "a corridor": job.corridor_deg is not None or job.corridor_mm is not None,
-        "a tolerance at a via point": tolerant,
+        "a tolerance at a via point": any(is_wide(via) for via in job.via),
     }
     for what, asked in together.items():
         if asked and job.timing != "shared":

@@ -35,7 +35,7 @@ def tool_deviation_mm(path: Array, through: Array, tool: Tool) -> float:
         distance = np.linalg.norm(first - second, axis=1)
         outer = np.linalg.norm(tool.at(ends[0]).position_mm - tool.at(ends[1]).position_mm, axis=1)
         best = max(best, float(distance.max()), float(outer.max()))
-        most = distance + 0.5 * _growth(path, through, tool.reach_mm)
+        most = distance + 0.5 * _growth(path @ tool.turns.T, through @ tool.turns.T, tool.reach_mm)
         open_ = most > best * (1.0 + SHARP) + 1e-9
         if not open_.any():
             return best * (1.0 + SHARP) + 1e-9
@@ -57,6 +57,7 @@ def _halved(pieces: Array) -> Array:
 def _growth(path: Array, through: Array, reach_mm: Array) -> Array:
     """Bound on how fast the distance between the tools changes over a piece, mm for the whole of it: (N,).
 
+    ``path`` and ``through`` are turns of rows of the Denavit-Hartenberg table, (N, 6, R) in degrees.
     d/du of p(q) - p(r) is J(q) (q' - r') + (J(q) - J(r)) r'. A column of J is no longer than the reach of its
     joint, and as joint k turns it changes by no more than the reach of the outer one of both.
     """

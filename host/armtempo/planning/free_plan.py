@@ -9,8 +9,9 @@ from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS
 from armtempo.arrays import Array
 from armtempo.errors import InputError
 from armtempo.model.arm import Arm
-from armtempo.model.job import Job, Pose
+from armtempo.model.job import Job
 from armtempo.model.plan import Search
+from armtempo.model.tool_pose import Pose
 from armtempo.planning import checks, corridor, free_path, lower_bounds
 from armtempo.planning.angle_bounds import of_path
 from armtempo.planning.free_motion import Demand, FreeMotion, Tolerance, through
@@ -25,6 +26,8 @@ from armtempo.splines.trajectory import JointSpline, Trajectory
 
 _BEYOND = 2.0
 """A free path is kept within so many times what its via points span on each side of them."""
+_WORTH_USING = 1e-3
+"""A tolerance of less than so many mm or degrees is not made use of."""
 _WIDER = 0.5 * checks.TOLERANCE
 """Ranges are widened by so much of themselves, so that a via point at their end is inside."""
 
@@ -78,11 +81,8 @@ def _demand(arm: Arm, job: Job, via_deg: Array, joints: list[int]) -> Demand:
     low, high = np.array([joint.range_deg for joint in driven]).T
     room = _WIDER * np.maximum(1.0, np.maximum(np.abs(low), np.abs(high)))
     span = np.ptp(via, axis=0)
-    tolerances = {
-        number: Tolerance(pose.tolerance_mm or np.inf, pose.tolerance_deg or np.inf)
-        for number, pose in enumerate(job.via)
-        if number and isinstance(pose, Pose) and max(pose.tolerance_mm, pose.tolerance_deg) > 0.0
-    }
+    tool = Tool(arm, joints, via_deg[0])
+    tolerances = _tolerances(job, via, tool)
     return Demand(
         names=tuple(joint.name for joint in driven),
         via_deg=via,
@@ -92,9 +92,22 @@ def _demand(arm: Arm, job: Job, via_deg: Array, joints: list[int]) -> Demand:
         stops={stop.via: stop.dwell_s for stop in job.stops},
         corridor_deg=np.inf if job.corridor_deg is None else job.corridor_deg,
         corridor_mm=np.inf if job.corridor_mm is None else job.corridor_mm,
-        tool=Tool(arm, joints, via_deg[0]) if tolerances or job.corridor_mm is not None else None,
+        tool=tool if tolerances or job.corridor_mm is not None else None,
         tolerances=tolerances,
     )
+
+
+def _tolerances(job: Job, via_deg: Array, tool: Tool) -> dict[int, Tolerance]:
+    """How far the tool may pass from where via angles (n + 1, J) bring it; what they miss a pose by is taken off."""
+    allowed = {}
+    for number, pose in enumerate(job.via):
+        if number and isinstance(pose, Pose) and checks.is_wide(pose):
+            miss = tool.miss(via_deg[number], pose)
+            turn_deg = pose.tolerance_deg - miss.rotation_deg if pose.fixed else np.inf
+            left = Tolerance(pose.tolerance_mm - miss.position_mm, turn_deg)
+            if min(left) > _WORTH_USING:
+                allowed[number] = left
+    return allowed
 
 
 def _trajectory(job: Job, via_deg: Array, groups: list[list[int]], found: list[Shortest]) -> Trajectory:

@@ -10,7 +10,7 @@ import numpy as np
 from armtempo import optimise
 from armtempo.arrays import Array
 from armtempo.model.arm import Limits
-from armtempo.model.job import Job
+from armtempo.model.job import GRADIENT, Job
 from armtempo.optimise.tracker import Result
 from armtempo.planning import checks, rest_to_rest
 from armtempo.planning.fitness import Fitness
@@ -54,11 +54,14 @@ def search(
     """Intervals (n,) by the job's optimiser, for joints on one axis with control points (n + degree, J).
 
     Where the result ends at bounds that follow from the job, they are widened and it goes on from anew; at
-    bounds that the job gives, that is only said.
+    bounds that the job gives, that is only said. Gradients start within the bounds and may leave them.
     """
     box = bounds_s(angle_points_deg, job.degree, limits)
     if job.bounds_s is not None:
         box = np.tile(np.array(job.bounds_s), (len(box), 1))
+    if job.optimiser == GRADIENT:
+        path = FixedPath(angle_points_deg, job.degree, limits, mirrored=True)
+        return gradient(path, box, rng, job.starts, progress)
     notes: list[str] = []
     best: Found | None = None
     for widening in range(_WIDENINGS + 1):
@@ -92,9 +95,6 @@ def _once(
     rng: np.random.Generator,
     progress: Progress,
 ) -> Found:
-    if job.optimiser == "gradient":
-        path = FixedPath(points, job.degree, limits, mirrored=True)
-        return gradient(path, box, rng, job.starts, progress)
     fitness = Fitness(points, job.degree, limits)
     parameters = dict(job.parameters)
     function = getattr(fitness, str(parameters.pop("fitness", checks.FITNESS[0])))

@@ -18,7 +18,7 @@ _WIGGLE = 1e-9
 """Turns smaller than this part of the joint's way are rounding."""
 _ROUNDED = 1.0 - 1e-9
 """Floors are this part of what comes out, for the rounding of angles and sums."""
-_MOST_CELLS, _LEAST_CELLS = 16, 2
+_MOST_CELLS, _LEAST_CELLS = 16, 4
 """Cells in a segment of the path."""
 _WORK = 10_000
 """Fewer cells where segments times the square of the joints' number would be more than this."""
@@ -52,11 +52,19 @@ def of_path(angle_points_deg: Array, degree: int, limits: Sequence[Limits], abou
 
 
 def _path_s(angle_points_deg: Array, degree: int, limits: Sequence[Limits], about_s: float) -> float:
-    """By duality; 0 where that proves nothing."""
+    """By duality, on more cells where few prove nothing; 0 where that does not help."""
     segments = len(angle_points_deg) - degree
-    parts = _WORK // (segments * len(limits) ** 2)
-    pieces = bspline.polynomials(angle_points_deg, degree)
-    pieces = bspline.subdivide(pieces, min(max(parts, _LEAST_CELLS), _MOST_CELLS))
+    parts = min(max(_WORK // (segments * len(limits) ** 2), _LEAST_CELLS), _MOST_CELLS)
+    found = _by_cells(angle_points_deg, degree, limits, about_s, parts)
+    while found <= 0.0 and parts < _MOST_CELLS:
+        parts *= 2
+        found = _by_cells(angle_points_deg, degree, limits, about_s, parts)
+    return found
+
+
+def _by_cells(points_deg: Array, degree: int, limits: Sequence[Limits], about_s: float, parts: int) -> float:
+    """By duality, with so many cells in a segment of the path."""
+    pieces = bspline.subdivide(bspline.polynomials(points_deg, degree), parts)
     cell_s = about_s / len(pieces)
     values = np.array([limit.values for limit in limits]) * cell_s ** np.arange(1, 4)
     cells = Cells(pieces, values, degree == 5)

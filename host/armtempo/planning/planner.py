@@ -12,8 +12,9 @@ import numpy as np
 import armtempo
 from armtempo.arrays import Array
 from armtempo.model.arm import Arm
-from armtempo.model.job import Job, Pose
+from armtempo.model.job import Job
 from armtempo.model.plan import Plan
+from armtempo.model.tool_pose import Pose
 from armtempo.planning import checks, free_plan, through_plan
 from armtempo.progress import Progress
 from armtempo.splines import extremes

@@ -8,31 +8,35 @@ So for each pose
    with the undriven joints at home comes first, and among equals the one nearest to the posture before;
 3. the driven joints take their angles from it. What the pose would need of the others, and how far the tool
    misses it without, is said in a note.
+
+A pose that asks for less than the whole orientation is solved for the driven joints alone.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from armtempo.arrays import Array
 from armtempo.errors import InputError, PlanError
-from armtempo.kinematics import numerical
 from armtempo.kinematics.branches import Branch, branch_of
 from armtempo.kinematics.choice import Choice, choose
-from armtempo.kinematics.forward import forward
-from armtempo.kinematics.geometry import Array, Geometry
+from armtempo.kinematics.constraint import Constraint, Miss
+from armtempo.kinematics.forward import frames
 from armtempo.kinematics.ranges import Ranges
-from armtempo.kinematics.shape import refusals
+from armtempo.kinematics.rejection import table
+from armtempo.kinematics.solver import PoseSolver
 from armtempo.model.arm import Arm
-from armtempo.model.job import Job, Pose
-from armtempo.model.pose import checked
+from armtempo.model.job import Job
+from armtempo.model.tool_pose import WHOLE, Pose
 
-MISS_MM = 0.01
-MISS_DEG = 0.01
-"""A tool this near to its pose has reached it."""
+STAYS_DEG = 0.01
+"""A joint without a motor that a pose needs this little away from home need not be named."""
+
+WORTH_SAYING = 0.01
+"""A miss of more than this part of the tolerance is said."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +44,8 @@ class Note:
     """Something about the via points that the user must know."""
 
     kind: str
-    """"undriven": the pose needs joints without a motor; "branch": the arm changes its branch before it."""
+    """"undriven": the pose needs joints without a motor; "miss": the tool comes near to the pose, within its
+    tolerance; "branch": the arm changes its branch before it."""
     via: int
     """Number of the via point, from 1."""
     text: str
@@ -60,7 +65,7 @@ class _Setup:
     """What all via points share."""
 
     arm: Arm
-    geometry: Geometry
+    solver: PoseSolver
     ranges: Ranges
     """Of the driven joints; for the others, which stay, the whole turn about home."""
     home: Array
@@ -75,26 +80,18 @@ class _Setup:
             for joint in arm.joints
         ]
         low, high = np.radians(ends).T
-        home = np.radians([joint.home_deg for joint in arm.joints])
+        solver = PoseSolver(arm)
         driven = np.array([joint.motor is not None for joint in arm.joints])
-        geometry = Geometry.of(arm)
-        return cls(arm, geometry, Ranges(low, high), home, driven, not refusals(geometry))
+        return cls(arm, solver, Ranges(low, high), np.array(solver.home_rad), driven, not solver.refusals)
 
     def moved(self, angles: Array) -> Array:
         """The posture with the driven joints at ``angles`` and the others at home."""
         return np.where(self.driven, angles, self.home)
 
-    def miss(self, target: Array, angles: Array) -> tuple[float, float]:
-        """How far the tool stays from its pose if only the driven joints move: mm and degrees."""
-        tool = forward(self.geometry, self.moved(angles))
-        chord = float(np.linalg.norm(tool[:3, :3] - target[:3, :3]))
-        turn = 2.0 * math.degrees(math.asin(min(chord / math.sqrt(8.0), 1.0)))
-        return float(np.linalg.norm(tool[:3, 3] - target[:3, 3])), turn
-
-    def reaches(self, target: Array, angles: Array) -> bool:
-        """Whether the tool gets there if only the driven joints move."""
-        distance, turn = self.miss(target, angles)
-        return distance <= MISS_MM and turn <= MISS_DEG
+    def miss(self, target: Pose, angles: Array) -> Miss:
+        """How far the tool stays from its pose if only the driven joints move."""
+        tool = frames(self.solver.geometry, self.moved(angles).tolist())[-1]
+        return Constraint.of(target).miss(tool)
 
 
 def resolve(arm: Arm, job: Job) -> Resolved:
@@ -112,9 +109,10 @@ def resolve(arm: Arm, job: Job) -> Resolved:
         where = f"job {job.name!r}, via {number}"
         choice = None
         if isinstance(via, Pose):
-            target = checked(via.matrix, where)
-            needed, choice = _solve(setup, target, via, posture, where)
-            notes += _undriven_note(setup, target, needed, number)
+            target = via.exact(where)
+            previous = posture if via.posture_deg is None else _preferred(setup, via.posture_deg, where)
+            needed, choice = _solve(setup, target, previous, via.posture_deg is None, where)
+            notes += _miss_note(setup, target, needed, number)
         else:
             needed = _spread(setup, via, where)
         posture = setup.moved(needed)
@@ -135,22 +133,31 @@ def _spread(setup: _Setup, via: tuple[float, ...], where: str) -> Array:
     return posture
 
 
-def _solve(setup: _Setup, target: Array, via: Pose, before: Array, where: str) -> tuple[Array, Choice | None]:
-    """All that the pose asks for, (joints,) in rad; the choice only where the closed form serves the arm."""
-    previous = before if via.posture_deg is None else _preferred(setup, via.posture_deg, where)
-    if not setup.closed_form:
-        found = numerical.solve(setup.geometry, target, setup.ranges, previous)
-        if not found.found:
-            raise PlanError(f"{where}: {found.reason}")
-        return found.angles_rad, None
-    choice = choose(setup.geometry, target, setup.ranges, previous)
+def _solve(
+    setup: _Setup, target: Pose, previous: Array, home_first: bool, where: str
+) -> tuple[Array, Choice | None]:
+    """All that the pose asks for, (joints,) in rad; the choice only where it came of the closed form."""
+    if not setup.closed_form or target.fixed != WHOLE:
+        return _searched(setup, target, previous, where), None
+    choice = choose(setup.solver.geometry, target.matrix, setup.ranges, previous)
     usable = [candidate for candidate in choice.candidates if not candidate.rejections]
     if not usable:
-        reasons = dict.fromkeys(r.text for candidate in choice.candidates for r in candidate.rejections)
-        raise PlanError(f"{where}: no posture reaches this pose: {'; '.join(reasons)}")
-    if via.posture_deg is None:
-        usable = [c for c in usable if setup.reaches(target, c.angles_rad)] or usable
+        return _searched(setup, target, previous, where, choice), None
+    if home_first:
+        reached = Constraint.of(target).reached
+        usable = [c for c in usable if reached(setup.miss(target, c.angles_rad))] or usable
     return min(usable, key=lambda candidate: candidate.distance_rad).angles_rad, choice
+
+
+def _searched(
+    setup: _Setup, target: Pose, previous: Array, where: str, choice: Choice | None = None
+) -> Array:
+    """A posture of the numerical search, (joints,) in rad; PlanError with all reasons where there is none."""
+    answer = setup.solver.solve(target, previous.tolist(), numerically=True)
+    if answer.success:
+        return np.array(answer.angles_rad)
+    reasons = table(candidate.rejections for candidate in choice.candidates) if choice else ""
+    raise PlanError(f"{where}: {answer.reason}{reasons}")
 
 
 def _preferred(setup: _Setup, posture_deg: tuple[float, ...], where: str) -> Array:
@@ -159,25 +166,32 @@ def _preferred(setup: _Setup, posture_deg: tuple[float, ...], where: str) -> Arr
     return np.radians(posture_deg)
 
 
-def _undriven_note(setup: _Setup, target: Array, needed: Array, number: int) -> list[Note]:
-    if setup.reaches(target, needed):
-        return []
-    needs = ", ".join(
+def _miss_note(setup: _Setup, target: Pose, needed: Array, number: int) -> list[Note]:
+    """What to say where the tool does not quite reach the pose."""
+    miss = setup.miss(target, needed)
+    if not Constraint.of(target).reached(miss):
+        text = (
+            f"via {number}: the pose needs joints that have no motor: {_needs(setup, needed)}; the tool misses the "
+            f"pose by {miss}"
+        )
+        return [Note("undriven", number, text)]
+    if max(miss.position_mm / target.tolerance_mm, miss.rotation_deg / target.tolerance_deg) > WORTH_SAYING:
+        allowed = f"{target.tolerance_mm:g} mm and {target.tolerance_deg:g} deg"
+        return [Note("miss", number, f"via {number}: the tool misses the pose by {miss} ({allowed} allowed)")]
+    return []
+
+
+def _needs(setup: _Setup, needed: Array) -> str:
+    return ", ".join(
         f"{joint.name} at {angle:.4g} deg (stays at {joint.home_deg:g})"
         for joint, angle in zip(setup.arm.joints, np.degrees(needed), strict=True)
-        if joint.motor is None and abs(angle - joint.home_deg) > MISS_DEG
+        if joint.motor is None and abs(angle - joint.home_deg) > STAYS_DEG
     )
-    distance, turn = setup.miss(target, needed)
-    text = (
-        f"via {number}: the pose needs joints that have no motor: {needs}; the tool misses the pose by "
-        f"{distance:.4g} mm and {turn:.4g} deg"
-    )
-    return [Note("undriven", number, text)]
 
 
 def _branch(setup: _Setup, posture: Array, before: Branch | None) -> Branch:
     """The branch at a via point; where the arm stands between two, it still counts as on the one before."""
-    here = branch_of(setup.geometry, posture)
+    here = branch_of(setup.solver.geometry, posture)
     return here.after(before) if before else here
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from armtempo_shared import motion
 from armtempo_shared.limits import MAX_MOTION_BYTES
 
+from armtempo.arm_check.resolution import findings as coarse_steps
 from armtempo.formats.text_table import aligned
 from armtempo.model.job import AUTO, GRADIENT
 from armtempo.model.plan import Plan, Search
@@ -28,7 +29,10 @@ _FLOORS = {
 
 
 def lines(plan: Plan) -> list[str]:
-    """A plan: motion times beside their lower bounds, extremes beside their limits; one string a line."""
+    """A plan: motion times beside their lower bounds, extremes beside their limits; one string a line.
+
+    Then what the user should know: notes on the poses, joints whose steps are coarse.
+    """
     job = plan.job
     text = [f"{job.name}: {plan.trajectory.duration_s:.4f} s, {', '.join(_settings(plan))}"]
     text.extend(aligned([*_HEAD, *(_row(plan, joint) for joint in range(len(plan.extremes)))], _WIDTHS))
@@ -41,6 +45,9 @@ def lines(plan: Plan) -> list[str]:
     if job.refine == AUTO:
         text.append(f"record: {record_bytes(plan)} bytes of the {MAX_MOTION_BYTES} that the board takes")
     text.extend(f"note: {note}" for note in plan.notes)
+    text.extend(
+        f"{each.level.value}: {each.where}: {each.what}; {each.next_step}" for each in coarse_steps(plan.arm)
+    )
     return text
 
 

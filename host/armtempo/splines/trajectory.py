@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armtempo.formats import json_codec
 from armtempo.splines import bspline, time_axis
 from armtempo.splines.bspline import Array
 
@@ -24,7 +25,7 @@ class JointSpline:
     refine: int
     angle_points_deg: Array
     time_points_s: Array
-    via_segments: tuple[int, ...] | None = None
+    via_segments: tuple[int, ...] | None = field(default=None, metadata=json_codec.ADDED)
     """Path segments before each via point; None: each path segment ends at one."""
 
     @cached_property

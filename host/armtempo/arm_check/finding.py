@@ -1,0 +1,43 @@
+"""What a check found: how bad, where, what, and what to do about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Level(Enum):
+    """How bad a finding is."""
+
+    ERROR = "error"
+    """It cannot work, or would do something else than the file says."""
+    WARNING = "warning"
+    """It may work, but is probably not meant so."""
+    NOTE = "note"
+    """Worth knowing; nothing looks wrong."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing found in an arm file or a job."""
+
+    level: Level
+    where: str
+    """The joint, or the part of the file."""
+    what: str
+    next_step: str
+
+
+def error(where: str, what: str, next_step: str) -> Finding:
+    """A finding that stands in the way."""
+    return Finding(Level.ERROR, where, what, next_step)
+
+
+def warning(where: str, what: str, next_step: str) -> Finding:
+    """A finding that looks wrong."""
+    return Finding(Level.WARNING, where, what, next_step)
+
+
+def note(where: str, what: str, next_step: str) -> Finding:
+    """A finding that is worth knowing."""
+    return Finding(Level.NOTE, where, what, next_step)

@@ -1,0 +1,105 @@
+"""``armtempo check``: what looks wrong about an arm file and a job."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from armtempo.cli import options
+
+if TYPE_CHECKING:
+    from armtempo.arm_check import Finding
+    from armtempo.arm_check.figures import JointFigures
+    from armtempo.model.arm import Arm
+
+
+@click.command()
+@options.arm
+@click.option(
+    "--job",
+    "job_path",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Job file (TOML) to look at too.",
+)
+@click.option(
+    "--picture",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Draw the arm at home and at the ends of its ranges into FILE (PNG or SVG). Needs the extra 'plot'.",
+)
+@click.option("--force", is_flag=True, help="Replace the picture if it is there.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def command(
+    arm_path: Path | None, job_path: Path | None, picture: Path | None, force: bool, as_json: bool
+) -> None:
+    """Hold an arm file, and a job, against common sense, and say what looks wrong and what to do about it.
+
+    Steps, step rates, resolution at the tool, torque, encoders, ranges, wiring. Exit code 1 where there are
+    errors; warnings and notes leave it 0.
+    """
+    from armtempo.arm_check import Level, check, figures
+
+    _check_picture(picture, force)
+    path = options.arm_file(arm_path)
+    arm, found = check(path, job_path)
+    joints = figures.of(arm) if arm else ()
+    (_print_json if as_json else _print_text)(path, arm, joints, found)
+    if arm and picture:
+        _draw(arm, picture)
+    if any(finding.level is Level.ERROR for finding in found):
+        raise SystemExit(1)
+
+
+def _check_picture(picture: Path | None, force: bool) -> None:
+    """Raise UsageError where the picture cannot be written as asked."""
+    if picture is None:
+        return
+    if picture.suffix not in (".png", ".svg"):
+        raise click.UsageError(f"--picture {picture}: give a name that ends in .png or .svg")
+    if picture.exists() and not force:
+        raise click.UsageError(f"--picture {picture}: is there already; choose another name, or add --force")
+
+
+def _print_text(path: Path, arm: Arm | None, joints: tuple[JointFigures, ...], found: list[Finding]) -> None:
+    from armtempo.arm_check import Level
+    from armtempo.arm_check.figures import table
+
+    click.echo(f"arm: {arm.name if arm else '(not readable)'} ({path})")
+    for line in table(joints):
+        click.echo(line)
+    for finding in found:
+        click.echo(f"{finding.level.value + ':':<9}{finding.where}: {finding.what}")
+        click.echo(f"{'':9}-> {finding.next_step}")
+    wrong = [finding for finding in found if finding.level is not Level.NOTE]
+    if not wrong:
+        click.echo("nothing looks wrong")
+        return
+    errors = sum(finding.level is Level.ERROR for finding in wrong)
+    click.echo(f"{_counted(errors, 'error')}, {_counted(len(wrong) - errors, 'warning')}")
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
+def _print_json(path: Path, arm: Arm | None, joints: tuple[JointFigures, ...], found: list[Finding]) -> None:
+    import json
+    from dataclasses import asdict
+
+    values: dict[str, Any] = {
+        "arm": arm.name if arm else None,
+        "file": str(path),
+        "joints": [joint.values for joint in joints],
+        "findings": [{**asdict(finding), "level": finding.level.value} for finding in found],
+    }
+    click.echo(json.dumps(values, indent=1))
+
+
+def _draw(arm: Arm, picture: Path) -> None:
+    from armtempo.report import arm_picture, plots
+
+    plots.save(arm_picture.arm_picture(arm), picture)
+    click.echo(f"wrote {picture}", err=True)

@@ -1,0 +1,51 @@
+"""``armtempo fk``: where the tool and every frame stand for given joint angles."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from armtempo.cli import options
+
+if TYPE_CHECKING:
+    from armtempo.arrays import Array
+    from armtempo.model.arm import Arm
+
+
+@click.command(context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
+@click.argument("where", nargs=-1)
+@options.job
+@options.arm
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def command(where: tuple[str, ...], job_path: Path | None, arm_path: Path | None, as_json: bool) -> None:
+    """Print the tool's pose and every frame for given joint angles.
+
+    WHERE: angles in degrees ('0,-60,40', or as separate numbers), of all joints or of those that have a motor, the
+    others at home; a via point such as P0; or a trajectory file for its start. Without it the arm's home. Hold the
+    frames against the arm: a wrong row of its table shows at once.
+    """
+    from armtempo.kinematics import frame_listing
+
+    arm = options.load_arm(arm_path)
+    angles_deg = _angles(where, arm, job_path)
+    if as_json:
+        import json
+
+        click.echo(json.dumps(frame_listing.values(arm, angles_deg), indent=1))
+    else:
+        click.echo("\n".join(frame_listing.lines(arm, angles_deg)))
+
+
+def _angles(where: tuple[str, ...], arm: Arm, job_path: Path | None) -> Array:
+    """Angles of all joints, deg (joints,)."""
+    from armtempo.cli import posture
+    from armtempo.kinematics.chain import spread_deg
+    from armtempo.kinematics.pose_file import numbers
+
+    if len(where) == 1 and posture.is_named(where[0]):
+        return spread_deg(arm, posture.parse(where[0], arm, job_path).tolist())
+    if not where:
+        return spread_deg(arm, arm.all_home_deg)
+    return spread_deg(arm, numbers(" ".join(where), "the angles"))

@@ -1,0 +1,50 @@
+"""``armtempo import-urdf``: an arm file out of a URDF robot description."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.argument("urdf", type=click.Path(dir_okay=False, path_type=Path))
+@click.option(
+    "-o",
+    "--out",
+    required=True,
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Arm file to write (TOML).",
+)
+@click.option("--base", metavar="LINK", help="Link that the arm stands on; without it the URDF's root.")
+@click.option(
+    "--tip", metavar="LINK", help="Link whose frame is the tool's; without it the chain's only end."
+)
+@click.option("--force", is_flag=True, help="Replace FILE if it is there.")
+def command(urdf: Path, out: Path, base: str | None, tip: str | None, force: bool) -> None:
+    """Make an arm file of a URDF's chain of revolute joints: its Denavit-Hartenberg rows and ranges.
+
+    The rows are held against the URDF's own forward kinematics at 1000 random postures before anything is
+    written. Motors, which a URDF does not describe, are left as comments to fill in. Needs the extra 'urdf'.
+    """
+    from armtempo.errors import InputError
+    from armtempo.formats import toml_table
+    from armtempo.formats.atomic_file import replace_text
+    from armtempo.model import arm_file
+    from armtempo.urdf import arm_text, fitting, reader
+
+    if out.exists() and not force:
+        raise InputError(f"{out}: is there already; choose another name, or --force to replace it")
+    if out.exists() and urdf.exists() and out.samefile(urdf):
+        raise InputError(f"{out}: is the URDF itself; choose another name")
+    chain = reader.read(urdf, base, tip)
+    fit = fitting.fit(chain)
+    text = arm_text.arm_text(chain, fit, urdf.name)
+    arm_file.of_table(toml_table.parse(text, str(out)))  # what would not be read again is not written
+    replace_text(out, text)
+    click.echo(f"{chain.robot!r}: {len(chain.joints)} joints from link {chain.base!r} to {chain.tip!r}")
+    click.echo(
+        f"worst error at {fit.postures} random postures: {fit.position_mm:.2g} mm and {fit.rotation_deg:.2g} degrees"
+    )
+    click.echo(f"wrote {out}; now put its motors in, then: armtempo check --arm {out}")

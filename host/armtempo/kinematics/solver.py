@@ -1,0 +1,218 @@
+"""From a target to angles, whatever the arm: by the closed form where it serves, else numerically.
+
+``PoseSolver.nearest`` is for loops that follow a moving target (a jog in tool space): one answer, near to where
+the arm is. ``PoseSolver.solve`` finds all postures and says why some are not to be had.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from armtempo.arrays import Array
+from armtempo.errors import InputError
+from armtempo.kinematics.choice import Choice, choose
+from armtempo.kinematics.constraint import Constraint, Miss
+from armtempo.kinematics.descent import descend
+from armtempo.kinematics.forward import forward, frames
+from armtempo.kinematics.geometry import Geometry
+from armtempo.kinematics.inverse import inverse_of_pose
+from armtempo.kinematics.numerical import MovingArm, NumericalSolutions, search, why_not
+from armtempo.kinematics.ranges import Ranges
+from armtempo.kinematics.rejection import out_of_range, table
+from armtempo.kinematics.shape import refusals
+from armtempo.kinematics.solutions import OK
+from armtempo.model.arm import Arm
+from armtempo.model.tool_pose import WHOLE, Pose
+
+CLOSED_FORM, NUMERICAL = "closed form", "numerical"
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """The posture that meets a target nearest to where the arm is, or why there is none."""
+
+    success: bool
+    angles_rad: tuple[float, ...]
+    """(joints,), within the ranges; without success the posture that comes nearest to the target from there."""
+    miss: Miss
+    """How far the tool then is from the target, in mm and deg."""
+    change_rad: float
+    """Largest change of a joint from the start: where it is large, the arm would change its branch."""
+    reason: str
+    """Why not; empty with success."""
+    method: str
+    """CLOSED_FORM or NUMERICAL."""
+
+    @property
+    def angles_deg(self) -> tuple[float, ...]:
+        """(joints,)"""
+        return tuple(map(math.degrees, self.angles_rad))
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """All that is known of a target's postures."""
+
+    target: Pose
+    choice: Choice | None
+    """The eight solutions of the closed form, where it was asked."""
+    search: NumericalSolutions | None
+    """What the numerical search found, where it was asked, or where none of the eight can be used."""
+    angles_rad: tuple[float, ...]
+    """(joints,): the posture chosen; without success the one that comes nearest to the target."""
+    tool: Array
+    """(4, 4): the pose that these angles lead to, lengths in mm."""
+    miss: Miss
+    """How far it is from the target."""
+    miss_driven: Miss
+    """How far the tool is if only the joints with a motor take these angles and the others stay at home."""
+    reason: str
+    """Why no posture can be used, and what to do; empty if one can."""
+
+    @property
+    def success(self) -> bool:
+        """Whether a posture can be used."""
+        return not self.reason
+
+    @property
+    def angles_deg(self) -> tuple[float, ...]:
+        """(joints,)"""
+        return tuple(map(math.degrees, self.angles_rad))
+
+
+@dataclass(frozen=True)
+class PoseSolver:
+    """The inverse kinematics of one arm."""
+
+    arm: Arm
+
+    @cached_property
+    def geometry(self) -> Geometry:
+        """In mm."""
+        return Geometry.of(self.arm)
+
+    @cached_property
+    def ranges(self) -> Ranges:
+        """Of all joints."""
+        return Ranges.of(self.arm)
+
+    @cached_property
+    def moving(self) -> MovingArm:
+        """The arm with its driven joints moving."""
+        return MovingArm.of(self.arm)
+
+    @cached_property
+    def home_rad(self) -> tuple[float, ...]:
+        """(joints,)"""
+        return tuple(map(math.radians, self.arm.all_home_deg))
+
+    @cached_property
+    def refusals(self) -> list[str]:
+        """Why the closed form does not serve this arm; empty if it does."""
+        return refusals(self.geometry)
+
+    def nearest(self, target: Pose, start_rad: Sequence[float]) -> Nearest:
+        """The posture that meets ``target`` nearest to ``start_rad``, (joints,): well under a millisecond.
+
+        Joints without a motor stay where they start. Arms of the closed form's class with six driven joints get
+        the nearest of all solutions; others the one that a descent from the start leads to, and no other is
+        looked for.
+        """
+        start = self._checked(start_rad)
+        if target.fixed == WHOLE and not self.refusals and len(self.moving.moving) == 6:
+            angles = self._nearest_of_eight(target, start)
+            if angles is not None:
+                return self._answer(target, start, angles, CLOSED_FORM)
+        constraint = Constraint.of(target)
+        problem = self.moving.problem(constraint, self.moving.underdetermined(target))
+        found = self.moving.placed(descend(problem, start).angles_rad, start)
+        outside = [
+            each.text
+            for each in out_of_range(self.ranges, found)
+            if (each.joint or 0) - 1 in self.moving.moving
+        ]
+        if not outside:
+            return self._answer(target, start, found, NUMERICAL)
+        within = descend(self.moving.problem(constraint, within=True), start).angles_rad
+        return self._answer(target, start, within, NUMERICAL, "; ".join(outside))
+
+    def solve(self, target: Pose, previous_rad: Sequence[float], numerically: bool = False) -> Answer:
+        """All postures that meet ``target``, the one nearest to ``previous_rad``, (joints,), chosen.
+
+        A whole pose is solved by the closed form where it serves the arm, unless ``numerically``, with all joints
+        moving. Otherwise the joints with a motor move, and all only where a whole pose needs them.
+        """
+        previous = self._checked(previous_rad)
+        choice = None
+        if target.fixed == WHOLE and not self.refusals and not numerically:
+            choice = choose(self.geometry, target.matrix, self.ranges, previous)
+            if choice.chosen:
+                return self._solved(target, choice, None, choice.chosen.angles_rad.tolist())
+            found = search(self.moving.with_all, target, previous)
+            reason = "" if found.chosen else _reason(choice, found)
+            return self._solved(target, choice, found, found.nearest.angles_rad, reason)
+        found = search(self.moving, target, previous)
+        if not found.chosen and target.fixed == WHOLE and found.arm != self.moving.with_all:
+            wider = search(self.moving.with_all, target, previous)
+            found = wider if wider.chosen else found
+        return self._solved(target, None, found, found.nearest.angles_rad, found.reason)
+
+    def _checked(self, angles_rad: Sequence[float]) -> list[float]:
+        """The angles of all joints; InputError for another number of them."""
+        angles = [float(angle) for angle in angles_rad]
+        if len(angles) != len(self.arm.joints):
+            raise InputError(f"{len(angles)} angles given, the arm has {len(self.arm.joints)} joints")
+        return angles
+
+    def _nearest_of_eight(self, target: Pose, start: list[float]) -> list[float] | None:
+        """The nearest solution of the closed form within the ranges; None if there is none."""
+        rows = [element for row in target.matrix for element in row]
+        best, least = None, math.inf
+        for angles, outcome in zip(*inverse_of_pose(self.geometry, rows, start)[:2], strict=True):
+            if outcome != OK:
+                continue
+            placed = self.ranges.placed(angles, start)
+            distance = math.dist(placed, start)
+            if distance < least and not any(self.ranges.excess(placed)):
+                best, least = placed, distance
+        return best
+
+    def _answer(
+        self, target: Pose, start: list[float], angles: list[float], method: str, outside: str = ""
+    ) -> Nearest:
+        constraint = Constraint.of(target)
+        miss = constraint.miss(frames(self.geometry, angles)[-1])
+        reached = constraint.reached(miss)
+        reason = ""
+        if not reached:
+            reason = outside or "the arm does not reach the pose from here"
+            reason += f"; the nearest posture that was found misses it by {miss}"
+        change = max(abs(angle - before) for angle, before in zip(angles, start, strict=True))
+        return Nearest(reached, tuple(angles), miss, change, reason, method)
+
+    def _solved(
+        self,
+        target: Pose,
+        choice: Choice | None,
+        found: NumericalSolutions | None,
+        angles: Sequence[float],
+        reason: str = "",
+    ) -> Answer:
+        constraint = Constraint.of(target)
+        driven = [
+            angle if joint.motor else home
+            for joint, angle, home in zip(self.arm.joints, angles, self.home_rad, strict=True)
+        ]
+        miss, miss_driven = (
+            constraint.miss(frames(self.geometry, posture)[-1]) for posture in (angles, driven)
+        )
+        tool = forward(self.geometry, angles)
+        return Answer(target, choice, found, tuple(angles), tool, miss, miss_driven, reason)
+
+
+def _reason(choice: Choice, found: NumericalSolutions) -> str:
+    """Why none of the eight solutions can be used."""
+    return why_not(found) + table(candidate.rejections for candidate in choice.candidates)

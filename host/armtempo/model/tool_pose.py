@@ -1,0 +1,120 @@
+"""A tool pose to reach: its position and as much of its orientation as is asked for, with tolerances."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from armtempo.arrays import Array
+from armtempo.errors import InputError
+from armtempo.formats import json_codec
+from armtempo.model import pose
+
+Rows = tuple[tuple[float, ...], ...]
+
+ROLL, PITCH, YAW, APPROACH = "roll", "pitch", "yaw", "approach"
+WHOLE = (ROLL, PITCH, YAW)
+CONSTRAINTS = {
+    (): 3,
+    (ROLL,): 4,
+    (PITCH,): 4,
+    (YAW,): 4,
+    (ROLL, PITCH): 5,
+    (PITCH, YAW): 5,
+    (APPROACH,): 5,
+    WHOLE: 6,
+}
+"""What may be asked of the orientation, and how many numbers that asks for, the three of the position included."""
+
+TOLERANCE_MM, TOLERANCE_DEG = 0.1, 0.1
+"""A tool this near to its pose has reached it, unless something else is asked for."""
+
+SMALLEST, LARGEST_MM, LARGEST_DEG = 1e-6, 1000.0, 180.0
+"""Tolerances that make sense."""
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A tool pose, or as much of one as ``fixed`` says.
+
+    The position always counts. Roll, pitch and yaw turn about x, then y, then z of the base.
+    """
+
+    matrix: Rows
+    """4 rows of 4, lengths in mm; its rotation is one of those that are asked for."""
+    posture_deg: tuple[float, ...] | None = None
+    """In a job: angles of all joints; the solution nearest to them is taken. None: nearest to the one before."""
+    fixed: tuple[str, ...] = field(default=WHOLE, metadata=json_codec.ADDED)
+    """A key of CONSTRAINTS: what counts of the orientation; "approach": the direction of the tool's z axis."""
+    tolerance_mm: float = field(default=TOLERANCE_MM, metadata=json_codec.ADDED)
+    tolerance_deg: float = field(default=TOLERANCE_DEG, metadata=json_codec.ADDED)
+
+    def __post_init__(self) -> None:
+        """InputError for what makes no pose."""
+        if self.fixed not in CONSTRAINTS:
+            allowed = ", ".join("+".join(fixed) or "nothing" for fixed in CONSTRAINTS)
+            raise InputError(f"a pose may fix {allowed} of its orientation, not {'+'.join(self.fixed)}")
+        if not (
+            SMALLEST <= self.tolerance_mm <= LARGEST_MM and SMALLEST <= self.tolerance_deg <= LARGEST_DEG
+        ):
+            raise InputError(
+                f"tolerances of {self.tolerance_mm:g} mm and {self.tolerance_deg:g} deg are not allowed; give "
+                f"{SMALLEST:g} to {LARGEST_MM:g} mm and {SMALLEST:g} to {LARGEST_DEG:g} deg"
+            )
+
+    @property
+    def constraints(self) -> int:
+        """How many numbers the pose asks for, 3 to 6."""
+        return CONSTRAINTS[self.fixed]
+
+    @property
+    def words(self) -> str:
+        """What is asked for."""
+        if self.fixed == WHOLE:
+            return "whole pose"
+        return " and ".join(("position", *self.fixed)) if self.fixed else "position only"
+
+    def exact(self, what: str = "the pose") -> Pose:
+        """The same with what rounding did to its rotation put right; InputError, naming ``what``, if it is no pose."""
+        return replace(self, matrix=_rows(pose.checked(self.matrix, what)))
+
+    @classmethod
+    def of_matrix(cls, matrix: Array, fixed: tuple[str, ...] = WHOLE) -> Pose:
+        """Of a checked matrix, (4, 4)."""
+        return cls(_rows(matrix), fixed=fixed)
+
+    @classmethod
+    def of_angles(
+        cls, position: Sequence[float], angles_deg: Mapping[str, float], what: str = "the pose"
+    ) -> Pose:
+        """A position with any of "roll", "pitch" and "yaw"; those left out are free. InputError names ``what``."""
+        fixed = tuple(name for name in WHOLE if name in angles_deg)
+        if fixed not in CONSTRAINTS:
+            raise InputError(
+                f"{what}: roll and yaw without pitch leave too much open; give pitch too, or leave one out"
+            )
+        rpy = [angles_deg.get(name, 0.0) for name in WHOLE]
+        return cls.of_matrix(pose.from_rpy(position, rpy, what), fixed)
+
+    @classmethod
+    def of_approach(
+        cls, position: Sequence[float], direction: Sequence[float], what: str = "the pose"
+    ) -> Pose:
+        """A position with the direction, of any length, in which the tool's z axis points."""
+        length = math.hypot(*direction)
+        if not 1e-9 <= length <= pose.LARGEST:
+            raise InputError(
+                f"{what}: the approach is a direction such as 0 0 -1 (straight down), not of length {length:g}"
+            )
+        z = np.array(direction) / length
+        x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
+        x /= np.linalg.norm(x)
+        matrix = np.column_stack((x, np.cross(z, x), z, position))
+        return cls.of_matrix(pose.checked(matrix, what), (APPROACH,))
+
+
+def _rows(matrix: Array) -> Rows:
+    return tuple(map(tuple, matrix.tolist()))

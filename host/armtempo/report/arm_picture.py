@@ -1,0 +1,122 @@
+"""A picture of an arm: its home posture, and each driven joint at the ends of its range."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armtempo.arrays import Array
+from armtempo.kinematics import Geometry, all_frames, forward
+from armtempo.kinematics.chain import outline_mm
+from armtempo.model.arm import Arm
+from armtempo.report.plots import new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+HOME, LOW, HIGH, GROUND = "#333333", "#1f77b4", "#d95f02", "#9a9a9a"
+_MOST_COLUMNS = 4
+_ARC_POINTS = 60
+_TICK = 0.08
+"""Length of the tool's x axis, as a share of the arm's height and width."""
+
+
+def arm_picture(arm: Arm) -> Figure:
+    """One field for the home posture from the side and from above, one for each driven joint.
+
+    A joint is seen along its axis, from the side where x, or else y, grows to the right. Raises
+    MissingPackageError where matplotlib is not installed.
+    """
+    count = 2 + len(arm.driven)
+    columns = min(_MOST_COLUMNS, (count + 1) // 2 if count > 3 else count)
+    rows = -(-count // columns)
+    figure, axes = new_figure(rows, columns, 4.2 * columns, 4.3 * rows + 0.5)
+    fields = list(axes.flat)
+    extent = np.ptp(outline_mm(arm, np.array(arm.all_home_deg)), axis=0)
+    size = float(extent.max()) or 1.0
+    _home(fields[0], arm, "home, from the side", (int(extent[1] > extent[0]), 2), size)
+    _home(fields[1], arm, "home, from above", (0, 1), size)
+    for axis, index in zip(fields[2:], arm.driven_indices, strict=False):
+        _joint(axis, arm, index, size)
+    for axis in fields[count:]:
+        axis.set_axis_off()
+    _explain(figure, arm)
+    return figure
+
+
+def _home(axis: Axes, arm: Arm, title: str, seen: tuple[int, int], size: float) -> None:
+    """The home posture; ``seen``: which of x, y, z go to the right and up."""
+    _draw(axis, arm, np.array(arm.all_home_deg), np.eye(3)[list(seen)], HOME, size)
+    if seen[1] == 2:
+        axis.axhline(0.0, color=GROUND, linewidth=0.8, zorder=0)
+    axis.set_xlabel(f"{'xyz'[seen[0]]} (mm)")
+    axis.set_ylabel(f"{'xyz'[seen[1]]} (mm)")
+    _frame(axis, title)
+
+
+def _joint(axis: Axes, arm: Arm, index: int, size: float) -> None:
+    joint, home = arm.joints[index], np.array(arm.all_home_deg)
+    before = all_frames(Geometry.of(arm), np.radians(home).tolist())[index]
+    view = _view(before[:3, 2])
+    low, high = joint.range_deg
+    for angle, colour in ((low, LOW), (high, HIGH), (joint.home_deg, HOME)):
+        angles = home.copy()
+        angles[index] = angle
+        _draw(axis, arm, angles, view, colour, size)
+    swept = np.repeat(home[None], _ARC_POINTS, axis=0)
+    swept[:, index] = np.linspace(low, high, _ARC_POINTS)
+    axis.plot(*(outline_mm(arm, swept)[:, -1] @ view.T).T, ":", color=GROUND, linewidth=1.2, zorder=1)
+    axis.plot(*(view @ before[:3, 3]), "o", markersize=11, markerfacecolor="none", color=HOME)
+    if abs(before[2, 2]) < 1e-6:
+        axis.axhline(0.0, color=GROUND, linewidth=0.8, zorder=0)
+    _frame(axis, f"{_plain(joint.name)}: {low:g}° to {high:g}°, home {joint.home_deg:g}°")
+
+
+def _view(direction: Array) -> Array:
+    """Right and up, (2, 3), of one who looks along ``direction``, or against it; up is the base's z axis, or y."""
+    up = np.array([0.0, 0.0, 1.0]) if abs(direction[2]) < 0.99 else np.array([0.0, 1.0, 0.0])
+    up = up - (up @ direction) * direction
+    up /= np.linalg.norm(up)
+    right = np.cross(up, direction)
+    return np.array([right if right[np.argmax(np.abs(right))] > 0.0 else -right, up])
+
+
+def _draw(axis: Axes, arm: Arm, angles_deg: Array, view: Array, colour: str, size: float) -> None:
+    """The arm's outline, a dot at each frame, and the tool's x axis."""
+    points = outline_mm(arm, angles_deg) @ view.T
+    order = 3 if colour == HOME else 2
+    axis.plot(*points.T, color=colour, linewidth=2.6, solid_capstyle="round", zorder=order)
+    axis.plot(*points[::2].T, "o", color=colour, markersize=4.5, zorder=order)
+    tool = forward(Geometry.of(arm), np.radians(angles_deg))
+    tick = np.array([tool[:3, 3], tool[:3, 3] + _TICK * size * tool[:3, 0]]) @ view.T
+    axis.plot(*tick.T, color=colour, linewidth=1.2, zorder=order)
+
+
+def _frame(axis: Any, title: str) -> None:
+    axis.set_title(title, fontsize=10)
+    axis.set_aspect("equal", adjustable="datalim")
+    axis.margins(0.08)
+    axis.grid(color="#dddddd", linewidth=0.5)
+    axis.set_axisbelow(True)
+
+
+def _explain(figure: Figure, arm: Arm) -> None:
+    from matplotlib.lines import Line2D
+
+    lines = [
+        Line2D([], [], color=colour, linewidth=2.6, label=label)
+        for colour, label in ((HOME, "home"), (LOW, "low end"), (HIGH, "high end"))
+    ]
+    lines.append(Line2D([], [], color=GROUND, linestyle=":", label="tool's way"))
+    lines.append(
+        Line2D([], [], color=HOME, linestyle="", marker="o", markerfacecolor="none", label="its axis")
+    )
+    figure.legend(handles=lines, loc="outside lower center", ncols=5, frameon=False)
+    figure.suptitle(f"{_plain(arm.name)}: each joint seen along its axis, the others at home; lengths in mm")
+
+
+def _plain(text: str) -> str:
+    """Text in which nothing is taken for a formula."""
+    return text.replace("$", r"\$")

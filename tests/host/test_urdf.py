@@ -1,0 +1,291 @@
+"""URDF in: rows of every kind of chain against a forward kinematics of the tests' own, and what does not fit."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from armtempo.cli import main
+from armtempo.errors import InputError, PlanError
+from armtempo.kinematics import Geometry, forward
+from armtempo.kinematics.shape import refusals
+from armtempo.model import arm_file
+from armtempo.urdf import fitting, reader
+from armtempo.urdf import rows as dh
+from click.testing import CliRunner
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+FOLDER = Path(__file__).parents[1] / "data" / "urdf"
+SEED = 20_260_102
+
+
+def about(axis: Array, angle: float) -> Array:
+    """A (4, 4) rotation, by Rodrigues' formula."""
+    axis = axis / np.linalg.norm(axis)
+    cross = np.cross(np.eye(3), axis)
+    pose = np.eye(4)
+    pose[:3, :3] += math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
+    return pose
+
+
+def tool_pose(path: Path, angles: dict[str, float]) -> Array:
+    """The pose of link ``tool`` in mm, straight from the XML."""
+    pose, link = np.eye(4), "tool"
+    above = {joint.find("child").get("link"): joint for joint in ElementTree.parse(path).iter("joint")}  # type: ignore[union-attr]
+    while link in above:
+        joint = above[link]
+        origin = joint.find("origin")
+        numbers = {key: np.array(origin.get(key).split(), float) for key in ("xyz", "rpy")}  # type: ignore[union-attr]
+        move = np.eye(4)
+        move[:3, 3] = 1000 * numbers["xyz"]
+        for unit, angle in zip(np.eye(3)[::-1], numbers["rpy"][::-1], strict=True):
+            move = move @ about(unit, angle)
+        if joint.get("name") in angles:
+            axis = np.array(joint.find("axis").get("xyz").split(), float)  # type: ignore[union-attr]
+            move = move @ about(axis, angles[str(joint.get("name"))])
+        pose, link = move @ pose, joint.find("parent").get("link")  # type: ignore[union-attr, assignment]
+    return pose
+
+
+def imported(tmp_path: Path, name: str, *options: str) -> tuple[Path, str]:
+    """The arm file of a URDF of the tests, and what the command said."""
+    out = tmp_path / f"{name}.toml"
+    result = CliRunner().invoke(main, ["import-urdf", str(FOLDER / f"{name}.urdf"), "-o", str(out), *options])
+    assert result.exit_code == 0, result.output
+    return out, result.output
+
+
+@pytest.mark.parametrize(
+    ("name", "joints"),
+    [
+        ("three_planar", "j1 j2 j3"),
+        ("four_skew", "base j1 j2 j3 j4 tool"),
+        ("six_rounded", "j1 j2 j3 j4 j5 j6"),
+        ("seven_intersecting", "j1 j2 j3 j4 j5 j6 j7"),
+    ],
+)
+def test_the_written_arm_stands_where_the_urdf_does(tmp_path: Path, name: str, joints: str) -> None:
+    """With constant rows only where base or tool need them."""
+    out, said = imported(tmp_path, name)
+    assert "worst error at 1000 random postures" in said
+    arm = arm_file.read(out)
+    assert [joint.name for joint in arm.joints] == joints.split()
+    rng = np.random.default_rng(SEED)
+    angles = np.array([0.0 if joint.name in ("base", "tool") else rng.uniform(-3, 3) for joint in arm.joints])
+    moved = {joint.name: angle for joint, angle in zip(arm.joints, angles, strict=True)}
+    wanted = tool_pose(FOLDER / f"{name}.urdf", moved)
+    found = forward(Geometry.of(arm), angles)
+    np.testing.assert_allclose(found[:3, 3], wanted[:3, 3], atol=0.02)
+    np.testing.assert_allclose(found[:3, :3], wanted[:3, :3], atol=2e-4)
+
+
+def test_ranges_are_the_urdfs_and_never_wider(tmp_path: Path) -> None:
+    arm = arm_file.read(imported(tmp_path, "four_skew")[0])
+    ranges = {joint.name: joint.range_deg for joint in arm.joints}
+    assert ranges["j1"] == (-114.5915, 114.5915)  # 2 rad are 114.59156 degrees
+    assert ranges["j4"] == reader.CONTINUOUS_DEG
+    assert ranges["base"] == ranges["tool"] == (-0.001, 0.001)
+    assert next(joint.home_deg for joint in arm.joints if joint.name == "j3") == 71.6  # 0 is not in its range
+
+
+def test_quarter_turns_with_few_digits_become_quarter_turns(tmp_path: Path) -> None:
+    """So that the closed-form inverse serves the arm."""
+    arm = arm_file.read(imported(tmp_path, "six_rounded")[0])
+    assert [abs(joint.alpha_deg) for joint in arm.joints] == [90, 180, 90, 90, 90, 180]
+    assert [joint.d_mm for joint in arm.joints] == [170, 0, 0, -260, 0, 40]
+    assert [joint.a_mm for joint in arm.joints] == [50, 300, 20.1, 0, 0, 0]
+    assert refusals(Geometry.of(arm)) == []
+
+
+def test_motors_are_left_to_fill_in_and_check_says_so(tmp_path: Path) -> None:
+    out, said = imported(tmp_path, "six_rounded")
+    assert f"armtempo check --arm {out}" in said
+    result = CliRunner().invoke(main, ["check", "--arm", str(out)])
+    assert result.exit_code == 1
+    assert "no joint has a motor" in result.output
+    text = out.read_text()
+    for mark in ("# limits", "# motor", "# encoder"):
+        text = text.replace(mark, mark[2:])
+    out.write_text(text)
+    assert next(joint.limits.speed_deg_s for joint in arm_file.read(out).driven if joint.limits) == 114.592
+    result = CliRunner().invoke(main, ["check", "--arm", str(out)])
+    assert "no motor" not in result.output
+
+
+def test_a_seventh_joint_gets_no_channel(tmp_path: Path) -> None:
+    text = imported(tmp_path, "seven_intersecting")[0].read_text()
+    assert "channel = 6" in text
+    assert "channel = 7" not in text
+    assert "The board drives 6 joints" in text
+
+
+def test_the_tip_chooses_the_chain(tmp_path: Path) -> None:
+    out, said = imported(tmp_path, "gripper", "--tip", "hand")
+    assert "3 joints from link 'base' to 'hand'" in said
+    out.unlink()
+    _, said = imported(tmp_path, "gripper", "--base", "l1", "--tip", "left_finger")
+    assert "3 joints from link 'l1' to 'left_finger'" in said
+
+
+REFUSED = [
+    ("gripper", [], ["Choose with --tip: left_finger, right_finger"]),
+    ("gripper", ["--tip", "right_finger"], ["joint 'right': it mimics 'left'"]),
+    ("gripper", ["--tip", "thumb"], ["has no link 'thumb' for --tip", "left_finger"]),
+    ("gripper", ["--base", "hand", "--tip", "l1"], ["no chain leads from link 'hand' to 'l1'"]),
+    ("gripper", ["--base", "hand", "--tip", "hand"], ["the same link"]),
+    ("four_skew", ["--tip", "base"], ["no joint between 'world' and 'base' turns"]),
+    ("no_limits", [], ["joint 'j2': it has no limits", "<limit lower="]),
+    ("broken", [], ["not valid XML", "line"]),
+    ("xacro", [], ["make a URDF of it first: xacro"]),
+    (
+        "does_not_fit",
+        [],
+        [
+            "joint 'slide': it slides",
+            "joint 'copy': it mimics 'turn'",
+            "joint 'float': it is free",
+            "joint 'glide': it moves in a plane",
+            "joint 'backwards': its limits 2 to -2 rad are no range",
+            "joint 'aimless': its axis has no direction",
+            "choose another chain with --base and --tip",
+        ],
+    ),
+    ("is_not_there", [], ["there is no such file"]),
+]
+
+
+@pytest.mark.parametrize(("name", "options", "said"), REFUSED)
+def test_what_does_not_fit_is_refused_with_its_reasons(
+    tmp_path: Path, name: str, options: list[str], said: list[str]
+) -> None:
+    out = tmp_path / "arm.toml"
+    result = CliRunner().invoke(main, ["import-urdf", str(FOLDER / f"{name}.urdf"), "-o", str(out), *options])
+    assert result.exit_code == 2
+    for text in said:
+        assert text in result.output
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("<html/>", "not <robot>"),
+        ('<robot><link name="a"/></robot>', "has no name"),
+        (
+            '<robot name="x"><link name="a"/><joint name="j" type="revolute"/></robot>',
+            "not a URDF that can be read",
+        ),
+        ('<robot name="x"/>', "has no joints"),
+        ('<robot name="x"><link name="a"/></robot>', "has no joints"),
+    ],
+)
+def test_xml_that_is_no_robot(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "robot.urdf"
+    path.write_text(text)
+    with pytest.raises(InputError, match=said):
+        reader.read(path)
+
+
+def test_names_of_any_kind_are_written_safely(tmp_path: Path) -> None:
+    path, out = tmp_path / "robot.urdf", tmp_path / "arm.toml"
+    text = (FOLDER / "three_planar.urdf").read_text()
+    path.write_text(text.replace('name="j1"', 'name="j &quot;1&quot;&#10;d_mm = 7 # \\ é"'))
+    result = CliRunner().invoke(main, ["import-urdf", str(path), "-o", str(out)])
+    assert result.exit_code == 0, result.output
+    assert arm_file.read(out).joints[0].name.startswith('j "1"')
+
+
+def test_nothing_is_overwritten(tmp_path: Path) -> None:
+    urdf, out = tmp_path / "robot.urdf", tmp_path / "arm.toml"
+    shutil.copy(FOLDER / "three_planar.urdf", urdf)
+    out.write_text("mine")
+    for command, kept in (([str(out)], out), ([str(urdf)], urdf), ([str(urdf), "--force"], urdf)):
+        before = kept.read_bytes()
+        result = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", *command])
+        assert result.exit_code == 2
+        assert kept.read_bytes() == before
+    assert CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(out), "--force"]).exit_code == 0
+    assert arm_file.read(out).name == "three planar"
+
+
+def test_without_the_extra_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setitem(sys.modules, "yourdfpy", None)
+    result = CliRunner().invoke(
+        main, ["import-urdf", str(FOLDER / "three_planar.urdf"), "-o", str(tmp_path / "a")]
+    )
+    assert result.exit_code == 1
+    assert "pip install 'armtempo[urdf]'" in result.output
+
+
+def test_a_table_that_does_not_keep_to_the_urdf_is_not_written(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    derive = dh.derive
+
+    def wrong(*arguments: object) -> list[dh.DhRow]:
+        first, *rest = derive(*arguments)  # type: ignore[arg-type]
+        return [first._replace(a_mm=first.a_mm + 0.1), *rest]
+
+    monkeypatch.setattr(dh, "derive", wrong)
+    chain = reader.read(FOLDER / "three_planar.urdf")
+    with pytest.raises(PlanError, match=r"off by 0\.1 mm"):
+        fitting.fit(chain)
+
+
+def random_turn(rng: np.random.Generator) -> Array:
+    """A turn of any kind: none, quarter turns about an axis, or any."""
+    kind = rng.integers(0, 3)
+    if kind == 0:
+        return np.eye(4)
+    if kind == 1:
+        return about(np.eye(3)[rng.integers(0, 3)], rng.integers(0, 4) * math.pi / 2)
+    return about(rng.normal(size=3), rng.uniform(-3, 3))
+
+
+def test_rows_of_300_random_chains() -> None:
+    """Parallel, meeting, collinear and skew axes, any base and tool: at most two rows more than joints."""
+    rng = np.random.default_rng(SEED)
+    for _ in range(300):
+        moves = []
+        for _ in range(int(rng.integers(2, 9))):
+            move = random_turn(rng)
+            move[:3, 3] = rng.uniform(-300, 300, 3) * rng.integers(0, 2, 3)
+            moves.append(move)
+        frames = [np.eye(4)]
+        for move in moves:
+            frames.append(frames[-1] @ move)
+        axes = [dh.AxisLine(frame[:3, 3], frame[:3, 2]) for frame in frames[1:-1]]
+        table = dh.derive(axes, frames[-1], dh.Near(1e-9, 1e-7))
+        assert len(axes) <= len(table) <= len(axes) + 2
+        angles = rng.uniform(-3, 3, len(axes))
+        wanted = moves[0]
+        for angle, move in zip(angles, moves[1:], strict=True):
+            wanted = wanted @ about(np.array([0.0, 0.0, 1.0]), angle) @ move
+        moved = [0.0 if row.joint is None else angles[row.joint] for row in table]
+        np.testing.assert_allclose(forward(dh.geometry(table), moved), wanted, atol=1e-8)
+
+
+def test_blank_names_are_replaced(tmp_path: Path) -> None:
+    path, out = tmp_path / "robot.urdf", tmp_path / "arm.toml"
+    text = (FOLDER / "three_planar.urdf").read_text()
+    path.write_text(text.replace('"three planar"', '" "').replace('name="j2"', 'name=" "'))
+    result = CliRunner().invoke(main, ["import-urdf", str(path), "-o", str(out)])
+    assert result.exit_code == 0, result.output
+    assert arm_file.read(out).name == "imported arm"
+    assert [joint.name for joint in arm_file.read(out).joints] == ["j1", "joint 2", "j3"]
+
+
+def test_what_an_arm_file_cannot_hold_is_not_written(tmp_path: Path) -> None:
+    path, out = tmp_path / "robot.urdf", tmp_path / "arm.toml"
+    text = (FOLDER / "three_planar.urdf").read_text()
+    path.write_text(text.replace("0.25 0 0.02", "2500 0 0"))
+    result = CliRunner().invoke(main, ["import-urdf", str(path), "-o", str(out)])
+    assert result.exit_code == 2
+    assert "joint[1].a_mm = 2500000.0 is not allowed" in result.output
+    assert not out.exists()
