@@ -120,10 +120,10 @@ def test_whatever_the_multipliers_the_bound_is_below_every_motion(seed: int) -> 
     assert dual_value.value(cells, Multipliers(*scattered)) * unit_s <= 7.2268, f"seed {seed}"
 
 
-def random_motion(seed: int) -> tuple[Arm, Job]:
-    """Two to 60 via points, limits over some decades, on one axis."""
+def random_motion(seed: int, most: int = 60) -> tuple[Arm, Job]:
+    """Two to ``most`` via points, limits over some decades, on one axis."""
     rng = np.random.default_rng(seed)
-    count = int(np.exp(rng.uniform(np.log(2), np.log(60))))
+    count = int(np.exp(rng.uniform(np.log(2), np.log(most))))
     joints = int(rng.integers(2, 5))
     via = rng.normal(0, 30, (count, joints))
     if seed % 3 == 0:
