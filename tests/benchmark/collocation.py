@@ -84,7 +84,9 @@ def least_s(via_deg: np.ndarray, limits: np.ndarray, pieces: int) -> float:
     )
     problem.set_initial(times, guess)
     problem.subject_to(times >= 1e-3)
-    q, v, a = casadi.DM(via[0]), casadi.DM.zeros(joints), casadi.DM.zeros(joints)
+    q, v, a = (problem.variable(joints) for _ in range(3))
+    for state, value in ((q, via[0]), (v, 0.0), (a, 0.0)):
+        problem.subject_to(state == value)
     for stretch in range(stretches):
         step = times[stretch] / pieces
         for piece in range(pieces):

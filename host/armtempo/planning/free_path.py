@@ -54,8 +54,13 @@ class Shortest:
 def shortest(demand: Demand, effort: Effort, progress: Progress) -> Shortest:
     """The fastest motion that meets the demand, from several starts.
 
-    Raises PlanError where no start keeps ranges and corridor.
+    Where via points have tolerances it comes from the one that passes them exactly, so it is never slower. Raises
+    PlanError where no start keeps ranges and corridor.
     """
+    if demand.tolerances:
+        exact = shortest(replace(demand, tolerances={}), effort, progress)
+        looser = Improver(_tightened(demand), exact.motion.layout).improved(exact.motion, _ROUNDS)
+        return replace(exact, motion=_within_corridor(demand, looser))
     even = effort.pieces is not None or _in_corridor(demand)
     whole = effort.starts + _ROUNDS
     best: FreeMotion | None = None
