@@ -24,7 +24,12 @@ FAULTS = ("lose", "double", "flip", "delay", "cut")
 _DELAY_S = 0.03
 _SAMPLE_S = 0.1
 _TURNS = 3
-_IMPORTED_LATER = ("armtempo_board", "armtempo_board.ends", "armtempo_board.store", "armtempo_board.storing")
+_IMPORTED_LATER = (
+    "armtempo_board.heap",
+    "armtempo_board.motion.endpoints",
+    "armtempo_board.storage.store",
+    "armtempo_board.app.store_commands",
+)
 _USB_BUFFER = 1024
 _STEP_S = 0.01
 
@@ -96,8 +101,9 @@ class Pipe:
     def start_board(self) -> None:
         """Power up: a new program on the same flash."""
         with board_modules():
-            from armtempo_board import store, storing  # noqa: F401  the program imports them when it needs them
-            from armtempo_board.app import App
+            from armtempo_board.app import store_commands  # noqa: F401  the program imports them when it needs them
+            from armtempo_board.app.app import App
+            from armtempo_board.storage import store  # noqa: F401  the program imports them when it needs them
 
             self._later = {name: sys.modules[name] for name in _IMPORTED_LATER}
             self.port = stand_in.Port()
@@ -160,7 +166,7 @@ class Pipe:
     def swap_board(self, board_id: bytes) -> None:
         """Another board at the same port, which some host has greeted before."""
         self.start_board()
-        self.app.board_id = board_id
+        self.app.controller.board_id = board_id
         self.app.commands.greeted = True
 
     def _check(self) -> None:
@@ -191,7 +197,7 @@ class Pipe:
                 self.port.outbox = bytearray()
 
     def _move(self) -> None:
-        engine = self.app.engine
+        engine = self.app.controller.engine
         if engine is None or not engine.moving:
             self._sample_s = self.clock()
         elif self.clock() >= self._sample_s + _SAMPLE_S:

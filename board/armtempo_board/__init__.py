@@ -1,41 +1,48 @@
 """The board program: MicroPython for the STM32F407.
 
-``main.py`` starts it; from the REPL ``armtempo_board.replay("feed")`` runs one stored trajectory.
+::
+
+    app/       the main loop, what the host's commands do, what the board tells, the start
+    link/      frames from and to the serial port
+    storage/   records in flash
+    motion/    one motion: checked, started, served, stopped
+    stepgen/   from splines to the times of steps; integers only, no hardware
+    hardware/  timers, DMA, pins, interrupts
+
+Each imports only from those below it, and from ``errors``, ``buffers`` and ``heap``. The functions here are for
+``boot.py``, ``main.py`` and the prompt; nothing in the packages uses them.
 """
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
+
+def load_program() -> "Any":
+    """Import the program, which takes most of the chip's heap; where that fails, the traceback says why."""
+    from armtempo_board import heap
+
+    heap.collect_often()
+    from armtempo_board.app import program
+
+    return program
+
+
+def start() -> None:
+    """Run the program until a host asks for the prompt."""
+    load_program().main()
+
+
+def keep_watchdog_fed() -> None:
+    """Feed a watchdog that runs since before a soft reset, as nothing else does now."""
+    from armtempo_board.app import watchdog
+
+    if watchdog.running():
+        watchdog.keep_fed()
 
 
 def replay(name: str = "") -> None:
-    """Run a stored trajectory without a host; see ``standalone.py``."""
-    from armtempo_board import standalone
+    """Run a stored motion without a host, the default where no name is given; see ``app/standalone.py``."""
+    from armtempo_board.app import standalone
 
     standalone.replay(name)
-
-
-def collect_often(often: bool = True) -> None:
-    """Whether the heap is collected long before it is full, so that it does not fall to pieces.
-
-    While a motion runs it is not: what MicroPython allocates for calls is given back at once, but it counts, and a
-    collection would come every few turns of the loop and take longer than the rings last.
-    """
-    import gc
-
-    if hasattr(gc, "threshold"):
-        gc.threshold((gc.mem_free() + gc.mem_alloc()) // 64 if often else -1)
-
-
-def forget() -> None:
-    """Let the next collection have the modules that only set-up or the start of a motion needs.
-
-    They are imported inside of functions, never at the head of a module, and never while a motion runs.
-    """
-    import sys
-
-    import armtempo_shared
-
-    for name in ("pins", "registers", "check", "rates", "ends", "weights", "store", "storing"):
-        sys.modules.pop("armtempo_board." + name, None)
-        globals().pop(name, None)
-    for name in ("armrecord", "table", "program", "basis"):
-        sys.modules.pop("armtempo_shared." + name, None)
-        if hasattr(armtempo_shared, name):
-            delattr(armtempo_shared, name)

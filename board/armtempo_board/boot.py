@@ -5,9 +5,8 @@ import pyb
 pyb.usb_mode("VCP")
 
 try:
-    from armtempo_board import watchdog
+    from armtempo_board import keep_watchdog_fed
 
-    if watchdog.running():
-        watchdog.keep_fed()
+    keep_watchdog_fed()
 except ImportError:  # the program is not, or not wholly, deployed
     pass

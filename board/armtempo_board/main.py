@@ -2,12 +2,8 @@
 
 import micropython
 
-micropython.kbd_intr(-1)  # what a host sends may hold a Ctrl-C, which must not end the start
+micropython.kbd_intr(-1)  # a Ctrl-C in what a host sends must not end the start
 
-from armtempo_board import collect_often  # noqa: E402
+from armtempo_board import start  # noqa: E402
 
-collect_often()  # the program takes most of the chip's heap
-
-from armtempo_board import program  # noqa: E402
-
-program.main()
+start()

@@ -12,6 +12,16 @@ STEP_FRACTION_BITS = 28
 SAMPLE_TICKS = TICK_HZ // 10
 """Ticks between two samples: 0.1 s exactly."""
 
+LONGEST_TICKS = 1 << 38
+"""A time control point is below it, a little under an hour: units of 1024 ticks stay small integers of the board."""
+LONGEST_SPAN_TICKS = 1 << 36
+"""The time control points of a segment differ by less."""
+
+MOST_STEPS = 1 << 27
+"""An angle control point is below it."""
+MOST_SPAN_STEPS = 1 << 24
+"""The angle control points of a segment differ by less."""
+
 MAX_JOINTS = 6
 MAX_ENCODERS = 4
 MAX_SEGMENTS = 512
@@ -28,10 +38,6 @@ Measured on the emulated chip at 3 cycles an instruction, with one, two and thre
 
 MAX_STEP_RATE_SUM = 240_000
 """Highest sum of the step rates of all joints, steps/s. The same."""
-
-LONGEST_TICKS = 1 << 38
-"""Times in a motion stay below this, a little under an hour: in units of 1024 ticks they are small integers
-of 32-bit MicroPython."""
 
 MAX_MOTION_BYTES = 16384
 """Largest motion record that the board takes: it must fit into its memory whole."""

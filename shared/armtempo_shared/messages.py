@@ -5,6 +5,11 @@ SYNC = 0xA5
 MAX_PAYLOAD = 256
 OVERHEAD = 9
 """Bytes of a frame besides its payload: SYNC, length H, sequence B, message id B, crc32 I."""
+LENGTH_AT, SEQUENCE_AT, NUMBER_AT, PAYLOAD_AT = 1, 3, 4, 5
+"""Offsets in a frame."""
+
+NO_JOINT = 255
+"""In the place of a joint's number: the fault or refusal is about none."""
 
 ARM_RECORD_NAME = "/arm"
 """put_begin with this name carries the arm record, not a trajectory."""

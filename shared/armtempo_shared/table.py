@@ -8,6 +8,8 @@ the letters of ``struct``, little endian without padding, then ``text`` (UTF-8) 
 the payload is such a tail. A line that begins with a blank goes on with the row.
 """
 
+from struct import calcsize
+
 _TABLE = """\
 C hello 01 protocol:B session:I
 C status 02
@@ -63,3 +65,11 @@ def rows(kind: str) -> "list[tuple[str, int, str, list[str], str]]":
             layout = "<" + "".join([field[1] for field in fields])
             found.append((words[1], int(words[2], 16), layout, [field[0] for field in fields], tail))
     return found
+
+
+def offset(kind: str, name: str, field: str) -> int:
+    """Bytes of the payload of a message before one of its fields; KeyError where there is none."""
+    for found, _, layout, fields, _ in rows(kind):
+        if found == name and field in fields:
+            return calcsize(layout[: 1 + fields.index(field)])
+    raise KeyError(field)

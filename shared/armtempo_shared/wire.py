@@ -9,7 +9,7 @@ sends commands; the board answers each with ``ok`` or ``error`` carrying the com
 command is answered again from memory but not executed again. The board sends events by itself, under their own
 sequence numbers.
 
-The board has its own frame finder, which allocates nothing (``armtempo_board/frames.py``); a test feeds
+The board has its own frame finder, which allocates nothing (``armtempo_board/link/frame_reader.py``); a test feeds
 both the same bytes.
 """
 

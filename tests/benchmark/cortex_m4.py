@@ -25,16 +25,16 @@ sys.path[:0] = [str(ROOT)] + [
 ]
 
 import micropython  # noqa: E402, F401  (puts ptr32 and its like into place)
-from armtempo_board import (  # noqa: E402
+from armtempo_board.stepgen import (  # noqa: E402
+    bezier,
     braking,
-    cell,
-    cells,
-    crossing,
-    parts,
-    points,
-    stretch,
-    traverse,
-    walker,
+    cubics,
+    interval_steps,
+    newton,
+    step_generator,
+    step_queue,
+    subdivision,
+    subintervals,
 )
 from armtempo_shared.motion import Motion  # noqa: E402
 
@@ -50,22 +50,21 @@ LINE = 800
 instructions of a run less those of the compiled functions, per line): 770 in the cruise, 770 in the shipped motion."""
 
 NATIVE_LINE = 12
-"""Instructions of a line of ``traverse``, which is compiled, but calls other functions, so it runs on CPython here: its
+"""Instructions of a line of ``queue_steps``. It is compiled, but calls other functions, so it runs on CPython here: its
 machine code over its lines. A call in it takes CALL more."""
 
 CALL = 250
 """Instructions of calling one compiled function from another (see board/docs/hardware.md)."""
 
-COMPILED = (points, cell, crossing, stretch, braking)
-ALL = (*COMPILED, parts, cells, traverse, walker)
+COMPILED = (bezier, subdivision, newton, cubics, step_queue, braking)
+ALL = (*COMPILED, subintervals, interval_steps, step_generator)
 
 
 class Count:
-    """Runs walkers with their compiled functions on the emulated core, and counts."""
+    """Runs generators with their compiled functions on the emulated core, and counts."""
 
     def __init__(self) -> None:
-        folder = ROOT / "board" / "armtempo_board"
-        self.machine = Machine(*(folder / f"{module.__name__.split('.')[1]}.py" for module in COMPILED))
+        self.machine = Machine(*(Path(str(module.__file__)) for module in COMPILED))
         self.on = False
         self.verify = False
         self.lines: Counter[str] = Counter()
@@ -82,7 +81,7 @@ class Count:
         def call(*arguments: Any) -> Any:
             if not self.on:
                 return original(*arguments)
-            if sys._getframe(1).f_code.co_name == "traverse":
+            if sys._getframe(1).f_code.co_name == "queue_steps":
                 self.native += CALL
             if not self.verify:
                 return self.machine.run(name, *arguments)
@@ -97,7 +96,7 @@ class Count:
     def walk(self, record: bytes, joint: int, skip: int, steps: int, batch: int = 512) -> dict[str, float]:
         """Instructions per step of ``steps`` steps behind the first ``skip``, in batches of entries."""
         motion = Motion(record)
-        subject = walker.Walker()
+        subject = step_generator.StepGenerator()
         ring = array("I", bytes(4096))
         subject.load(motion, joint, oracle.start_steps(motion, joint), 168, 20_000)
         head = self._fill(subject, ring, 0, skip, batch)
@@ -122,7 +121,9 @@ class Count:
             "longest": self.longest,
         }
 
-    def _fill(self, subject: walker.Walker, ring: array[int], head: int, steps: int, batch: int) -> int:
+    def _fill(
+        self, subject: step_generator.StepGenerator, ring: array[int], head: int, steps: int, batch: int
+    ) -> int:
         end = head + 2 * steps
         self.longest = 0.0
         while head < end and (subject.waits() or not subject.ended):
@@ -142,7 +143,7 @@ class Count:
         if "armtempo_board" not in code.co_filename or code.co_name in ("write", "waits"):
             return None
         if event == "line":
-            if code.co_name == "traverse":
+            if code.co_name == "queue_steps":
                 self.native += NATIVE_LINE
             else:
                 self.lines[code.co_name] += 1
@@ -152,11 +153,11 @@ class Count:
         """Instructions of the loop that writes a step's two entries, groups of 16 steps."""
         counts = []
         for steps in (128, 384):
-            state = array("i", bytes(4 * stretch.STATE_SIZE))
+            state = array("i", bytes(4 * step_queue.QUEUE_SIZE))
             settings = {
-                stretch.FIRST: 252 << 22, stretch.SECOND: 1 << 29, stretch.THIRD: 1 << 29, stretch.POWER: 9,
-                stretch.SHIFT: 13, stretch.GROUP: 16, stretch.CARRY: 5, stretch.STEPS: steps,
-                stretch.UNTIL_1024: 1 << 28, stretch.PULSE: 168,
+                step_queue.FIRST: 252 << 22, step_queue.SECOND: 1 << 29, step_queue.THIRD: 1 << 29, step_queue.POWER: 9,
+                step_queue.SHIFT: 13, step_queue.GROUP: 16, step_queue.CARRY: 5, step_queue.STEPS: steps,
+                step_queue.UNTIL_KITICKS: 1 << 28, step_queue.PULSE: 168,
             }  # fmt: skip
             for place, value in settings.items():
                 state[place] = value
@@ -172,7 +173,7 @@ def measure() -> dict[str, dict[str, float]]:
     cruise = motions.steady(333_000)
     figures = {"kernel": {"compiled": count.kernel()}}
     figures["cruise"] = count.walk(cruise, 0, 3_000, 33_400)
-    figures["cruise"]["stretches"] = 2 * count.machine.calls["differences"]
+    figures["cruise"]["stretches"] = 2 * count.machine.calls["put_cubics"]
     figures["ramp"] = count.walk(motions.cruise(333_000), 0, 10_000, 10_000)
     for joint in range(3):
         figures[f"shipped joint {joint + 1}"] = count.walk(motions.feeding(), joint, 0, 20_000, 128)

@@ -38,7 +38,7 @@ HEADER = f"""
 #define MICROPY_HEAP_END ((char *)&_heap_end - *(volatile uint32_t *){CUT_AT:#x})
 """
 BOARD_C = "void SystemClock_Config(void) {\n}\n"
-START = "from armtempo_board import program"
+START = "from armtempo_board import start"
 PROBE = f"""import gc
 
 gc.collect()
@@ -48,8 +48,9 @@ import probe
 probe.replace()
 gc.collect()
 print("@ own", gc.mem_alloc() - before)
-{START}
+{START}, load_program
 
+load_program()
 probe.tell("modules")
 """
 LIMIT_S = 60.0

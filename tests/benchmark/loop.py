@@ -127,7 +127,9 @@ class Board:
             name: places[name]
             for name in ("allocated", "at_compare", "at_feed", "feed_ticks", "looks_per_ms")
         }
-        self._settings |= {name.split(".")[1]: _short(name) for name in ("access.matches", "crossing.enter")}
+        self._settings |= {
+            name.split(".")[1]: _short(name) for name in ("isr.matches", "newton.set_interval")
+        }
 
     def run(self, case: Case, cycles: float) -> Run:
         """Run a motion; a fault may end it."""
@@ -209,7 +211,10 @@ def _write(tree: Path, case: Case, settings: dict[str, Any]) -> None:
             entry = wire.COMMAND[name]
             frame = wire.frame(sequence, entry[1], wire.encode(entry, values, tail))
             file.write(struct.pack("<H", len(frame)) + frame)
-    probe = f"import probe\n\nprobe.replace({settings!r})\n{firmware.START}, core\n\nprobe.hook(core)\n"
+    probe = (
+        f"import probe\n\nprobe.replace({settings!r})\n{firmware.START}, load_program\n\nload_program()\n"
+        "from armtempo_board import core\n\nprobe.hook(core)\n"
+    )
     for path, data in program_files.start_files().items():
         (tree / Path(path).name).write_text(data.decode().replace(firmware.START, probe))
 

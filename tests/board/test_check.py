@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.planning import checks
 from armtempo_shared import codes, limits, motion
 
 from tests import interpreters
@@ -114,8 +113,8 @@ def test_reversal_that_the_driver_cannot_follow(interpreter: str, tmp_path: Path
 
 def test_numbers_beyond_the_evaluator(interpreter: str, tmp_path: Path) -> None:
     """The bounds are those by which the host refuses a plan."""
-    span_s, most_s = (ticks / limits.TICK_HZ for ticks in (checks.LONGEST_SPAN_TICKS, limits.LONGEST_TICKS))
-    span_steps, segments = float(checks.MOST_SPAN_STEPS), 100
+    span_s, most_s = (ticks / limits.TICK_HZ for ticks in (limits.LONGEST_SPAN_TICKS, limits.LONGEST_TICKS))
+    span_steps, segments = float(limits.MOST_SPAN_STEPS), 100
     spread = [most_s * part / (segments + 2) for part in range(segments + 3)]
     flat = [0.0] * (segments + 3)
     verdicts = judge(

@@ -13,10 +13,10 @@ from tests.benchmark.emulated import Machine
 BOARD = interpreters.ROOT / "board" / "armtempo_board"
 
 SERVE = {1: (209, 382), 3: (257, 478), 6: (329, 622)}
-FREEZE = {1: 150, 3: 202, 6: 289}
+FREEZE = {1: 148, 3: 200, 6: 287}
 TAKE = {1: 198, 3: 278, 6: 398}
-HUNGRY = {1: (208, 255), 3: (360, 501), 6: (588, 870)}
-EMIT = {2: 484, 32: 886, 512: 9256}
+REFILL = {1: (208, 255), 3: (360, 501), 6: (588, 870)}
+EMIT = {2: 485, 32: 878, 512: 9128}
 WRITTEN = 193
 ARM_CHANNEL = 228
 
@@ -31,8 +31,8 @@ def _offsets(module: str) -> dict[str, int]:
     return {name: int(number) for name, number in found}
 
 
-AT = _offsets("access.py")
-QUEUE = _offsets("stretch.py")
+AT = _offsets("hardware/isr.py")
+QUEUE = _offsets("stepgen/step_queue.py")
 
 
 def _words(count: int) -> array[int]:
@@ -43,7 +43,7 @@ def _block(joints: int, made: int = 20) -> array[int]:
     """Joints whose rings are fed; ``made`` entries stand in each."""
     block = _words(AT["BLOCK_HEAD"] + 6 * AT["JOINT_WORDS"])
     block[AT["JOINTS"]] = joints
-    block[AT["NEXT"]] = 5000
+    block[AT["NEXT_SAMPLE"]] = 5000
     for joint in range(joints):
         at = AT["BLOCK_HEAD"] + joint * AT["JOINT_WORDS"]
         block[at + AT["CCR_AT"]] = AT["CCR1"] + joint % 3
@@ -51,16 +51,16 @@ def _block(joints: int, made: int = 20) -> array[int]:
         block[at + AT["ON_TIM5"]] = joint // 3
         ring = at + AT["RING"]
         block[ring + AT["FED"]] = 1
-        block[ring + AT["MADE"]] = made
-        block[ring + AT["FIRST"]] = RING
+        block[ring + AT["WRITTEN"]] = made
+        block[ring + AT["NDTR_AT_START"]] = RING
         block[ring + AT["MASK"]] = RING - 1
-        block[ring + AT["LAST"]] = 100_000
+        block[ring + AT["LAST_TIME"]] = 100_000
     return block
 
 
 @pytest.fixture(scope="module")
 def machine() -> Machine:
-    return Machine(BOARD / "access.py", BOARD / "stretch.py")
+    return Machine(BOARD / "hardware" / "isr.py", BOARD / "stepgen" / "step_queue.py")
 
 
 def _cost(machine: Machine, name: str, *arguments: array[int] | int) -> int:
@@ -74,11 +74,11 @@ def test_turning_and_stopping(machine: Machine, joints: int) -> None:
     idle, turn = SERVE[joints]
     block, timer2, timer5, port = _block(joints), _words(18), _words(18), _words(10)
     timer2[AT["CNT"]] = 100
-    assert _cost(machine, "serve", block, timer2, port) <= idle
+    assert _cost(machine, "serve_compare", block, timer2, port) <= idle
     block[AT["BLOCK_HEAD"] + AT["DIR_BIT"]] = 128
     block[AT["BLOCK_HEAD"] + AT["TURN_TIMES"]] = 100
     block[AT["BLOCK_HEAD"] + AT["TURNS_IN"]] = 1
-    assert _cost(machine, "serve", block, timer2, port) <= turn
+    assert _cost(machine, "serve_compare", block, timer2, port) <= turn
     assert port[AT["BSRR"]] == 128
     assert _cost(machine, "freeze", block, timer2, timer5) <= FREEZE[joints]
 
@@ -87,35 +87,35 @@ def test_turning_and_stopping(machine: Machine, joints: int) -> None:
 def test_a_sample(machine: Machine, joints: int) -> None:
     """Without encoders: these come by way of objects."""
     raw = _words(AT["RAW_ROOM"] * AT["RAW_WORDS"])
-    assert _cost(machine, "take", raw, _block(joints), _words(60), 0) <= TAKE[joints]
+    assert _cost(machine, "take_sample", raw, _block(joints), _words(60), 0) <= TAKE[joints]
 
 
-@pytest.mark.parametrize("joints", sorted(HUNGRY))
+@pytest.mark.parametrize("joints", sorted(REFILL))
 def test_looking_after_the_rings(machine: Machine, joints: int) -> None:
     """All of them full, and all to be written to."""
-    full, hungry = HUNGRY[joints]
+    full, to_refill = REFILL[joints]
     dma, timer = _words(60), _words(18)
     dma[0] = RING
-    assert _cost(machine, "hungry", _block(joints, RING - 8), dma, timer) <= full
-    assert machine.run("hungry", _block(joints, RING - 8), dma, timer) == 0
-    assert _cost(machine, "hungry", _block(joints), dma, timer) <= hungry
-    assert machine.run("hungry", _block(joints), dma, timer) == (1 << joints) - 1
+    assert _cost(machine, "rings_to_refill", _block(joints, RING - 8), dma, timer) <= full
+    assert machine.run("rings_to_refill", _block(joints, RING - 8), dma, timer) == 0
+    assert _cost(machine, "rings_to_refill", _block(joints), dma, timer) <= to_refill
+    assert machine.run("rings_to_refill", _block(joints), dma, timer) == (1 << joints) - 1
 
 
 @pytest.mark.parametrize("entries", sorted(EMIT))
 def test_writing_to_a_ring(machine: Machine, entries: int) -> None:
-    """Edges of a long stretch in groups of 16 steps."""
+    """Edges of a long cubic in groups of 16 steps."""
     queue, ring, block = _words(136), _words(RING + 1), _block(1, 0)
     values = {"FIRST": 252 << 22, "SECOND": 1 << 29, "THIRD": 1 << 29, "POWER": 9, "SHIFT": 13, "GROUP": 16}
-    values |= {"CARRY": 5, "STEPS": 512, "UNTIL_1024": 1 << 28, "PULSE": 168}
+    values |= {"CARRY": 5, "STEPS": 512, "UNTIL_KITICKS": 1 << 28, "PULSE": 168}
     for name, value in values.items():
         queue[QUEUE[name]] = value
     assert _cost(machine, "emit", entries, ring, queue, RING - 1) <= EMIT[entries]
     assert queue[QUEUE["HEAD"]] == entries
     at = AT["BLOCK_HEAD"] + AT["RING"]
     state = block[at : at + AT["STATE_WORDS"]]
-    assert _cost(machine, "written", state, ring, _words(18), queue) <= WRITTEN
-    assert state[AT["MADE"]] == entries
+    assert _cost(machine, "note_written", state, ring, _words(18), queue) <= WRITTEN
+    assert state[AT["WRITTEN"]] == entries
 
 
 def test_arming_a_channel(machine: Machine) -> None:

@@ -106,7 +106,7 @@ def _documented() -> list[tuple[str, str]]:
 
 def test_sections_in_the_documentation() -> None:
     """The documented register table has the rows that the board applies."""
-    source = (interpreters.ROOT / "board" / "armtempo_board" / "registers.py").read_text()
+    source = (interpreters.ROOT / "board" / "armtempo_board" / "hardware" / "registers.py").read_text()
     notes = re.findall(r"\),  # ([^:]*):", source)  # "18.4.1 (17.4.1)" behind each row
     applied = {name for note in notes for name in _SECTION.findall(note)}
     documented = {name for sections, _ in _documented() for name in _SECTION.findall(sections)}

@@ -13,19 +13,10 @@ from tests import interpreters
 from tests.board import motions, oracle, walking
 
 BOARD = interpreters.ROOT / "board" / "armtempo_board"
-MOTION_PATH = (
-    "points",
-    "parts",
-    "cell",
-    "cells",
-    "crossing",
-    "stretch",
-    "walker",
-    "braking",
-    "check",
-    "rates",
-    "ends",
-)
+MOTION_PATH = [
+    *sorted((BOARD / "stepgen").glob("*.py")),
+    *(BOARD / "motion" / f"{name}.py" for name in ("motion_check", "rate_check", "endpoints")),
+]
 QUICK = next(name for name in ("micropython", "cpython") if name in interpreters.AVAILABLE)
 """The interpreter for the long cases; that all give the same is shown on shorter ones."""
 
@@ -127,10 +118,10 @@ def _verify_braked(motion: Motion, joint: int, steps: walking.Steps, start: int,
     assert np.max(error * exact.speed[:count], initial=0.0) / walking.TICK_HZ <= 0.02
 
 
-@pytest.mark.parametrize("module", MOTION_PATH)
-def test_no_float_can_occur(module: str) -> None:
+@pytest.mark.parametrize("module", MOTION_PATH, ids=lambda path: path.stem)
+def test_no_float_can_occur(module: Path) -> None:
     """The chip has single floats only, so the motion path has none: no constant, no true division, no call."""
-    tree = ast.parse((BOARD / f"{module}.py").read_text())
+    tree = ast.parse(module.read_text())
     for node in ast.walk(tree):
         if isinstance(node, ast.Constant):
             assert not isinstance(node.value, float | complex)

@@ -20,7 +20,7 @@ GAP_TICKS = 20_000
 
 @dataclass(frozen=True)
 class Steps:
-    """What a walker wrote for one joint: rising edges in ticks and directions."""
+    """What a generator wrote for one joint: rising edges in ticks and directions."""
 
     ticks: NDArray[np.int64]
     direction: NDArray[np.int64]
@@ -92,7 +92,7 @@ def peak_rate(record: bytes) -> float:
 
 
 def braked(ticks: NDArray[np.float64], start: int, length: int) -> NDArray[np.float64]:
-    """Motion time at a real time while braking (the law in ``armtempo_board/braking.py``)."""
+    """Motion time at a real time while braking (the law in ``armtempo_board/stepgen/braking.py``)."""
     x = np.clip((ticks - start) / length, 0.0, 1.0)
     return np.where(ticks < start, ticks, start + length * (x - 2.5 * x**4 + 3 * x**5 - x**6))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +12,8 @@ import pytest
 from armtempo.deploy import changes, firmware, package, program_files
 from armtempo.deploy.remote import Survey
 from armtempo.errors import InputError, LinkError, MissingPackageError
-from armtempo.link.program_version import own_crc
+from armtempo.link.program_version import PACKAGES, own_crc, package_folder
+from armtempo_shared.program_hash import sources_crc
 
 CORTEX_M4 = 6 | 3 << 8 | 7 << 10
 BOARD = Survey("STM32F4DISC with STM32F407", (1, 29, 0), CORTEX_M4, 95_000, 189, 512, False, None, {})
@@ -22,9 +24,32 @@ def quiet(text: str) -> None: ...
 
 def test_modules_are_what_the_board_imports() -> None:
     names = set(program_files.modules())
-    assert {"armtempo_board/app.py", "armtempo_board/__init__.py", "armtempo_shared/motion.py"} <= names
+    assert {"armtempo_board/app/app.py", "armtempo_board/__init__.py", "armtempo_shared/motion.py"} <= names
     assert not {"armtempo_board/main.py", "armtempo_shared/wire.py", "armtempo_shared/meanings.py"} & names
     assert program_files.stamp() == f"{own_crc():08x}\n".encode()
+
+
+def test_the_hash_covers_names_and_contents_in_all_packages(tmp_path: Path) -> None:
+    folders = [tmp_path / name for name in PACKAGES]
+    for folder in folders:
+        shutil.copytree(package_folder(folder.name), folder)
+    found = {own_crc()}
+
+    def crc() -> int:
+        return sources_crc(*map(str, folders))
+
+    assert crc() in found
+    nested = folders[0] / "stepgen" / "newton.py"
+    for change in (
+        lambda: nested.write_text(nested.read_text() + "# more\n"),
+        lambda: nested.rename(nested.with_name("other.py")),
+        lambda: nested.with_name("other.py").rename(folders[0] / "motion" / "other.py"),
+    ):
+        change()
+        assert crc() not in found
+        found.add(crc())
+    (folders[0] / "stepgen" / "notes.txt").write_text("not a source")
+    assert crc() in found
 
 
 def test_compiled_files_fit_the_smallest_board() -> None:
@@ -37,7 +62,7 @@ def test_compiled_files_fit_the_smallest_board() -> None:
 
 def test_sources_go_where_there_is_room() -> None:
     library = changes.choose(replace(BOARD, free_blocks=2000, free_heap=200_000), False, quiet)
-    assert "/flash/lib/armtempo_board/app.py" in library
+    assert "/flash/lib/armtempo_board/app/app.py" in library
     told: list[str] = []
     library = changes.choose(replace(BOARD, free_blocks=2000), False, told.append)
     assert "/flash/lib/armtempo_board/core.mpy" in library
@@ -125,7 +150,7 @@ def test_firmware_folder_holds_the_program_and_its_hash(tmp_path: Path) -> None:
     told: dict[str, int] = {}
     exec((folder / "armtempo_shared" / "firmware.py").read_text(), told)
     assert told["CRC"] == own_crc()
-    assert "import CRC" in (folder / "armtempo_shared" / "program.py").read_text()
+    assert "import CRC" in (folder / "armtempo_shared" / "program_hash.py").read_text()
 
 
 def test_missing_compiler_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from armtempo.errors import InputError, PlanError
 from armtempo.model.arm import Arm, Limits
-from armtempo.planning import checks
 from armtempo.records import encode
 from armtempo.splines.trajectory import JointSpline, Trajectory
 from armtempo_shared import armrecord, limits, motion
@@ -91,7 +90,7 @@ def spread(seconds: float, deg: float = 10.0, segments: int = 4) -> Trajectory:
 
 
 def test_numbers_that_the_board_cannot_hold_are_refused_as_it_does() -> None:
-    span_s, most_s = checks.LONGEST_SPAN_TICKS / limits.TICK_HZ, limits.LONGEST_TICKS / limits.TICK_HZ
+    span_s, most_s = limits.LONGEST_SPAN_TICKS / limits.TICK_HZ, limits.LONGEST_TICKS / limits.TICK_HZ
     for made, words in (
         (spread(span_s * 8 / 5), "raise refine or add via points"),
         (spread(most_s, segments=100), "stop = true and plan with --split"),

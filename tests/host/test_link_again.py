@@ -71,22 +71,22 @@ def test_another_board_at_the_same_port_gets_no_command(tmp_path: Path) -> None:
     def swap() -> None:
         pipe.unplug_for(1.0)
         pipe.swap_board(b"another")
-        pipe.app.engine.moving = True
+        pipe.app.controller.engine.moving = True
 
     with pytest.raises(LinkError, match=r"another board is on pipe now \(another, before") as caught:
         replay(board, stored, swap)
     assert "after the last sample" in str(caught.value)
-    assert pipe.app.engine.calls == []  # above all no stop
+    assert pipe.app.controller.engine.calls == []  # above all no stop
 
 
 def test_the_same_board_started_anew_is_found_out_before_any_command(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
     board, _ = prepared(pipe)
     pipe.unplug_for(1.0)
-    pipe.swap_board(pipe.app.board_id)
+    pipe.swap_board(pipe.app.controller.board_id)
     with pytest.raises(OtherBoardError, match="started anew"):
         board.home([1, 2, 3])
-    assert "home" not in pipe.app.engine.calls
+    assert "home" not in pipe.app.controller.engine.calls
     assert board.session.reopen is not None
 
 

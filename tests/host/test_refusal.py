@@ -56,7 +56,7 @@ def test_a_record_for_which_the_board_has_no_memory(tmp_path: Path, monkeypatch:
     pipe = Pipe(tmp_path / "flash")
     board, data = ready(pipe)
 
-    store = pipe._later["armtempo_board.store"].Store
+    store = pipe._later["armtempo_board.storage.store"].Store
     guarded = store._guard
 
     def short_of_memory(self: Any, call: Any, *arguments: Any) -> Any:

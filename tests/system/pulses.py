@@ -11,7 +11,7 @@ from tests.system.exact import ExactJoint
 from tests.system.replays import Replay
 
 PINS = (("A15", "E7"), ("A1", "E8"), ("B10", "E10"))
-"""STEP and DIR of the shipped arm's joints (board-side home of the fact: armtempo_board/pins.py)."""
+"""STEP and DIR of the shipped arm's joints (board-side home of the fact: armtempo_board/hardware/pins.py)."""
 Ticks = NDArray[np.int64]
 
 

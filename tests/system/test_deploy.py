@@ -70,7 +70,7 @@ def test_from_an_empty_board_and_back(tmp_path: Path, name: str) -> None:
         assert "kept as /flash/main.py.before-armtempo" in armtempo("deploy", "--port", port, cwd=tmp_path)
         assert "unconfigured" in armtempo("status", "--port", port, cwd=tmp_path)
         assert "up to date" in armtempo("deploy", "--port", port, cwd=tmp_path)
-        damaged = next((flash / "lib" / "armtempo_board").glob("program.*"))
+        damaged = next((flash / "lib" / "armtempo_board").rglob("program.*py"))
         damaged.write_bytes(b"")
         assert "1 files of the library written" in armtempo("deploy", "--port", port, cwd=tmp_path)
         armtempo("home", "--port", port, cwd=tmp_path)
@@ -81,6 +81,7 @@ def test_from_an_empty_board_and_back(tmp_path: Path, name: str) -> None:
         assert "armtempo deploy" in armtempo("status", "--port", port, cwd=tmp_path, code=1)
     assert (flash / "main.py").read_text() == "print('somebody else')\n"
     assert not (flash / "boot.py").exists()
+    assert not (flash / "lib" / "armtempo_board").exists(), "its packages are gone too"
     assert (flash / "armtempo" / "small.atm").exists()
 
 

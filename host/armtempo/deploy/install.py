@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -51,9 +51,8 @@ def deploy(port: str, mpy: bool = False, tell: Tell = LOG.info, progress: Progre
     change = difference(found, library)
     if change.write or change.remove or not is_complete(found):
         _keep_aside(remote, found, tell)
-        remote.run(
-            each("os.remove", [f"{program_files.ROOT}/main.py", program_files.STAMP_PATH, *change.remove])
-        )
+        gone = each("os.remove", [f"{program_files.ROOT}/main.py", program_files.STAMP_PATH, *change.remove])
+        remote.run(gone, each("os.rmdir", _folders(change.remove)))
         _write(remote, change.write, progress)
         _verify(remote, library)
         _write(remote, last_files(found), progress)
@@ -78,8 +77,7 @@ def undeploy(port: str, tell: Tell = LOG.info) -> None:
     for path in aside:
         remote.run(rename(path, path.removesuffix(KEPT_ASIDE)))
         tell(f"{path.removesuffix(KEPT_ASIDE)} is the one from before again")
-    for folder in sorted({path.rsplit("/", 1)[0] for path in files}):
-        remote.run(["rmdir", f":{folder}"])
+    remote.run(each("os.rmdir", _folders(files)))
     remote.run(["reset"])
     tell(f"{len(files)} files of the library removed; stored motions are kept")
     if found.firmware_crc is not None:
@@ -139,6 +137,12 @@ def _write(remote: Remote, files: Mapping[str, bytes], progress: Progress) -> No
         for line in remote.lines(*commands):
             done += line.startswith("cp ")
             progress(min(done, len(files)), len(files))
+
+
+def _folders(files: Iterable[str]) -> list[str]:
+    """The packages that the files stand in, inner ones first; those that are not empty are not removed."""
+    folders = {part for path in files for part in _parents(path) if part != program_files.LIBRARY}
+    return sorted(folders, reverse=True)
 
 
 def _parents(path: str) -> list[str]:

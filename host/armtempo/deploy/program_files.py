@@ -5,12 +5,13 @@ from __future__ import annotations
 import ast
 import subprocess
 import tempfile
+from collections.abc import Iterable
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from armtempo_shared.program import STAMP
+from armtempo_shared.program_hash import STAMP
 from armtempo_shared.table import rows
 
 from armtempo import simulator
@@ -22,7 +23,8 @@ ROOT = "/flash"
 LIBRARY = f"{ROOT}/lib"
 STAMP_PATH = f"{LIBRARY}/{PACKAGES[0]}/{STAMP}"
 START_FILES = ("boot.py", "main.py")
-"""Modules of the board package that become files of the flash's root; main.py goes last."""
+"""Files of the board package that become files of the flash's root; main.py goes last."""
+_MAIN = f"{PACKAGES[0]}.app.program"
 _ARCHITECTURES = {1: "x86", 2: "x64", 3: "armv6", 4: "armv6m", 5: "armv7m", 6: "armv7em", 7: "armv7emsp"}
 """By the number in ``sys.implementation._mpy`` (MicroPython's py/persistentcode.h)."""
 
@@ -30,12 +32,13 @@ _ARCHITECTURES = {1: "x86", 2: "x64", 3: "armv6", 4: "armv6m", 5: "armv7m", 6: "
 def modules() -> dict[str, Path]:
     """Source file of each module the board needs, by its path below the library folder."""
     board, shared = (package_folder(name) for name in PACKAGES)
-    files = [path for path in sorted(board.glob("*.py")) if path.name not in START_FILES]
+    starts = [board / name for name in START_FILES]
+    files = [path for path in sorted(board.rglob("*.py")) if path not in starts]
     needed = {"__init__"}.union(*(_imported(path) for path in files))
     while more := set[str]().union(*(_imported(shared / f"{stem}.py") for stem in needed)) - needed:
         needed |= more
-    files += [shared / f"{stem}.py" for stem in sorted(needed)]
-    return {f"{path.parent.name}/{path.name}": path for path in files}
+    found = {f"{PACKAGES[0]}/{path.relative_to(board).as_posix()}": path for path in files}
+    return found | {f"{PACKAGES[1]}/{stem}.py": shared / f"{stem}.py" for stem in sorted(needed)}
 
 
 def _imported(path: Path) -> set[str]:
@@ -101,16 +104,17 @@ def compact_program(hash_module: str = "") -> Compact:
     files = {path[:-3].removesuffix("/__init__").replace("/", "."): file for path, file in modules().items()}
     sources = {module: file.read_text(encoding="utf-8") for module, file in files.items()}
     if hash_module:
-        sources[f"{PACKAGES[1]}.program"] = hash_module
+        sources[f"{PACKAGES[1]}.program_hash"] = hash_module
     board = package_folder(PACKAGES[0])
     outside = [ast.parse((board / name).read_text(encoding="utf-8")) for name in START_FILES]
     outside += [ast.parse(sources[package]) for package in PACKAGES]
     nodes = [node for tree in outside for node in ast.walk(tree)]
-    entries = {alias.name for node in nodes if isinstance(node, ast.ImportFrom) for alias in node.names}
+    imports = [node for node in nodes if isinstance(node, ast.ImportFrom)]
+    entries = {f"{node.module}.{alias.name}" for node in imports for alias in node.names}
     return compact(
         sources,
-        f"{PACKAGES[0]}.program",
-        {f"{PACKAGES[0]}.{name}" for name in entries} & set(sources),
+        _MAIN,
+        entries & set(sources),
         {*_handlers(), *_hardware_names(), *(name for node in nodes for name in _named(node))},
     )
 
@@ -127,10 +131,19 @@ def _handlers() -> set[str]:
 
 
 def _hardware_names() -> set[str]:
-    """Names of the methods of pyb, machine and the like; the simulated hardware has them all."""
-    files = (Path(simulator.__file__).parent / "hardware").rglob("*.py")
-    nodes = [node for file in files for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))]
-    return {node.name for node in nodes if isinstance(node, ast.FunctionDef)}
+    """What methods of the hardware are called: the stand-ins for its modules have them all, and what they import."""
+    folder = Path(simulator.__file__).parent / "hardware"
+    files = list(folder.glob("*.py"))
+    imports = [node for node in _nodes(files) if isinstance(node, ast.ImportFrom)]
+    files += [
+        file for node in imports if (file := folder / f"{str(node.module).replace('.', '/')}.py").exists()
+    ]
+    names = {node.name for node in _nodes(files) if isinstance(node, ast.FunctionDef)}
+    return {name for name in names if not name.startswith("_")}
+
+
+def _nodes(files: Iterable[Path]) -> list[ast.AST]:
+    return [node for file in files for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))]
 
 
 def _named(node: ast.AST) -> list[str]:

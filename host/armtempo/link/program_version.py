@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib.util import find_spec
 from pathlib import Path
 
-from armtempo_shared.program import sources_crc
+from armtempo_shared.program_hash import sources_crc
 
 PACKAGES = ("armtempo_board", "armtempo_shared")
 

@@ -7,11 +7,14 @@ import math
 import numpy as np
 from armtempo_shared import motion
 from armtempo_shared.limits import (
+    LONGEST_SPAN_TICKS,
     LONGEST_TICKS,
     MAX_MOTION_BYTES,
     MAX_SEGMENTS,
     MAX_STEP_RATE,
     MAX_STEP_RATE_SUM,
+    MOST_SPAN_STEPS,
+    MOST_STEPS,
     TICK_HZ,
 )
 
@@ -37,11 +40,6 @@ from armtempo.splines.trajectory import JointSpline, Trajectory
 
 TOLERANCE = 1e-9
 """Allowance for rounding: largest excess over a limit, relative, and over a range, in degrees."""
-
-LONGEST_SPAN_TICKS = 1 << 36
-MOST_STEPS, MOST_SPAN_STEPS = 1 << 27, 1 << 24
-"""What the board's evaluator can hold besides LONGEST_TICKS: the span of the degree + 1 time control points of a
-segment, the largest angle control point, and the span of those of a segment. A test holds them against the board."""
 
 FITNESS = ("stretched", "penalised")
 """Values of the job's parameter ``fitness``: ``stretched`` scales each candidate until it just keeps its

@@ -6,7 +6,7 @@ import stand_in
 
 stand_in.install()
 
-from armtempo_board.app import App  # noqa: E402
+from armtempo_board.app.app import App  # noqa: E402
 
 port = stand_in.Port()
 app = App(port, sys.argv[1])
@@ -25,11 +25,11 @@ print(host.ask("home", (3,), bytes(8)))
 print(host.ask("status"))
 print(host.ask("start", (0, 5), "feed"))
 print(host.ask("start", (0, stand_in.wire.record_crc(motion)), "feed"))
-app.engine.advance(3)
+app.controller.engine.advance(3)
 print(host.ask("put_begin", (10, 0), "x"))
 print(host.ask("samples", (2, 0)))
-app.engine.advance(1)
-app.engine.finish()
+app.controller.engine.advance(1)
+app.controller.engine.finish()
 print(host.ask("status"))
 for event in host.events:
     print(event)

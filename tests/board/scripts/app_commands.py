@@ -12,7 +12,7 @@ def case_repeated_command_acts_once():
     answers = host.turn()
     host.send("home", (1,), bytes(8), sequence)
     answers += host.turn()
-    assert app.engine.calls.count("home") == 2  # one was the connecting
+    assert app.controller.engine.calls.count("home") == 2  # one was the connecting
     assert len(answers) == 3
     assert answers[0] == answers[1] == answers[2]
 
@@ -23,7 +23,7 @@ def case_same_number_other_content_is_another_command():
     host.turn()
     host.send("home", (2,), bytes(8), sequence)
     host.turn()
-    assert app.engine.calls.count("home") == 3
+    assert app.controller.engine.calls.count("home") == 3
 
 
 def case_repeated_start_answers_again():
@@ -32,7 +32,7 @@ def case_repeated_start_answers_again():
     first = host.turn()
     host.send("start", (0, wire.record_crc(host.record)), "feed", sequence)
     second = host.turn()
-    assert app.engine.calls.count("start") == 1
+    assert app.controller.engine.calls.count("start") == 1
     assert [frame for frame in first if frame[1] == 0x7E] == second
 
 
@@ -85,10 +85,10 @@ def case_start_only_when_everything_is_valid():
     three = stand_in.record(stand_in.arm(), joints=3)
     host.upload("three", three)
     assert host.ask("start", (0, wire.record_crc(three)), "three") == ("error", "wrong_joints", 255, 3)
-    app.engine.refusal = (21, 1, 5)
+    app.controller.engine.refusal = (21, 1, 5)
     assert start(host) == ("error", "too_fast", 1, 5)
-    assert app.engine.calls.count("start") == 0
-    app.engine.refusal = None
+    assert app.controller.engine.calls.count("start") == 0
+    app.controller.engine.refusal = None
     assert start(host) == ("ok", (1, 84000), b"")
 
 
@@ -101,7 +101,7 @@ def case_only_a_few_commands_while_moving():
             answer = host.ask(name, [1] * len(fields), b"")
             busy = name not in ("hello", "status", "samples")
             assert (answer[:2] == ("error", "busy")) == busy, (name, answer)
-    assert app.engine.calls[-1] == "start"
+    assert app.controller.engine.calls[-1] == "start"
 
 
 run(globals())

@@ -6,8 +6,12 @@ from app_rig import connected, ends_of, run, start, state
 def case_fault_stays_until_cleared():
     app, host = connected()
     start(host)
-    app.engine.advance(1)
-    app.engine.fault, app.engine.fault_joint, app.engine.moving = 42, 1, False
+    app.controller.engine.advance(1)
+    app.controller.engine.fault, app.controller.engine.fault_joint, app.controller.engine.moving = (
+        42,
+        1,
+        False,
+    )
     assert state(host) == "fault"
     assert ends_of(host)[-1] == ("fault", (1, 42, 1, 8400000))
     assert start(host) == ("error", "fault_pending", 1, 42)
@@ -21,19 +25,19 @@ def case_fault_stays_until_cleared():
 def case_exception_becomes_a_fault():
     app, host = connected()
     start(host)
-    app.engine.explode = ValueError("deliberate")
+    app.controller.engine.explode = ValueError("deliberate")
     host.turn()
     assert state(host) == "fault"
     kinds = [kind for kind, _ in ends_of(host)]
     assert sorted(kinds) == ["fault", "notice"]
     assert "deliberate" in next(rest for kind, _, rest in host.events if kind == "notice")
     assert host.ask("status")[1][1] == 44
-    assert app.engine.calls[-1] == "freeze"
+    assert app.controller.engine.calls[-1] == "freeze"
 
 
 def case_exception_in_a_command_becomes_a_fault():
     app, host = connected()
-    app.store().names = None
+    app.controller.store().names = None
     assert host.ask("list", (0,)) is None
     assert state(host) == "fault"
 
@@ -50,12 +54,12 @@ def case_endless_exceptions_end_the_program():
 
 def case_whatever_ends_the_loop_freezes_what_moves():
     app, host = connected()
-    app.halt()
-    assert "freeze" not in app.engine.calls
+    app.controller.halt()
+    assert "freeze" not in app.controller.engine.calls
     start(host)
-    app.halt()
-    assert app.engine.calls[-1] == "freeze"
-    assert not app.moving()
+    app.controller.halt()
+    assert app.controller.engine.calls[-1] == "freeze"
+    assert not app.controller.moving()
 
 
 class Failing:
@@ -64,7 +68,7 @@ class Failing:
 
 
 def case_a_failing_led_freezes_what_moves():
-    from armtempo_board import program
+    from armtempo_board.app import program
 
     app, host = connected()
     start(host)
@@ -72,7 +76,7 @@ def case_a_failing_led_freezes_what_moves():
     try:
         program.run(Failing(), None, None)
     except ValueError:
-        assert app.engine.calls[-1] == "freeze"
+        assert app.controller.engine.calls[-1] == "freeze"
         return
     raise AssertionError("went on")
 

@@ -6,7 +6,7 @@ import stand_in
 
 stand_in.install()
 
-from armtempo_board.app import App  # noqa: E402
+from armtempo_board.app.app import App  # noqa: E402
 from armtempo_shared import wire  # noqa: E402
 
 ROOT = sys.argv[1]

@@ -65,7 +65,7 @@ def case_damaged_file_in_flash_is_not_run():
         file.write(data)
     assert start(host) == ("error", "bad_record", 255, 0)
     assert host.ask("list", (0,)) == ("ok", (1, len(data), 0, 0, 0, 0), "feed")
-    assert app.engine.calls.count("load") == 0
+    assert app.controller.engine.calls.count("load") == 0
 
 
 run(globals())

@@ -2,9 +2,9 @@
 
 import random
 
-from armtempo_board import access
-from armtempo_board.encoders import Encoder
-from armtempo_board.following import Following
+from armtempo_board.hardware import isr
+from armtempo_board.hardware.encoders import EncoderInput
+from armtempo_board.motion.following_error import FollowingError
 from engine_rig import TICK_HZ, Motion, Rig, Steps, arm, cases, row
 from virtual_board import standalone
 
@@ -17,7 +17,7 @@ def both_ways_round():
     for channel, timer in ((0, 1), (1, 3), (2, 8), (3, 4)):
         for inverted in (0, 1):
             board = standalone.start()
-            encoder = Encoder(channel, inverted)
+            encoder = EncoderInput(channel, inverted)
             total = 0
             for n in range(300):
                 jump = random.choice((1, -1, 32767, -32767, random.randrange(-32767, 32768)))
@@ -32,7 +32,7 @@ def both_ways_round():
 def declared():
     """The count goes on from what was declared, also across the counter's zero."""
     board = standalone.start()
-    encoder = Encoder(0, 0)
+    encoder = EncoderInput(0, 0)
     board.timers[1].turn(-5)
     encoder.declare(-1000)
     assert encoder.counts == -1000
@@ -46,15 +46,15 @@ def declared():
 def expected_counts():
     """The quotient rounds down, wherever the joint stands; the sign of the ratio counts."""
     for numerator, denominator in ((5, 16), (-5, 16), (80, 256), (4000, 12800), (7, 1), (0, 5)):
-        following = Following(
+        following = FollowingError(
             row(encoder=0, counts_num=numerator, counts_den=denominator, following_counts=10)
         )
         for steps in (0, 1, -1, 15, 16, -16, 17, 123456, -123457, 999999):
             exact = steps * numerator / denominator
             assert exact - 1 < following.expected(steps) <= exact
-    assert not following.lost(100, 10) and following.lost(100, -11)
-    assert not Following(row(following_counts=10, encoder=255)).lost(100, -1000)
-    assert not Following(row(following_counts=0, encoder=1)).lost(100, -1000)
+    assert not following.is_exceeded(100, 10) and following.is_exceeded(100, -11)
+    assert not FollowingError(row(following_counts=10, encoder=255)).is_exceeded(100, -1000)
+    assert not FollowingError(row(following_counts=0, encoder=1)).is_exceeded(100, -1000)
 
 
 def at_full_speed():
@@ -91,9 +91,9 @@ def moved_by_hand():
 def unread_counter():
     """The counter of an encoder timer reads back as 16 bits."""
     board = standalone.start()
-    encoder = Encoder(1, 0)
+    encoder = EncoderInput(1, 0)
     board.timers[3].turn(-1)
-    assert access.read_counter(encoder.address) == 0xFFFF
+    assert isr.read_counter(encoder.address) == 0xFFFF
 
 
 cases(

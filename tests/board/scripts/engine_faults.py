@@ -84,7 +84,7 @@ def estop_anywhere():
         stopped(rig, codes.ESTOP)
         assert rig.engine.known == (0 if releases else 7)
         assert not rig.engine.clear()
-        assert rig.engine.load(MOTION)[0] == codes.FAULT_PENDING
+        assert rig.refusal(MOTION)[0] == codes.FAULT_PENDING
         external_interrupts.set_level("E15", 1)
         rig.turn()
         if number % 4 == 0:
@@ -144,19 +144,19 @@ def written_too_late():
 
 def with_slow_emit(rig):
     """Run to the end; whatever is written to the first joint's ring takes 30 ms."""
-    from armtempo_board import feeder
+    from armtempo_board.motion import ring_feeder
 
-    emit = feeder.emit
+    emit = ring_feeder.emit
 
     def slow_emit(*arguments):
         emit(*arguments)
         if arguments[1] is rig.engine._joints[0].ring.words:
             rig.board.stand_still(84 * 30_000)
 
-    feeder.emit = slow_emit
+    ring_feeder.emit = slow_emit
     while rig.engine.moving:
         rig.turn()
-    feeder.emit = emit
+    ring_feeder.emit = emit
 
 
 def interrupt_gone():
@@ -164,12 +164,12 @@ def interrupt_gone():
     for moment in (-500_000, 300_000, 9_000_000):
         rig = Rig(arm(3))
         import stm
-        from armtempo_board import access
+        from armtempo_board.hardware import isr
         from machine import mem32
 
         rig.start(LONG)
         rig.run_to(moment)
-        mem32[stm.TIM6 + 4 * access.DIER] = 0
+        mem32[stm.TIM6 + 4 * isr.DIER] = 0
         while rig.engine.moving:
             rig.turn()
         stopped(rig, codes.INTERNAL, rig.engine.fault_joint)
@@ -239,7 +239,7 @@ def following():
         assert rig.engine.known == 6
         stopped(rig, codes.FOLLOWING, 0)
         assert rig.engine.clear()
-        assert rig.engine.load(MOTION) == (codes.UNHOMED, 0, 0)
+        assert rig.refusal(MOTION) == (codes.UNHOMED, 0, 0)
         rig.engine.home(1, [0, 0, 0])
         assert rig.engine.known == 7
 
@@ -259,13 +259,13 @@ def refusals():
     rig = Rig(arm(2))
     motion = Motion(TICK_HZ, Steps((1000, 400, 2000, 1)), Steps())
     Evaluator.refusal = (codes.TOO_FAST, 1, 400_000)
-    assert rig.engine.load(motion) == (codes.TOO_FAST, 1, 400_000)
+    assert rig.refusal(motion) == (codes.TOO_FAST, 1, 400_000)
     Evaluator.refusal = None
     Evaluator.offset = -3
-    assert rig.engine.load(motion) == (codes.WRONG_START, 0, -3)
+    assert rig.refusal(motion) == (codes.WRONG_START, 0, -3)
     Evaluator.offset = 0
     rig.start(motion)
-    assert rig.engine.load(motion)[0] == codes.BUSY
+    assert rig.refusal(motion)[0] == codes.BUSY
     assert not rig.engine.clear()
     rig.run_to(motion.duration + TICK_HZ)
     assert rig.engine.fault == 0

@@ -4,14 +4,15 @@ import sys
 from array import array
 
 from arm_rows import HEAD, arm, row  # noqa: F401
-from armtempo_board import points, stretch, walker
+from armtempo_board.errors import Refused
+from armtempo_board.stepgen import bezier, step_generator, step_queue
 from virtual_board import machine_state, standalone
 from virtual_board.arm import motors
 
 TICK_HZ = 84_000_000
 FEWER = 3 if "short" in sys.argv else 1
 """Repetitions are divided by it; the emulated interpreter is slow."""
-SLOTS = stretch.STATE_SIZE - 13 * stretch.QUEUE_ROOM
+SLOTS = step_queue.QUEUE_SIZE - 13 * step_queue.CAPACITY
 
 
 class Steps:
@@ -49,38 +50,37 @@ class Motion:
         self.joints = joints
 
 
-class Walker:
-    """Takes the place of the evaluator's walker."""
+class StepGenerator:
+    """Takes the place of the evaluator's generator."""
 
-    waits = walker.Walker.waits
-    latest_k = walker.Walker.latest_k
-    write = walker.Walker.write
+    waits = step_generator.StepGenerator.waits
+    latest_kiticks = step_generator.StepGenerator.latest_kiticks
+    write = step_generator.StepGenerator.write
 
     def __init__(self):
         self.ended = True
         self.at_turn = False
         self.direction = 1
-        self.state = array("i", bytes(4 * stretch.STATE_SIZE))
+        self.queue = array("i", bytes(4 * step_queue.QUEUE_SIZE))
 
-    def lend(self):
-        """Nothing to lend."""
+    subintervals = None
 
     def load(self, motion, joint, position, pulse, gap):
         """Stand before the first step."""
         self._steps = motion.joints[joint]
         self._place = [0, 0]
-        state = self.state
-        state[stretch.PULSE] = pulse
-        state[stretch.STEPS] = state[stretch.LATEST_1024] = 0
-        state[stretch.OUT] = state[stretch.IN]
+        state = self.queue
+        state[step_queue.PULSE] = pulse
+        state[step_queue.STEPS] = state[step_queue.LATEST_KITICKS] = 0
+        state[step_queue.OUT] = state[step_queue.IN]
         self.at_turn = False
         first = self._steps.at(self._place)
         self.ended = first is None
         self.direction = 1 if first is None else first[1]
 
-    def next_1024(self):
+    def next_kiticks(self):
         """Time of the next step, in 1024 ticks."""
-        return stretch.upcoming(self.state)
+        return step_queue.next_kiticks(self.queue)
 
     def turn(self):
         """Go on in the other direction."""
@@ -88,9 +88,9 @@ class Walker:
         self.at_turn = False
 
     def prepare(self, until):
-        """Queue steps as the evaluator's walker does: the first of a block by itself, the others in stretches."""
-        self.state[stretch.UNTIL_1024] = until
-        while not self.ended and not self.at_turn and stretch.wanted(self.state):
+        """Queue steps as the evaluator's does: the first of a block by itself, the others as cubics."""
+        self.queue[step_queue.UNTIL_KITICKS] = until
+        while not self.ended and not self.at_turn and step_queue.has_room(self.queue):
             time, direction = self._steps.at(self._place)
             if direction != self.direction:
                 self.at_turn = True
@@ -99,22 +99,22 @@ class Walker:
             steps = 1
             if self._place[1]:
                 steps = max(1, min(count - self._place[1], 1024, (1 << 27) // gap))
-            stretch.single(self.state, (time >> 12) + points.BIAS, time & 4095)
+            step_queue.put_single(self.queue, (time >> 12) + bezier.BIAS, time & 4095)
             if steps > 1:
                 self._lengthen(time, gap, steps)
             self._steps.go_on(self._place, steps)
             self.ended = self._steps.at(self._place) is None
 
     def _lengthen(self, time, gap, steps):
-        """The stretch queued last has so many steps, all as far apart."""
-        state = self.state
-        place = SLOTS + 13 * ((state[stretch.IN] - 1) % stretch.QUEUE_ROOM)
+        """The item queued last has so many steps, all as far apart."""
+        state = self.queue
+        place = SLOTS + 13 * ((state[step_queue.IN] - 1) % step_queue.CAPACITY)
         base = (time - gap) & 0xFFFFFFFF
         base -= base >> 31 << 32
         words = (0, gap, 1 << 29, 1 << 29, 0, 0, base, 0, 0, 16, 0, steps, (time - gap) >> 10)
         for word, value in enumerate(words):
             state[place + word] = value
-        state[stretch.LATEST_1024] = (time + (steps - 1) * gap) >> 10
+        state[step_queue.LATEST_KITICKS] = (time + (steps - 1) * gap) >> 10
 
 
 class Pulses:
@@ -197,12 +197,13 @@ class Evaluator:
 
     refusal = None
     offset = 0
-    Walker = Walker
+    StepGenerator = StepGenerator
 
     @staticmethod
     def check(motion, joints, gap_ticks, parts):
         """The refusal that a test has set."""
-        return Evaluator.refusal
+        if Evaluator.refusal:
+            raise Refused(*Evaluator.refusal)
 
     @staticmethod
     def duration_ticks(motion):
@@ -227,23 +228,24 @@ class Rig:
         self.board = standalone.start()
         self.board.observers.append(self)
         self._zero = 0
-        import armtempo_board.check
-        import armtempo_board.engine
-        import armtempo_board.joint
-        from armtempo_board import pins
+        import armtempo_board.motion.engine
+        import armtempo_board.motion.joint_drive
+        import armtempo_board.motion.motion_check
+        from armtempo_board import heap
+        from armtempo_board.hardware import pins
 
         if planned:
-            armtempo_board.joint.Walker = Walker
-            armtempo_board.ends = Evaluator
-            armtempo_board.check.check = Evaluator.check
-            armtempo_board.engine.forget = lambda: None  # what stands in for the evaluator stays
+            armtempo_board.motion.joint_drive.StepGenerator = StepGenerator
+            armtempo_board.motion.endpoints = Evaluator
+            armtempo_board.motion.motion_check.check = Evaluator.check
+            heap.forget = lambda: None  # what stands in for the evaluator stays
         self.arm = machine_state.arm = motors.ArmOnPins(self.board, pins, lambda: (self.head, joints), 1, ())
         self.pins = pins
         self.pulses = [
-            Pulses(self, joint, pins.STEP[joint["channel"]][0], pins.STEP[joint["channel"]][6])
+            Pulses(self, joint, pins.STEP[joint["channel"]][0], pins.DIR[joint["channel"]])
             for joint in joints
         ]
-        self.engine = armtempo_board.engine.Engine(self.head, joints)
+        self.engine = armtempo_board.motion.engine.Engine(self.head, joints)
         self.engine.home((1 << len(joints)) - 1, [0] * len(joints))
 
     # a world for the board
@@ -268,9 +270,16 @@ class Rig:
         self.samples = []
         for pulses, steps in zip(self.pulses, motion.joints):
             pulses.expect(steps)
-        refused = self.engine.load(motion)
-        assert refused is None, refused
+        self.engine.load(motion)
         self.engine.start(homing)
+
+    def refusal(self, motion):
+        """(code, joint, value) where it cannot be loaded, else None."""
+        try:
+            self.engine.load(motion)
+        except Refused as refused:
+            return refused.code, refused.joint, refused.value
+        return None
 
     def trusting(self):
         """The steps of this motion are not planned here: do not watch them."""

@@ -323,6 +323,6 @@ def replace(settings):
 def hook(core):
     """Take the place of two of the program's functions; the settings say what it calls them."""
     here["core"] = core
-    for name, function in (("matches", matches), ("enter", enter)):
+    for name, function in (("matches", matches), ("set_interval", enter)):
         programs.append(getattr(core, here[name]))
         setattr(core, here[name], function)

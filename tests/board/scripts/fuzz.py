@@ -14,9 +14,10 @@ import stand_in
 
 stand_in.install()
 
-import armtempo_board.app  # noqa: E402
-from armtempo_board import frames, link, store  # noqa: E402
-from armtempo_board.app import App  # noqa: E402
+from armtempo_board import heap  # noqa: E402
+from armtempo_board.app.app import App  # noqa: E402
+from armtempo_board.link import frame_reader, serial_link  # noqa: E402
+from armtempo_board.storage import store  # noqa: E402
 from armtempo_shared import wire  # noqa: E402
 from armtempo_shared.table import rows  # noqa: E402
 
@@ -26,9 +27,9 @@ IDS = [row[1] for row in rows("C")]
 
 
 def speed_up():
-    """On CPython: the same as the viper functions in ``octets``, by its own fast means."""
+    """On CPython: the same as the viper functions in ``buffers``, by its own fast means."""
 
-    def seal(table, data, places, there):
+    def apply_crc(table, data, places, there):
         start, end = places & 0x7FFF, places >> 15
         crc = crc32(memoryview(data)[start:end])
         if not there:
@@ -39,7 +40,8 @@ def speed_up():
         to, at = places & 0x7FFF, places >> 15
         target[to : to + count] = source[at : at + count]
 
-    frames.seal, frames.copy, link.seal, link.copy = seal, copy, seal, copy
+    frame_reader.apply_crc = serial_link.apply_crc = apply_crc
+    frame_reader.copy = serial_link.copy = copy
 
 
 class Stream:
@@ -118,7 +120,7 @@ def board():
     """A configured and homed board with "feed" stored, on a flash in memory."""
     chip = flash.Flash()
     store.os, store.open = chip, chip.open
-    armtempo_board.app.forget = lambda: None  # a store that is imported anew would be on the real flash
+    heap.forget = lambda: None  # a store that is imported anew would be on the real flash
     port = stand_in.Port()
     app = App(port, "/flash")
     host = stand_in.Host(app, port)
@@ -159,7 +161,7 @@ while given < FRAMES:
             idle += 1
             stand_in.Clock.now_ms += 1
         app.link.flush()
-    assert app.engine.calls.count("start") == 0, "a motion started"
-    assert app.fault() == 0
+    assert app.controller.engine.calls.count("start") == 0, "a motion started"
+    assert app.controller.fault() == 0
 print(given, acted, app.link.reader.bad)
 print(len([n for n in IDS if reached.get(n)]) == len(IDS))

@@ -5,13 +5,13 @@ Arguments: motion records. Prints how many parts were compared, and the deepest 
 
 import sys
 
-from armtempo_board import cell
-from armtempo_board.parts import Parts
+from armtempo_board.stepgen import subdivision
+from armtempo_board.stepgen.subintervals import Subintervals
 from armtempo_shared.motion import Motion
 
 DEEPEST = 14
 LOW = (1 << 28) - 1
-ROOT = cell.PIECES_SIZE - 13
+ROOT = subdivision.PIECES_SIZE - 13
 
 
 def halved(pieces, node, level):
@@ -32,8 +32,8 @@ def walk(motion, joint, parts, number):
     """Split and skip by chance; the numbers of parts, and the deepest level."""
     parts.load(motion, joint)
     count = deepest = 0
-    while parts.bring():
-        node, level = parts.time_local[cell.NODE], parts.angle_local[cell.LEVEL]
+    while parts.measure():
+        node, level = parts.time_measures[subdivision.NODE], parts.angle_measures[subdivision.LEVEL]
         assert node >> level == 1
         for pieces in (parts.angle, parts.time):
             assert list(pieces)[:12] == halved(pieces, node, level), (joint, node, level)
@@ -49,7 +49,7 @@ def walk(motion, joint, parts, number):
 
 def main(*records):
     """All joints of all records with the same buffers, as the board reuses them."""
-    parts = Parts()
+    parts = Subintervals()
     found = []
     for number, record in enumerate(records):
         with open(record, "rb") as file:

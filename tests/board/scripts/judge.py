@@ -2,7 +2,8 @@
 
 import sys
 
-from armtempo_board.check import check
+from armtempo_board.errors import Refused
+from armtempo_board.motion.motion_check import check
 from armtempo_shared.motion import Motion
 
 
@@ -12,7 +13,10 @@ def main(low, high, rate, gap, *records):
     for record in records:
         with open(record, "rb") as file:
             motion = Motion(file.read())
-        print(check(motion, [row] * motion.joints, int(gap)))
+        try:
+            print(check(motion, [row] * motion.joints, int(gap)))
+        except Refused as refused:
+            print((refused.code, refused.joint, refused.value))
 
 
 main(*sys.argv[1:])

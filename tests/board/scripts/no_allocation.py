@@ -15,13 +15,19 @@ from array import array
 import pyb
 import stm
 from arm_rows import HEAD, arm
-from armtempo_board import access, check, registers  # noqa: F401  they are forgotten again: not counted
-from armtempo_board.engine import Engine
+from armtempo_board.hardware import isr, registers  # noqa: F401  they are forgotten again: not counted
+from armtempo_board.motion import motion_check  # noqa: F401  they are forgotten again: not counted
+from armtempo_board.motion.engine import Engine
 from armtempo_shared import armrecord  # noqa: F401
 from brake_motion import BRAKE_TICKS, record
 
 STEP_TICKS = 30_000
 BUFFER = array("i", [0] * 8)
+
+
+def compare_of(ring):
+    """Word of the ring's compare register in its timer."""
+    return ring._block[ring._at + isr.CCR_AT]
 
 
 class Streams:
@@ -34,16 +40,16 @@ class Streams:
     def play(self, now):
         """Let match what lies before ``now`` (ticks, modulo 2**32)."""
         ring = self.ring
-        at = (ring._registers - stm.DMA1) // 4 + access.STREAM_NDTR
+        at = (ring._registers - stm.DMA1) // 4 + isr.STREAM_NDTR
         dma = stm.BLOCKS["DMA1"]
         timer = stm.BLOCKS["TIM5" if ring.timer == stm.TIM5 else "TIM2"]
-        if not dma[at - 1] & 1 or not timer[access.DIER] >> (8 + ring._compare - access.CCR1 + 1) & 1:
+        if not dma[at - 1] & 1 or not timer[isr.DIER] >> (8 + compare_of(ring) - isr.CCR1 + 1) & 1:
             return
         entries = ring.entries
         loads = (entries - dma[at]) % entries
-        while (now - timer[ring._compare]) & 0xFFFFFFFF < 1 << 31:
+        while (now - timer[compare_of(ring)]) & 0xFFFFFFFF < 1 << 31:
             loads += 1
-            timer[ring._compare] = ring.words[(loads - 1) % entries + 1]
+            timer[compare_of(ring)] = ring.words[(loads - 1) % entries + 1]
             self.matched += 1
         dma[at] = (entries - loads) % entries or entries
 
@@ -51,21 +57,21 @@ class Streams:
 def move_to(now, streams):
     """All that the hardware does until ``now``, the compare interrupt at its time."""
     timer = stm.BLOCKS["TIM2"]
-    while timer[access.DIER] & 16 and (now - timer[access.CCR4]) & 0xFFFFFFFF < 1 << 30:
-        show((timer[access.CCR4] + 200) & 0xFFFFFFFF, streams)
+    while timer[isr.DIER] & 16 and (now - timer[isr.CCR4]) & 0xFFFFFFFF < 1 << 30:
+        show((timer[isr.CCR4] + 200) & 0xFFFFFFFF, streams)
         locked(pyb.Timer.callbacks[2, 4], 4)
     show(now & 0xFFFFFFFF, streams)
-    if stm.BLOCKS["TIM6"][access.CR1] & 1:
+    if stm.BLOCKS["TIM6"][isr.CR1] & 1:
         locked(pyb.Timer.callbacks[6, 0], 6)
 
 
 def show(counter, streams):
     """Bring the registers to a time."""
     for name in ("TIM2", "TIM5"):
-        stm.BLOCKS[name][access.CNT] = counter
+        stm.BLOCKS[name][isr.CNT] = counter
     for stream in streams:
         stream.play(counter)
-    stm.BLOCKS["TIM1"][access.CNT] = streams[0].matched // 2 * 5 // 16 & 0xFFFF
+    stm.BLOCKS["TIM1"][isr.CNT] = streams[0].matched // 2 * 5 // 16 & 0xFFFF
 
 
 def locked(function, argument=None):
@@ -81,20 +87,19 @@ def locked(function, argument=None):
 
 def run(joints, brake_at):
     """A whole motion, braked at a time (or not)."""
-    stm.BLOCKS["TIM1"][access.CNT] = 0
+    stm.BLOCKS["TIM1"][isr.CNT] = 0
     engine = Engine(HEAD, joints)
     engine.home(7, [0, 0, 0])
     motion = record(BRAKE_TICKS)
-    refused = engine.load(motion)
-    assert refused is None, refused
+    engine.load(motion)
     streams = [Streams(joint.ring) for joint in engine._joints]
-    now = stm.BLOCKS["TIM2"][access.CNT] - (1 << 32)
+    now = stm.BLOCKS["TIM2"][isr.CNT] - (1 << 32)
     engine.moving = True
     samples = 0
     while engine.moving:
         now += STEP_TICKS
         move_to(now, streams)
-        if engine._block[access.DONE] or (brake_at and now > brake_at):
+        if engine._block[isr.SAMPLES_DONE] or (brake_at and now > brake_at):
             engine.brake() if brake_at else engine.service()
             brake_at = 0
         else:

@@ -6,7 +6,7 @@ from virtual_board import standalone
 
 standalone.start(flash=sys.argv[1], program=sys.path[:])
 
-from armtempo_board import pins  # noqa: E402
+from armtempo_board.hardware import pins  # noqa: E402
 from virtual_board import setup  # noqa: E402
 
 setup.connect(pins)

@@ -4,11 +4,12 @@ from array import array
 
 import uctypes
 import virtual_board.standalone  # noqa: F401
-from armtempo_board import access, stretch
-from armtempo_board.ring import size
+from armtempo_board.hardware import isr
+from armtempo_board.hardware.ring import size
+from armtempo_board.stepgen import step_queue
 from engine_rig import cases
 
-BLOCK = access.BLOCK_HEAD + 6 * access.JOINT_WORDS
+BLOCK = isr.BLOCK_HEAD + 6 * isr.JOINT_WORDS
 
 
 def words(count):
@@ -17,8 +18,8 @@ def words(count):
 
 def ring_state(entries):
     """The state of a ring with so many entries."""
-    state = words(access.STATE_WORDS)
-    state[access.MASK] = entries - 1
+    state = words(isr.STATE_WORDS)
+    state[isr.MASK] = entries - 1
     return state
 
 
@@ -26,31 +27,31 @@ def counting_matches():
     """NDTR counts down and starts again; every match is counted whatever the number since the last look."""
     for entries, first in ((1024, 1024), (1024, 1023), (64, 64), (128, 127)):
         state, dma = ring_state(entries), words(60)
-        state[access.FIRST] = first
-        state[access.NDTR_AT] = 35
+        state[isr.NDTR_AT_START] = first
+        state[isr.NDTR_AT] = 35
         total = 0
         for jump in (0, 1, 2, entries - 1, 0, entries // 2 - 1, entries - 1, entries - 24, 7) * 3:
             total += jump
             dma[35] = (first - total) % entries or entries
-            assert access.matches(state, dma) == total
-            state[access.LOADS] = total
+            assert isr.matches(state, dma) == total
+            state[isr.MATCHED] = total
 
 
 def ready(entries, made, matched, last, now):
     """A block whose second joint has a fed ring, the ring's state in it, DMA, timer."""
     block, dma, timer = words(BLOCK), words(60), words(18)
-    block[access.JOINTS] = 2
-    block[access.PULSE] = 100
-    at = access.BLOCK_HEAD + access.JOINT_WORDS + access.RING
-    state = memoryview(block)[at : at + access.STATE_WORDS]
-    state[access.MASK] = entries - 1
-    state[access.FIRST] = entries
-    state[access.NDTR_AT] = 35
-    state[access.MADE] = made
-    state[access.FED] = 1
-    state[access.LAST] = last & 0xFFFFFFFF
+    block[isr.JOINTS] = 2
+    block[isr.PULSE_TICKS] = 100
+    at = isr.BLOCK_HEAD + isr.JOINT_WORDS + isr.RING
+    state = memoryview(block)[at : at + isr.STATE_WORDS]
+    state[isr.MASK] = entries - 1
+    state[isr.NDTR_AT_START] = entries
+    state[isr.NDTR_AT] = 35
+    state[isr.WRITTEN] = made
+    state[isr.FED] = 1
+    state[isr.LAST_TIME] = last & 0xFFFFFFFF
     dma[35] = (entries - matched) % entries or entries
-    timer[access.CNT] = now & 0xFFFFFFFF
+    timer[isr.CNT] = now & 0xFFFFFFFF
     return block, state, dma, timer
 
 
@@ -73,38 +74,38 @@ def when_to_write():
     ):
         block, state, dma, timer = ready(entries, made, matched, last, now)
         if matched > entries:
-            state[access.LOADS] = matched - entries // 2
-        assert access.hungry(block, dma, timer) == 2 * hungry, (made, matched, last, now)
-        assert state[access.FED] == fed
-        assert state[access.LOADS] == matched
+            state[isr.MATCHED] = matched - entries // 2
+        assert isr.rings_to_refill(block, dma, timer) == 2 * hungry, (made, matched, last, now)
+        assert state[isr.FED] == fed
+        assert state[isr.MATCHED] == matched
         if hungry:
-            assert state[access.ROOM] == min(entries - 8 - (made - matched), 512)
+            assert state[isr.ROOM] == min(entries - 8 - (made - matched), 512)
         if not fed:
-            assert access.hungry(block, dma, timer) == -1
-        block[access.FROZEN] = 1
-        assert access.hungry(block, dma, timer) == -1
+            assert isr.rings_to_refill(block, dma, timer) == -1
+        block[isr.FROZEN] = 1
+        assert isr.rings_to_refill(block, dma, timer) == -1
 
 
 def written_and_wrapped():
     """The far-away entry stands behind the newest, the first word is repeated behind the end; too late is told."""
     for entries in (64, 256, 1024):
         _, state, _, timer = ready(entries, 0, 0, 1000, 0)
-        queue = words(stretch.STATE_SIZE)
-        queue[stretch.PULSE] = 100
+        queue = words(step_queue.QUEUE_SIZE)
+        queue[step_queue.PULSE] = 100
         ring = words(entries + 1)
         made = 0
         for count in (2, entries - 24, 20, 2, entries - 16, 16, 2, 0):
-            before = state[access.LAST]
+            before = state[isr.LAST_TIME]
             for n in range(count):
                 ring[(made + n) % entries] = (made + n) * 3_000_000 & 0xFFFFFFFF
-            queue[stretch.HEAD] = made + count
-            timer[access.CNT] = (before - 100 + (count == 20)) & 0xFFFFFFFF
-            assert access.written(state, ring, timer, queue) == (count == 20)
+            queue[step_queue.HEAD] = made + count
+            timer[isr.CNT] = (before - 100 + (count == 20)) & 0xFFFFFFFF
+            assert isr.note_written(state, ring, timer, queue) == (count == 20)
             made += count
             last = (made - 1) * 3_000_000 & 0xFFFFFFFF
-            assert state[access.MADE] == made
-            assert state[access.LAST] == last
-            assert ring[made % entries] == last ^ 0x80000000 == state[access.FAR]
+            assert state[isr.WRITTEN] == made
+            assert state[isr.LAST_TIME] == last
+            assert ring[made % entries] == last ^ 0x80000000 == state[isr.FAR_TIME]
             assert ring[entries] == ring[0]
 
 
@@ -124,96 +125,96 @@ def times_across_the_wrap():
     timer = words(18)
     times = words(1)
     for now in (0, 5, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, 0xFFFFF000):
-        timer[access.CNT] = now
-        assert access.clock_k(timer) == now >> 10
-        for gap_k in (0, 1, 16, 1000, (1 << 21) - 1, -1, -16, -(1 << 20)):
-            times[0] = (now + 1024 * gap_k) & 0xFFFFFFFF
-            assert access.until_k(timer, times, 0) == gap_k, (now, gap_k)
+        timer[isr.CNT] = now
+        assert isr.counter_kiticks(timer) == now >> 10
+        for gap_kiticks in (0, 1, 16, 1000, (1 << 21) - 1, -1, -16, -(1 << 20)):
+            times[0] = (now + 1024 * gap_kiticks) & 0xFFFFFFFF
+            assert isr.kiticks_until(timer, times, 0) == gap_kiticks, (now, gap_kiticks)
 
 
 def due_or_not():
     """Turns and samples at, before and after the present, around the wrap; the soonest is armed."""
     for now in (0, 1000, 0x7FFFFFF0, 0xFFFFFFF0):
-        block, timer, port, state = words(BLOCK), words(18), words(8), words(access.STATE_WORDS)
-        block[access.JOINTS] = 2
-        block[access.SLACK] = 100
-        timer[access.CNT] = now
+        block, timer, port, state = words(BLOCK), words(18), words(8), words(isr.STATE_WORDS)
+        block[isr.JOINTS] = 2
+        block[isr.TURN_SLACK_TICKS] = 100
+        timer[isr.CNT] = now
         for joint in range(2):
-            block[access.BLOCK_HEAD + joint * access.JOINT_WORDS + access.DIR_BIT] = 1 << (7 + joint)
-        second = access.BLOCK_HEAD + access.JOINT_WORDS
-        block[access.NEXT] = (now + 900) & 0xFFFFFFFF
-        state[access.LAST] = (now - 50) & 0xFFFFFFFF
-        assert access.add_turn(block, state, access.BLOCK_HEAD, 50)
-        assert access.add_turn(block, state, second, 51)
-        assert access.add_turn(block, state, second, 400)
-        assert access.serve(block, timer, port) == 0
-        assert port[access.BSRR] == 1 << 7
-        port[access.ODR] = 1 << 7
-        assert timer[access.CCR4] == (now + 1) & 0xFFFFFFFF
-        timer[access.CNT] = (now + 20) & 0xFFFFFFFF
-        assert access.serve(block, timer, port) == 0
-        assert port[access.BSRR] == 1 << 8
-        port[access.ODR] = 3 << 7
-        assert timer[access.CCR4] == (now + 350) & 0xFFFFFFFF
-        assert block[access.LATE] == 0
-        timer[access.CNT] = (now + 460) & 0xFFFFFFFF
-        assert access.serve(block, timer, port) == 0
-        assert port[access.BSRR] == 1 << (8 + 16)
-        assert block[access.LATE] == 1
-        timer[access.CNT] = (now + 900) & 0xFFFFFFFF
-        assert access.serve(block, timer, port) == 1
-        assert block[access.NOW] == timer[access.CNT]
+            block[isr.BLOCK_HEAD + joint * isr.JOINT_WORDS + isr.DIR_BIT] = 1 << (7 + joint)
+        second = isr.BLOCK_HEAD + isr.JOINT_WORDS
+        block[isr.NEXT_SAMPLE] = (now + 900) & 0xFFFFFFFF
+        state[isr.LAST_TIME] = (now - 50) & 0xFFFFFFFF
+        assert isr.add_turn(block, state, isr.BLOCK_HEAD, 50)
+        assert isr.add_turn(block, state, second, 51)
+        assert isr.add_turn(block, state, second, 400)
+        assert isr.serve_compare(block, timer, port) == 0
+        assert port[isr.BSRR] == 1 << 7
+        port[isr.ODR] = 1 << 7
+        assert timer[isr.CCR4] == (now + 1) & 0xFFFFFFFF
+        timer[isr.CNT] = (now + 20) & 0xFFFFFFFF
+        assert isr.serve_compare(block, timer, port) == 0
+        assert port[isr.BSRR] == 1 << 8
+        port[isr.ODR] = 3 << 7
+        assert timer[isr.CCR4] == (now + 350) & 0xFFFFFFFF
+        assert block[isr.TURN_LATE] == 0
+        timer[isr.CNT] = (now + 460) & 0xFFFFFFFF
+        assert isr.serve_compare(block, timer, port) == 0
+        assert port[isr.BSRR] == 1 << (8 + 16)
+        assert block[isr.TURN_LATE] == 1
+        timer[isr.CNT] = (now + 900) & 0xFFFFFFFF
+        assert isr.serve_compare(block, timer, port) == 1
+        assert block[isr.NOW] == timer[isr.CNT]
 
 
 def turn_queue():
     """Eight turns fit; the ninth waits."""
-    block, state = words(BLOCK), words(access.STATE_WORDS)
-    for n in range(access.TURN_ROOM):
-        state[access.LAST] = 1000 * n
-        assert access.add_turn(block, state, access.BLOCK_HEAD, 5)
-    assert not access.add_turn(block, state, access.BLOCK_HEAD, 5)
-    block[access.BLOCK_HEAD + access.TURNS_OUT] = 1
-    assert access.add_turn(block, state, access.BLOCK_HEAD, 5)
+    block, state = words(BLOCK), words(isr.STATE_WORDS)
+    for n in range(isr.TURN_ROOM):
+        state[isr.LAST_TIME] = 1000 * n
+        assert isr.add_turn(block, state, isr.BLOCK_HEAD, 5)
+    assert not isr.add_turn(block, state, isr.BLOCK_HEAD, 5)
+    block[isr.BLOCK_HEAD + isr.TURNS_OUT] = 1
+    assert isr.add_turn(block, state, isr.BLOCK_HEAD, 5)
 
 
 def sample_times():
     """From 0 in steps of a tenth of a second to the end; raw samples that find no room are counted."""
-    block, raw, dma, encoder = words(BLOCK), words(access.RAW_ROOM * access.RAW_WORDS), words(60), words(18)
-    at = access.BLOCK_HEAD + access.RING
-    block[at + access.MASK] = 63
-    block[at + access.FIRST] = 64
-    block[at + access.NDTR_AT] = 35
-    block[at + access.LOADS] = 60
-    block[access.JOINTS] = 1
-    block[access.ENCODERS] = 1
-    block[access.LEFT] = 3
-    block[access.END] = 20_000_000
+    block, raw, dma, encoder = words(BLOCK), words(isr.RAW_ROOM * isr.RAW_WORDS), words(60), words(18)
+    at = isr.BLOCK_HEAD + isr.RING
+    block[at + isr.MASK] = 63
+    block[at + isr.NDTR_AT_START] = 64
+    block[at + isr.NDTR_AT] = 35
+    block[at + isr.MATCHED] = 60
+    block[isr.JOINTS] = 1
+    block[isr.ENCODERS] = 1
+    block[isr.SAMPLES_LEFT] = 3
+    block[isr.LAST_SAMPLE] = 20_000_000
     dma[35] = 51
-    encoder[access.CNT] = 65535
+    encoder[isr.CNT] = 65535
     times = []
     for n in range(4):
-        times.append(block[access.NEXT])
-        assert not block[access.DONE]
-        block[access.NOW] = 1000 + n
-        access.take(raw, block, dma, (uctypes.addressof(encoder),))
+        times.append(block[isr.NEXT_SAMPLE])
+        assert not block[isr.SAMPLES_DONE]
+        block[isr.NOW] = 1000 + n
+        isr.take_sample(raw, block, dma, (uctypes.addressof(encoder),))
     assert times == [0, 8_400_000, 16_800_000, 20_000_000]
-    assert block[access.DONE]
+    assert block[isr.SAMPLES_DONE]
     assert list(raw[11:13]) == [1001, 77] and raw[18] == 65535
     for _ in range(20):
-        access.take(raw, block, dma, (uctypes.addressof(encoder),))
-    assert (block[access.TAKEN], block[access.LOST]) == (access.RAW_ROOM, 24 - access.RAW_ROOM)
+        isr.take_sample(raw, block, dma, (uctypes.addressof(encoder),))
+    assert (block[isr.RAW_IN], block[isr.RAW_LOST]) == (isr.RAW_ROOM, 24 - isr.RAW_ROOM)
     assert raw[0] == 1000
 
 
 def late_first_step():
     """A channel is armed only while its first edge lies ahead, and behind a DIR turn and its set-up."""
     block, timer, ring = words(BLOCK), words(18), words(1)
-    at = access.BLOCK_HEAD
-    block[at + access.CCR_AT] = access.CCR1 + 1
-    block[at + access.CCMR_AT] = access.CCMR1
-    block[at + access.MODE_SHIFT] = 12
-    block[access.SETUP] = 420
-    timer[access.CNT] = 0xFFFFFFF0
+    at = isr.BLOCK_HEAD
+    block[at + isr.CCR_AT] = isr.CCR1 + 1
+    block[at + isr.CCMR_AT] = isr.CCMR1
+    block[at + isr.MODE_SHIFT] = 12
+    block[isr.DIR_SETUP_TICKS] = 420
+    timer[isr.CNT] = 0xFFFFFFF0
     for first, turn, late in (
         (200, None, 0),
         (0xFFFFFFF0 + 84, None, 0),
@@ -223,21 +224,21 @@ def late_first_step():
         (1000, 581, 1),
         (1000, 0xFFFFFFFF, 0),
     ):
-        block[at + access.TURNS_IN] = block[at + access.TURNS_OUT] = 0
+        block[at + isr.TURNS_IN] = block[at + isr.TURNS_OUT] = 0
         if turn is not None:
-            block[at + access.TURN_TIMES] = turn
-            block[at + access.TURNS_IN] = 1
+            block[at + isr.TURN_TIMES] = turn
+            block[at + isr.TURNS_IN] = 1
         ring[0] = first & 0xFFFFFFFF
-        timer[access.CCMR1] = 4 << 4 | 4 << 12
-        timer[access.DIER] = 1 << 4
-        assert access.arm_channel(block, timer, ring, at) == late, (first, turn)
+        timer[isr.CCMR1] = 4 << 4 | 4 << 12
+        timer[isr.DIER] = 1 << 4
+        assert isr.arm_channel(block, timer, ring, at) == late, (first, turn)
         if not late:
-            assert timer[access.CCR1 + 1] == ring[0]
-            assert timer[access.CCMR1] == 4 << 4 | 3 << 12
-            assert timer[access.DIER] == 1 << 4 | 1 << 10
-    access.release_channel(block, timer, at)
-    assert timer[access.CCMR1] == 4 << 4 | 4 << 12
-    assert timer[access.DIER] == 1 << 4
+            assert timer[isr.CCR1 + 1] == ring[0]
+            assert timer[isr.CCMR1] == 4 << 4 | 3 << 12
+            assert timer[isr.DIER] == 1 << 4 | 1 << 10
+    isr.release_channel(block, timer, at)
+    assert timer[isr.CCMR1] == 4 << 4 | 4 << 12
+    assert timer[isr.DIER] == 1 << 4
 
 
 def counters_in_step():
@@ -251,8 +252,8 @@ def counters_in_step():
         (1000, 1017, 0),
         (1000, 900, 0),
     ):
-        first[access.CNT], second[access.CNT] = a, b
-        assert access.in_step(first, second) == agree, (a, b)
+        first[isr.CNT], second[isr.CNT] = a, b
+        assert isr.counters_agree(first, second) == agree, (a, b)
 
 
 def towards_a_switch():
@@ -260,8 +261,8 @@ def towards_a_switch():
     pairs = array("I", [8, 7, 1, 0, 1, 8, 10, 0, 2, 1, 9, 7, 0, 0, 0])
     port = words(8)
     for line, levels, found in ((8, 1 << 7, 1), (8, 1 << 10, 0), (8, 0, 3), (9, 0, 0), (10, 1 << 7, 0)):
-        port[access.ODR] = levels
-        assert access.towards(pairs, 3, line, access.directions(port)) == found
+        port[isr.ODR] = levels
+        assert isr.joint_towards(pairs, 3, line, isr.output_levels(port)) == found
 
 
 cases(

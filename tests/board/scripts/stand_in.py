@@ -50,13 +50,13 @@ def install():
     ends = Module()
     ends.duration_ticks = lambda motion: 84000
     ends.start_offset = lambda motion, joint, position: 7 - position
-    import armtempo_board
+    from armtempo_board import heap
 
-    armtempo_board.forget = lambda: None  # what stands in for a module stays
+    heap.forget = lambda: None  # what stands in for a module stays
     sys.modules["machine"] = machine
     sys.modules["pyb"] = pyb
-    sys.modules["armtempo_board.engine"] = engine
-    sys.modules["armtempo_board.ends"] = ends
+    sys.modules["armtempo_board.motion.engine"] = engine
+    sys.modules["armtempo_board.motion.endpoints"] = ends
     sys.modules["time"] = _install_time()
     if not hasattr(sys, "print_exception"):
         sys.print_exception = lambda error, file: file.write(repr(error))
@@ -83,7 +83,10 @@ class Engine:
 
     def load(self, motion):
         self.calls.append("load")
-        return self.refusal
+        if self.refusal:
+            from armtempo_board.errors import Refused
+
+            raise Refused(*self.refusal)
 
     def start(self, homing=False):
         self.calls.append("start")

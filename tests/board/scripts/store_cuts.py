@@ -8,8 +8,8 @@ import stand_in
 
 stand_in.install()
 
-from armtempo_board import store  # noqa: E402
-from armtempo_board.refusal import Refused  # noqa: E402
+from armtempo_board.errors import Refused  # noqa: E402
+from armtempo_board.storage import store  # noqa: E402
 from armtempo_shared import codes, wire  # noqa: E402
 
 ARM = stand_in.arm()

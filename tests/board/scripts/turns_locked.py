@@ -10,7 +10,7 @@ import stand_in
 
 stand_in.install()
 
-from armtempo_board.app import App  # noqa: E402
+from armtempo_board.app.app import App  # noqa: E402
 from armtempo_shared import wire  # noqa: E402
 
 TURNS = 2000
@@ -97,7 +97,7 @@ for number in range(40):
 frames.append(b"noise" + frames[0][:-1] + b"x")
 frames.append(command(200, "home", 0) + command(201, "list", 0))
 app.link.stream = port = Port(frames)
-app.engine = Still()
+app.controller.engine = Still()
 app.turn()
 micropython.heap_lock()
 for turn in range(TURNS):
@@ -106,7 +106,7 @@ for turn in range(TURNS):
     stand_in.Clock.now_ms += 1
     app.turn()
 micropython.heap_unlock()
-assert app.fault() == 0, app.fault()
-assert app.samples.next > TURNS // 10 - 5
+assert app.controller.fault() == 0, app.controller.fault()
+assert app.controller.samples.next > TURNS // 10 - 5
 assert port.taken > TURNS
-print(app.samples.next, app.samples.first, port.taken)
+print(app.controller.samples.next, app.controller.samples.first, port.taken)

@@ -10,42 +10,43 @@ import sys
 from array import array
 
 import micropython
-from armtempo_board import check as checking
-from armtempo_board import rates
-from armtempo_board.walker import Walker
+from armtempo_board.errors import Refused
+from armtempo_board.motion import motion_check as checking
+from armtempo_board.motion import rate_check
+from armtempo_board.stepgen.step_generator import StepGenerator
 from armtempo_shared.motion import Motion
 
 MASK = 1023
 NEVER = 1 << 28
 checking.MAX_STEP_RATE = 333_000  # the evaluator is tried beyond what the program's loop keeps up with
-rates.MAX_STEP_RATE_SUM = 1_000_000
+rate_check.MAX_STEP_RATE_SUM = 1_000_000
 FREE = {"min_steps": -50000000, "max_steps": 50000000, "max_rate": 336330}
 
 
-def walk(motion, joint, walker, out, pulse, gap, room, start, length):
+def walk(motion, joint, generator, out, pulse, gap, room, start, length):
     """All steps of one joint; nothing may be allocated on the way."""
     ring = array("I", bytes(4 * (MASK + 1)))
-    walker.load(motion, joint, first_position(motion, joint), pulse, gap)
+    generator.load(motion, joint, first_position(motion, joint), pulse, gap)
     head = 0
     braked = not length
-    start_k = start >> 10
+    start_kiticks = start >> 10
     lock, unlock = heap_lock, heap_unlock
-    while walker.waits() or not walker.ended:
+    while generator.waits() or not generator.ended:
         lock()
-        if walker.at_turn and not walker.waits():
-            walker.turn()
-        walker.prepare(NEVER if braked else start_k)
-        near = walker.next_1024()
-        brake_now = not braked and near >= start_k
-        count = 0 if brake_now else walker.write(ring, MASK, head, room)
+        if generator.at_turn and not generator.waits():
+            generator.turn()
+        generator.prepare(NEVER if braked else start_kiticks)
+        near = generator.next_kiticks()
+        brake_now = not braked and near >= start_kiticks
+        count = 0 if brake_now else generator.write(ring, MASK, head, room)
         unlock()
         if brake_now:
-            walker.brake(start, length)
+            generator.brake(start, length)
             braked = True
         for i in range(0, count, 2):
             rise = ring[(head + i) & MASK]
             fall = ring[(head + i + 1) & MASK]
-            out.write(struct.pack("<iiiII", joint, walker.direction, near, rise, fall))
+            out.write(struct.pack("<iiiII", joint, generator.direction, near, rise, fall))
         head = (head + count) & MASK
 
 
@@ -58,16 +59,20 @@ def first_position(motion, joint):
 
 
 def main(pulse, gap, room, start, length, *records):
-    """Walk all with one walker, as the board reuses them."""
-    walker = Walker()
+    """Walk all with one generator, as the board reuses them."""
+    generator = StepGenerator()
     for record in records:
         with open(record, "rb") as file:
             motion = Motion(file.read())
-        wrong = checking.check(motion, [FREE] * motion.joints, int(gap))
+        wrong = None
+        try:
+            checking.check(motion, [FREE] * motion.joints, int(gap))
+        except Refused as refused:
+            wrong = (refused.code, refused.joint, refused.value)
         print(wrong)
         with open(record + ".steps", "wb") as out:
             for joint in range(0 if wrong else motion.joints):
-                walk(motion, joint, walker, out, int(pulse), int(gap), int(room), int(start), int(length))
+                walk(motion, joint, generator, out, int(pulse), int(gap), int(room), int(start), int(length))
 
 
 def nothing():

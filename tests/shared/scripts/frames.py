@@ -13,7 +13,7 @@ class Time:
 
 sys.modules["time"] = Time
 
-from armtempo_board.frames import FrameReader  # noqa: E402
+from armtempo_board.link.frame_reader import FrameReader  # noqa: E402
 
 
 class Stream:

@@ -288,7 +288,7 @@ def case_interrupt_dies(world):
     return trial.seen
 
 
-COUNTING = ("Joint._reset", "Ring.stop", "Joint.position")
+COUNTING = ("JointDrive._count_from", "Ring.stop", "JointDrive.position")
 """Functions between whose calls a joint's count is not what it should be."""
 
 

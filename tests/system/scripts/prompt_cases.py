@@ -12,7 +12,7 @@ GO = whole_board.read(FLASHES + "/finish/armtempo/go.atm")
 CONNECT = b"\r\x03"  # what mpremote sends first
 BITE_MS = 8000
 MOVES_TICKS = DURATION - 20_000_000
-RUNNING = "from armtempo_board import watchdog; print(watchdog.running())"
+RUNNING = "import machine; print(machine.mem32[0x40003008] & 0xFFF != 0xFFF)"  # the watchdog's reload value
 SEED = 20266
 
 
@@ -141,7 +141,7 @@ def case_the_program_goes_on_where_it_was_left(world):
     yield from world.ask("start", (0, wire.record_crc(GO)), "go")
     yield from world.still()
     yield from prompt(world)
-    world.type(b"from armtempo_board import program; program.main()\r")
+    world.type(b"from armtempo_board import start; start()\r")
     yield from world.hello(2)
     status = yield from world.status()
     assert (status["state"], status["run"], status["steps"]) == ("idle", 1, HOME)
@@ -171,10 +171,10 @@ def case_ctrl_c_stops_a_replay_wherever_it_comes(world):
     yield from world.home(HOME)
     yield from prompt(world)
     yield from typed(world, "import armtempo_board")
-    yield from typed(world, "from armtempo_board import program")
+    yield from typed(world, "program = armtempo_board.load_program()")
     for number in range(12):
         declared = world.steps()
-        yield from typed(world, "program.app.home(7, %s)" % HOME)
+        yield from typed(world, "program.app.controller.home(7, %s)" % HOME)
         world.type(b"armtempo_board.replay('go')\r")
         yield from world.until(lambda: machine_state.board.timers[2].running)
         yield from world.wait(numbers.randrange(0, 2300))

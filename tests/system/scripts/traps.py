@@ -46,7 +46,7 @@ class Trap:
 
 NEVER = (
     "fail", "freeze", "_freeze", "finish_pulses", "halt", "_stopped",  # what stops the outputs
-    "turn", "run", "_look_around",  # what catches exceptions
+    "turn", "run", "_serve_panel",  # what catches exceptions
     "arm_channel", "release_channel", "disable_irq", "enable_irq", "release",  # interrupts are off there
 )  # fmt: skip
 """What must not fail: nothing would be left to rely on."""

@@ -1,9 +1,9 @@
 """Make the board program small before it is compiled: what a module costs in a board's memory is largely names.
 
 MicroPython keeps every name that a file mentions, and 10 to 20 bytes for each place where a module holds one. So
-constants are put in where they are used (``constants``), the modules that are always needed become one
-(``merge``), the program's own names become short (``shorten``), and those that are used most come first
-(``order``). The behaviour of the program does not change.
+packages within packages go (``flatten``), constants are put in where they are used (``constants``), the modules that
+are always needed become one (``merge``), the program's own names become short (``shorten``), and those that are used
+most come first (``order``). The behaviour of the program does not change.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from armtempo.deploy.compact.constants import fold
+from armtempo.deploy.compact.flatten import flatten
 from armtempo.deploy.compact.frames import Functions, functions
 from armtempo.deploy.compact.merge import merge, used_whole
 from armtempo.deploy.compact.order import often_used_first
@@ -35,12 +36,12 @@ def compact(
     ``sources``: text by dotted module name, packages by their own. ``main``: what it needs at once becomes the
     module ``core`` of its package. ``entries``: modules that are imported from outside, ``main`` among them.
     ``keep``: names that must stay, as they are used from outside or made at run time. Raises ValueError where
-    a module asks another for a name that is not there.
+    a module asks another for a name that is not there, or a package cannot be made flat.
     """
-    trees = {module: _at_run_time(ast.parse(text)) for module, text in sources.items()}
+    trees, flat = flatten({module: _at_run_time(ast.parse(text)) for module, text in sources.items()})
     whole = used_whole(trees)
     fold(trees, whole)
-    merged = merge(trees, main, entries)
+    merged = merge(trees, flat[main], {flat[entry] for entry in entries})
     names = short_names(merged, keep, whole)
     known = functions(merged, names)
     shorten(merged, names)

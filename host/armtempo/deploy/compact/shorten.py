@@ -35,7 +35,7 @@ _TYPES = (
 _SHORTEST = 3
 """Shorter names are kept."""
 _BUILT_IN = """
-    abs all any append bool builtins bytearray bytecode bytes callable chr classmethod clear const copy count dict dir
+    abs all any append bool builtins bytearray bytecode bytes callable chr classmethod clear copy count dict dir
     divmod end endswith eval exec extend find format from_bytes get getattr globals hasattr hash id index insert int
     isalpha isdigit isinstance islower isspace issubclass isupper items iter join key len list little locals lower
     lstrip main map max min next object open ord pop popitem pow print range readline remove replace repr reverse
@@ -44,7 +44,8 @@ _BUILT_IN = """
 """
 """Names that every MicroPython has built in, so that they cost nothing: the format of .mpy files counts on them.
 
-Without those that MicroPython itself looks for in objects.
+Without those that MicroPython itself looks for in objects, and without ``const``, whose calls the compiler takes for
+declarations.
 """
 
 

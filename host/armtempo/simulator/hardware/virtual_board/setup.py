@@ -43,7 +43,7 @@ def learn(folders):
     """Load the pin table and the arm record's layout from the sources in ``folders``, whatever the board has."""
     path = list(sys.path)
     sys.path[0:0] = folders
-    from armtempo_board import pins
+    from armtempo_board.hardware import pins
 
     from virtual_board.arm import motors  # noqa: F401  with its armrecord
 

@@ -119,7 +119,7 @@ class ArmOnPins:
 
     def _motor(self, number, joint, enable):
         lines, pins = self.board.pins, self._pins
-        step, direction = pins.STEP[joint["channel"]][0], pins.STEP[joint["channel"]][6]
+        step, direction = pins.STEP[joint["channel"]][0], pins.DIR[joint["channel"]]
         encoder = None
         if joint["encoder"] < len(pins.ENCODER):
             encoder = self.board.timers[pins.ENCODER[joint["encoder"]][0]]

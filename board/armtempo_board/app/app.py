@@ -1,0 +1,101 @@
+"""The main loop of the board program: from the serial link over commands and controller to events and back.
+
+::
+
+    link ─▶ commands ─▶ controller ─▶ store, engine
+    link ◀─ events ◀─── controller ◀─ samples
+
+Whatever goes wrong in it freezes the engine and becomes a fault that stays until the host clears it.
+"""
+
+import io
+import sys
+import time
+
+from armtempo_shared import codes
+from micropython import const
+
+from armtempo_board import heap
+from armtempo_board.app.commands import Commands
+from armtempo_board.app.controller import Controller
+from armtempo_board.app.events import Events
+from armtempo_board.link.serial_link import SerialLink
+
+_EXTRA_SERVICES_PER_TURN = const(3)  # of the engine, while something moves
+_MOST_FAILURES = const(10)  # turns of the loop that fail one after the other; then the program gives up
+
+
+class App:
+    """Puts the parts together; ``stream`` is the serial port, ``root`` the folder of the store.
+
+    ``fault``: what is pending from the start, 0 for none.
+    """
+
+    def __init__(self, stream: object, root: str, program_crc: int = 0, fault: int = 0) -> None:
+        self.link = SerialLink(stream)
+        self.controller = Controller(root, program_crc, fault)
+        self.commands = Commands(self.controller, self.link)
+        self.events = Events(self.controller, self.link)
+        self.turns = self._failed = 0  # turns of the loop, and the last of them that failed
+        self._failures = 0
+        heap.forget()
+        self.controller.configure()
+
+    def enter(self) -> None:
+        """The program begins, perhaps again after it was left."""
+        self.commands.leaving = False
+        self.commands.greeted = False
+        self.link.forget()
+
+    def left(self) -> int:
+        """Whether a host has asked for the REPL, and the reply is out."""
+        return self.commands.leaving and self.link.idle()
+
+    def turn(self) -> None:
+        """One turn of the loop; an exception in it becomes a fault."""
+        self.turns = (self.turns + 1) & 0xFFFF
+        try:
+            self._turn()
+        except Exception as error:
+            self.fail(error)
+
+    def _turn(self) -> None:
+        controller = self.controller
+        link = self.link
+        if link.poll():
+            controller.refill()
+            self.commands.act()
+        if controller.engine:
+            controller.service(time.ticks_diff(time.ticks_ms(), link.heard_ms))
+            self.events.note_fault(controller.fault())
+        if self.commands.greeted and self.events.push():
+            controller.refill()
+        link.flush()
+        if link.escape:
+            self._escape()
+        for _ in range(_EXTRA_SERVICES_PER_TURN):
+            if controller.moving():
+                controller.engine.service()
+
+    def _escape(self) -> None:
+        self.link.escape = False
+        if not self.controller.moving():
+            self.link.forget()
+            self.commands.leaving = True
+
+    def fail(self, error: "BaseException") -> None:
+        """Freeze and keep the fault; raises where one turn after the other fails."""
+        again = (self.turns - self._failed) & 0xFFFF <= 1
+        self._failures = self._failures + 1 if again else 1
+        self._failed = self.turns
+        self.controller.fail()
+        self.events.note(_traceback(error))
+        self.events.note_fault(codes.INTERNAL)
+        if self._failures >= _MOST_FAILURES:
+            raise error
+
+
+def _traceback(error: "BaseException") -> str:
+    text = io.StringIO()
+    sys.print_exception(error, text)
+    return str(text.getvalue())

@@ -1,0 +1,33 @@
+"""The replay button, or a level on its pin: high starts the default motion."""
+
+import time
+
+from micropython import const
+from pyb import Pin
+
+_STEADY_MS = const(30)
+
+
+class Button:
+    """``pressed`` is True once for each press that lasts long enough."""
+
+    def __init__(self) -> None:
+        from armtempo_board.hardware import pins  # here, so that it can be forgotten
+
+        self._pin = Pin(pins.BUTTON, Pin.IN, Pin.PULL_DOWN)
+        self._high = True  # a level that is high from the start is no press
+        self._changed_ms = time.ticks_ms()
+
+    def held(self) -> bool:
+        """Whether it is down now."""
+        return bool(self._pin.value())
+
+    def pressed(self) -> bool:
+        """Whether it went down and has been steady since."""
+        now_ms = time.ticks_ms()
+        if self.held() == self._high:
+            self._changed_ms = now_ms
+        elif time.ticks_diff(now_ms, self._changed_ms) >= _STEADY_MS:
+            self._high = not self._high
+            return self._high
+        return False

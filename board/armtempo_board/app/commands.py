@@ -1,0 +1,222 @@
+"""What the board does for each command of the message table; refusals are raised as ``Refused``.
+
+While a motion runs only the commands of ``_WHILE_MOVING`` are taken, and all of them but ``hello`` allocate nothing.
+The commands about the store are in ``store_commands.py``, which is imported when one comes.
+"""
+
+from struct import calcsize, pack_into, unpack_from
+
+from armtempo_shared import codes, limits
+from armtempo_shared.messages import NO_JOINT, NUMBER_AT, PAYLOAD_AT, PROTOCOL_VERSION
+from micropython import const
+
+from armtempo_board.buffers import u32
+from armtempo_board.errors import Refused
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
+    from armtempo_board.app.controller import Controller
+    from armtempo_board.link.serial_link import SerialLink
+
+_WHILE_MOVING = ("hello", "status", "stop", "samples")
+_BYTES_PER_POSITION = const(4)
+_BYTES_OF_INDEX = const(4)  # of a sample
+_ANSWER_AT = const(6)  # in a reply: its payload begins with the command's number
+# a row of the commands: what acts on it, formats of its fields and of its answer's, its tail
+_HANDLER = const(0)
+_FIELDS = const(1)
+_ANSWER = const(2)
+_TAIL = const(3)
+
+
+class Commands:
+    """Acts on the frame in ``link.reader`` and leaves the reply with the link."""
+
+    def __init__(self, controller: "Controller", link: "SerialLink") -> None:
+        from armtempo_shared.table import offset, rows  # here, so that it can be forgotten
+
+        self.controller = controller
+        self.greeted = False  # a host has said hello
+        self.leaving = False  # a host has asked for the REPL
+        self._link = link
+        self._session = 0
+        self._table: "dict[int, Any]" = {}
+        while_moving = bytearray()
+        kept: "dict[str, str]" = {}  # one string for all that are equal, to save heap
+        for command, answer in zip(rows("C"), rows("A")):
+            name, number, fields, _, tail = command
+            _, _, values, _, _ = answer
+            handler = getattr(self, "_" + name, name)
+            self._table[number] = (
+                handler,
+                kept.setdefault(fields, fields),
+                kept.setdefault(values, values),
+                tail,
+            )
+            if name in _WHILE_MOVING:
+                while_moving.append(number)
+            if name == "hello":
+                self._hello_number = number
+        self._while_moving = bytes(while_moving)
+        self._ticks_at = _ANSWER_AT + offset("A", "status", "ticks")
+        (_, self._ok, _, _, _), (_, self._error, self._error_fields, _, _) = rows("R")
+
+    def act(self) -> None:
+        """Act on one command."""
+        number = self._link.reader.data[NUMBER_AT]
+        try:
+            self._dispatch(number)
+        except Refused as refused:
+            self._refuse(number, refused.code, refused.joint, refused.value)
+
+    def _dispatch(self, number: int) -> None:
+        row = self._table.get(number)
+        if row is None:
+            return self._refuse(number, codes.UNKNOWN_COMMAND)
+        length = self._link.reader.length()
+        fixed = calcsize(row[_FIELDS])
+        if length < fixed or (length > fixed and not row[_TAIL]):
+            return self._refuse(number, codes.MALFORMED)
+        if not self.greeted and number != self._hello_number:
+            return self._refuse(number, codes.NO_SESSION)
+        if self.controller.moving() and number not in self._while_moving:
+            return self._refuse(number, codes.BUSY)
+        self._link.reply[PAYLOAD_AT] = number
+        self.controller.refill()
+        handler = row[_HANDLER]
+        size = self._store(handler, row, length) if isinstance(handler, str) else handler(row, length)
+        self.controller.refill()
+        self._link.answer(self._ok, _ANSWER_AT - PAYLOAD_AT + (size or 0))
+
+    def _store(self, name: str, row: tuple, length: int) -> "int | None":
+        from armtempo_board.app import store_commands  # here, so that it can be forgotten
+
+        return getattr(store_commands, name)(self, row, length)  # type: ignore[no-any-return]
+
+    def _refuse(self, number: int, code: int, joint: int = NO_JOINT, value: int = 0) -> None:
+        pack_into(self._error_fields, self._link.reply, PAYLOAD_AT, number, code, joint, value)
+        self._link.answer(self._error, calcsize(self._error_fields))
+
+    # for those who act on a command
+
+    def fields(self, row: tuple) -> tuple:
+        """The fields of the command that stands in the reader."""
+        return unpack_from(row[_FIELDS], self._link.reader.data, PAYLOAD_AT)
+
+    def tail(self, row: tuple, length: int) -> bytes:
+        """What comes behind its fields."""
+        return bytes(self._link.reader.data[PAYLOAD_AT + calcsize(row[_FIELDS]) : PAYLOAD_AT + length])
+
+    def text(self, row: tuple, length: int) -> str:
+        """The same as text; refuses what is none."""
+        try:
+            return self.tail(row, length).decode()
+        except UnicodeError:
+            raise Refused(codes.MALFORMED)
+
+    def reply(self, row: tuple, *values: int) -> int:
+        """Put the fields of the answer into the reply; their size."""
+        pack_into(row[_ANSWER], self._link.reply, _ANSWER_AT, *values)
+        return calcsize(row[_ANSWER])
+
+    def reply_tail(self, size: int, tail: bytes) -> int:
+        """Put the tail of the answer behind fields of ``size`` bytes; the size of all."""
+        self._link.reply[_ANSWER_AT + size : _ANSWER_AT + size + len(tail)] = tail
+        return size + len(tail)
+
+    # session
+
+    def _hello(self, row: tuple, length: int) -> int:
+        protocol, session = self.fields(row)
+        if protocol != PROTOCOL_VERSION:
+            raise Refused(codes.PROTOCOL, value=PROTOCOL_VERSION)
+        if not self.greeted or session != self._session:
+            self._begin_session(session)
+        controller = self.controller
+        controller.measure_free()
+        size = self.reply(
+            row,
+            PROTOCOL_VERSION,
+            controller.joints,
+            limits.MAX_ENCODERS,
+            controller.state(),
+            limits.TICK_HZ,
+            limits.MAX_STEP_RATE,
+            limits.MAX_STEP_RATE_SUM,
+            controller.free_flash,
+            controller.free_heap,
+            controller.arm_crc,
+            controller.program_crc,
+            controller.boot,
+        )
+        return self.reply_tail(size, controller.board_id)
+
+    def _begin_session(self, session: int) -> None:
+        self.greeted = True
+        self._session = session
+        self._link.forget()
+        self.controller.samples.skip()
+        self.controller.forget_store()
+
+    def _status(self, row: tuple, length: int) -> int:
+        controller = self.controller
+        reply = self._link.reply
+        samples = controller.samples
+        pack_into(
+            row[_ANSWER],
+            reply,
+            _ANSWER_AT,
+            controller.state(),
+            controller.fault(),
+            controller.fault_joint(),
+            controller.known(),
+            controller.run_number,
+            0,
+            samples.next - samples.first,
+            samples.lost,
+            self._link.reader.bad,
+        )
+        size = calcsize(row[_ANSWER])
+        return size + controller.put_snapshot(reply, self._ticks_at, _ANSWER_AT + size)
+
+    def _leave(self, row: tuple, length: int) -> None:
+        self.leaving = True
+
+    # motion
+
+    def _home(self, row: tuple, length: int) -> None:
+        (mask,) = self.fields(row)
+        joints = self.controller.joints
+        self.controller.check_ready()
+        fixed = calcsize(row[_FIELDS])
+        if length - fixed != _BYTES_PER_POSITION * joints or mask >> joints:
+            raise Refused(codes.MALFORMED)
+        steps = unpack_from("<%di" % joints, self._link.reader.data, PAYLOAD_AT + fixed)
+        self.controller.home(mask, steps)
+
+    def _start(self, row: tuple, length: int) -> int:
+        flags, crc = self.fields(row)
+        name = self.text(row, length)
+        self.controller.begin(name, flags, crc)
+        return self.reply(row, self.controller.run_number, self.controller.duration_ticks)
+
+    def _stop(self, row: tuple, length: int) -> int:
+        if not self.controller.moving():
+            raise Refused(codes.NOT_MOVING)
+        self.controller.stop(self._link.reader.data[PAYLOAD_AT])
+        return 0
+
+    def _clear(self, row: tuple, length: int) -> None:
+        self.controller.clear()
+
+    def _samples(self, row: tuple, length: int) -> int:
+        data = self._link.reader.data
+        samples = self.controller.samples
+        acknowledged = u32(data, PAYLOAD_AT)
+        wanted_at = PAYLOAD_AT + _BYTES_OF_INDEX
+        samples.acknowledge(acknowledged)
+        samples.send_again(acknowledged, data[wanted_at] | data[wanted_at + 1] << 8)
+        pack_into(row[_ANSWER], self._link.reply, _ANSWER_AT, samples.first, samples.next - samples.first)
+        return calcsize(row[_ANSWER])

@@ -1,0 +1,323 @@
+"""What the board does with its arm: takes the stored record, starts and stops runs, keeps their samples.
+
+::
+
+    store ─▶ Motion ─▶ engine (step generator, rings, DMA, pins) ─▶ samples
+
+It knows no link and no messages. Commands, the button and the prompt call it; events read it. States and timings:
+shared/docs/protocol.md.
+"""
+
+import gc
+import os
+import sys
+from array import array
+
+import machine
+from armtempo_shared import codes, messages
+from armtempo_shared.limits import MAX_JOINTS
+from armtempo_shared.messages import ARM_RECORD_NAME, NO_JOINT, SAMPLE_BRAKING, START_HOMING
+from armtempo_shared.motion import Motion, MotionError
+from micropython import const
+
+from armtempo_board import heap
+from armtempo_board.app.sample_buffer import SampleBuffer
+from armtempo_board.buffers import COMMANDED, pack_offsets, sample_to_wire
+from armtempo_board.errors import Refused
+from armtempo_board.motion.engine import Engine
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from typing import Any
+
+_MOST_SAMPLES = const(4096)  # bytes of the sample buffer at most,
+_LEAST_SAMPLES = const(1024)  # and at least;
+_SAMPLES_SHARE = const(16)  # between them, this part of the free heap
+_BYTES_PER_JOINT = const(8)  # in a sample on the wire
+_CRC_BYTES = const(4)
+_BOOT_BYTES = const(4)
+_NEVER_MS = const((1 << 30) - 1)
+
+
+class Controller:
+    """``root``: the folder of the store. ``fault``: what is pending from the start, 0 for none."""
+
+    def __init__(self, root: str, program_crc: int, fault: int) -> None:
+        from armtempo_shared.table import offset  # here, so that it can be forgotten
+
+        flags_at = offset("E", "sample", "flags") - offset("E", "sample", "ticks")
+        self._root = root
+        self._store: "Any" = None
+        self.engine: "Any" = None
+        self.samples = SampleBuffer(MAX_JOINTS, 0, flags_at)
+        self.program_crc = program_crc
+        self.board_id = _board_id()
+        self.boot = int.from_bytes(os.urandom(_BOOT_BYTES), "little")  # another number after each power-up
+        self.joints = 0
+        self.arm_crc = 0
+        self.free_flash = 0
+        self.free_heap = 0
+        self.run_number = 0
+        self.duration_ticks = 0
+        self.done = False  # a run has ended without a fault, and the host has not been told
+        self._silence_ms = _NEVER_MS  # of the host, after which a run is stopped
+        self._raw = array("i", [0] * COMMANDED)
+        self._fault = fault
+        self._running = False  # a run has begun and its end has not been noticed
+        self._braking = False
+        self._can_brake = False  # the motion can come to rest along its path
+        self._by_host = False  # the run was started by a command
+        self._assumed = 0  # joints whose position a homing motion took for granted
+
+    # the loop
+
+    def service(self, silent_ms: int) -> None:
+        """Keep steps and samples coming; notice the end of a run, or that the host was silent for too long."""
+        self.engine.service()
+        self._collect()
+        if self._running:
+            if not self.engine.moving:
+                self._end()
+            elif silent_ms > self._silence_ms and self._by_host and not self._braking:
+                self._fault = codes.LINK_LOST
+                self.stop(0)
+
+    def refill(self) -> None:
+        """What cannot wait for the end of longer work while something moves."""
+        if self.engine:
+            self.engine.refill()
+
+    def _collect(self) -> None:
+        while self.engine.next_sample(self._raw):
+            self.samples.add(self._raw, SAMPLE_BRAKING if self._braking else 0)
+
+    def _end(self) -> None:
+        self._collect()
+        self._withdraw_assumed()
+        heap.collect_often()
+        self._running = False
+        self._braking = False
+        if not self.fault():
+            self.done = True
+
+    def fail(self) -> None:
+        """The program has failed: freeze, and INTERNAL is the pending fault."""
+        self._fault = codes.INTERNAL
+        if self.engine:
+            self.engine.freeze()
+            self._withdraw_assumed()
+
+    def halt(self) -> None:
+        """Freeze what still moves; the position stays known."""
+        if self.engine and self.engine.moving:
+            self.engine.freeze()
+
+    # the store, which is there only while it is needed: its code takes memory that a motion needs
+
+    def store(self) -> "Any":
+        """The store; an upload that is under way keeps it."""
+        if self._store is None:
+            from armtempo_board.storage import store
+
+            self._store = store.Store(self._root)
+        return self._store
+
+    def forget_store(self) -> None:
+        """Give up an upload that is under way."""
+        if self._store is not None:
+            self._store.abandon()
+            self._store = None
+
+    # what commands, button and prompt ask for
+
+    def configure(self) -> None:
+        """Take the stored arm record; without one the board stays unconfigured."""
+        from armtempo_shared.armrecord import FLAG_STOP_ON_LINK_LOSS  # here, so that it can be forgotten
+
+        record = self._arm_record()
+        if record is None:
+            return
+        head, joints, crc = record
+        if crc == self.arm_crc:
+            return
+        self.forget_store()
+        heap.forget()
+        if self.engine:
+            self.engine.close()
+            self.engine = None
+            self.arm_crc = 0
+        self.engine = Engine(head, joints)
+        self._silence_ms = head["link_timeout_ms"] if head["flags"] & FLAG_STOP_ON_LINK_LOSS else _NEVER_MS
+        self.joints = len(joints)
+        self.arm_crc = crc
+        self._raw = array("i", [0] * (COMMANDED + 2 * self.joints))
+        self.samples = SampleBuffer(self.joints, _sample_memory(), self.samples.flags_at)
+
+    def _arm_record(self) -> "tuple[dict[str, int], list[dict[str, int]], int] | None":
+        """The stored one: head, joints, crc32; None where there is none."""
+        from armtempo_shared import armrecord  # here, so that it can be forgotten
+
+        try:
+            return armrecord.unpack(self.store().read(ARM_RECORD_NAME))
+        except (Refused, armrecord.ArmRecordError):
+            return None
+
+    def check_ready(self) -> None:
+        """Refuses while a fault is pending or no arm is configured."""
+        if self.fault():
+            raise Refused(codes.FAULT_PENDING, self.fault_joint(), self.fault())
+        if not self.engine:
+            raise Refused(codes.UNCONFIGURED)
+
+    def home(self, mask: int, steps: "Sequence[int]") -> None:
+        """Declare where the joints of ``mask`` stand; ``steps`` has a number for every joint."""
+        for joint in range(self.joints):
+            row = self.engine.limits[joint]
+            if mask >> joint & 1 and not row["min_steps"] <= steps[joint] <= row["max_steps"]:
+                raise Refused(codes.OUT_OF_RANGE, joint, steps[joint])
+        self.engine.home(mask, steps)
+
+    def begin(self, name: str, flags: int, crc: "int | None" = None) -> None:
+        """Start a stored motion, or refuse. ``crc``: of the record that the host means; None: there is no host."""
+        self.check_ready()
+        homing = bool(flags & START_HOMING)
+        unknown = self.everyone() & ~self.known()
+        if unknown and not homing:
+            raise Refused(codes.UNHOMED, _lowest(unknown))
+        motion = self.load(name, crc)
+        self.forget_store()
+        heap.forget()
+        gc.collect()
+        if homing:
+            self._assume(motion, unknown)
+        try:
+            self.engine.load(motion)
+        except Refused:
+            self._withdraw_assumed()
+            raise
+        self.samples.clear()
+        self.done = False
+        self.duration_ticks = self.engine.duration_ticks
+        self.run_number += 1
+        self._by_host = crc is not None
+        self._braking = False
+        self._can_brake = motion.brake_ticks > 0
+        heap.forget()
+        gc.collect()
+        heap.collect_often(False)
+        self._running = True
+        self.engine.start(homing)
+
+    def _assume(self, motion: "Motion", mask: int) -> None:
+        """A homing motion may begin anywhere; joints that are not known to stand there are unknown after it."""
+        from armtempo_board.motion import endpoints  # here, so that it can be forgotten
+
+        self.engine.snapshot(self._raw)
+        for joint in range(self.joints):
+            if endpoints.start_offset(motion, joint, self._raw[COMMANDED + joint]):
+                mask |= 1 << joint
+        self.home(mask, [endpoints.start_offset(motion, joint, 0) for joint in range(self.joints)])
+        self._assumed = mask
+
+    def _withdraw_assumed(self) -> None:
+        if self._assumed:
+            self.engine.known &= ~self._assumed
+            self._assumed = 0
+
+    def load(self, name: str, crc: "int | None" = None) -> "Motion":
+        """The stored motion, checked as far as its head and checksum go, or refused."""
+        data = self.store().read(name)
+        try:
+            motion = Motion(data)
+        except MotionError:
+            raise Refused(codes.BAD_RECORD)
+        if crc is not None and int.from_bytes(data[-_CRC_BYTES:], "little") != crc:
+            raise Refused(codes.BAD_CHECKSUM)
+        if motion.arm_crc != self.arm_crc:
+            raise Refused(codes.ARM_MISMATCH)
+        if motion.joints != self.joints:
+            raise Refused(codes.WRONG_JOINTS, value=motion.joints)
+        return motion
+
+    def stop(self, now: int) -> None:
+        """Brake along the path; freeze where ``now``, or where the motion has no way to brake."""
+        self._braking = True
+        if now or not self._can_brake:
+            self.engine.freeze()
+        else:
+            self.engine.brake()
+
+    def clear(self) -> None:
+        """Clear what is pending; the cause must be gone."""
+        if self.engine and not self.engine.clear():
+            raise Refused(codes.FAULT_PENDING, self.fault_joint(), self.fault())
+        self._fault = 0
+
+    def measure_free(self) -> None:
+        """Bring ``free_flash`` and ``free_heap`` up to date; costs milliseconds, so not while moving."""
+        if not self.moving():
+            self.free_flash = self.store().free()
+            self.free_heap = _free_heap()
+
+    # what the board tells
+
+    def moving(self) -> bool:
+        """Whether steps may still come."""
+        return self.engine is not None and self.engine.moving
+
+    def known(self) -> int:
+        """Bit a joint: its position is known."""
+        return self.engine.known if self.engine else 0
+
+    def everyone(self) -> int:
+        """Bit a joint, all set."""
+        return (1 << self.joints) - 1
+
+    def fault(self) -> int:
+        """Code of the pending fault, 0 for none."""
+        return self._fault or (self.engine.fault if self.engine else 0)
+
+    def fault_joint(self) -> int:
+        """The joint that the fault is about, or NO_JOINT."""
+        return self.engine.fault_joint if self.engine and self.engine.fault else NO_JOINT
+
+    def state(self) -> int:
+        """Number of the state (messages.STATES)."""
+        if self.moving():
+            return messages.BRAKING if self._braking else messages.MOVING
+        if self.fault():
+            return messages.FAULT
+        if not self.engine:
+            return messages.UNCONFIGURED
+        return messages.IDLE if self.known() == self.everyone() else messages.UNHOMED
+
+    def put_snapshot(self, target: bytearray, ticks_at: int, joints_at: int) -> int:
+        """Write motion clock, commanded steps and counts of this moment as the wire has them; bytes of the joints."""
+        if not self.engine:
+            return 0
+        self.engine.snapshot(self._raw)
+        sample_to_wire(target, self._raw, pack_offsets(ticks_at, joints_at), self.joints)
+        return _BYTES_PER_JOINT * self.joints
+
+
+def _board_id() -> bytes:
+    return b"".join([b"%02x" % byte for byte in machine.unique_id()]) + b" " + sys.version.encode()
+
+
+def _lowest(mask: int) -> int:
+    joint = 0
+    while not mask >> joint & 1:
+        joint += 1
+    return joint
+
+
+def _free_heap() -> int:
+    free = getattr(gc, "mem_free", None)
+    return free() if free else 0
+
+
+def _sample_memory() -> int:
+    gc.collect()
+    free = _free_heap()
+    return min(max(free // _SAMPLES_SHARE, _LEAST_SAMPLES), _MOST_SAMPLES) if free else _MOST_SAMPLES

@@ -1,0 +1,97 @@
+"""What the board sends unasked: samples, then the end of the run or its fault; notices."""
+
+from struct import calcsize, pack_into
+
+from armtempo_shared.messages import MAX_PAYLOAD
+from micropython import const
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from armtempo_board.app.controller import Controller
+    from armtempo_board.link.serial_link import SerialLink
+
+_BYTES_PER_JOINT = const(8)
+
+
+class Events:
+    """Hands the link what is waiting, as the link has room."""
+
+    def __init__(self, controller: "Controller", link: "SerialLink") -> None:
+        from armtempo_shared.table import offset, rows  # here, so that it can be forgotten
+
+        self._controller = controller
+        self._link = link
+        found = {name: (number, layout) for name, number, layout, _, _ in rows("E")}
+        self._sample, self._sample_layout = found["sample"]
+        self._slot_at = offset("E", "sample", "ticks")  # of what the sample buffer keeps
+        self._done = found["done"] + (offset("E", "done", "ticks"),)
+        self._fault = found["fault"] + (offset("E", "fault", "ticks"),)
+        self._notice_number, _ = found["notice"]
+        self._noted = 0  # the fault that was noted last
+        self._fault_waits = False
+        self._notice = b""
+
+    def note_fault(self, code: int) -> None:
+        """Called every turn with the pending fault (0: none); each is sent once."""
+        if code != self._noted:
+            self._noted = code
+            self._fault_waits = code != 0
+
+    def note(self, text: str) -> None:
+        """Keep the end of a text for the host, as it says what is wrong; until that is sent, others are dropped."""
+        if not self._notice:
+            self._notice = text.encode()[-MAX_PAYLOAD:]
+
+    def push(self) -> bool:
+        """Hand the link what is waiting and has room, one sample at most; whether there was one."""
+        if self._push_sample():
+            return True
+        if self._controller.samples.waiting() < 0:
+            self._push_end()
+        self._push_notice()
+        return False
+
+    def _push_sample(self) -> bool:
+        samples = self._controller.samples
+        index = samples.waiting()
+        size = self._slot_at + samples.size
+        link = self._link
+        if index < 0 or not link.room(size):
+            return False
+        at = link.payload()
+        pack_into(self._sample_layout, link.out, at, self._controller.run_number, index, 0, 0)
+        samples.take(index, link.out, at + self._slot_at)
+        link.event(self._sample, size)
+        return True
+
+    def _push_end(self) -> None:
+        controller = self._controller
+        if controller.done and self._room(self._done):
+            controller.done = False
+            samples = controller.samples
+            self._put(self._done, controller.run_number, 0, samples.next, samples.lost)
+        if self._fault_waits and self._room(self._fault):
+            self._fault_waits = False
+            self._put(self._fault, controller.run_number, controller.fault(), controller.fault_joint(), 0)
+
+    def _room(self, event: "tuple[int, str, int]") -> int:
+        _, layout, _ = event
+        return self._link.room(calcsize(layout) + _BYTES_PER_JOINT * self._controller.joints)
+
+    def _put(self, event: "tuple[int, str, int]", *values: int) -> None:
+        """``values``: of the event's fields; the ticks, which are 0 there, and the joints are put in here."""
+        number, layout, ticks_at = event
+        link = self._link
+        at = link.payload()
+        pack_into(layout, link.out, at, *values)
+        size = calcsize(layout)
+        size += self._controller.put_snapshot(link.out, at + ticks_at, at + size)
+        link.event(number, size)
+
+    def _push_notice(self) -> None:
+        link = self._link
+        if self._notice and link.room(len(self._notice)):
+            at = link.payload()
+            link.out[at : at + len(self._notice)] = self._notice
+            link.event(self._notice_number, len(self._notice))
+            self._notice = b""

@@ -1,0 +1,111 @@
+"""Starts the board program on the hardware: serial port, watchdog, LEDs, button."""
+
+import os
+
+import armtempo_shared
+import machine
+import micropython
+import pyb
+from armtempo_shared import codes
+from micropython import const
+
+from armtempo_board.stepgen import step_generator  # isort: skip  # noqa: F401  nested imports cost stack: the deepest first
+
+import armtempo_board
+from armtempo_board import heap
+from armtempo_board.app.app import App
+from armtempo_board.app.button import Button
+from armtempo_board.app.leds import Leds
+from armtempo_board.app.watchdog import Watchdog, has_reset
+from armtempo_board.errors import Refused
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
+ROOT = "/flash/armtempo"
+_CTRL_C = const(3)
+_EXCEPTION_BUFFER = const(100)
+_EIGHTH_TURN = const(7)  # while something moves, LEDs, watchdog and button come in every eighth turn only
+
+app: "Any" = None
+"""The program's App; it is kept when the program is left for the REPL."""
+
+
+def main(root: str = ROOT) -> None:
+    """Run until a host asks for the REPL."""
+    global app
+    micropython.alloc_emergency_exception_buf(_EXCEPTION_BUFFER)
+    leds = Leds()
+    button = Button()  # before the engine, which may take its pin for a sixth joint
+    port = pyb.USB_VCP()
+    app = app or _build(port, root)
+    app.enter()
+    watchdog = Watchdog()
+    _detach(port)
+    try:
+        run(leds, button, watchdog)
+    finally:
+        watchdog.leave()
+        _attach(port)
+    print("armtempo ended; Ctrl-D starts it again")
+
+
+def _build(port: "pyb.USB_VCP", root: str) -> App:
+    """The App; what only its set-up needs is forgotten again, to save heap."""
+    from armtempo_shared.program_hash import program_crc  # here, so that it can be forgotten
+
+    crc = program_crc(armtempo_board.__file__, armtempo_shared.__file__)
+    del program_crc
+    built = App(port, root, crc, codes.WATCHDOG if has_reset() else 0)
+    built.controller.forget_store()
+    heap.forget()
+    return built
+
+
+def run(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
+    """Turn the loop until a host asks for the REPL. Whatever ends it, nothing goes on moving then."""
+    try:
+        while True:
+            app.turn()
+            try:
+                if app.left():
+                    break
+                _serve_panel(leds, button, watchdog)
+            except Exception as error:
+                app.fail(error)
+    finally:
+        app.controller.halt()
+
+
+def _serve_panel(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
+    """LEDs, watchdog, button."""
+    controller = app.controller
+    if controller.moving() and app.turns & _EIGHTH_TURN:
+        return
+    leds.show(controller.state())
+    watchdog.feed()
+    pressed = button.pressed()  # a press while something moves does nothing, then or later
+    if controller.moving():
+        return
+    if pressed:
+        _replay_default()
+    machine.idle()
+
+
+def _replay_default() -> None:
+    try:
+        app.controller.begin(app.controller.store().default(), 0)
+    except Refused as refused:
+        app.events.note("button: refused, error %d" % refused.code)
+
+
+def _detach(port: "Any") -> None:
+    os.dupterm(None, 1)
+    micropython.kbd_intr(-1)
+    port.init(flow=pyb.USB_VCP.RTS | pyb.USB_VCP.CTS)  # without CTS a write waits for the host
+
+
+def _attach(port: "Any") -> None:
+    micropython.kbd_intr(_CTRL_C)
+    os.dupterm(port, 1)

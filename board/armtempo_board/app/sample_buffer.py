@@ -1,0 +1,78 @@
+"""Samples of the current or last run, kept in one fixed buffer until the host has them.
+
+A sample is kept as the ``sample`` event carries it behind run and index: ticks (8 bytes), flags (1), then
+commanded steps and encoder counts of each joint (4 and 4).
+"""
+
+from micropython import const
+
+from armtempo_board.buffers import copy, pack_offsets, sample_to_wire
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from array import array
+
+_BYTES_PER_JOINT = const(8)
+
+
+class SampleBuffer:
+    """First in, first out; where the memory ends the oldest is dropped, and counted in ``lost``."""
+
+    def __init__(self, joints: int, memory: int, flags_at: int) -> None:
+        """``memory``: bytes to keep samples in; ``flags_at``: bytes of a sample before its flags."""
+        self.flags_at = flags_at
+        self.size = flags_at + 1 + _BYTES_PER_JOINT * joints
+        self._joints = joints
+        self._capacity = memory // self.size
+        self._buffer = bytearray(self._capacity * self.size)
+        self.clear()
+
+    def clear(self) -> None:
+        """A new run begins."""
+        self.first = 0  # index of the oldest sample kept
+        self.next = 0  # index of the next sample
+        self.sent = 0  # samples before this one have been sent at least once
+        self.lost = 0
+        self._again = 0  # the next one to be sent again,
+        self._again_end = 0  # up to here
+
+    def add(self, raw: "array[int]", flags: int) -> None:
+        """Keep one: ``raw`` as the engine fills it; ``flags`` of the sample event."""
+        if self.next - self.first == self._capacity:
+            self.first += 1
+            self.lost += 1
+            self.sent = max(self.sent, self.first)
+        at = self.next % self._capacity * self.size
+        flags_at = at + self.flags_at
+        sample_to_wire(self._buffer, raw, pack_offsets(at, flags_at + 1), self._joints)
+        self._buffer[flags_at] = flags
+        self.next += 1
+
+    def acknowledge(self, index: int) -> None:
+        """All before ``index`` have arrived; what was never sent cannot have."""
+        self.first = max(self.first, min(index, self.sent))
+
+    def skip(self) -> None:
+        """A new host: it asks for what it wants of the older ones."""
+        self.sent = self.next
+        self._again = self._again_end = 0
+
+    def send_again(self, index: int, count: int) -> None:
+        """Send up to ``count`` from ``index`` on again."""
+        self._again = max(index, self.first)
+        self._again_end = min(index + count, self.sent)
+
+    def waiting(self) -> int:
+        """Index of the next sample to send, or -1."""
+        self._again = max(self._again, self.first)
+        if self._again < self._again_end:
+            return self._again
+        return self.sent if self.sent < self.next else -1
+
+    def take(self, index: int, target: bytearray, at: int) -> None:
+        """Copy the sample ``waiting`` named to target[at:]; it counts as sent."""
+        copy(target, self._buffer, pack_offsets(at, index % self._capacity * self.size), self.size)
+        if index == self.sent:
+            self.sent += 1
+        else:
+            self._again = index + 1

@@ -1,0 +1,86 @@
+"""``armtempo_board.replay("feed")``: runs one stored motion from the REPL, without a host."""
+
+import micropython
+import pyb
+from armtempo_shared import codes
+from armtempo_shared.messages import NO_JOINT
+
+from armtempo_board.app import program
+from armtempo_board.app.app import App
+from armtempo_board.app.watchdog import Watchdog
+from armtempo_board.errors import Refused
+from armtempo_board.motion import endpoints
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from armtempo_board.app.controller import Controller
+
+_CTRL_C = b"\x03"
+
+
+class _Nobody:
+    """Takes the place of the serial port, which the REPL uses."""
+
+    def readinto(self, buffer: bytearray, count: int) -> None:
+        """Nothing comes."""
+
+    def write(self, buffer: bytearray, start: int, count: int) -> None:
+        """Nothing is taken."""
+
+
+def replay(name: str = "", root: str = program.ROOT) -> None:
+    """Run a stored motion, the default where no name is given, and print how it ended.
+
+    Where the position is unknown the arm must stand where the motion begins: calling this declares it.
+    Ctrl-C brakes, a second one freezes.
+    """
+    app = program.app = program.app or App(_Nobody(), root)
+    controller = app.controller
+    port, app.link.stream = app.link.stream, _Nobody()
+    watchdog = Watchdog()
+    micropython.kbd_intr(-1)  # KeyboardInterrupt could come in the midst of anything
+    try:
+        _begin(controller, name or controller.store().default())
+        _follow(app, watchdog)
+        steps = [controller.engine.commanded(joint) for joint in range(controller.joints)]
+        print("fault: " + _name(controller.fault()) if controller.fault() else "done", "at steps", steps)
+    except Refused as refused:
+        where = "" if refused.joint == NO_JOINT else "joint %d" % (refused.joint + 1)
+        print("refused:", _name(refused.code), where, refused.value or "")
+    finally:
+        controller.halt()
+        micropython.kbd_intr(ord(_CTRL_C))
+        watchdog.leave()
+        app.link.stream = port
+
+
+def _begin(controller: "Controller", name: str) -> None:
+    if controller.engine and not controller.fault():
+        motion = controller.load(name)
+        unknown = controller.everyone() & ~controller.known()
+        if unknown:
+            print("taking the posture of the arm as the start of", name)
+            starts = [endpoints.start_offset(motion, joint, 0) for joint in range(controller.joints)]
+            controller.home(unknown, starts)
+    controller.begin(name, 0)
+
+
+def _follow(app: "App", watchdog: "Watchdog") -> None:
+    port = pyb.USB_VCP()
+    byte = bytearray(1)
+    presses = 0
+    while app.controller.moving():
+        app.turn()
+        watchdog.feed()
+        if port.readinto(byte) and byte == _CTRL_C and app.controller.moving():
+            app.controller.stop(presses)
+            presses = 1
+    app.turn()
+
+
+def _name(code: int) -> str:
+    """Of a refusal or fault, as in ``codes``."""
+    for name in dir(codes):
+        if getattr(codes, name) == code:
+            return name.lower()
+    return str(code)

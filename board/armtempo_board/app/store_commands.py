@@ -1,0 +1,107 @@
+"""What the board does for each command about the store; refusals are raised as ``Refused``.
+
+Each function has the name of its command. ``commands``: gives the command's fields and takes its answer; ``row``: the
+command's row in the table of ``Commands``; ``length``: bytes of its payload. It returns the bytes of its answer.
+"""
+
+from armtempo_shared import codes
+from armtempo_shared.messages import ARM_RECORD_NAME, MAX_PAYLOAD
+from armtempo_shared.motion import Motion, MotionError
+from micropython import const
+
+from armtempo_board.buffers import u32
+from armtempo_board.errors import Refused
+from armtempo_board.motion import endpoints
+
+_CRC_BYTES = const(4)
+_NUMBER_BYTES = const(1)  # of the command, in front of the answer
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Protocol
+
+    from armtempo_board.app.controller import Controller
+
+    class Caller(Protocol):
+        """What is asked of the caller, see ``commands.Commands``."""
+
+        controller: Controller
+
+        def fields(self, row: tuple) -> tuple: ...
+
+        def tail(self, row: tuple, length: int) -> bytes: ...
+
+        def text(self, row: tuple, length: int) -> str: ...
+
+        def reply(self, row: tuple, *values: int) -> int: ...
+
+        def reply_tail(self, size: int, tail: bytes) -> int: ...
+
+
+def put_begin(commands: "Caller", row: tuple, length: int) -> None:
+    """Begin an upload."""
+    size, _ = commands.fields(row)
+    commands.controller.store().begin(commands.text(row, length), size)
+
+
+def put_data(commands: "Caller", row: tuple, length: int) -> int:
+    """Add a piece to it."""
+    (offset,) = commands.fields(row)
+    return commands.reply(row, commands.controller.store().write(offset, commands.tail(row, length)))
+
+
+def put_commit(commands: "Caller", row: tuple, length: int) -> None:
+    """Check it and put it in place; an arm record is taken at once."""
+    (crc,) = commands.fields(row)
+    if commands.controller.store().commit(crc) == ARM_RECORD_NAME:
+        commands.controller.configure()
+
+
+def list(commands: "Caller", row: tuple, length: int) -> int:
+    """One of the stored motions, and how many there are."""
+    (index,) = commands.fields(row)
+    store = commands.controller.store()
+    names = store.names()
+    if index >= len(names):
+        raise Refused(codes.NOT_FOUND)
+    name = names[index]
+    data = store.read(name)
+    try:
+        motion = Motion(data)
+        crc, duration, joints = (
+            u32(data, len(data) - _CRC_BYTES),
+            endpoints.duration_ticks(motion),
+            motion.joints,
+        )
+    except MotionError:
+        crc = duration = joints = 0
+    default = name == store.default()
+    size = commands.reply(row, len(names), len(data), crc, duration, joints, default)
+    return commands.reply_tail(size, name.encode())
+
+
+def remove(commands: "Caller", row: tuple, length: int) -> None:
+    """Remove a motion."""
+    commands.controller.store().remove(commands.text(row, length))
+
+
+def rename(commands: "Caller", row: tuple, length: int) -> None:
+    """Give a motion another name."""
+    (old_length,) = commands.fields(row)
+    names = commands.text(row, length)
+    commands.controller.store().rename(names[:old_length], names[old_length:])
+
+
+def get(commands: "Caller", row: tuple, length: int) -> int:
+    """A piece of a record."""
+    offset, wanted = commands.fields(row)
+    fixed = commands.reply(row, 0)
+    wanted = min(wanted, MAX_PAYLOAD - _NUMBER_BYTES - fixed)
+    size, data = commands.controller.store().part(commands.text(row, length), offset, wanted)
+    commands.reply(row, size)
+    return commands.reply_tail(fixed, data)
+
+
+def set_default(commands: "Caller", row: tuple, length: int) -> None:
+    """Make a motion the one that the button starts."""
+    commands.controller.store().set_default(commands.text(row, length))

@@ -1,0 +1,48 @@
+"""The watchdog: resets the chip when the loop hangs.
+
+The hardware cannot be stopped once it is started. So a timer feeds it from when the program is left for the REPL;
+``boot.py`` does the same after a soft reset.
+"""
+
+import machine
+import pyb
+from micropython import const
+
+_TIMEOUT_MS = const(8000)
+_RELOAD = const(0x40003008)  # IWDG_RLR, RM0090 page 714
+_UNTOUCHED = const(0xFFF)  # its value after a reset
+_TIMER = const(7)  # used by nothing else
+_FEEDS_HZ = const(1)
+
+_kept = None
+
+
+class Watchdog:
+    """Starts with the loop, not before: a program that fails before that leaves a usable REPL."""
+
+    def __init__(self) -> None:
+        self._watchdog = machine.WDT(timeout=_TIMEOUT_MS)
+        self.feed = self._watchdog.feed
+        if _kept:
+            _kept.deinit()
+
+    def leave(self) -> None:
+        """Feed it from a timer interrupt from now on."""
+        keep_fed()
+
+
+def has_reset() -> bool:
+    """Whether it made the last reset."""
+    return machine.reset_cause() == machine.WDT_RESET
+
+
+def running() -> bool:
+    """Whether it was started since the last hard reset."""
+    return bool(machine.mem32[_RELOAD] & _UNTOUCHED != _UNTOUCHED)
+
+
+def keep_fed() -> None:
+    """Feed it once a second from a timer interrupt, which allocates nothing."""
+    global _kept
+    feed = machine.WDT(timeout=_TIMEOUT_MS).feed
+    _kept = pyb.Timer(_TIMER, freq=_FEEDS_HZ, callback=lambda timer: feed())

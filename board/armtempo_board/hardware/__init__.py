@@ -1,0 +1,1 @@
+"""The chip: pins, timers, DMA streams and the interrupt code."""

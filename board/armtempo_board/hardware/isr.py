@@ -1,0 +1,475 @@
+"""Compiled code that reaches registers: rings, the compare interrupt, the freeze. Allocates nothing.
+
+One file, as the compiler puts constants in only within a file. The offsets here are the only home of the register
+layout (in words; RM0090). ``block`` is the memory that the main loop and the interrupts share; its layout follows the
+offsets. Costs are instructions of the Cortex-M4 (docs/hardware.md). The same code runs on 64-bit interpreters, where
+words do not wrap and loads are not sign-extended; so every difference of two times is cut to size before it is judged.
+
+Ki ticks are 1024 ticks (12.2 us): the counter in them has 22 bits, which are a small integer.
+"""
+
+import micropython
+from micropython import const
+
+# TIM2, TIM5 and encoder timers: RM0090 18.4.21
+CR1 = const(0)
+CR2 = const(1)
+SMCR = const(2)
+DIER = const(3)
+SR = const(4)
+EGR = const(5)
+CCMR1 = const(6)
+CCER = const(8)
+CNT = const(9)
+PSC = const(10)
+ARR = const(11)
+CCR1 = const(13)
+CCR4 = const(16)
+# one DMA stream: RM0090 10.5.11
+STREAM_CR = const(0)
+STREAM_NDTR = const(1)
+STREAM_PAR = const(2)
+STREAM_M0AR = const(3)
+STREAM_FCR = const(5)
+STREAM_ON = const(1)
+# GPIO: RM0090 8.4.11
+IDR = const(4)
+ODR = const(5)
+BSRR = const(6)
+
+# words of the block
+NEXT_SAMPLE = const(0)  # time of the next sample
+SAMPLES_LEFT = const(1)  # samples still to come before the last one
+LAST_SAMPLE = const(2)  # time of the last sample
+SAMPLES_DONE = const(3)  # the last sample has been taken
+RAW_IN = const(4)  # raw samples taken
+RAW_OUT = const(5)  # raw samples converted
+RAW_LOST = const(6)  # raw samples that found no room
+NOW = const(7)  # counter when the interrupt came
+FROZEN = const(8)  # outputs are frozen
+FAULT = const(9)
+FAULT_JOINT = const(10)
+STEP_HIGH = const(11)  # bit a joint: its STEP was high when frozen, so the pulse was finished
+PULSE_TICKS = const(12)  # STEP high time
+JOINTS = const(13)
+ENCODERS = const(14)
+TURN_LATE = const(15)  # a turn of DIR came too late
+TURN_SLACK_TICKS = const(16)  # how late it may come
+DIR_SETUP_TICKS = const(17)  # DIR stable before a rising edge
+BLOCK_HEAD = const(18)
+# words of a joint in the block, behind the head
+DIR_BIT = const(0)  # in the DIR port
+TURNS_IN = const(1)  # turns of DIR that were queued,
+TURNS_OUT = const(2)  # and made
+ON_TIM5 = const(3)  # else on TIM2
+CCR_AT = const(4)  # word of its compare register in the timer
+CCMR_AT = const(5)  # and of the register that has its mode,
+MODE_SHIFT = const(6)  # with the mode's place there
+ON_PORT_B = const(7)  # its STEP pin; else on port A
+PIN_BIT = const(8)
+TURN_TIMES = const(9)  # when the queued turns are due
+TURN_ROOM = const(8)  # so many
+RING = const(17)  # the state of its ring
+JOINT_WORDS = const(26)
+# words of a ring's state
+WRITTEN = const(0)  # entries written since the stream was started
+MATCHED = const(1)  # words that the stream has handed on since; so many matches have been
+NDTR_AT_START = const(2)  # NDTR right after the start
+LAST_TIME = const(3)  # time of the last entry written
+FAR_TIME = const(4)  # of the entry behind it, half a round of the counter away
+MASK = const(5)  # entries of the ring, a power of two, less 1
+NDTR_AT = const(6)  # word offset of its stream's NDTR in DMA1
+FED = const(7)  # the interrupt writes to the ring; it stops that when the ring has run out of entries
+ROOM = const(8)  # entries that may be written now
+STATE_WORDS = const(9)
+
+# words of a pair of limit switch and joint
+PAIR_LINE = const(0)  # of the switch
+PAIR_DIR_BIT = const(1)
+PAIR_LEVEL = const(2)  # of DIR, that moves towards the switch
+PAIR_JOINT = const(3)
+PAIR_MOVES = const(4)  # whether the joint moves
+PAIR_WORDS = const(5)
+# words of a raw sample
+RAW_COUNTER = const(0)
+RAW_MATCHES = const(1)  # six, one a joint
+RAW_ENCODERS = const(7)  # four counters
+RAW_WORDS = const(11)
+RAW_ROOM = const(4)  # raw samples: 0.4 s; the main loop comes every few milliseconds
+
+# as in step_queue.py: words of the queue
+_PULSE = const(17)
+_HEAD = const(18)
+
+# SAMPLE_TICKS of limits.py
+_SAMPLE_TICKS = const(8400000)
+
+_FIRST_ENTRY = const(0)
+_HERE = const(0)  # the word at which a pointer stands
+_PORT_A = const(0)
+_PORT_B = const(1)
+_LEAST_AHEAD_TICKS = const(84)  # 1 us: a compare value nearer than that may be missed
+_CALL_TICKS = const(336)  # 4 us
+SPARE_ENTRIES = const(8)  # of a ring, that are not overwritten: those matched last, and the far-away entry
+_GUARD_TICKS = const(32768)  # 390 us: entries are only added behind a rising edge that is further away,
+_FAR_AHEAD_TICKS = const(3145728)  # but not 37 ms away,
+_MOST_ENTRIES = const(512)  # and so many at most, which takes less than the 390 us
+# modes of an output (RM0090 18.4.7), by what is subtracted from all three bits set
+_MODE_BITS = const(7)
+_TO_TOGGLE = const(4)  # 3: toggle on match
+_TO_FORCED_LOW = const(3)  # 4: forced inactive
+
+
+@micropython.viper
+def counter_kiticks(timer: ptr32) -> int:
+    """The counter in Ki ticks, 22 bits."""
+    return (timer[CNT] >> 10) & 0x3FFFFF
+
+
+@micropython.viper
+def counters_agree(timer2: ptr32, timer5: ptr32) -> int:
+    """1 where both counters show the same time, as far as reads one after the other can tell; else 0.
+
+    0 also where an interrupt came between the reads.
+    """
+    before = timer2[CNT]
+    other = timer5[CNT]
+    took = (timer2[CNT] - before) & 0x3FFFFFFF
+    apart = (other - before + 16) & 0x3FFFFFFF
+    return 1 if took < 100 and apart <= took + 32 else 0
+
+
+@micropython.viper
+def word_kiticks(words: ptr32, at: int) -> int:
+    """A counter value that stands in an array, in Ki ticks, 22 bits."""
+    return (words[at] >> 10) & 0x3FFFFF
+
+
+@micropython.viper
+def copy_word(source: ptr32, at: int, target: ptr32, to: int) -> object:
+    """Copy a word that may be too large for a small integer."""
+    target[to] = source[at]
+
+
+@micropython.viper
+def read_counter(timer: ptr32) -> int:
+    """A 16-bit counter."""
+    return timer[CNT] & 0xFFFF
+
+
+@micropython.viper
+def kiticks_until(timer: ptr32, words: ptr32, at: int) -> int:
+    """Ki ticks from now until the time ``words[at]``; negative when it has passed."""
+    gap = ((words[at] - timer[CNT]) >> 10) & 0x3FFFFF
+    if gap >= 0x200000:
+        gap -= 0x400000
+    return gap
+
+
+@micropython.viper
+def matches(state: ptr32, dma: ptr32) -> int:
+    """Matches of a ring since its stream was started.
+
+    Fewer than the ring has entries can have come since MATCHED was written. So the difference is unambiguous, also
+    where the interrupt writes MATCHED meanwhile.
+    """
+    matched = state[MATCHED]
+    return matched + ((state[NDTR_AT_START] - dma[state[NDTR_AT]] - matched) & state[MASK])
+
+
+@micropython.viper
+def rings_to_refill(block: ptr32, dma: ptr32, timer: ptr32) -> int:
+    """Bit a joint: a quarter of its ring is free, so entries are to be added now, ROOM at most. -1: no ring is fed.
+
+    130 instructions and 76 a joint, 123 where entries are to be added.
+    """
+    found = 0
+    fed = 0
+    now = timer[CNT] + block[PULSE_TICKS] + _GUARD_TICKS
+    joint = 0 if block[FROZEN] else block[JOINTS]
+    block = ptr32(int(block) + 4 * (BLOCK_HEAD + RING) + joint * (4 * JOINT_WORDS))
+    while joint:
+        joint -= 1
+        block = ptr32(int(block) - 4 * JOINT_WORDS)
+        if block[FED]:
+            fed = 1
+            block[MATCHED] = (
+                (block[NDTR_AT_START] - dma[block[NDTR_AT]] - block[MATCHED]) & block[MASK]
+            ) + block[MATCHED]
+            room = block[MATCHED] - block[WRITTEN]
+            if room:
+                room += block[MASK] + 1
+                if (
+                    room > block[MASK] >> 2
+                    and ((block[LAST_TIME] - now) & 0x3FFFFFFF) < _FAR_AHEAD_TICKS - _GUARD_TICKS
+                ):
+                    found |= 1 << joint
+                    room -= SPARE_ENTRIES
+                    block[ROOM] = room
+                    if room > _MOST_ENTRIES:
+                        block[ROOM] = _MOST_ENTRIES
+            else:
+                block[FED] = 0
+    return found if fed else -1
+
+
+@micropython.viper
+def note_written(state: ptr32, ring: ptr32, timer: ptr32, queue: ptr32) -> int:
+    """Count what was written up to the queue's HEAD, and write the far-away entry behind it; 1: it came too late.
+
+    The program itself puts entry 0 into the compare register. So the stream begins with entry 1 and goes on to one
+    word behind the ring: entry 0 is repeated there.
+    """
+    late = 0
+    written = queue[_HEAD]
+    if written != state[WRITTEN]:
+        late = ((state[LAST_TIME] - queue[_PULSE] - timer[CNT]) >> 31) & 1
+        state[WRITTEN] = written
+        state[LAST_TIME] = ring[(written - 1) & state[MASK]]
+        half = 1
+        state[FAR_TIME] = (half << 31) + state[LAST_TIME]
+        ring[written & state[MASK]] = state[FAR_TIME]
+        ring[state[MASK] + 1] = ring[_FIRST_ENTRY]
+    return late
+
+
+@micropython.viper
+def arm_channel(block: ptr32, timer: ptr32, ring: ptr32, at: int) -> int:
+    """Put the first entry into the compare register and let it toggle; 1 where it is too late for that.
+
+    ``at``: the joint's words in the block. Call it with interrupts off.
+    """
+    if block[FROZEN]:
+        return 0
+    first = ring[_FIRST_ENTRY]
+    due = first - block[DIR_SETUP_TICKS]
+    block = ptr32(int(block) + 4 * at)
+    if (
+        block[TURNS_IN] != block[TURNS_OUT]
+        and ((due - block[TURN_TIMES + ((block[TURNS_IN] - 1) & (TURN_ROOM - 1))]) >> 31) & 1
+    ):
+        return 1
+    timer[block[CCR_AT]] = first
+    bit = 1 << (block[CCR_AT] - CCR1 + 1)
+    timer[SR] = (1 << 16) - 1 - bit
+    mode = block[CCMR_AT]
+    timer[mode] = (timer[mode] | (_MODE_BITS << block[MODE_SHIFT])) - (_TO_TOGGLE << block[MODE_SHIFT])
+    timer[DIER] = timer[DIER] | (bit << 8)
+    return ((first - timer[CNT] - _LEAST_AHEAD_TICKS) >> 31) & 1
+
+
+@micropython.viper
+def release_channel(block: ptr32, timer: ptr32, at: int) -> object:
+    """Hold the output low and take no more words from DMA. Call it with interrupts off."""
+    block = ptr32(int(block) + 4 * at)
+    mode = block[CCMR_AT]
+    timer[mode] = (timer[mode] | (_MODE_BITS << block[MODE_SHIFT])) - (_TO_FORCED_LOW << block[MODE_SHIFT])
+    timer[DIER] = timer[DIER] & (0xFFFF - (1 << (block[CCR_AT] - CCR1 + 9)))
+
+
+@micropython.viper
+def push_away(timer: ptr32, compare: int, state: ptr32) -> object:
+    """Move the compare value of an empty ring half a round of the counter away."""
+    half = 1
+    far = timer[CNT] + (half << 31)
+    timer[compare] = far
+    state[FAR_TIME] = far
+
+
+@micropython.viper
+def set_last_to_now(timer: ptr32, state: ptr32) -> object:
+    """Take the time of the last entry for now."""
+    state[LAST_TIME] = timer[CNT]
+
+
+@micropython.viper
+def add_turn(block: ptr32, state: ptr32, at: int, delay: int) -> int:
+    """Queue a turn of DIR, ``delay`` ticks behind the last entry; 0 when the queue is full."""
+    block = ptr32(int(block) + 4 * at)
+    queued = block[TURNS_IN]
+    if ((queued - block[TURNS_OUT]) & 0xFF) >= TURN_ROOM:
+        return 0
+    block[TURN_TIMES + (queued & (TURN_ROOM - 1))] = state[LAST_TIME] + delay
+    block[TURNS_IN] = (queued + 1) & 0xFF
+    return 1
+
+
+@micropython.viper
+def interrupt_soon(timer: ptr32) -> object:
+    """Let the compare interrupt come in 4 us, to look at what was queued."""
+    while True:
+        timer[CCR4] = timer[CNT] + _CALL_TICKS
+        if ((timer[CCR4] - timer[CNT]) >> 31) & 1 == 0:
+            break
+
+
+@micropython.viper
+def serve_compare(block: ptr32, timer: ptr32, port: ptr32) -> int:
+    """The compare interrupt: turn the DIR pins that are due; 1 when a sample is due, else arm for the next.
+
+    185 instructions and 24 a joint; a turn of DIR takes almost as much again.
+    """
+    head = block
+    while True:
+        now = timer[CNT]
+        soonest = 1 << 29
+        turned = 0
+        joints = block[JOINTS]
+        block = ptr32(int(block) + 4 * BLOCK_HEAD)
+        while joints:
+            joints -= 1
+            if block[TURNS_OUT] != block[TURNS_IN] and not head[FROZEN]:
+                gap = block[TURN_TIMES + (block[TURNS_OUT] & (TURN_ROOM - 1))] - now
+                if ((gap - 1) >> 31) & 1:
+                    bit = block[DIR_BIT]
+                    if port[ODR] & bit:
+                        bit <<= 16
+                    turned |= bit
+                    block[TURNS_OUT] = (block[TURNS_OUT] + 1) & 0xFF
+                    if ((gap + head[TURN_SLACK_TICKS]) >> 31) & 1:
+                        head[TURN_LATE] = 1
+                    soonest = 0
+                else:
+                    gap &= 0x3FFFFFFF
+                    if gap < soonest:
+                        soonest = gap
+            block = ptr32(int(block) + 4 * JOINT_WORDS)
+        block = head
+        if turned:
+            port[BSRR] = turned
+        if not block[SAMPLES_DONE]:
+            gap = block[NEXT_SAMPLE] - now
+            if ((gap - 1) >> 31) & 1:
+                block[NOW] = now
+                return 1
+            gap &= 0x3FFFFFFF
+            if gap < soonest:
+                soonest = gap
+        if soonest:
+            now += soonest
+            timer[CCR4] = now
+            if not ((now - timer[CNT] - 1) >> 31) & 1:
+                return 0
+
+
+@micropython.viper
+def take_sample(raw: ptr32, block: ptr32, dma: ptr32, encoders: object) -> object:
+    """Store a raw sample and find the time of the next. 160 instructions, 40 a joint, 100 an encoder."""
+    n = block[RAW_IN]
+    if ((n - block[RAW_OUT]) & 0xFF) >= RAW_ROOM:
+        block[RAW_LOST] = block[RAW_LOST] + 1
+    else:
+        block[RAW_IN] = (n + 1) & 0xFF
+        raw = ptr32(int(raw) + (n & (RAW_ROOM - 1)) * (4 * RAW_WORDS))
+        raw[RAW_COUNTER] = block[NOW]
+        head = block
+        n = block[JOINTS]
+        raw = ptr32(int(raw) + 4 * n)
+        block = ptr32(int(block) + 4 * (BLOCK_HEAD + RING) + n * (4 * JOINT_WORDS))
+        while n:
+            n -= 1
+            block = ptr32(int(block) - 4 * JOINT_WORDS)
+            raw[_HERE] = (
+                (block[NDTR_AT_START] - dma[block[NDTR_AT]] - block[MATCHED]) & block[MASK]
+            ) + block[MATCHED]
+            raw = ptr32(int(raw) - 4)
+        block = head
+        n = block[ENCODERS]
+        while n:
+            n -= 1
+            raw[RAW_ENCODERS + n] = ptr32(encoders[n])[CNT]  # type: ignore[index]
+    n = block[SAMPLES_LEFT]
+    if n:
+        n -= 1
+        block[SAMPLES_LEFT] = n
+        if n:
+            block[NEXT_SAMPLE] = block[NEXT_SAMPLE] + _SAMPLE_TICKS
+        else:
+            block[NEXT_SAMPLE] = block[LAST_SAMPLE]
+    else:
+        block[SAMPLES_DONE] = 1
+
+
+@micropython.viper
+def freeze(block: ptr32, timer2: ptr32, timer5: ptr32) -> int:
+    """Stop all STEP outputs now; ``finish_pulses`` has to follow; 0 where that is done. 125 + 27 a joint.
+
+    First no more words come from DMA, then every compare value goes half a round of the counter away: from there on
+    the pins stand still. A request that DMA had before is served within a few bus cycles, long before the compare
+    value is overwritten here.
+    """
+    if block[FROZEN]:
+        return 0
+    block[FROZEN] = 1
+    timer2[DIER] = 0
+    timer5[DIER] = 0
+    far = 1
+    far = (far << 31) + timer2[CNT]
+    joints = block[JOINTS]
+    block = ptr32(int(block) + 4 * BLOCK_HEAD)
+    while joints:
+        joints -= 1
+        if block[ON_TIM5]:
+            timer5[block[CCR_AT]] = far
+        else:
+            timer2[block[CCR_AT]] = far
+        block = ptr32(int(block) + 4 * JOINT_WORDS)
+    return 1
+
+
+@micropython.viper
+def finish_pulses(block: ptr32, timer2: ptr32, timer5: ptr32, ports: object) -> object:
+    """After ``freeze``: a STEP pin that is high gets its falling edge, one that is low is held low."""
+    port_a = ptr32(ports[_PORT_A])  # type: ignore[index]
+    port_b = ptr32(ports[_PORT_B])  # type: ignore[index]
+    head = block
+    high = 0
+    joint = block[JOINTS]
+    block = ptr32(int(block) + 4 * BLOCK_HEAD + joint * (4 * JOINT_WORDS))
+    while joint:
+        joint -= 1
+        block = ptr32(int(block) - 4 * JOINT_WORDS)
+        timer = timer2
+        if block[ON_TIM5]:
+            timer = timer5
+        port = port_a
+        if block[ON_PORT_B]:
+            port = port_b
+        if (port[IDR] >> block[PIN_BIT]) & 1:
+            high |= 1 << joint
+            timer[block[CCR_AT]] = timer[CNT] + head[PULSE_TICKS]
+        else:
+            mode = block[CCMR_AT]
+            timer[mode] = (timer[mode] | (_MODE_BITS << block[MODE_SHIFT])) - (
+                _TO_FORCED_LOW << block[MODE_SHIFT]
+            )
+    head[STEP_HIGH] = high
+
+
+@micropython.viper
+def set_fault(block: ptr32, code: int, joint: int) -> object:
+    """Note a fault; the first one stays."""
+    if not block[FAULT]:
+        block[FAULT] = code
+        block[FAULT_JOINT] = joint
+
+
+@micropython.viper
+def joint_towards(pairs: ptr32, count: int, line: int, levels: int) -> int:
+    """1 + the active joint that moves towards the switch on ``line``, or 0; ``levels`` of the DIR port."""
+    while count:
+        if (
+            pairs[PAIR_LINE] == line
+            and pairs[PAIR_MOVES]
+            and ((levels >> pairs[PAIR_DIR_BIT]) & 1) == pairs[PAIR_LEVEL]
+        ):
+            return pairs[PAIR_JOINT] + 1
+        pairs = ptr32(int(pairs) + 4 * PAIR_WORDS)
+        count -= 1
+    return 0
+
+
+@micropython.viper
+def output_levels(port: ptr32) -> int:
+    """Levels that the program drives the DIR port to."""
+    return port[ODR]

@@ -1,0 +1,145 @@
+"""One STEP output: its pin, its ring of edge times and the DMA stream that feeds its compare register.
+
+The stream fetches one word ahead of the match that asks for it (RM0090 10.3.12). So the entry in the compare register
+and the one behind it can no longer be changed. Therefore new entries are added while the last rising edge is still well
+ahead (see ``isr.rings_to_refill``), and a ring that has run out of entries is started anew.
+"""
+
+from array import array
+
+import stm
+import uctypes
+from machine import disable_irq, enable_irq, mem32
+from micropython import const
+from pyb import Pin
+
+from armtempo_board.hardware import isr
+
+_LASTS_MS = const(4)
+_LEAST_ENTRIES = const(64)
+_MOST_ENTRIES = const(1024)
+_FAR_KITICKS = const(1 << 20)
+_TIM5 = const(5)
+_FIRST_FED = const(1)  # entry that the stream begins with: entry 0 goes into the compare register by hand
+
+
+def size(rate: int) -> int:
+    """Entries for a joint of at most ``rate`` steps/s: a power of two. A full ring lasts 4 ms, or has 1024 entries.
+
+    The interrupt that fills it comes every 0.5 ms; nothing is added in the last 390 us.
+    """
+    wanted = 2 * rate * _LASTS_MS // 1000 + isr.SPARE_ENTRIES
+    entries = _LEAST_ENTRIES
+    while entries < min(wanted, _MOST_ENTRIES):
+        entries *= 2
+    return entries
+
+
+class Ring:
+    """``channel``: row of ``pins.STEP``. ``block``: the memory of the interrupts; ``at``: the joint's words in it.
+
+    ``entries``: see ``size``.
+    """
+
+    def __init__(self, channel: int, block: "array[int]", at: int, entries: int) -> None:
+        from armtempo_board.hardware import pins, registers  # here, so that they can be forgotten
+
+        pin, timer, compare, alternate, stream, dma_channel = pins.STEP[channel]
+        self.entries = entries
+        self.words = array("I", bytearray(4 * entries + 4))
+        self.state = memoryview(block)[at + isr.RING : at + isr.RING + isr.STATE_WORDS]
+        self.state[isr.MASK] = entries - 1
+        self._fed = memoryview(self.words)[_FIRST_FED:]
+        self._block = block
+        self._at = at
+        self._mode = registers.stream_mode(dma_channel)
+        self.timer = getattr(stm, "TIM%d" % timer)
+        # addresses are large integers: made once, here
+        self._registers = registers.stream_address(stream)
+        self._ndtr = self._registers + 4 * isr.STREAM_NDTR
+        self._flags, self._all_flags = registers.stream_flags(stream)
+        address = registers.compare_address(timer, compare)
+        registers.apply(registers.stream_rows(stream, dma_channel, address, uctypes.addressof(self._fed)))
+        self._describe(pin, timer, compare)
+        self.stop()
+        Pin(pin, Pin.AF_PP, alt=alternate)
+
+    def _describe(self, pin: str, timer: int, compare: int) -> None:
+        from armtempo_board.hardware import pins  # here, so that it can be forgotten
+
+        block, at = self._block, self._at
+        self.state[isr.NDTR_AT] = (self._ndtr - stm.DMA1) // 4
+        block[at + isr.ON_TIM5] = timer == _TIM5
+        block[at + isr.CCR_AT] = isr.CCR1 + compare - 1
+        block[at + isr.CCMR_AT] = isr.CCMR1 + (compare - 1) // 2
+        block[at + isr.MODE_SHIFT] = 12 if compare % 2 == 0 else 4
+        block[at + isr.ON_PORT_B] = pins.port(pin) == "B"
+        block[at + isr.PIN_BIT] = pins.line(pin)
+
+    def matches(self) -> int:
+        """Entries that have matched since the stream was started."""
+        return isr.matches(self.state, stm.DMA1)
+
+    def room(self) -> int:
+        """Entries of an empty ring."""
+        return self.entries - isr.SPARE_ENTRIES
+
+    def written(self) -> int:
+        """Entries written since the stream was started."""
+        return self.state[isr.WRITTEN]
+
+    def fed(self) -> int:
+        """Whether the interrupt writes to the ring; it stops that where the ring has run out of entries."""
+        return self.state[isr.FED]
+
+    def feed(self, on: int) -> int:
+        """Let the interrupt write to the ring, or not; returns what was before."""
+        before = self.state[isr.FED]
+        self.state[isr.FED] = on
+        if on:
+            mem32[stm.TIM6] = 1  # CR1: it stops while no ring is fed
+        return before
+
+    def last_kiticks(self) -> int:
+        """Ki ticks (1024 ticks) from now to the last entry."""
+        return isr.kiticks_until(self.timer, self.state, isr.LAST_TIME)
+
+    def stop(self) -> None:
+        """Switch the stream off, ready to be filled from entry 0."""
+        self.state[isr.FED] = 0
+        mem32[self._registers] = self._mode
+        mem32[self._flags] = self._all_flags
+        mem32[self._ndtr] = self.entries
+        self.state[isr.WRITTEN] = 0
+        self.state[isr.MATCHED] = 0
+        self.state[isr.NDTR_AT_START] = self.entries
+
+    def run(self, queue: "array[int]") -> int:
+        """Take in what was written from entry 0 on, switch the stream on and let the output toggle.
+
+        1 where the first entry came too late. ``queue``: see step_queue.py.
+        """
+        isr.note_written(self.state, self.words, self.timer, queue)
+        mem32[self._registers] = self._mode | isr.STREAM_ON
+        self.state[isr.NDTR_AT_START] = mem32[self._ndtr] & 0xFFFF
+        before = disable_irq()
+        late = isr.arm_channel(self._block, self.timer, self.words, self._at)
+        enable_irq(before)
+        self.feed(1)
+        return late
+
+    def release(self) -> None:
+        """Hold the output low."""
+        before = disable_irq()
+        isr.release_channel(self._block, self.timer, self._at)
+        enable_irq(before)
+
+    def push_away(self) -> None:
+        """Keep the compare value of an empty ring far from the counter."""
+        if isr.kiticks_until(self.timer, self.state, isr.FAR_TIME) < _FAR_KITICKS:
+            self.set_last_to_now()
+            isr.push_away(self.timer, self._block[self._at + isr.CCR_AT], self.state)
+
+    def set_last_to_now(self) -> None:
+        """Take the time of the last entry for now: the ring is empty, only turns of DIR are measured from it."""
+        isr.set_last_to_now(self.timer, self.state)

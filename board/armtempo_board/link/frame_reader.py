@@ -1,0 +1,124 @@
+"""Finds frames in what the host sends, in one fixed buffer; allocates nothing.
+
+The frame layout is that of ``armtempo_shared.wire``. It never reads beyond the end of the frame that it is in, and
+outside of frames one byte at a time, so that what follows a frame stays in the port's own buffer.
+"""
+
+import time
+
+from armtempo_shared.messages import LENGTH_AT, MAX_PAYLOAD, OVERHEAD, PAYLOAD_AT, SYNC
+from micropython import const
+
+from armtempo_board.buffers import CHECK, CRC_TABLE, apply_crc, copy, pack_offsets
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
+_QUIET_MS = const(50)  # a frame that stays incomplete for so long is given up
+_ATTEMPTS = const(8)  # reads and rejected frames in one poll: bounds its time
+_PIECE = const(64)  # bytes read at once
+_FIRST = const(0)
+
+
+class FrameReader:
+    """``poll`` until it says True; then the frame stands in ``data``."""
+
+    def __init__(self) -> None:
+        self.data = bytearray(MAX_PAYLOAD + OVERHEAD)
+        self.bad = 0  # runs of bytes that were passed over
+        self.outside = -1  # last byte that came outside of any frame; -1: none in this poll
+        self._filled = 0
+        self._whole = 0  # length of the whole frame that stands in data, 0: none
+        self._skipping = False
+        self._piece = bytearray(_PIECE)
+        self._heard_ms = 0
+
+    def length(self) -> int:
+        """Payload bytes of the frame that stands in ``data``."""
+        return self._whole - OVERHEAD
+
+    def empty(self) -> bool:
+        """Whether no part of a frame waits for its rest."""
+        return self._filled == 0
+
+    def poll(self, stream: "Any", now_ms: "Any") -> bool:
+        """Whether a whole frame with the right check stands in ``data``, until the next poll."""
+        self.outside = -1
+        if self._whole:
+            self._drop(self._whole)
+            self._whole = 0
+        for _ in range(_ATTEMPTS):
+            missing = self._missing()
+            if missing == 0:
+                if self._accept():
+                    return True
+            elif not self._read(stream, missing, now_ms) or self.outside >= 0:
+                return False
+        return False
+
+    def _missing(self) -> int:
+        """Bytes still needed to judge the frame that begins at data[0]."""
+        if self._filled < PAYLOAD_AT:
+            return 1 if self._filled == 0 else PAYLOAD_AT - self._filled
+        length = self._announced()
+        if length > MAX_PAYLOAD:
+            return 0
+        return max(0, length + OVERHEAD - self._filled)
+
+    def _announced(self) -> int:
+        """Payload bytes by the frame's head."""
+        return self.data[LENGTH_AT] | self.data[LENGTH_AT + 1] << 8
+
+    def _accept(self) -> bool:
+        length = self._announced()
+        if length > MAX_PAYLOAD or not apply_crc(
+            CRC_TABLE, self.data, pack_offsets(LENGTH_AT, PAYLOAD_AT + length), CHECK
+        ):
+            self._reject()
+            return False
+        self._whole = length + OVERHEAD
+        self._skipping = False
+        return True
+
+    def _read(self, stream: "Any", missing: int, now_ms: "Any") -> bool:
+        """Take up to ``missing`` bytes; False where none are there."""
+        count = stream.readinto(self._piece, min(missing, _PIECE))
+        if not count:
+            if self._filled and time.ticks_diff(now_ms, self._heard_ms) >= _QUIET_MS:
+                self._reject()
+                return True
+            return False
+        self._heard_ms = now_ms
+        first = self._piece[_FIRST]
+        if self._filled == 0 and first != SYNC:
+            self.outside = first
+            self._skip()
+            return True
+        copy(self.data, self._piece, pack_offsets(self._filled, 0), count)
+        self._filled += count
+        return True
+
+    def _skip(self) -> None:
+        if not self._skipping:
+            self._skipping = True
+            self.bad += 1
+
+    def _reject(self) -> None:
+        """What begins at data[0] is no frame: go on at the next SYNC behind it."""
+        self._skip()
+        at = 1
+        while at < self._filled and self.data[at] != SYNC:
+            at += 1
+        self._drop(at)
+
+    def _drop(self, count: int) -> None:
+        self._filled -= count
+        copy(self.data, self.data, pack_offsets(0, count), self._filled)
+        at = 0
+        while at < self._filled and self.data[at] != SYNC:
+            at += 1
+        if at:
+            self._skip()
+            self._filled -= at
+            copy(self.data, self.data, pack_offsets(0, at), self._filled)

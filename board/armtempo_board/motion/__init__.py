@@ -1,0 +1,1 @@
+"""One motion: checked, loaded, started, kept supplied with steps, stopped, and sampled on its way."""

@@ -1,0 +1,40 @@
+"""Where a motion begins and when it ends, from its control points in exact integers."""
+
+import struct
+
+from armtempo_shared.basis import BASIS, FACTORIAL
+from armtempo_shared.limits import STEP_FRACTION_BITS, TICK_FRACTION_BITS
+from armtempo_shared.motion import Motion
+from micropython import const
+
+_CONSTANT = const(0)  # the power of u in a row of BASIS
+
+
+def _at_node(motion: Motion, offset: int, node: int) -> "tuple[int, int]":
+    """(numerator, denominator) of a spline at the start of its segment ``node``, Eq. (15) at u = 0."""
+    degree = motion.degree
+    points = struct.unpack_from("<%dq" % degree, motion.data, offset + 8 * node)
+    weights = BASIS[degree][_CONSTANT]
+    return sum([weights[i] * points[i] for i in range(degree)]), FACTORIAL[degree]
+
+
+def duration_ticks(motion: Motion) -> int:
+    """Time at which the last joint is done, in whole ticks, rounded up."""
+    longest = 0
+    for joint in range(1 if motion.shared else motion.joints):
+        total, parts = _at_node(motion, motion.time_offset(joint), motion.segments * motion.refine)
+        longest = max(longest, -(-total // (parts << TICK_FRACTION_BITS)))
+    return longest
+
+
+def start_offset(motion: Motion, joint: int, position_steps: int) -> int:
+    """0 where the joint stands at the motion's start, else how many steps the start is away (not 0).
+
+    Within half a step and 1/64 counts as standing there: the step generator takes it from that.
+    """
+    total, parts = _at_node(motion, motion.angle_offset(joint), 0)
+    one = parts << STEP_FRACTION_BITS
+    off = total - position_steps * one
+    if 64 * abs(off) <= 33 * one:
+        return 0
+    return (2 * off + one) // (2 * one) or (1 if off > 0 else -1)

@@ -1,0 +1,396 @@
+"""One motion at a time: from its splines to the pins, and back to samples.
+
+``load`` checks a motion and fills the rings. ``start`` lets the counters run. ``service`` keeps steps ready for the
+interrupt that fills the rings; call it every few milliseconds until ``moving`` is False. Then ``fault`` says why the
+motion ended. After any stop ``commanded`` is exact for every joint whose bit in ``known`` is set:
+
+=====================  =============================================================
+end, brake, freeze     known: each pulse that has begun is finished, and all are counted
+limit switch           the same
+underrun               the same: the ring stops, no wrong step is made
+E-stop                 known, but unknown where the arm record releases the drivers
+following error        unknown for the joint that was lost
+DIR turned too late    unknown for all joints
+exception in service   unknown for all joints
+=====================  =============================================================
+"""
+
+import gc
+import time
+from array import array
+
+import stm
+from armtempo_shared import codes
+from armtempo_shared.messages import NO_JOINT
+from armtempo_shared.motion import Motion
+from machine import mem32
+from micropython import const
+
+from armtempo_board import heap
+from armtempo_board.buffers import COMMANDED, TICKS_HIGH, TICKS_LOW
+from armtempo_board.errors import Refused
+from armtempo_board.hardware import isr
+from armtempo_board.hardware.encoders import EncoderInput, NoEncoder
+from armtempo_board.hardware.inputs import Inputs
+from armtempo_board.hardware.sampler import Sampler
+from armtempo_board.motion.following_error import FollowingError
+from armtempo_board.motion.joint_drive import LOOKAHEAD_KITICKS, JointDrive
+from armtempo_board.motion.readings import Readings
+from armtempo_board.motion.ring_feeder import RingFeeder
+
+LEAD_TICKS = const(1680000)
+"""Time from the start of the counters to time 0: 20 ms, in which drivers switch on and DIR settles."""
+
+_PREFILLS = const(32)
+_ANY_JOINT = const(0)
+_ROUNDS = const(8)  # of filling the queues, before other work gets its turn
+_BRAKE_MARGIN_KITICKS = const(2048)  # 25 ms, within which all joints get the law of braking
+_PULSE_SPARE_US = const(5)
+_TICKS_PER_US = const(84)
+_START_US = const(50)
+_START_CHECKS = const(5)
+# work beside the filling of queues: one of these in each call of ``service``
+_POLL_SWITCHES = const(0)
+_CHECK_FOLLOWING = const(1)
+_CHECK_INTERRUPT = const(2)
+_LIMITS = ("min_steps", "max_steps", "max_rate")  # what of a joint's row in the arm record is needed later
+
+
+class Engine:
+    """``head`` and ``joints`` as ``armrecord.unpack`` gives them. Nothing moves, drivers are off."""
+
+    def __init__(self, head: "dict[str, int]", joints: "list[dict[str, int]]") -> None:
+        from armtempo_shared import armrecord  # here, so that they can be forgotten
+
+        from armtempo_board.hardware import registers
+
+        rows = [row for row in joints if row["encoder"] != armrecord.NONE]
+        fitted = [EncoderInput(row["encoder"], row["encoder_inverted"]) for row in rows]
+        self._sampler = Sampler(len(joints), tuple([encoder.address for encoder in fitted]))
+        self._block = self._sampler.block
+        self._sampler.connect()
+        registers.apply(registers.CLOCKS)
+        registers.apply(registers.TIMERS)
+        self._joints = [JointDrive(n, head, row, self._sampler) for n, row in enumerate(joints)]
+        self._encoders = [fitted[rows.index(row)] if row in rows else NoEncoder() for row in joints]
+        slots = [isr.RAW_ENCODERS + rows.index(row) if row in rows else 0 for row in joints]
+        self._readings = Readings(self._sampler, self._joints, self._encoders, slots)
+        self._following = [FollowingError(row) for row in joints]
+        self._inputs = Inputs(head, joints, self._sampler)
+        RingFeeder(self._inputs, self._joints, self._block)  # its timer's callback keeps it alive
+        registers.apply(registers.PRIORITIES)
+        self.limits = [{name: row[name] for name in _LIMITS} for row in joints]
+        self._pulse_us = head["pulse_ticks"] // _TICKS_PER_US + _PULSE_SPARE_US
+        self._epoch = 0
+        self._counter_kiticks = 0
+        self._watched_joint = self._background_task = 0
+        self._homing = False
+        self._brake_ticks = 0
+        self._braked = self._end_moves = False
+        self._in_service = False  # service() or refill() is at work, or has not come to its end
+        self.moving = False
+        self.finished = False
+        self.fault = 0
+        self.fault_joint = NO_JOINT
+        self.known = 0
+        self.duration_ticks = 0
+
+    # before a motion
+
+    def home(self, mask: int, steps: "list[int]") -> None:
+        """The joints of ``mask`` stand at ``steps`` (one number for every joint)."""
+        for number, joint in enumerate(self._joints):
+            if mask >> number & 1:
+                joint.declare(steps[number])
+                self._encoders[number].declare(self._following[number].expected(steps[number]))
+        self.known |= mask
+
+    def load(self, motion: Motion) -> None:
+        """Check a motion and fill the rings; Refused where something is wrong."""
+        self._check(motion)
+        self._inputs.enable(True)
+        self._set_clock(-LEAD_TICKS)
+        self._end_ticks = self.duration_ticks
+        self._sampler.plan(self._end_ticks)
+        self._readings.clear()
+        self._brake_ticks = motion.brake_ticks
+        self._braked = self._end_moves = False
+        for number, joint in enumerate(self._joints):
+            joint.load(motion, number)
+            self._inputs.watch(number, 1)
+            self._prefill(joint)
+        self.finished = False
+
+    def _check(self, motion: Motion) -> None:
+        if self.moving:
+            raise Refused(codes.BUSY)
+        self._watch_idle()
+        if self.fault:
+            raise Refused(codes.FAULT_PENDING, self.fault_joint, self.fault)
+        self._check_splines(motion)
+        heap.forget()
+        from armtempo_board.motion import endpoints  # here, so that it can be forgotten
+
+        self.duration_ticks = endpoints.duration_ticks(motion)
+        for number, joint in enumerate(self._joints):
+            if not self.known >> number & 1:
+                raise Refused(codes.UNHOMED, number)
+            off = endpoints.start_offset(motion, number, joint.position(joint.ring.matches()))
+            if off:
+                raise Refused(codes.WRONG_START, number, off)
+
+    def _check_splines(self, motion: Motion) -> None:
+        from armtempo_board.motion.motion_check import check  # here, so that it can be forgotten
+
+        joint = self._joints[_ANY_JOINT]  # the gap is the same for all
+        check(motion, self.limits, joint.gap_ticks, joint.generator.subintervals)
+
+    def _prefill(self, joint: JointDrive) -> None:
+        now_kiticks = self._clock()
+        for _ in range(_PREFILLS):
+            joint.refill(now_kiticks)
+
+    def start(self, homing: bool = False) -> None:
+        """Let the counters run. ``homing``: a limit switch ends the motion without a fault."""
+        gc.collect()
+        self._homing = homing
+        self.moving = True
+        before_kiticks = isr.counter_kiticks(stm.TIM2)
+        mem32[stm.TIM2 + 4 * isr.CR1] = 1
+        time.sleep_us(_START_US)
+        for _ in range(_START_CHECKS):
+            if isr.counters_agree(stm.TIM2, stm.TIM5) and isr.counter_kiticks(stm.TIM2) != before_kiticks:
+                return
+        self._fail(codes.START_FAILED, NO_JOINT)
+
+    # while it moves
+
+    def service(self) -> None:
+        """Keep the queues filled, convert samples, look for faults. An exception in it leaves the position unknown."""
+        self._in_service = True
+        self._service()
+        self._in_service = False
+
+    def refill(self) -> None:
+        """Keep the queues filled and nothing else: for between other work, as full ones last a few milliseconds."""
+        if self.moving and not self._block[isr.FROZEN]:
+            self._in_service = True
+            self._refill_queues()
+            self._in_service = False
+
+    def _service(self) -> None:
+        if not self.moving:
+            self._watch_idle()
+            return
+        if self._block[isr.FROZEN]:
+            self._stopped()
+            return
+        if not self._refill_queues():
+            return
+        self._background_task = self._background_task + 1 if self._background_task < _CHECK_INTERRUPT else 0
+        if self._background_task == _POLL_SWITCHES:
+            self._inputs.poll()
+        elif self._background_task == _CHECK_FOLLOWING:
+            self._check_following()
+        elif self._sampler.overdue(self._watched_joint):
+            self._block[isr.TURN_LATE] = 1
+        if self._block[isr.TURN_LATE]:
+            self._fail(codes.INTERNAL, NO_JOINT)
+        elif self._has_ended():
+            self._finish()
+
+    def _refill_queues(self) -> bool:
+        """Keep all queues filled; False where that ended the motion."""
+        now_kiticks = self._clock()
+        self._readings.convert(self._epoch, self._counter_kiticks)
+        if self._end_moves and self._sampler.quiet():
+            self._sampler.end_at(self.duration_ticks)
+            self._end_moves = False
+        for _ in range(_ROUNDS):
+            can_queue_more = False
+            for number in range(len(self._joints)):
+                joint = self._joints[number]
+                fault = joint.refill(now_kiticks)
+                if fault:
+                    self._fail(fault, number)
+                    return False
+                can_queue_more = can_queue_more or joint.can_queue_more
+            if not can_queue_more:
+                break
+            now_kiticks = self._clock()
+        return True
+
+    def _has_ended(self) -> bool:
+        for joint in self._joints:
+            if not joint.ended:
+                return False
+        return self._sampler.done()
+
+    def _check_following(self) -> None:
+        """Compare one joint with its encoder; the next joint comes with the next call."""
+        number = self._watched_joint
+        self._watched_joint = (number + 1) % len(self._joints)
+        joint = self._joints[number]
+        if not self._following[number].limit:
+            return
+        matches = joint.ring.matches()
+        if self._sampler.waits():  # a sample may be older than these matches, and comes first
+            return
+        encoder = self._encoders[number]
+        encoder.update()
+        if self._following[number].is_exceeded(joint.position(matches), encoder.counts):
+            self.known &= ~(1 << number)
+            self._fail(codes.FOLLOWING, number)
+
+    def _watch_idle(self) -> None:
+        """While nothing moves: follow the encoders, and look at the E-stop."""
+        for encoder in self._encoders:
+            encoder.update()
+        if self._inputs.estop_active():
+            self._inputs.trip_estop()
+        if self._block[isr.FAULT] and not self.fault:
+            self._take_fault()
+
+    def freeze(self) -> None:
+        """Stop all outputs now; not a fault."""
+        self._inputs.freeze()
+        if self._in_service:
+            self._in_service = False
+            self.known = 0
+        if self.moving:
+            self._stopped()
+
+    def brake(self) -> None:
+        """Come to rest along the path; freeze where the motion's record has no brake time.
+
+        Over the record's brake time acceleration and jerk stay within 1.25 times the arm's limits. Braking begins
+        behind what is in the rings, about 75 ms from now. A motion that is over by then ends by itself.
+        """
+        if not self.moving or self._braked:
+            return
+        if not self._brake_ticks:
+            self.freeze()
+            return
+        now_kiticks = self._clock()
+        start_kiticks = now_kiticks + LOOKAHEAD_KITICKS + _BRAKE_MARGIN_KITICKS
+        for joint in self._joints:
+            start_kiticks = max(start_kiticks, now_kiticks + joint.ahead_kiticks())
+        if start_kiticks << 10 < self.duration_ticks:
+            self._brake_at(start_kiticks << 10)
+
+    def _brake_at(self, start_ticks: int) -> None:
+        self._braked = self._end_moves = True
+        self.duration_ticks = self._end_ticks = start_ticks + self._brake_ticks
+        for joint in self._joints:
+            joint.brake(start_ticks, self._brake_ticks)
+            if not self._refill_queues():
+                break
+
+    def _fail(self, code: int, joint: int) -> None:
+        self._inputs.freeze()
+        isr.set_fault(self._block, code, joint)
+        self._stopped()
+
+    # after it
+
+    def _stopped(self) -> None:
+        """The outputs were frozen: let pulses that have begun end, then count."""
+        time.sleep_us(self._pulse_us)
+        self._stop_counters()
+        self._end_ticks = max(self.motion_ticks(), 0)
+        self._clock()
+        self._readings.convert(self._epoch, self._counter_kiticks)
+        high = self._block[isr.STEP_HIGH]
+        for number, joint in enumerate(self._joints):
+            joint.settle(high >> number & 1)
+        self._sampler.take_now()
+        self._readings.convert(self._epoch, self._counter_kiticks)
+        if self._block[isr.TURN_LATE]:
+            self.known = 0
+        if self._block[isr.FAULT] == codes.LIMIT_SWITCH and self._homing:
+            self._block[isr.FAULT] = 0
+        if self._block[isr.FAULT]:
+            self._take_fault()
+        self._finish()
+
+    def _take_fault(self) -> None:
+        self.fault = self._block[isr.FAULT]
+        self.fault_joint = self._block[isr.FAULT_JOINT]
+        if self.fault == codes.ESTOP and self._inputs.releases:
+            self.known = 0
+
+    def _finish(self) -> None:
+        self._stop_counters()
+        for number, joint in enumerate(self._joints):
+            joint.empty()
+            self._inputs.watch(number, 0)
+        self.moving = False
+        self.finished = True
+
+    def _stop_counters(self) -> None:
+        mem32[stm.TIM6] = 0
+        mem32[stm.TIM2 + 4 * isr.DIER] = 0
+        mem32[stm.TIM2 + 4 * isr.CR1] = 0
+        mem32[stm.TIM5 + 4 * isr.CR1] = 0
+
+    def clear(self) -> bool:
+        """Clear the fault, unless its cause is still there; True where it is cleared."""
+        if self.moving or self._inputs.estop_active():
+            return False
+        self._block[isr.FAULT] = 0
+        self.fault = 0
+        self.fault_joint = NO_JOINT
+        return True
+
+    def close(self) -> None:
+        """Release the hardware; the rings are not used after it."""
+        self.freeze()
+        self._inputs.close()
+
+    # what it knows
+
+    def commanded(self, joint: int) -> int:
+        """Steps issued so far, as a position."""
+        while True:
+            matches = self._joints[joint].ring.matches()
+            if not self._sampler.waits():
+                return self._joints[joint].position(matches)
+            self._readings.convert(
+                self._epoch, self._counter_kiticks
+            )  # samples come first: they may be older
+
+    def next_sample(self, buffer: "array[int]") -> bool:
+        """Copy the oldest sample to ``buffer``, its words as in ``buffers.py``; False: there is none."""
+        return self._readings.next(buffer)
+
+    def snapshot(self, buffer: "array[int]") -> None:
+        """Write a sample of this moment to ``buffer``; after a motion with the time at which it ended."""
+        ticks = self._end_ticks if self.finished else max(self.motion_ticks(), 0)
+        low = ticks & 0xFFFFFFFF
+        buffer[TICKS_LOW] = low - (1 << 32) if low >> 31 else low
+        buffer[TICKS_HIGH] = ticks >> 32
+        count = len(self._joints)
+        for number in range(count):
+            buffer[COMMANDED + number] = self.commanded(number)
+            self._encoders[number].update()
+            buffer[COMMANDED + count + number] = self._encoders[number].counts
+
+    def motion_ticks(self) -> int:
+        """The motion clock, 64 bits; negative before time 0."""
+        counter = mem32[stm.TIM2 + 4 * isr.CNT] & 0xFFFFFFFF
+        epoch = self._epoch + (1 if counter >> 10 < self._counter_kiticks else 0)
+        return int((epoch << 32) + counter)
+
+    def _set_clock(self, ticks: int) -> None:
+        mem32[stm.TIM2 + 4 * isr.CNT] = ticks & 0xFFFFFFFF
+        mem32[stm.TIM5 + 4 * isr.CNT] = ticks & 0xFFFFFFFF
+        self._epoch = ticks >> 32
+        self._counter_kiticks = isr.counter_kiticks(stm.TIM2)
+
+    def _clock(self) -> int:
+        """The motion clock in Ki ticks (1024 ticks): a small integer."""
+        low = isr.counter_kiticks(stm.TIM2)
+        if low < self._counter_kiticks:
+            self._epoch += 1
+        self._counter_kiticks = low
+        return (self._epoch << 22) + low

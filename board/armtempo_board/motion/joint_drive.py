@@ -1,0 +1,174 @@
+"""The drive of one joint: step generator, ring, DIR pin, and the count of what has been stepped.
+
+The generator puts steps into its queue, from where an interrupt (ring_feeder.py) writes them to the ring. Ki ticks are
+1024 ticks, 12.2 us.
+"""
+
+from array import array
+
+import stm
+from armtempo_shared import codes
+from armtempo_shared.motion import Motion
+from micropython import const
+from pyb import Pin
+
+from armtempo_board.hardware import isr
+from armtempo_board.hardware.ring import Ring, size
+from armtempo_board.hardware.sampler import Sampler
+from armtempo_board.stepgen.step_generator import StepGenerator
+
+LOOKAHEAD_KITICKS = const(4096)
+"""How far ahead steps are computed: 50 ms. Braking begins behind what is computed."""
+
+_GUARD_KITICKS = const(16)  # 195 us: a turn of DIR is queued only behind an edge that is further away
+_OVERDUE_KITICKS = const(-164)  # 2 ms ago: the interrupt that fills the rings comes no more
+_REFILL_KITICKS = const(256)  # 3 ms between two looks at a queue that goes on far enough
+_NEVER_KITICKS = const(1 << 29)
+_TURN_SLACK_TICKS = const(8400)  # 100 us: how late the interrupt that turns DIR may come
+_TURNS = const(8)
+
+
+class JointDrive:
+    """``head`` and ``row``: the arm record's; ``sampler`` has the memory that the interrupts read."""
+
+    def __init__(self, number: int, head: "dict[str, int]", row: "dict[str, int]", sampler: Sampler) -> None:
+        from armtempo_board.hardware import pins  # here, so that it can be forgotten
+
+        self._sampler = sampler
+        block = sampler.block
+        self._words_at = sampler.joint_at(number)
+        self.ring = Ring(row["channel"], block, self._words_at, size(row["max_rate"]))
+        self.generator = StepGenerator()
+        self._inverted = row["dir_inverted"]
+        self._turn_delay = head["dir_hold_ticks"] + _TURN_SLACK_TICKS
+        self.gap_ticks = max(
+            head["pulse_ticks"] + self._turn_delay + _TURN_SLACK_TICKS + head["dir_setup_ticks"],
+            head["pulse_ticks"] + head["low_ticks"],
+        )
+        name = pins.DIR[row["channel"]]
+        self._dir = Pin(name, Pin.OUT_PP, value=0)
+        block[self._words_at + isr.DIR_BIT] = 1 << pins.line(name)
+        block[isr.PULSE_TICKS] = head["pulse_ticks"]
+        block[isr.TURN_SLACK_TICKS] = _TURN_SLACK_TICKS
+        block[isr.DIR_SETUP_TICKS] = head["dir_setup_ticks"]
+        self._turn_steps = array("i", [0] * _TURNS)  # steps of the ring before each turn that is queued
+        self._direction = 1
+        self._count_from(0)
+        self.ended = True
+        self.can_queue_more = False  # at once, as the last call of ``refill`` took only a limited time
+        self._next_refill_kiticks = 0
+
+    def _count_from(self, position: int) -> None:
+        """The ring begins anew at a position."""
+        self._base = position
+        self._base_steps = 0
+        self._turns_in = self._turns_out = 0
+
+    def load(self, motion: Motion, number: int) -> None:
+        """Stand before a motion; the clock stands before 0."""
+        position = self._base
+        self.generator.load(motion, number, position, self._sampler.block[isr.PULSE_TICKS], self.gap_ticks)
+        self._direction = self.generator.direction
+        self._dir.value((self._direction > 0) ^ self._inverted)
+        self.ring.release()  # a motion may have been loaded and never started
+        self.ring.stop()
+        self._count_from(position)
+        self.ended = False
+        self._next_refill_kiticks = -LOOKAHEAD_KITICKS  # nothing is to be done before
+
+    def position(self, matches: int) -> int:
+        """Commanded steps after so many matches of the ring; call it in the order of the matches."""
+        steps = (matches + 1) >> 1
+        while self._turns_out != self._turns_in:
+            turned = self._turn_steps[self._turns_out & (_TURNS - 1)]
+            if turned > steps:
+                break
+            self._base += self._direction * (turned - self._base_steps)
+            self._base_steps = turned
+            self._direction = -self._direction
+            self._turns_out += 1
+        return self._base + self._direction * (steps - self._base_steps)
+
+    def ahead_kiticks(self) -> int:
+        """How far ahead steps are in the ring, rounded up."""
+        return self.ring.last_kiticks() + 1 if self.ring.fed() else 0
+
+    def refill(self, now_kiticks: int) -> int:
+        """Keep the queue filled; code of a fault, or 0."""
+        self.can_queue_more = False
+        if now_kiticks < self._next_refill_kiticks:
+            return 0
+        generator = self.generator
+        until_kiticks = now_kiticks + LOOKAHEAD_KITICKS
+        self.can_queue_more = generator.prepare(until_kiticks)
+        if not self.ring.fed():
+            return self._restart(now_kiticks) if self._sampler.quiet() else 0
+        ahead_kiticks = self.ring.last_kiticks()
+        if generator.at_turn and not generator.waits() and ahead_kiticks > _GUARD_KITICKS and self._turn():
+            self.can_queue_more = True
+        elif generator.latest_kiticks() > until_kiticks:
+            self._next_refill_kiticks = now_kiticks + _REFILL_KITICKS
+        return codes.INTERNAL if ahead_kiticks < _OVERDUE_KITICKS else 0
+
+    def _turn(self) -> bool:
+        """Queue the turn of DIR that the generator stands at; False while the queue is full."""
+        if self._turns_in - self._turns_out >= _TURNS:
+            return False
+        if not isr.add_turn(self._sampler.block, self.ring.state, self._words_at, self._turn_delay):
+            return False
+        self._turn_steps[self._turns_in & (_TURNS - 1)] = self.ring.written() >> 1
+        self._turns_in += 1
+        self.generator.turn()
+        isr.interrupt_soon(stm.TIM2)
+        return True
+
+    def _restart(self, now_kiticks: int) -> int:
+        """The ring has run out of steps: fill it from its start once the next ones come near."""
+        ring = self.ring
+        generator = self.generator
+        if not generator.waits():
+            if generator.ended:
+                ring.release()
+                self.ended = True
+                self._next_refill_kiticks = _NEVER_KITICKS
+            elif generator.at_turn:
+                ring.set_last_to_now()
+                self._turn()
+            return 0
+        if generator.next_kiticks() - now_kiticks > LOOKAHEAD_KITICKS:
+            ring.push_away()
+            self._next_refill_kiticks = now_kiticks + _REFILL_KITICKS
+            return 0
+        if ring.written():
+            self.empty()
+        if not generator.write(ring.words, ring.entries - 1, 0, ring.room()):
+            return 0
+        return codes.UNDERRUN if ring.run(generator.queue) else 0
+
+    def brake(self, start_ticks: int, length_ticks: int) -> None:
+        """Come to rest along the path (see ``StepGenerator.brake``)."""
+        fed = self.ring.feed(0)
+        self.generator.brake(start_ticks, length_ticks)
+        self._next_refill_kiticks = -LOOKAHEAD_KITICKS
+        self.ring.feed(fed)
+
+    def empty(self) -> None:
+        """Empty the ring; the position stays."""
+        self._count_from(self.position(self.ring.matches()))
+        self.ring.stop()
+
+    def settle(self, high: int) -> None:
+        """The outputs were frozen: count the last step. ``high``: STEP was high when they were.
+
+        A rising edge that came after the last word from DMA is not in the ring's count, but the pin shows it.
+        """
+        matches = self.ring.matches()
+        if high and matches & 1 == 0:
+            self.position(matches)
+            self._base += self._direction
+        self.ring.release()
+        self.ended = True
+
+    def declare(self, steps: int) -> None:
+        """The joint stands at ``steps``; nothing moves."""
+        self._base = steps

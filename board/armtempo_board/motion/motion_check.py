@@ -1,0 +1,179 @@
+"""Is a motion fit to be run? The board itself judges it before each start.
+
+Subintervals are judged by the convex hulls of their Bezier points, and halved where that does not decide: what passes
+is proven, not sampled.
+"""
+
+import struct
+
+from armtempo_shared import codes
+from armtempo_shared.limits import (
+    LONGEST_TICKS,
+    MAX_STEP_RATE,
+    MOST_SPAN_STEPS,
+    MOST_STEPS,
+    STEP_FRACTION_BITS,
+    TICK_FRACTION_BITS,
+    TICK_HZ,
+)
+from micropython import const
+
+from armtempo_board.errors import Refused
+from armtempo_board.motion import rate_check
+from armtempo_board.stepgen import subdivision
+from armtempo_board.stepgen.bezier import BIAS, HIGH, LAST_HIGH
+from armtempo_board.stepgen.subdivision import (
+    DIFFERENCE_BIAS,
+    FIRST_DIFFERENCE,
+    LAST_DIFFERENCE,
+    LEAST,
+    MOST,
+    SCALE,
+)
+from armtempo_board.stepgen.subintervals import Subintervals
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from array import array
+
+    from armtempo_shared.motion import Motion
+
+GAP_TICKS = const(25200)
+"""Least time between opposite steps that is assumed where none is given: 0.3 ms."""
+
+_SHORT_TICKS = const(1024)
+_HIGH_TICKS_BITS = const(12)  # a high word of time counts 2**12 ticks
+_PASS = const(0)
+_SPLIT = const(-1)
+
+
+def check(
+    motion: "Motion",
+    joints: "list[dict[str, int]]",
+    gap_ticks: int = GAP_TICKS,
+    interval: "Subintervals | None" = None,
+) -> None:
+    """Refused for the first thing that is wrong, with the joint and a value.
+
+    ``joints``: the joints' rows of the arm record; ``gap_ticks``: see ``StepGenerator.load``. ``interval``: is used for
+    the walk through the motion, to save heap.
+    The value is, by code: time_order, the control point; too_long, ticks or steps of 2**28; out_of_range, the position
+    in steps; too_fast, steps/s; too_abrupt, steps/s**2.
+    """
+    interval = interval or Subintervals()
+    for joint in range(motion.joints):
+        _check_numbers(motion, joint)
+        interval.load(motion, joint)
+        judge = Judge(interval, joints[joint], gap_ticks)
+        while measured := interval.measure():
+            code = judge.verdict(measured)
+            if code == _SPLIT:
+                interval.split()
+            elif code:
+                raise Refused(code, joint, judge.value)
+            else:
+                interval.skip()
+    rate_check.check_sum(motion, joints, interval)
+
+
+def _check_numbers(motion: "Motion", joint: int) -> None:
+    """Increasing time control points, and all numbers within what step generation can hold."""
+    count = motion.degree + 1
+    for offset, segments, is_time in (
+        (motion.time_offset(joint), motion.segments * motion.refine, True),
+        (motion.angle_offset(joint), motion.segments, False),
+    ):
+        for segment in range(segments):
+            control = struct.unpack_from("<%dq" % count, motion.data, offset + 8 * segment)
+            if is_time:
+                for i in range(count - 1):
+                    if control[i] >= control[i + 1]:
+                        raise Refused(codes.TIME_ORDER, joint, segment + i + 1)
+            span = max(control) - min(control)
+            most = max(max(control), -min(control))
+            # the same for time: LONGEST_SPAN_TICKS with its fraction bits is this number too
+            if span >= MOST_SPAN_STEPS << STEP_FRACTION_BITS or most >= MOST_STEPS << STEP_FRACTION_BITS:
+                raise Refused(codes.TOO_LONG, joint, most)
+            if is_time and most >> TICK_FRACTION_BITS >= LONGEST_TICKS:
+                raise Refused(codes.TOO_LONG, joint, most >> TICK_FRACTION_BITS)
+
+
+class Judge:
+    """Judges the subintervals of one joint; ``value`` says how much where one fails."""
+
+    def __init__(self, interval: "Subintervals", row: "dict[str, int]", gap_ticks: int) -> None:
+        self._interval = interval
+        self._gap_ticks = gap_ticks
+        self._low = row["min_steps"] + BIAS
+        self._high = row["max_steps"] + BIAS
+        limit = min(row["max_rate"], MAX_STEP_RATE + MAX_STEP_RATE // 100)
+        self._mantissa, self._exponent = rate_check.scaled(limit)
+        self.value = 0
+
+    def verdict(self, measured: int) -> int:
+        """A code, _PASS, or _SPLIT where halves have to be looked at; ``measured``: what ``measure`` gave."""
+        interval = self._interval
+        for position in (interval.start(), interval.end()):
+            if not self._low <= position <= self._high:
+                self.value = position - BIAS
+                return codes.OUT_OF_RANGE
+        if not interval.angle_measures[SCALE] or not interval.time_measures[SCALE]:
+            return _SPLIT
+        return self._range() or self._rate() or self._reversal(measured)
+
+    def _is_short(self) -> bool:
+        time = self._interval.time
+        return time[LAST_HIGH] - time[HIGH] < 2 and self._interval.ticks() <= _SHORT_TICKS
+
+    def _range(self) -> int:
+        """All points of the hull within the joint's range prove it for the subinterval."""
+        measures = self._interval.angle_measures
+        is_inside = self._low <= measures[subdivision.LOWEST] and measures[subdivision.HIGHEST] <= self._high
+        return _PASS if is_inside or self._is_short() else _SPLIT
+
+    def _rate(self) -> int:
+        """|angle'| <= rate * time' for all Bezier points of the derivatives proves it for the subinterval."""
+        interval = self._interval
+        angle, time = interval.angle_measures, interval.time_measures
+        shift = 30 - self._exponent + angle[SCALE] - time[SCALE] + _HIGH_TICKS_BITS
+        found = rate_check.compare(angle, time, self._mantissa, shift)
+        if found == rate_check.SLOWER:
+            return _PASS
+        if found == rate_check.UNDECIDED and not self._is_short():
+            return _SPLIT
+        is_certain = found == rate_check.FASTER
+        self.value = rate_check.at_ends(interval) if is_certain else rate_check.highest(interval)
+        return codes.TOO_FAST
+
+    def _reversal(self, measured: int) -> int:
+        """Where the joint stands still or reverses, acceleration may carry it 0.02 steps in half a gap.
+
+        Two opposite steps closer than the gap are left out; acceleration a goes a gap**2 / 8 past a half step.
+        """
+        interval = self._interval
+        if measured & subdivision.ANGLE_STEADY:
+            return _PASS
+        if not measured & subdivision.TIME_STEADY:
+            return _SPLIT
+        numerator, denominator = _acceleration(interval.angle_measures, interval.time_measures)
+        if numerator * self._gap_ticks**2 * 100 <= denominator * 16:
+            return _PASS
+        if not self._is_short():
+            return _SPLIT
+        self.value = numerator * TICK_HZ * TICK_HZ // denominator
+        return codes.TOO_ABRUPT
+
+
+def _acceleration(angle: "array[int]", time: "array[int]") -> "tuple[int, int]":
+    """An upper bound of |angle'' / time'**2 - angle' time'' / time'**3|, steps/tick**2: (numerator, denominator)."""
+    least = time[LEAST] - DIFFERENCE_BIAS
+    most = max(abs(angle[LEAST] - DIFFERENCE_BIAS), abs(angle[MOST] - DIFFERENCE_BIAS))
+    numerator = 4 * (_second_difference(angle) * least + most * _second_difference(time))
+    denominator = 5 * least**3
+    scale = 2 * (time[SCALE] - _HIGH_TICKS_BITS) - angle[SCALE]
+    return (numerator << scale, denominator) if scale >= 0 else (numerator, denominator << -scale)
+
+
+def _second_difference(measures: "array[int]") -> int:
+    """The greatest second difference of the points, absolute."""
+    return max([abs(measures[i + 1] - measures[i]) for i in range(FIRST_DIFFERENCE, LAST_DIFFERENCE)])

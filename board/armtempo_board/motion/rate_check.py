@@ -1,0 +1,143 @@
+"""Step rates of subintervals against a limit."""
+
+from array import array
+
+import micropython
+from armtempo_shared import codes
+from armtempo_shared.limits import MAX_STEP_RATE_SUM, TICK_HZ
+from micropython import const
+
+from armtempo_board.errors import Refused
+from armtempo_board.stepgen.bezier import BIAS, HIGH, LAST_HIGH, LOW_BITS
+from armtempo_board.stepgen.subdivision import (
+    DIFFERENCE_BIAS,
+    FIRST_DIFFERENCE,
+    LAST_DIFFERENCE,
+    LEAST,
+    MOST,
+    SCALE,
+)
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from armtempo_shared.motion import Motion
+
+    from armtempo_board.stepgen.subintervals import Subintervals
+
+SLOWER = const(1)
+UNDECIDED = const(0)
+FASTER = const(-1)
+
+# as in subdivision.py: measures
+_FIRST_DIFFERENCE = const(1)
+_LAST_DIFFERENCE = const(5)
+_DIFFERENCE_BIAS = const(1 << 29)
+
+_HALF_MASK = const((1 << 15) - 1)
+_POINT_BYTES = const(8)
+_SPANS = const(128)  # of time, in which the joints' rates are summed
+_HIGH_TICKS_BITS = const(12)  # a high word of time counts 2**12 ticks
+
+
+def scaled(rate: int) -> "tuple[int, int]":
+    """(mantissa of 30 bits, exponent): ``rate`` steps/s in steps per tick is mantissa / 2**exponent."""
+    exponent = 0
+    while (rate << exponent) // TICK_HZ < 1 << 29:
+        exponent += 1
+    return (rate << exponent) // TICK_HZ, exponent
+
+
+@micropython.viper
+def compare(angle: ptr32, time: ptr32, mantissa: int, shift: int) -> int:
+    """Whether a subinterval keeps a rate: its differences against those of time * mantissa / 2**(30 - shift).
+
+    ``angle``, ``time``: its measures. At the ends the differences are the rate itself: FASTER there is certain.
+    """
+    found = SLOWER
+    high = mantissa >> 15
+    low = mantissa & _HALF_MASK
+    i = _FIRST_DIFFERENCE
+    while i <= _LAST_DIFFERENCE:
+        step = angle[i] - _DIFFERENCE_BIAS
+        if step < 0:
+            step = 0 - step
+        tick = time[i] - _DIFFERENCE_BIAS
+        if tick < 0:
+            return UNDECIDED
+        most = (tick >> 15) * high + (((tick & _HALF_MASK) * high) >> 15) + (((tick >> 15) * low) >> 15)
+        if shift >= 0:
+            step = (step >> shift) if shift < 31 else 0
+        else:
+            most = (most >> (0 - shift)) if shift > -31 else 0
+        if step > most + 4:
+            found = UNDECIDED
+            if i == _FIRST_DIFFERENCE or i == _LAST_DIFFERENCE:  # noqa: SIM109  viper knows no tuples
+                return FASTER
+        i += 1
+    return found
+
+
+def highest(interval: "Subintervals") -> int:
+    """An upper bound of the subinterval's rate in steps/s."""
+    angle, time = interval.angle_measures, interval.time_measures
+    most = max(abs(angle[LEAST] - DIFFERENCE_BIAS), abs(angle[MOST] - DIFFERENCE_BIAS))
+    return _rate(interval, most, time[LEAST] - DIFFERENCE_BIAS)
+
+
+def at_ends(interval: "Subintervals") -> int:
+    """The greater of the subinterval's rates at its two ends, in steps/s."""
+    angle, time = interval.angle_measures, interval.time_measures
+    rates = [
+        _rate(interval, abs(angle[i] - DIFFERENCE_BIAS), time[i] - DIFFERENCE_BIAS)
+        for i in (FIRST_DIFFERENCE, LAST_DIFFERENCE)
+    ]
+    return max(rates)
+
+
+def _rate(interval: "Subintervals", steps: int, ticks: int) -> int:
+    """Differences of angle and time, in their local units, as steps/s."""
+    if ticks <= 0:
+        return TICK_HZ
+    up = interval.time_measures[SCALE] - _HIGH_TICKS_BITS
+    return min((steps * TICK_HZ << up) // (ticks << interval.angle_measures[SCALE]), TICK_HZ)
+
+
+def check_sum(motion: "Motion", joints: "list[dict[str, int]]", interval: "Subintervals") -> None:
+    """Refused (too_fast, no joint, rate) where all joints together may step too fast in one of many spans of time."""
+    limit = MAX_STEP_RATE_SUM + MAX_STEP_RATE_SUM // 100
+    if sum([row["max_rate"] for row in joints]) <= limit:
+        return
+    longest = max([_end_high(motion, joint) for joint in range(motion.joints)])
+    width = longest // _SPANS + 1
+    sums = array("I", bytes(4 * (_SPANS + 1)))
+    for joint in range(motion.joints):
+        _add(interval, motion, joint, width, sums)
+    worst = max(sums)
+    if worst > limit:
+        raise Refused(codes.TOO_FAST, value=worst)
+
+
+def _end_high(motion: "Motion", joint: int) -> int:
+    """The last time control point in 4096 ticks, rounded up."""
+    at = motion.time_offset(joint) + _POINT_BYTES * (motion.segments * motion.refine + motion.degree - 1)
+    return (int.from_bytes(motion.data[at : at + _POINT_BYTES], "little") >> LOW_BITS) + 1
+
+
+def _add(interval: "Subintervals", motion: "Motion", joint: int, width: int, sums: "array[int]") -> None:
+    """Add the joint's highest rate in each span of ``width`` * 4096 ticks."""
+    peaks = array("I", bytes(4 * (_SPANS + 1)))
+    interval.load(motion, joint)
+    while interval.measure():
+        is_measured = interval.angle_measures[SCALE] and interval.time_measures[SCALE]
+        begin, end = interval.time[HIGH], interval.time[LAST_HIGH]
+        if not is_measured or end - begin > width:
+            interval.split()
+            continue
+        rate = highest(interval)
+        first = max(begin - BIAS, 0) // width
+        last = min((end - BIAS) // width, _SPANS)
+        for i in range(first, last + 1):
+            peaks[i] = max(peaks[i], rate)
+        interval.skip()
+    for i in range(_SPANS + 1):
+        sums[i] += peaks[i]

@@ -1,0 +1,247 @@
+"""Cubics: the times of up to 1024 steps between two nodes, by the cubic Hermite polynomial through them.
+
+Here are their error bound, and the forward differences that go into the queue.
+"""
+
+import micropython
+from micropython import const
+
+# as in step_queue.py: words of the queue, and of an item
+_TIME = const(0)
+_FIRST = const(1)
+_SECOND = const(2)
+_THIRD = const(3)
+_POWER = const(4)
+_SHIFT = const(5)
+_BASE = const(6)
+_REMAINDER = const(7)
+_LEFT = const(8)
+_GROUP = const(9)
+_CARRY = const(10)
+_STEPS = const(11)
+_BASE_KITICKS = const(12)
+_ITEM_WORDS = const(13)
+_TIME_SCALE = const(14)
+_BASE_HIGH = const(15)
+_IN = const(20)
+_LATEST_KITICKS = const(22)
+_ITEMS = const(32)
+_ITEMS_MASK = const(7)
+_COUNT_MASK = const(0xFFFF)
+_BIAS = const(1 << 29)
+_HIGH_BIAS = const(1 << 28)
+# as in newton.py: words of the solver
+_FIRST_NODE = const(28)
+_FIRST_TIME = const(28)
+_FIRST_MANTISSA = const(29)
+_FIRST_EXPONENT = const(30)
+_MIDDLE_TIME = const(36)
+_MIDDLE_MANTISSA = const(37)
+_MIDDLE_EXPONENT = const(38)
+_END_TIME = const(44)
+_END_MANTISSA = const(45)
+_END_EXPONENT = const(46)
+# of two neighbouring nodes
+_NODE_TIME = const(0)
+_NODE_MANTISSA = const(1)
+_NODE_EXPONENT = const(2)
+_NODE_DELAY = const(3)
+_NODE_RATE = const(4)
+_NEXT_TIME = const(8)
+_NEXT_MANTISSA = const(9)
+_NEXT_EXPONENT = const(10)
+_NODE_WORDS = const(8)
+
+_HALF_MASK = const((1 << 15) - 1)
+
+
+@micropython.viper
+def cubics_fit(steps: int, solver: ptr32, queue: ptr32) -> int:
+    """1 where two cubics of ``steps`` each, from FIRST_NODE over MIDDLE_NODE to END_NODE, keep the error bound; else 0.
+
+    2 where twice as many steps would do.
+
+    The Hermite cubic through the first and the end node misses the middle one by D in time and by E / (4 steps) in
+    slope. Its fourth derivative alone makes each of the two D / 16 wrong at most, its fifth E / 26. D / 16 + E / 16 <=
+    1/8 tick is asked, which leaves a factor of four for what is not constant about them. The rounding of the third
+    difference (see ``put_cubics``) is allowed a tenth of a tick; where groups of 16 steps are possible it is far below.
+    """
+    # The slopes with one exponent, and log2 of the steps, rounded up
+    power = 0
+    while (1 << power) < steps:
+        power += 1
+    exponent = solver[_FIRST_EXPONENT]
+    if solver[_MIDDLE_EXPONENT] < exponent:
+        exponent = solver[_MIDDLE_EXPONENT]
+    if solver[_END_EXPONENT] < exponent:
+        exponent = solver[_END_EXPONENT]
+    if exponent < power + 6:
+        return 0
+    start = solver[_FIRST_MANTISSA] >> (solver[_FIRST_EXPONENT] - exponent)
+    middle = solver[_MIDDLE_MANTISSA] >> (solver[_MIDDLE_EXPONENT] - exponent)
+    end = solver[_END_MANTISSA] >> (solver[_END_EXPONENT] - exponent)
+    # The slopes differ by a quarter at most, and by no more than the third difference can hold
+    off = start - end
+    if off < 0:
+        off = 0 - off
+    if off > start >> 2:
+        return 0
+    if 3 * power > exponent + 5 and (exponent < 8 or off > steps << (exponent - 8)):
+        return 0
+    # steps * slope at the three nodes, in units of the nodes' times
+    up = 15 - power
+    down = exponent - power - queue[_TIME_SCALE]
+    start = ((start >> 15) * steps << up) + ((start & _HALF_MASK) * steps >> power)
+    middle = ((middle >> 15) * steps << up) + ((middle & _HALF_MASK) * steps >> power)
+    end = ((end >> 15) * steps << up) + ((end & _HALF_MASK) * steps >> power)
+    middle -= start
+    end -= start
+    if down >= 0:
+        start >>= down
+        middle >>= down
+        end >>= down
+    else:
+        down = 0 - down
+        start <<= down
+        middle <<= down
+        end <<= down
+    # D and E of the Hermite cubic at the middle node
+    first = solver[_MIDDLE_TIME] - solver[_FIRST_TIME] - start
+    second = solver[_END_TIME] - solver[_MIDDLE_TIME] - start
+    off = 2 * (first - second) + end
+    if off < 0:
+        off = 0 - off
+    first = 4 * middle + end - 3 * (first + second)
+    if first < 0:
+        first = 0 - first
+    off += 4 * first
+    limit = 8 << queue[_TIME_SCALE]
+    if off > limit:
+        return 0
+    if off <= limit >> 4:
+        return 2
+    return 1
+
+
+@micropython.viper
+def put_cubics(steps: int, node: ptr32, queue: ptr32, held_back: int) -> object:
+    """Put in the ``steps`` from FIRST_NODE (itself already there) to MIDDLE_NODE, and those to END_NODE, which becomes
+    the first.
+
+    ``node``: the solver. ``held_back``: 1 where the last of the steps is left out.
+
+    With K = T - N s_a and D = N (s_b - s_a), the Hermite cubic is s_a k + (3 K - D) k**2 / N**2 + (D - 2 K) k**3 /
+    N**3: T ticks over N steps, with slopes s_a, s_b at the two nodes.
+    Its differences are taken over groups of steps; within a group time grows evenly: groups are as long as
+    that is true within 3/32 tick (second derivative times the group squared, over 8). What the third and the
+    second difference lose by rounding goes into those below them, so that the cubic it leaves vanishes at both
+    ends and in the middle, the square at both ends: at most 0.004 M**3 and 0.06 M**2 units, for M groups.
+    """
+    scale = queue[_TIME_SCALE]
+    node = ptr32(int(node) + 4 * _FIRST_NODE)  # then the middle one
+    put_in = queue[_IN]
+    while True:
+        item = ptr32(int(queue) + 4 * (_ITEMS + _ITEM_WORDS * (put_in & _ITEMS_MASK)))
+        # The slopes with one exponent; D; log2 of the steps, rounded up
+        power = 0
+        while (1 << power) < steps:
+            power += 1
+        exponent = node[_NODE_EXPONENT]
+        if node[_NEXT_EXPONENT] < exponent:
+            exponent = node[_NEXT_EXPONENT]
+        shift = exponent - power
+        start = node[_NODE_MANTISSA] >> (node[_NODE_EXPONENT] - exponent)
+        bend = (node[_NEXT_MANTISSA] >> (node[_NEXT_EXPONENT] - exponent)) - start
+        up = 15 - power
+        bend = (((bend >> 15) * steps) << up) + (((bend & _HALF_MASK) * steps) >> power)
+        # K
+        time = node[_NEXT_TIME] - node[_NODE_TIME]
+        rest = node[_NODE_TIME] & ((1 << scale) - 1)
+        high = shift - scale
+        if high >= 0:
+            time <<= high
+            rest <<= high
+        else:
+            time >>= 0 - high
+            rest >>= 0 - high
+        time -= (((start >> 15) * steps) << up) + (((start & _HALF_MASK) * steps) >> power)
+        # Hermite: the square and the cubic coefficient (times 6)
+        square = 3 * time - bend
+        cubic = 6 * (bend - 2 * time)
+        # How long a group may be: the second derivative is greatest at an end
+        time = 2 * square
+        bend = time + cubic
+        if time < 0:
+            time = 0 - time
+        if bend < 0:
+            bend = 0 - bend
+        if time < bend:
+            time = bend
+        time = time // steps // steps + 1
+        group = 4
+        if group > power:
+            group = power
+        while group and (time << (2 * group)) > (3 << shift) >> 2:
+            group -= 1
+        # Into units of the differences, with some fraction bits: cubic * 2**(2 group + power) / steps**3
+        bits = power
+        if bits > 8:
+            bits = 8
+        up = 2 * group + power + bits
+        time = 5
+        while time:
+            if time == 2:  # and square * 2**(group + power) / steps**2
+                third = cubic << up
+                cubic = square
+                up = group + power + bits
+            high = cubic
+            if high < 0:
+                high = 0 - high
+            while up and not high >> 28:
+                high += high
+                cubic += cubic
+                up -= 1
+            cubic = cubic // steps
+            time -= 1
+        # Forward differences, rounded; what the third and the second lose goes into those below
+        square = cubic << up
+        cubic = third
+        half = (1 << bits) >> 1
+        groups = steps >> group
+        third = (cubic + half) >> bits
+        cubic -= third << bits
+        square += (cubic * groups) >> 2
+        bend = 2 * square + (third << bits)
+        second = (bend + half) >> bits
+        bend -= second << bits
+        square += (third << bits) // 6 - cubic * groups * groups // 12 + ((bend * groups - bend) >> 1)
+        # The item
+        item[_TIME] = rest + (1 << (shift - 1))
+        item[_FIRST] = start + ((square + half) >> bits)
+        item[_SECOND] = second + _BIAS
+        item[_THIRD] = third + _BIAS
+        item[_POWER] = power
+        item[_SHIFT] = shift
+        high = queue[_BASE_HIGH] - _HIGH_BIAS
+        time = node[_NODE_TIME] >> scale
+        item[_BASE] = (high << 12) + time
+        item[_REMAINDER] = 0
+        item[_LEFT] = 0
+        item[_CARRY] = power - group
+        item[_GROUP] = 1 << group
+        item[_STEPS] = steps
+        item[_BASE_KITICKS] = (high << 2) + (time >> 10)
+        node = ptr32(int(node) + 4 * _NODE_WORDS)
+        put_in = (put_in + 1) & _COUNT_MASK
+        if put_in != (queue[_IN] + 1) & _COUNT_MASK:
+            break
+    item[_STEPS] = steps - held_back
+    queue[_LATEST_KITICKS] = (high << 2) + (node[_NODE_TIME] >> (scale + 10))
+    queue[_IN] = put_in
+    # The end node becomes the first
+    item = ptr32(int(node) - 4 * 2 * _NODE_WORDS)
+    item[_NODE_TIME] = node[_NODE_TIME]
+    item[_NODE_MANTISSA] = node[_NODE_MANTISSA]
+    item[_NODE_EXPONENT] = node[_NODE_EXPONENT]
+    item[_NODE_DELAY] = node[_NODE_DELAY]
+    item[_NODE_RATE] = node[_NODE_RATE]

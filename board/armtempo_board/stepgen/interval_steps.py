@@ -1,0 +1,163 @@
+"""Through a monotone subinterval: its steps into the queue, as cubics where the error bound allows it, else singly."""
+
+import micropython
+from micropython import const
+
+from armtempo_board.stepgen.braking import scale_slope, to_real_time
+from armtempo_board.stepgen.cubics import cubics_fit, put_cubics
+from armtempo_board.stepgen.newton import solve
+
+_MOST_STEPS = const(1024)  # of a cubic
+_SINGLY = const(8)  # steps solved one by one before a cubic is tried again; an item of the queue holds 8
+
+# as in step_queue.py: words of the queue
+_LEFT = const(8)
+_GROUP = const(9)
+_STEPS = const(11)
+_BASE_KITICKS = const(12)
+_UNTIL_KITICKS = const(13)
+_ITEM_WORDS = const(13)
+_TIME_SCALE = const(14)
+_BASE_HIGH = const(15)
+_IN = const(20)
+_OUT = const(21)
+_LATEST_KITICKS = const(22)
+_REACHED = const(23)
+_LAST_STEP = const(24)
+_CUBIC_STEPS = const(25)
+_SLOW_TICKS = const(26)
+_INTERVAL_HIGH = const(27)
+_MODE = const(28)
+_SINGLE_STEPS = const(29)
+_HELD_BACK = const(30)
+_ENDED = const(31)
+_ITEMS = const(32)
+_ITEMS_MASK = const(7)
+_HIGH_BIAS = const(1 << 28)
+_COUNT_MASK = const(0xFFFF)
+_FULL = const(7)
+_BRAKING = const(1)
+_AT_START = const(2)
+# as in newton.py: words of the solver
+_FIRST_NODE = const(28)
+_FIRST_TIME = const(28)
+_MANTISSA = const(29)  # of the first node
+_EXPONENT = const(30)
+_FIRST_DELAY = const(31)
+_MIDDLE_NODE = const(36)
+_END_NODE = const(44)
+_END_MANTISSA = const(45)
+_END_EXPONENT = const(46)
+_END_DELAY = const(47)
+# of a node
+_NODE_TIME = const(0)
+_NODE_DELAY = const(3)
+_NODE_WORDS = const(8)
+
+
+@micropython.viper
+def queue_steps(solver: object, queue: object, budget: int) -> object:
+    """Queue the subinterval's steps behind REACHED, until all are in, or the queue is full or reaches UNTIL_KITICKS.
+
+    ``budget``: nodes to be solved at most, or a few more; each takes about 2000 instructions. A last step that is
+    slow is not put in, but HELD_BACK is set. ENDED is set where braking ends before. The words of ``queue`` are named
+    in step_queue.py, those of ``solver`` in newton.py.
+    """
+    words = ptr32(queue)  # type: ignore[arg-type]
+    nodes = ptr32(solver)  # type: ignore[arg-type]
+    reached = words[_REACHED]
+    last = words[_LAST_STEP]
+    high = words[_INTERVAL_HIGH]
+    mode = words[_MODE]
+    scale = words[_TIME_SCALE]
+    slow_ticks = words[_SLOW_TICKS]
+    until_kiticks = words[_UNTIL_KITICKS]
+    count = 0  # single steps in the queue that IN does not count yet
+    while reached < last and budget > 0:
+        if (words[_IN] - words[_OUT]) & _COUNT_MASK >= _FULL or words[_LATEST_KITICKS] > until_kiticks:
+            break
+        length = (last - reached) >> 1
+        if length > 1 and mode < _AT_START and not words[_SINGLE_STEPS]:
+            # Two cubics of ``length`` steps each: as long as the last that fitted, and so that none of a few is left
+            size = words[_CUBIC_STEPS]
+            if length > size:
+                length = (last - reached) // (2 * ((last - reached - 1) // (2 * size) + 1))
+                if length < 8:
+                    length = size if size < 8 else 8
+            while length > 1:
+                solve(solver, reached, length)
+                budget -= 2
+                words[_BASE_HIGH] = high
+                verdict = 1
+                if mode:
+                    # Braking: the nodes in real time, all three counting from one base
+                    verdict = int(to_real_time(solver, _MIDDLE_NODE, high, scale))
+                    if verdict:
+                        scale_slope(solver, _MIDDLE_NODE)
+                        verdict = int(to_real_time(solver, _END_NODE, high, scale))
+                    if verdict:
+                        scale_slope(solver, _END_NODE)
+                        base = (nodes[_FIRST_DELAY] >> 12) << 12
+                        words[_BASE_HIGH] = high + (base >> 12)
+                        if (nodes[_END_DELAY] - base) >> (28 - scale):
+                            verdict = 0
+                        else:
+                            node = ptr32(int(nodes) + 4 * _FIRST_NODE)
+                            i = 3
+                            while i:
+                                node[_NODE_TIME] = ((node[_NODE_DELAY] - base) << scale) + node[_NODE_TIME]
+                                node[_NODE_DELAY] = base
+                                node = ptr32(int(node) + 4 * _NODE_WORDS)
+                                i -= 1
+                if verdict:
+                    verdict = int(cubics_fit(length, solver, queue))
+                if verdict:
+                    break
+                length >>= 1
+                words[_CUBIC_STEPS] = length if length > 2 else 2
+            if length > 1:
+                reached += length + length
+                held_back = 0
+                if reached == last and nodes[_END_MANTISSA] >> nodes[_END_EXPONENT] > slow_ticks:
+                    held_back = 1
+                put_cubics(length, solver, queue, held_back)
+                words[_HELD_BACK] = held_back
+                if verdict == 2 and length + length > size and size < _MOST_STEPS:
+                    words[_CUBIC_STEPS] = size + size
+            else:
+                words[_SINGLE_STEPS] = _SINGLY
+        else:
+            # A single step
+            if words[_SINGLE_STEPS]:
+                words[_SINGLE_STEPS] = words[_SINGLE_STEPS] - 1
+            solve(solver, reached + 1, 0)
+            budget -= 1
+            base = 0
+            if mode & _BRAKING:
+                if not int(to_real_time(solver, _FIRST_NODE, high, scale)):
+                    words[_ENDED] = 1
+                    break
+                if mode == _BRAKING:
+                    scale_slope(solver, _FIRST_NODE)
+                base = nodes[_FIRST_DELAY]
+            reached += 1
+            if reached == last and (mode > _BRAKING or nodes[_MANTISSA] >> nodes[_EXPONENT] > slow_ticks):
+                words[_HELD_BACK] = 1
+            else:
+                base += (nodes[_FIRST_TIME] + (1 << (scale - 1))) >> scale
+                if not count:
+                    item = ptr32(int(words) + ((words[_IN] & _ITEMS_MASK) * _ITEM_WORDS + _ITEMS) * 4)
+                    item[_LEFT] = 0
+                    item[_GROUP] = 0
+                item[count] = ((high - _HIGH_BIAS) << 12) + base
+                words[_LATEST_KITICKS] = ((high - _HIGH_BIAS) << 2) + (base >> 10)
+                if not count:
+                    item[_BASE_KITICKS] = words[_LATEST_KITICKS]
+                count += 1
+                item[_STEPS] = count
+            if count and (count == _SINGLY or (not words[_SINGLE_STEPS] and last - reached > 3)):
+                words[_IN] = (words[_IN] + 1) & _COUNT_MASK
+                count = 0
+    if count:
+        words[_IN] = (words[_IN] + 1) & _COUNT_MASK
+    words[_REACHED] = reached

@@ -1,0 +1,263 @@
+"""The queue of steps between the step generator and the ring of a joint.
+
+An item of the queue is a cubic in forward differences (cubics.py), or up to eight single steps. ``emit`` writes the
+items to the ring, edge by edge. An interrupt may call it: only ``emit`` changes OUT and the item that it works on, only
+the others change IN, and an item is whole before IN counts it.
+
+Times are ticks modulo 2**32, or in Ki ticks (1024 ticks, 12.2 us), which are small integers.
+"""
+
+import micropython
+from micropython import const
+
+# words of the queue: first the item that ``emit`` works on
+_TIME = const(0)  # of the step written last, from the base on; ticks * 2**SHIFT
+FIRST = const(1)  # first difference over a group; ticks * 2**(SHIFT + POWER) / steps of a group
+SECOND = const(2)  # the second, + 2**29
+THIRD = const(3)  # the third, + 2**29
+POWER = const(4)
+SHIFT = const(5)
+_BASE = const(6)  # ticks, modulo 2**32
+_REMAINDER = const(7)  # what the steps of a group have left over of its time
+_LEFT = const(8)  # steps left in the group; of single steps: the word in which the next one's time stands
+GROUP = const(9)  # steps in a group; 0: single steps, whose times stand in words 0 to 7
+CARRY = const(10)  # _REMAINDER / 2**CARRY is in units of _TIME
+STEPS = const(11)  # steps not written yet
+_BASE_KITICKS = const(12)
+_ITEM_WORDS = const(13)
+UNTIL_KITICKS = const(13)  # steps after it are not written
+# what cubics are made from
+TIME_SCALE = const(14)  # fraction bits of the nodes' times
+_BASE_HIGH = const(15)  # what the nodes' times count from; 4096 ticks, + 2**28
+_STEP = const(16)  # time of one step of the group that ``emit`` is in; ticks * 2**SHIFT
+PULSE = const(17)  # ticks
+HEAD = const(18)  # entry of the ring to be written next; not masked
+_ROOM = const(19)  # entries of the ring that may be written
+# items put in and taken out, modulo 2**16
+IN = const(20)
+OUT = const(21)
+LATEST_KITICKS = const(22)  # time of the last step put in
+# the subinterval that is gone through (interval_steps.py)
+REACHED = const(23)  # its step that was put in last
+LAST_STEP = const(24)  # its last one
+CUBIC_STEPS = const(25)  # steps of a cubic that kept the error bound
+SLOW_TICKS = const(26)  # a last step that takes longer is held back
+INTERVAL_HIGH = const(27)  # what the subinterval's times count from; 4096 ticks, + 2**28
+MODE = const(28)
+SINGLE_STEPS = const(29)  # steps to be solved one by one before a cubic is tried again
+HELD_BACK = const(30)
+ENDED = const(31)
+_ITEMS = const(32)  # CAPACITY of them
+CAPACITY = const(8)  # items
+QUEUE_SIZE = const(136)
+
+_FULL = const(7)  # items: there is no room for two more
+# bits of MODE
+BRAKING = const(1)
+AT_START = const(2)  # all steps come at the start of the subinterval
+
+_ITEMS_MASK = const(7)
+_COUNT_MASK = const(0xFFFF)
+_KITICKS_MASK = const(0x3FFFFF)
+# entries of a ring: a step is the time of its rising and of its falling edge
+_RISE = const(0)
+_FALL = const(1)
+_RISE_2 = const(2)
+_FALL_2 = const(3)
+_RISE_3 = const(4)
+_FALL_3 = const(5)
+_RISE_4 = const(6)
+_FALL_4 = const(7)
+
+_BIAS = const(1 << 29)
+_HIGH_BIAS = const(1 << 28)
+_LONG_KITICKS = const(1 << 19)  # longer than any cubic
+
+
+@micropython.viper
+def emit(now: int, ring: ptr32, queue: ptr32, mask: int) -> object:
+    """Write edges of the items in the queue to the ring: up to UNTIL_KITICKS, and as many as ``now`` says.
+
+    The compiler keeps the first two arguments in registers: ``now`` becomes the running time, and ``ring`` moves.
+    """
+    start = int(ring)
+    pulse = queue[PULSE]
+    queue[_ROOM] = now
+    while True:
+        if queue[_ROOM] < 2:
+            break
+        # Take the next item out of the queue
+        if not queue[STEPS]:
+            count = queue[OUT]
+            if count == queue[IN]:
+                break
+            ring = ptr32(int(queue) + 4 * (_ITEMS + _ITEM_WORDS * (count & _ITEMS_MASK)))
+            n = 0
+            while n < _ITEM_WORDS:
+                queue[n] = ring[n]
+                n += 1
+            queue[OUT] = (count + 1) & _COUNT_MASK
+        at = queue[HEAD] & mask
+        # Single steps: their times as they stand
+        if not queue[GROUP]:
+            now = queue[queue[_LEFT]]
+            if queue[_BASE_KITICKS] + (((now - queue[_TIME]) >> 10) & _KITICKS_MASK) > queue[UNTIL_KITICKS]:
+                break
+            ring = ptr32(start + 4 * at)
+            ring[_RISE] = now
+            ring[_FALL] = now + pulse
+            queue[_LEFT] = queue[_LEFT] + 1
+            queue[STEPS] = queue[STEPS] - 1
+            queue[HEAD] = queue[HEAD] + 2
+            queue[_ROOM] = queue[_ROOM] - 2
+            continue
+        # A cubic: how many of its steps fit in front of the ring's end, into the room and before UNTIL_KITICKS
+        now = queue[_TIME]
+        shift = queue[SHIFT]
+        count = (mask + 1 - at) >> 1
+        n = queue[_ROOM] >> 1
+        if count > n:
+            count = n
+        if count > queue[STEPS]:
+            count = queue[STEPS]
+        n = queue[UNTIL_KITICKS] - queue[_BASE_KITICKS]
+        if n < _LONG_KITICKS:
+            step = queue[_STEP]
+            if not queue[_LEFT]:
+                step = queue[FIRST] >> queue[POWER]
+            n = (n << 10) - ((now + step) >> shift)
+            if n < 0:
+                break
+            n = n // ((step >> shift) + 1) + 1
+            if count > n:
+                count = n
+        if not count:
+            break
+        queue[STEPS] = queue[STEPS] - count
+        queue[HEAD] = queue[HEAD] + count + count
+        queue[_ROOM] = queue[_ROOM] - count - count
+        ring = ptr32(start + 4 * at)
+        base = queue[_BASE]
+        # Forward differences, in local variables, which cost less than words of the queue
+        first = queue[FIRST]
+        second = queue[SECOND] - _BIAS
+        third = queue[THIRD] - _BIAS
+        power = queue[POWER]
+        remainder = queue[_REMAINDER]
+        left = queue[_LEFT]
+        carry = queue[CARRY]
+        step = queue[_STEP]
+        while count:
+            # The next group: the time of one of its steps, and the next differences
+            if not left:
+                left = queue[GROUP]
+                step = first >> power
+                remainder += first - (step << power)
+                n = remainder >> carry
+                remainder -= n << carry
+                now += n
+                first += second
+                second += third
+            n = count
+            if n > left:
+                n = left
+            left -= n
+            count -= n
+            # Its steps, evenly spaced: four at a time, then singly
+            while n >= 4:
+                now = now + step
+                ring[_RISE] = (now >> shift) + base
+                ring[_FALL] = ring[_RISE] + pulse
+                now = now + step
+                ring[_RISE_2] = (now >> shift) + base
+                ring[_FALL_2] = ring[_RISE_2] + pulse
+                now = now + step
+                ring[_RISE_3] = (now >> shift) + base
+                ring[_FALL_3] = ring[_RISE_3] + pulse
+                now = now + step
+                ring[_RISE_4] = (now >> shift) + base
+                ring[_FALL_4] = ring[_RISE_4] + pulse
+                ring = ptr32(int(ring) + 32)
+                n -= 4
+            while n:
+                now = now + step
+                ring[_RISE] = (now >> shift) + base
+                ring[_FALL] = ring[_RISE] + pulse
+                ring = ptr32(int(ring) + 8)
+                n -= 1
+        queue[_TIME] = now
+        queue[FIRST] = first
+        queue[SECOND] = second + _BIAS
+        queue[_REMAINDER] = remainder
+        queue[_LEFT] = left
+        queue[_STEP] = step
+
+
+@micropython.viper
+def put_single(queue: ptr32, high: int, ticks: int) -> object:
+    """Put in one step at ``high`` (4096 ticks, + 2**28) and ``ticks``."""
+    put_in = queue[IN]
+    item = ptr32(int(queue) + 4 * (_ITEMS + _ITEM_WORDS * (put_in & _ITEMS_MASK)))
+    high -= _HIGH_BIAS
+    item[_TIME] = (high << 12) + ticks
+    item[_LEFT] = 0
+    item[GROUP] = 0
+    item[STEPS] = 1
+    high = (high << 2) + (ticks >> 10)
+    item[_BASE_KITICKS] = high
+    queue[LATEST_KITICKS] = high
+    queue[IN] = (put_in + 1) & _COUNT_MASK
+
+
+@micropython.viper
+def has_room(queue: ptr32) -> int:
+    """1 where the queue has room for two items and does not go on beyond UNTIL_KITICKS, else 0."""
+    if (queue[IN] - queue[OUT]) & _COUNT_MASK >= _FULL:
+        return 0
+    return 1 if queue[LATEST_KITICKS] <= queue[UNTIL_KITICKS] else 0
+
+
+@micropython.viper
+def holds_steps(queue: ptr32) -> int:
+    """1 while steps in the queue have not been written, else 0."""
+    return 1 if queue[STEPS] or queue[IN] != queue[OUT] else 0
+
+
+@micropython.viper
+def next_kiticks(queue: ptr32) -> int:
+    """Time of the next step in the queue, or of the one before it; -1: there is none."""
+    if queue[STEPS]:
+        now = queue[_TIME]
+        if not queue[GROUP]:
+            return queue[_BASE_KITICKS] + (((queue[queue[_LEFT]] - now) >> 10) & _KITICKS_MASK)
+        if queue[_LEFT]:
+            now += queue[_STEP]
+        else:
+            now += queue[FIRST] >> queue[POWER]
+        return queue[_BASE_KITICKS] + (now >> (queue[SHIFT] + 10))
+    if queue[IN] == queue[OUT]:
+        return -1
+    return queue[_ITEMS + _ITEM_WORDS * (queue[OUT] & _ITEMS_MASK) + _BASE_KITICKS]
+
+
+@micropython.viper
+def withdraw(queue: ptr32, first: int, from_kiticks: int) -> int:
+    """Take the last items back out, down to one that begins before a time; ``emit`` must not run meanwhile.
+
+    None goes that was put in before the ``first``. Returns their steps that were not written.
+    """
+    steps = 0
+    put_in = queue[IN]
+    while put_in != first:
+        if put_in == queue[OUT]:
+            steps += queue[STEPS]
+            queue[STEPS] = 0
+            break
+        put_in = (put_in - 1) & _COUNT_MASK
+        item = _ITEMS + _ITEM_WORDS * (put_in & _ITEMS_MASK)
+        steps += queue[item + STEPS]
+        if queue[item + _BASE_KITICKS] < from_kiticks:
+            break
+    queue[IN] = put_in
+    queue[LATEST_KITICKS] = 0
+    return steps

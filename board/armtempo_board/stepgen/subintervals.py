@@ -1,0 +1,103 @@
+"""The subintervals of one joint's motion in order of time: time segments, halved as often as asked.
+
+A subinterval that holds steps is halved until Newton's method is safe in it: its angle is monotone, its speed and
+that of time vary by no more than a factor of two, and it lasts at most 2**23 ticks. One without a half step in the
+convex hull of its Bezier points holds no step and is passed over whole. So no step is missed: the hull holds the
+curve, and differences of one sign prove it monotone.
+"""
+
+from array import array
+
+from micropython import const
+
+from armtempo_board.stepgen import bezier, subdivision
+from armtempo_board.stepgen.subdivision import search
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from armtempo_shared.motion import Motion
+
+_START_LEVEL = const(4)
+
+
+class Subintervals:
+    """Walks through a joint's motion; all buffers are made once.
+
+    ``angle`` and ``time`` begin with the Bezier points of the subinterval (bezier.py); ``angle_measures`` and
+    ``time_measures`` are what was measured of them (subdivision.py). ``min_ticks``: a subinterval no longer than
+    this that comes back to the position where it began is passed over.
+    """
+
+    def __init__(self) -> None:
+        self.angle = array("i", bytes(4 * subdivision.PIECES_SIZE))
+        self.time = array("i", bytes(4 * subdivision.PIECES_SIZE))
+        self.angle_measures = array("i", bytes(4 * subdivision.MEASURES_SIZE))
+        self.time_measures = array("i", bytes(4 * subdivision.MEASURES_SIZE))
+        self.min_ticks = 0
+
+    def load(self, motion: "Motion", joint: int) -> None:
+        """Stand before the first subinterval."""
+        self._data = motion.data
+        self._weights = bezier.weights(motion.degree)
+        self._angle_offset = motion.angle_offset(joint) >> 2
+        self._time_offset = motion.time_offset(joint) >> 2
+        self._refine = motion.refine
+        self._segments = motion.segments * motion.refine
+        self._number = -1
+        self.angle_measures[subdivision.LEVEL] = _START_LEVEL
+        self.time_measures[subdivision.NODE] = 1 << _START_LEVEL
+        self.time_measures[subdivision.MOVE] = subdivision.STAY
+        self.load_segment()
+
+    def load_segment(self) -> bool:
+        """Load the next time segment and the part of the angle segment that belongs to it; False: there is none."""
+        number = self._number + 1
+        if number == self._segments:
+            return False
+        self._number = number
+        offset = self._angle_offset + 2 * (number // self._refine)
+        bezier.from_control_points(self._data, offset, self._weights, self.angle)
+        bezier.restrict(self.angle, number % self._refine, self._refine)
+        bezier.from_control_points(self._data, self._time_offset + 2 * number, self._weights, self.time)
+        bezier.restrict(self.time, 0, 1)
+        return True
+
+    def search(self, steps: int) -> int:
+        """Look for steps in the next subintervals; see subdivision.py.
+
+        ``steps`` (+ bezier.BIAS): the position to which the steps so far lead.
+        """
+        found = search(self.time, self.angle, self.time_measures, self.angle_measures, steps, self.min_ticks)
+        # a new segment is enough for one call
+        return subdivision.NOT_YET if found == subdivision.END and self.load_segment() else found
+
+    def measure(self) -> int:
+        """Compute and measure the subinterval; 0: past the end, else MEASURED and its other results."""
+        found = 0
+        while not found:
+            found = search(self.time, self.angle, self.time_measures, self.angle_measures, 0, 0) >> 2
+            if not found and not self.load_segment():
+                break
+        return found
+
+    def split(self) -> None:
+        """Go on with its first half."""
+        self.time_measures[subdivision.MOVE] = subdivision.SPLIT
+
+    def skip(self) -> None:
+        """Go on behind it, with one twice as long where the grid allows it."""
+        self.time_measures[subdivision.MOVE] = subdivision.SKIP
+
+    def start(self) -> int:
+        """Position (+ bezier.BIAS) at its start."""
+        return self.angle[bezier.HIGH] + (self.angle[bezier.LOW] >> 27)
+
+    def end(self) -> int:
+        """Position (+ bezier.BIAS) at its end."""
+        return self.angle[bezier.LAST_HIGH] + (self.angle[bezier.LAST_LOW] >> 27)
+
+    def ticks(self) -> int:
+        """Its length, where that is no more than 2**28 ticks."""
+        time = self.time
+        low = time[bezier.LAST_LOW] - time[bezier.LOW]
+        return ((time[bezier.LAST_HIGH] - time[bezier.HIGH]) << 12) + (low >> 16)

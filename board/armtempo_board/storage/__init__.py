@@ -1,0 +1,1 @@
+"""Records in the flash file system."""

@@ -1,0 +1,320 @@
+"""Records in flash: motions, the arm record, the name of the default motion; never half written.
+
+A record is written to ``NAME.new``, read back, synced and renamed. Where a power cut leaves a ``.new`` file,
+``recover`` takes it if the old file is gone and the new one is whole, and removes it otherwise.
+
+A record's name is that of its motion, or ``ARM_RECORD_NAME``. The module is imported when it is needed and forgotten
+before a motion (see ``Controller.store``): no file is read or written while one runs.
+"""
+
+import os
+from binascii import crc32
+
+from armtempo_shared import codes
+from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_NAME
+from armtempo_shared.messages import ARM_RECORD_NAME
+from armtempo_shared.motion import Motion, MotionError
+from micropython import const
+
+from armtempo_board.errors import Refused
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
+
+_MOTION = ".atm"
+_ARM = "arm.ata"
+_DEFAULT = "default.txt"
+_NEW = ".new"
+_ENOSPC = const(28)
+_ERRNO = const(0)  # of an exception's arguments
+_ST_SIZE = const(6)  # of os.stat
+_F_BSIZE = const(0)  # of os.statvfs
+_F_BAVAIL = const(3)
+_CRC_BYTES = const(4)
+_PIECE = const(512)
+_MOST_FREE = const(0x3FFFFFFF)
+
+
+def _file_name(name: str) -> str:
+    """The file of a record."""
+    return _ARM if name == ARM_RECORD_NAME else _motion_file(name)
+
+
+def _motion_file(name: str) -> str:
+    """The file of a motion; refuses what is no name for one."""
+    if not 0 < len(name) <= MAX_NAME:
+        raise Refused(codes.BAD_NAME)
+    for letter in name:
+        if not ("a" <= letter <= "z" or "A" <= letter <= "Z" or "0" <= letter <= "9" or letter in "-_"):
+            raise Refused(codes.BAD_NAME)
+    return name + _MOTION
+
+
+def _sync() -> None:
+    sync = getattr(os, "sync", None)
+    if sync:
+        sync()
+
+
+def _whole(file_name: str, data: bytes) -> bool:
+    """Whether the bytes are a whole record, of the kind that the file's name says."""
+    if file_name.endswith(_MOTION):
+        try:
+            Motion(data)
+        except MotionError:
+            return False
+        return True
+    if file_name == _ARM:
+        from armtempo_shared import armrecord  # here, so that it can be forgotten
+
+        try:
+            armrecord.unpack(data)
+        except armrecord.ArmRecordError:
+            return False
+        return True
+    return data.endswith(b"\n")
+
+
+class Store:
+    """The folder ``root``; every method refuses with FLASH_ERROR or FLASH_FULL where the flash fails."""
+
+    def __init__(self, root: str) -> None:
+        self._root = root
+        self._file: "Any" = None  # the upload under way,
+        self._target = ""  # its file name,
+        self._size = 0  # bytes announced
+        self._received = 0  # and received so far
+        self.recover()
+
+    def recover(self) -> None:
+        """Make the folder if it is missing, finish or undo what a power cut interrupted."""
+        for function in (os.stat, os.mkdir):  # a folder that is there costs no write
+            try:
+                function(self._root)
+                break
+            except OSError:
+                pass
+        for name in self._files():
+            if name.endswith(_NEW):
+                self._recover(name[: -len(_NEW)])
+
+    def free(self) -> int:
+        """Bytes free in the flash; as many as a small integer can hold at most."""
+        try:
+            stat = os.statvfs(self._root)
+        except OSError:
+            return 0
+        return min(stat[_F_BSIZE] * stat[_F_BAVAIL], _MOST_FREE)
+
+    def names(self) -> "list[str]":
+        """Names of the stored motions, sorted."""
+        return sorted([name[: -len(_MOTION)] for name in self._files() if name.endswith(_MOTION)])
+
+    def begin(self, name: str, size: int) -> None:
+        """Begin an upload; gives up one that was under way."""
+        file_name = _file_name(name)
+        self.abandon()
+        if size > MAX_MOTION_BYTES:
+            raise Refused(codes.TOO_LONG, value=MAX_MOTION_BYTES)
+        if size + _PIECE > self.free():
+            raise Refused(codes.FLASH_FULL, value=self.free())
+        self._other_case(file_name)
+        self._file = self._guard(open, self._path(file_name + _NEW), "wb")
+        self._target = file_name
+        self._size = size
+        self._received = 0
+
+    def write(self, offset: int, data: bytes) -> int:
+        """Add a piece; one that has come before is ignored. Returns the offset of the next."""
+        if not self._file or not offset <= self._received or offset + len(data) > self._size:
+            raise Refused(codes.BAD_OFFSET, value=self._received)
+        fresh = data[self._received - offset :]
+        if fresh:
+            try:
+                self._put(self._file, fresh)
+            except Refused:
+                self.abandon()
+                raise
+            self._received += len(fresh)
+        return self._received
+
+    def commit(self, crc: int) -> str:
+        """Check the upload as it stands in the flash and put it in place; returns the record's name."""
+        if not self._file or self._received != self._size:
+            raise Refused(codes.BAD_OFFSET, value=self._received)
+        name = self._target
+        try:
+            self._close()
+            self._check(name, crc)
+        except Refused:
+            self._discard(name + _NEW)
+            raise
+        self._replace(name)
+        return ARM_RECORD_NAME if name == _ARM else name[: -len(_MOTION)]
+
+    def abandon(self) -> None:
+        """Give up the upload under way, if any."""
+        if self._file:
+            try:
+                self._file.close()
+            except OSError:
+                pass
+            self._file = None
+            self._discard(self._target + _NEW)
+
+    def read(self, name: str) -> bytes:
+        """All bytes of a record; NOT_FOUND, or TOO_LONG where they do not fit into memory; "" is none."""
+        if not name:
+            raise Refused(codes.NOT_FOUND)
+        return self._read(_file_name(name))
+
+    def part(self, name: str, offset: int, length: int) -> "tuple[int, bytes]":
+        """(size of the record, bytes from offset on)."""
+        file_name = _file_name(name)
+        size = self._size_of(file_name)
+        file = self._guard(open, self._path(file_name), "rb")
+        try:
+            self._guard(file.seek, min(offset, size))
+            return size, self._guard(file.read, length)
+        finally:
+            file.close()
+
+    def remove(self, name: str) -> None:
+        """Remove a motion."""
+        file_name = _motion_file(name)
+        self._size_of(file_name)
+        self._guard(os.remove, self._path(file_name))
+        self._guard(_sync)
+
+    def rename(self, old: str, new: str) -> None:
+        """Give a motion another name; where it is the default it stays that."""
+        old_file, new_file = _motion_file(old), _motion_file(new)
+        self._size_of(old_file)
+        if new.lower() in [name.lower() for name in self.names() if name != old] or new == old:
+            raise Refused(codes.EXISTS)
+        was_default = self.default() == old
+        if was_default:
+            self._write_default(new + "\n" + old)
+        self._guard(os.rename, self._path(old_file), self._path(new_file))
+        self._guard(_sync)
+        if was_default:
+            self._write_default(new)
+
+    def default(self) -> str:
+        """Name of the default motion, "" for none."""
+        try:
+            lines = self._read(_DEFAULT).decode().split("\n")
+        except (Refused, UnicodeError):
+            return ""
+        names = self.names()
+        for name in lines:
+            if name in names:
+                return name
+        return ""
+
+    def set_default(self, name: str) -> None:
+        """Make a stored motion the default; "" for none."""
+        if name:
+            self._size_of(_motion_file(name))
+        self._write_default(name)
+
+    def _write_default(self, text: str) -> None:
+        file = self._guard(open, self._path(_DEFAULT + _NEW), "wb")
+        try:
+            self._put(file, text.encode() + b"\n")
+        except Refused:
+            file.close()
+            self._discard(_DEFAULT + _NEW)
+            raise
+        self._guard(file.close)
+        self._replace(_DEFAULT)
+
+    def _other_case(self, file_name: str) -> None:
+        """FAT ignores the case of letters: two names must differ in more than that."""
+        for name in self._files():
+            if name != file_name and name.lower() == file_name.lower():
+                raise Refused(codes.EXISTS)
+
+    def _files(self) -> "list[str]":
+        try:
+            return os.listdir(self._root)
+        except OSError:
+            return []
+
+    def _size_of(self, file_name: str) -> int:
+        """Bytes of a file; NOT_FOUND."""
+        try:
+            return os.stat(self._path(file_name))[_ST_SIZE]
+        except OSError:
+            raise Refused(codes.NOT_FOUND)
+
+    def _path(self, file_name: str) -> str:
+        return self._root + "/" + file_name
+
+    def _read(self, file_name: str) -> bytes:
+        size = self._size_of(file_name)
+        if size > MAX_MOTION_BYTES:
+            raise Refused(codes.TOO_LONG, value=size)
+        file = self._guard(open, self._path(file_name), "rb")
+        try:
+            return bytes(self._guard(file.read))
+        except MemoryError:
+            raise Refused(codes.TOO_LONG, value=size)
+        finally:
+            file.close()
+
+    def _put(self, file: "Any", data: bytes) -> None:
+        if self._guard(file.write, data) != len(data):
+            raise Refused(codes.FLASH_FULL)
+
+    def _close(self) -> None:
+        file = self._file
+        self._file = None
+        self._received = 0
+        self._guard(file.close)
+        self._guard(_sync)
+
+    def _check(self, name: str, crc: int) -> None:
+        data = self._read(name + _NEW)
+        if (
+            int.from_bytes(data[-_CRC_BYTES:], "little") != crc
+            or crc32(memoryview(data)[:-_CRC_BYTES]) != crc
+        ):
+            raise Refused(codes.BAD_CHECKSUM)
+        if not _whole(name, data):
+            raise Refused(codes.BAD_RECORD)
+
+    def _replace(self, name: str) -> None:
+        try:
+            self._guard(os.rename, self._path(name + _NEW), self._path(name))
+        except Refused:
+            self._recover(name)  # FAT may have removed the old one already
+            raise
+        self._guard(_sync)
+
+    def _discard(self, file_name: str) -> None:
+        try:
+            os.remove(self._path(file_name))
+        except OSError:
+            pass
+
+    def _recover(self, name: str) -> None:
+        try:
+            whole = name not in self._files() and _whole(name, self._read(name + _NEW))
+        except Refused:
+            whole = False
+        if not whole:
+            return self._discard(name + _NEW)
+        try:
+            os.rename(self._path(name + _NEW), self._path(name))
+            return _sync()
+        except OSError:
+            return None  # the next start tries again
+
+    def _guard(self, function: "Callable[..., Any]", *arguments: object) -> "Any":
+        try:
+            return function(*arguments)
+        except OSError as error:
+            raise Refused(codes.FLASH_FULL if error.args[_ERRNO] == _ENOSPC else codes.FLASH_ERROR)

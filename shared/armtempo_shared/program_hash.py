@@ -1,0 +1,49 @@
+"""The hash by which host and board compare the program that each has."""
+
+import os
+from binascii import crc32
+
+STAMP = "program.txt"
+"""File in the board package, written last by a deployment: the hash of the sources, 8 hex digits.
+
+Where it is missing the hash is taken from the source files that are there."""
+_PIECE = 512
+
+
+def program_crc(board: str, shared: str) -> int:
+    """The hash of the program, by the files of its two packages; that of the stamp where there is one."""
+    board, shared = [path[: path.rindex("/")] for path in (board, shared)]
+    try:
+        with open(board + "/" + STAMP) as file:
+            return int(file.read().strip(), 16)
+    except (OSError, ValueError):
+        return sources_crc(board, shared)
+
+
+def sources_crc(board: str, shared: str) -> int:
+    """crc32 over paths and contents of the Python files in and below both folders, in order of their paths."""
+    crc = 0
+    for folder in (board, shared):
+        for path in sorted(_sources(folder)):
+            crc = _file_crc(folder + path, crc32(path.encode(), crc))
+    return crc
+
+
+def _sources(folder: str) -> "list[str]":
+    """Paths of the Python files, from the folder on; what has no dot in its name is taken for a folder."""
+    found = []
+    for name in os.listdir(folder):
+        if name.endswith(".py"):
+            found.append("/" + name)
+        elif "." not in name:
+            found += ["/" + name + path for path in _sources(folder + "/" + name)]
+    return found
+
+
+def _file_crc(path: str, crc: int) -> int:
+    with open(path, "rb") as file:
+        piece = file.read(_PIECE)
+        while piece:
+            crc = crc32(piece, crc)
+            piece = file.read(_PIECE)
+    return crc
