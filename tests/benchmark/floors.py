@@ -29,10 +29,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--count", type=int, default=1000)
+    parser.add_argument("--minutes", type=float, default=np.inf, help="begin no further job after these")
     options = parser.parse_args()
+    end = time.monotonic() + 60.0 * options.minutes
     over, above, vias = [], 0, []
     start = time.process_time()
     for seed in range(options.first, options.first + options.count):
+        if time.monotonic() > end:
+            break
         arm, job = random_motion(seed, most=500)
         most = time_parameterization.most_refine(job, len(job.via) - 1, len(arm.driven))
         plan = planner.plan(arm, replace(job, refine=min(REFINE, most), optimiser="gradient", starts=1))

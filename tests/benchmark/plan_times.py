@@ -27,7 +27,7 @@ from tests.host import problems  # noqa: E402
 def main() -> None:
     """Print a line for each plan."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--large", action="store_true", help="300 via points too")
+    parser.add_argument("--large", action="store_true", help="300 and 500 via points too")
     options = parser.parse_args()
     arm = Arm.paper()
     paper = Job.paper(arm)
@@ -45,10 +45,10 @@ def main() -> None:
     _print("free, 1 start", arm, replace(job, path="free", starts=1))
     _print("free, per-joint", arm, replace(job, path="free", timing="per-joint"))
     equal = problems.make_arm([[50.0, 50.0, 150.0]] * 3)
-    for vias in (10, 30, 100, *((300,) if options.large else ())):
+    for vias, refine in ((10, 4), (30, 4), (100, 4), *(((300, 1), (500, 1)) if options.large else ())):
         via = np.random.default_rng(1).normal(0, 40, (vias, 3))
-        many = Job("many", tuple(map(tuple, via.tolist())), refine=4, optimiser="gradient", starts=1)
-        _print(f"{vias} via points, refine 4, gradient", equal, many)
+        many = Job("many", tuple(map(tuple, via.tolist())), refine=refine, optimiser="gradient", starts=1)
+        _print(f"{vias} via points, refine {refine}, gradient", equal, many)
 
 
 def _print(label: str, arm: Arm, job: Job) -> None:

@@ -33,10 +33,14 @@ def main() -> None:
     parser.add_argument("--path", choices=["free", "through"], default="free")
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--count", type=int, default=100)
+    parser.add_argument("--minutes", type=float, default=np.inf, help="begin no further job after these")
     options = parser.parse_args()
+    end = time.monotonic() + 60.0 * options.minutes
     counts = {"planned": 0, "refused": 0, "nothing moves": 0, "faulty": 0}
     seconds = []
     for seed in range(options.first, options.first + options.count):
+        if time.monotonic() > end:
+            break
         arm, job = _job(options.path, seed)
         if np.all(np.ptp(job.via, axis=0) == 0):
             counts["nothing moves"] += 1
