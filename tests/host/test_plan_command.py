@@ -176,7 +176,7 @@ def test_a_stop_on_the_spline_is_refused_and_split_makes_two_motions_of_it() -> 
 
 SLOW = """
 name = "slow"
-refine = 1
+refine = 32
 polish = false
 iterations = 5
 [[via]]
@@ -190,10 +190,10 @@ angles_deg = [40, -60, 40]
 
 
 def test_a_motion_too_long_for_the_board_ends_with_1_and_is_split_on_request() -> None:
-    """Beyond 3272 s; joint 1 at 0.0125 deg/s takes about 3000 s to each via point."""
+    """Beyond 3272 s; joint 1 at 0.012 deg/s takes about 1700 s to each via point."""
     text = shipped.files()[shipped.PAPER].read_text()
     assert text.count("speed_deg_s = 50.0") == 1
-    Path("slow_arm.toml").write_text(text.replace("speed_deg_s = 50.0", "speed_deg_s = 0.0125"))
+    Path("slow_arm.toml").write_text(text.replace("speed_deg_s = 50.0", "speed_deg_s = 0.012"))
     Path("slow.toml").write_text(SLOW.replace("stop = true\n", ""))
     whole = run("--job", "slow.toml", "--arm", "slow_arm.toml")
     assert whole.exit_code == 1

@@ -230,9 +230,11 @@ def check_held(trajectory: Trajectory, arm: Arm) -> None:
 def _check_times(where: str, joint_spline: JointSpline) -> None:
     ticks = joint_spline.time_points_s * TICK_HZ
     if np.max(np.abs(ticks)) >= LONGEST_TICKS:
+        longest_s, reached_s = LONGEST_TICKS / TICK_HZ, ticks.max() / TICK_HZ
         raise PlanError(
-            f"{where}: lasts {joint_spline.duration_s:.0f} s, the board counts to "
-            f"{LONGEST_TICKS / TICK_HZ:.0f} s; mark via points with stop = true and plan with --split"
+            f"{where}: lasts {joint_spline.duration_s:.0f} s, its time control points reach {reached_s:.0f} s, "
+            f"the board counts to {longest_s:.0f} s; mark via points with stop = true and plan with --split"
+            + (", or raise refine" if joint_spline.duration_s < longest_s else "")
         )
     span = _span(ticks, joint_spline.degree)
     if span >= LONGEST_SPAN_TICKS:
