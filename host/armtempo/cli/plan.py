@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import messages, options
 from armtempo.cli.progress import ProgressBar
+from armtempo.errors import InputError
 
 if TYPE_CHECKING:
     from armtempo.model.arm import Arm
@@ -21,7 +22,7 @@ def _refine(ctx: click.Context, param: click.Parameter, value: str | None) -> in
     if value is None or value == "auto":
         return value
     if not value.isdecimal() or not 1 <= int(value) <= 64:
-        raise click.BadParameter(f"{value!r} must be 'auto' or a whole number from 1 to 64")
+        raise InputError(f"--refine: {value!r} is not allowed", "give auto or a whole number from 1 to 64")
     return int(value)
 
 
@@ -123,7 +124,7 @@ def _write_curve(arm: Arm, job: Job, target: Path) -> None:
     from armtempo.errors import MissingPackageError
     from armtempo.formats.atomic_file import replace_text
     from armtempo.planning.corridor_curve import unit_of
-    from armtempo.report import corridor_plot, plots
+    from armtempo.report import corridor_plot, drawing
 
     with ProgressBar("planning") as progress:
         points = pipeline.corridor_curve(arm, job, progress)
@@ -133,9 +134,9 @@ def _write_curve(arm: Arm, job: Job, target: Path) -> None:
     table, picture = (target.with_name(f"{target.stem}-corridor{suffix}") for suffix in (".csv", ".png"))
     replace_text(table, corridor_plot.csv(points, unit))
     try:
-        plots.save(corridor_plot.figure(points, unit, job.name), picture)
+        drawing.save(corridor_plot.figure(points, unit, job.name), picture)
     except MissingPackageError as error:
-        click.echo(f"no plot: {error}", err=True)
+        messages.show(error, "no plot")
         click.echo(f"written: {table}")
         return
     click.echo(f"written: {table}, {picture}")

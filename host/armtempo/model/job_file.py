@@ -120,9 +120,9 @@ def _vias(top: Table, arm: Arm) -> tuple[tuple[tuple[float, ...] | Pose, ...], t
         stops = [_stop(table, n, len(tables)) for n, table in enumerate(tables) if _stops(table)]
         vias = [_via(table, f"{top.file}: via[{n}]", arm) for n, table in enumerate(tables, 1)]
     if len(vias) < 2:
-        raise InputError(f"{top.file}: {len(vias)} via point is not a motion; at least 2 are needed")
+        raise InputError(f"{top.file}: {len(vias)} via point is not a motion", "at least 2 are needed")
     if len(vias) - 1 > MAX_SEGMENTS:
-        raise InputError(f"{top.file}: {len(vias)} via points; the board holds at most {MAX_SEGMENTS + 1}")
+        raise InputError(f"{top.file}: {len(vias)} via points", f"the board holds at most {MAX_SEGMENTS + 1}")
     return tuple(vias), tuple(stops)
 
 
@@ -146,7 +146,10 @@ def _stop(table: Table, via: int, count: int) -> Stop:
 def _via(table: Table, where: str, arm: Arm) -> tuple[float, ...] | Pose:
     forms = [key for key in ("angles_deg", "matrix", "position_mm") if table.has(key)]
     if len(forms) != 1:
-        raise InputError(f"{where}: exactly one of angles_deg, matrix and position_mm is needed")
+        raise InputError(
+            f"{where}: exactly one of angles_deg, matrix and position_mm is needed",
+            "leave all but one of them out",
+        )
     if forms == ["angles_deg"]:
         angles = _angles(table, "angles_deg", arm)
         table.done()

@@ -41,7 +41,10 @@ def curve(arm: Arm, job: Job, progress: Progress) -> list[CorridorTime]:
     ``planner.plan``; InputError where the path is not free.
     """
     if job.path != "free":
-        raise InputError(f'job {job.name!r}: a corridor curve needs path = "free"')
+        raise InputError(
+            f'job {job.name!r}: a corridor curve needs path = "free"',
+            'add --path free, or path = "free" to the job',
+        )
     unit = unit_of(job)
     whole = _NARROWER + 4
     wide = planner.plan(arm, _in(job, unit, _WIDE[unit]), part(progress, 0, whole))

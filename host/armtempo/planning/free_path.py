@@ -77,7 +77,7 @@ def shortest(demand: Demand, effort: Effort, progress: Progress) -> Shortest:
             best = found if best is None or found.total_s < best.total_s else best
         progress(number + 1, whole)
     if best is None:
-        raise problem or PlanError("a free path needs at least one start")
+        raise problem or PlanError("a free path needs at least one start", "set starts to 1 or more")
     final = _finished(demand, best, effort, even)
     progress(whole, whole)
     return Shortest(final, np.array(times))

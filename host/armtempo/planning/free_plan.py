@@ -68,8 +68,8 @@ def _most_segments(arm: Arm, job: Job, vias: int) -> int:
     if needed > most:
         raise InputError(
             f"job {job.name!r}: a free path through {vias} via points with {pieces} pieces between any two needs "
-            f"{needed} segments, the board's record holds {most}; lower refine, use fewer via points or "
-            'path = "through"'
+            f"{needed} segments, the board's record holds {most}",
+            'lower refine, use fewer via points or path = "through"',
         )
     return most
 

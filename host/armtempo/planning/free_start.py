@@ -109,7 +109,8 @@ def _inside(demand: Demand, motion: FreeMotion) -> FreeMotion:
         if found is None:
             raise PlanError(
                 f"{name}: no path with {layout.pieces.min()} pieces between via points stays within its range and "
-                "corridor; raise refine, widen the corridor, or move the via points away from the end of the range"
+                "corridor",
+                "raise refine, widen the corridor, or move the via points away from the end of the range",
             )
         points[:, joint] = found * size[joint]
     return replace(motion, angle_points_deg=points)

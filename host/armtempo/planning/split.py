@@ -44,7 +44,8 @@ def at_few_stops(job: Job, via_deg: Array, whole: Trajectory) -> list[Job]:
         if takes_s > LONGEST_S:
             raise PlanError(
                 f"job {job.name!r}: from via point {begin + 1} to {after + 1} it takes {takes_s:.0f} s, the "
-                f"board counts to {LONGEST_S:.0f} s; mark a via point between them with stop = true"
+                f"board counts to {LONGEST_S:.0f} s",
+                "mark a via point between them with stop = true",
             )
     return _parts(job, via_deg, cuts)
 
@@ -52,7 +53,8 @@ def at_few_stops(job: Job, via_deg: Array, whole: Trajectory) -> list[Job]:
 def _stops(job: Job) -> Sequence[Stop]:
     if not job.stops:
         raise PlanError(
-            f"job {job.name!r}: there is no rest to split it at; mark via points with stop = true in the job file"
+            f"job {job.name!r}: there is no rest to split it at",
+            "mark via points with stop = true in the job file",
         )
     return job.stops
 
