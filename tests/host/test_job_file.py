@@ -87,11 +87,11 @@ def test_a_position_may_ask_for_a_part_of_the_orientation(
     [
         (
             "position_mm = [1, 2, 3]\nrpy_deg = [0, 0, 0]\npitch_deg = 3",
-            "position_mm goes alone or with one of",
+            "give position_mm alone, with one of",
         ),
         (
             "position_mm = [1, 2, 3]\napproach = [0, 0, 1]\nyaw_deg = 3",
-            "position_mm goes alone or with one of",
+            "give position_mm alone, with one of",
         ),
         (
             "position_mm = [1, 2, 3]\nroll_deg = 0\nyaw_deg = 3",
