@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 
 def _names(ctx: click.Context, parameter: click.Parameter, value: str) -> list[str]:
     """Algorithms, separated by commas."""
-    from armtempo.optimise import ALGORITHMS
+    from armtempo.model.job_file import OPTIMISERS
 
     names = [name.strip().lower() for name in value.split(",")]
     for name in names:
-        if name not in ALGORITHMS:
+        if name not in OPTIMISERS:
             raise InputError(
                 f"--algorithms: {name!r} is not known",
-                f"give some of {', '.join(sorted(ALGORITHMS))}, separated by commas",
+                f"give some of {', '.join(sorted(OPTIMISERS))}, separated by commas",
             )
     return names
 

@@ -109,9 +109,11 @@ class Table:
             raise self.fail(key, allowed)
         return value
 
-    def choice(self, key: str, choices: Sequence[Any], default: Any = _REQUIRED) -> Any:
-        """One of ``choices``."""
-        allowed = "one of " + ", ".join(repr(choice) for choice in choices)
+    def choice(
+        self, key: str, choices: Sequence[Any], default: Any = _REQUIRED, allowed: str | None = None
+    ) -> Any:
+        """One of ``choices``; ``allowed`` says in words what they are, where there are many."""
+        allowed = allowed or "one of " + ", ".join(repr(choice) for choice in choices)
         value = self._get(key, default, allowed)
         if not any(type(value) is type(choice) and value == choice for choice in choices):
             raise self.fail(key, allowed)

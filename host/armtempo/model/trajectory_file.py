@@ -18,6 +18,7 @@ from armtempo.errors import InputError
 from armtempo.formats import json_codec
 from armtempo.formats.atomic_file import check_replaceable, replace_text, why
 from armtempo.model import arm_json
+from armtempo.model.job import AUTO
 from armtempo.model.plan import Plan
 from armtempo.splines.trajectory import JointSpline
 
@@ -148,11 +149,24 @@ def _check(plan: Plan, path: Path | str) -> None:
             f"{path}: shared timing, but the joints' time control points differ",
             "plan it again",
         )
+    if isinstance(plan.job.refine, str) and plan.job.refine != AUTO:
+        raise InputError(
+            f"{path}: plan.job.refine {plan.job.refine!r} should be a number or {AUTO!r}", "plan it again"
+        )
     if any(not 0 <= index < len(joints) for search in plan.searches for index in search.joints):
         raise InputError(f"{path}: searches name a joint that there is not", "plan it again")
 
 
-def _check_spline(spline: JointSpline, segments: int, where: str) -> None:
+def _check_spline(spline: JointSpline, stretches: int, where: str) -> None:
+    segments = stretches
+    if spline.via_segments is not None:
+        if len(spline.via_segments) != stretches + 1 or spline.via_segments[0] != 0:
+            raise InputError(
+                f"{where}: via_segments must name {stretches + 1} via points, the first at 0", "plan it again"
+            )
+        if np.any(np.diff(spline.via_segments) < 1):
+            raise InputError(f"{where}: its via_segments do not increase", "plan it again")
+        segments = spline.via_segments[-1]
     if spline.degree not in BASIS or spline.refine < 1:
         raise InputError(
             f"{where}: degree {spline.degree} with refine {spline.refine} is not known",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armtempo.model.plan import Plan
-from armtempo.planning import path_deviation
+from armtempo.planning import checks, path_deviation
 from armtempo.report import html_page
 
 _EXTREMES = {
@@ -37,6 +37,8 @@ def timing(sheet: html_page.Page, plan: Plan) -> None:
         rows.append([f"P{via}", *(f"{joint[via]:.3f}" for joint in times), f"{spread:.3f}"])
     header = ("via point", *(f"{joint.name} (s)" for joint in plan.arm.driven), "apart by (s)")
     sheet.table(header, rows, "When each joint passes the via points")
+    if checks.is_free(plan.job):
+        return
     stray = path_deviation.tool_stray_mm(plan.arm, plan.trajectory)
     sheet.note(
         f"The joints do not pass a via point together, so the tool strays up to {stray:.1f} mm from the path "
@@ -48,6 +50,7 @@ def origin(sheet: html_page.Page, plan: Plan, others: Sequence[tuple[str, object
     """Settings and versions that made the plan, and ``others`` about the run."""
     job = plan.job
     rows: list[tuple[str, object]] = [
+        ("path", job.path),
         ("optimiser", f"{job.optimiser}, population {job.population}, {job.iterations} iterations"),
         ("seed", job.seed),
         ("degree, timing, refine", f"{job.degree}, {job.timing}, {job.refine}"),

@@ -84,6 +84,23 @@ def polynomials(control_points: Array, degree: int) -> Array:
     return np.asarray(pieces)
 
 
+def refined(control_points: Array, parts: int, degree: int) -> Array:
+    """Control points of the same spline with each segment cut into ``parts``.
+
+    ``control_points``: (n + degree, ...). Returns (n * parts + degree, ...). A finer knot row takes them over by
+    ``degree`` + 1 sums over ``parts`` neighbours.
+    """
+    mask = np.full(1, float(parts))
+    for _ in range(degree + 1):
+        mask = np.convolve(mask, np.full(parts, 1.0 / parts))
+    count = (len(control_points) - degree) * parts + degree
+    spread = np.zeros((len(control_points) * parts, *control_points.shape[1:]))
+    spread[::parts] = control_points
+    first = degree * (parts - 1)
+    full = np.apply_along_axis(np.convolve, 0, spread, mask)
+    return np.asarray(full[first : first + count])
+
+
 def subdivide(coefficients: Array, parts: int) -> Array:
     """The same curve with each segment cut into ``parts`` equal ones, each over [0, 1] again.
 
