@@ -90,7 +90,7 @@ class Chip:
     def _sync_pins(self, names):
         routed = False
         for port in self.pins.ports:
-            if memory.BLOCKS[memory.index("GPIOA") // memory.BLOCK_WORDS + port.index] in names:
+            if "GPIO" + gpio.PORTS[port.index] in names:
                 routed = port.sync(self.now) or routed
         if routed:
             self.pins.route((self.timers[2], self.timers[5]))
