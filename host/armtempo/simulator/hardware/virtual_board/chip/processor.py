@@ -62,6 +62,8 @@ class Chip:
         self.millisecond = None
         self.next_ms = TICKS_PER_MS
         memory.poke(memory.index("IWDG") + 2, 0xFFF)
+        for port, register, value in gpio.AT_RESET:
+            memory.poke(memory.index(port) + register, value)
         self.sync(True)
 
     # -- what the program wrote ------------------------------------------------------------------
