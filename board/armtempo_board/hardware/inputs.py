@@ -67,7 +67,7 @@ class Inputs:
         pull = Pin.PULL_UP if level else Pin.PULL_DOWN
         pin = Pin(name, Pin.IN, pull=pull)
         ExtInt(pin, mode, pull, None)  # removes an earlier engine's callback: a line takes only one
-        ExtInt(pin, mode, pull, self._freeze)
+        ExtInt(pin, mode, pull, self._freeze)  # type: ignore[arg-type]  # what it returns does not matter
         return pin
 
     def _add_limits(self, joints: "list[dict[str, int]]", none: int) -> None:
@@ -119,7 +119,7 @@ class Inputs:
         self._trip(isr.SOFTWARE_LINE)
 
     @micropython.viper
-    def _trip(self, line: object) -> object:
+    def _trip(self, line: int) -> object:
         before = disable_irq()
         self._freeze(line)
         enable_irq(before)

@@ -2,8 +2,8 @@
 
 TIM4 counts nanoseconds of the emulator's time there, in which an instruction takes one. Nothing is connected to pins,
 and the registers of the external interrupts are memory: a flag is set there, and the interrupt made pending. The
-callback is told that port A is where its level register is TIM4's counter: so what it takes for the levels of the pins, right
-behind the stop of both counters, is the time.
+callback is told that port A is where its level register is TIM4's counter: so what it takes for the levels of the pins,
+right behind the stop of both counters, is the time.
 """
 
 from array import array
