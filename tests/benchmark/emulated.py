@@ -47,8 +47,8 @@ class Machine:
         self.calls: Counter[str] = Counter()
         self._spent: Counter[str] = Counter()
         self.functions: dict[str, tuple[int, list[str]]] = {}
-        self._uc = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
-        self._uc.mem_map(0, 0x200000)
+        self.core = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
+        self.core.mem_map(0, 0x200000)
         self._next_code = _CODE
         for module in modules:
             self._load(module)
@@ -58,8 +58,8 @@ class Machine:
         self._write(_TABLES + 0x40, [0, 0, _TABLES + 0x60, _TABLES + 0x80])  # module context
         self._write(_TABLES, [0, _TABLES + 0x40])  # function object
         self._lengths: dict[int, int] = {}
-        self._uc.hook_add(UC_HOOK_BLOCK, self._block)
-        self._uc.hook_add(UC_HOOK_CODE, self._answer, begin=_STUBS, end=_RETURN - 1)
+        self.core.hook_add(UC_HOOK_BLOCK, self._block)
+        self.core.hook_add(UC_HOOK_CODE, self._answer, begin=_STUBS, end=_RETURN - 1)
 
     def run(self, name: str, *arguments: int | array[int] | bytes) -> int:
         """Call a function; arrays are written back. Returns its value and counts in ``count``.
@@ -79,7 +79,7 @@ class Machine:
                 self._write(_STACK + 0x200 + 8 * number, [0, number])
             if kind in _POINTERS or (kind == _CLOSED and not number):
                 data = bytes(argument)  # type: ignore[arg-type]
-                self._uc.mem_write(at, data)
+                self.core.mem_write(at, data)
                 places.append((argument, at, len(data)))
                 value = at
                 at += (len(data) + 255) & ~255
@@ -92,14 +92,14 @@ class Machine:
             (UC_ARM_REG_R0, _TABLES), (UC_ARM_REG_R1, len(arguments)), (UC_ARM_REG_R2, 0),
             (UC_ARM_REG_R3, _STACK + 0x100), (UC_ARM_REG_SP, _STACK), (UC_ARM_REG_LR, _RETURN | 1),
         ):  # fmt: skip
-            self._uc.reg_write(register, value)
+            self.core.reg_write(register, value)
         before = self.count
-        self._uc.emu_start(entry | 1, _RETURN)
+        self.core.emu_start(entry | 1, _RETURN)
         self.calls[name] += 1
         self._spent[name] += self.count - before
         for argument, place, size in places:
             if isinstance(argument, array):
-                data = self._uc.mem_read(place, size)
+                data = self.core.mem_read(place, size)
                 argument[:] = array(argument.typecode, bytes(data))
         result = self._result
         return result - (1 << 32) if result >> 31 else result
@@ -140,7 +140,7 @@ class Machine:
     _result = 0
 
     def _write(self, address: int, words: list[int]) -> None:
-        self._uc.mem_write(address, struct.pack(f"<{len(words)}I", *words))
+        self.core.mem_write(address, struct.pack(f"<{len(words)}I", *words))
 
     def _load(self, module: Path) -> None:
         tree = ast.parse(module.read_text())
@@ -163,7 +163,7 @@ class Machine:
         if not all(isinstance(annotation, ast.Name) for annotation in annotations):
             return  # takes objects: needs a runtime
         kinds = [annotation.id for annotation in annotations]  # type: ignore[union-attr]
-        self._uc.mem_write(self._next_code, code)
+        self.core.mem_write(self._next_code, code)
         self.functions[node.name] = (self._next_code, [_CLOSED] * closed + kinds)
         self._next_code += (len(code) + 15) & ~15
 

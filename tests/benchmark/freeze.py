@@ -42,12 +42,17 @@ def stored() -> dict[str, Any]:
     return dict(json.loads(STORED.read_text()))
 
 
-def alone() -> int:
-    """Instructions of the callback by itself on an emulated core, where it freezes."""
-    at = {
+def block_at() -> dict[str, int]:
+    """The numbers that isr.py names: places in the block, and registers."""
+    return {
         name: int(number)
         for name, number in re.findall(r"^([A-Z]\w+) = const\((\d+)\)", ISR.read_text(), re.MULTILINE)
     }
+
+
+def alone() -> int:
+    """Instructions of the callback by itself on an emulated core, where it freezes."""
+    at = block_at()
     registers = at["BLOCK_WORDS"]
     words = array("I", bytes(4 * (registers + 2100)))
     words[at["TIM2_AT"]] = DATA_AT + 4 * registers
