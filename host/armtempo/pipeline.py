@@ -54,7 +54,10 @@ def load(path: Path | str, arm: Arm | None = None) -> Plan:
     """
     found = trajectory_file.load(path)
     if arm is not None and encode.arm_record(arm) != encode.arm_record(found.arm):
-        raise InputError(f"{path} was planned for another arm than {arm.source}; plan it again with this arm")
+        raise InputError(
+            f"{path} was planned for another arm than {arm.source}",
+            "plan it again with this arm",
+        )
     return found
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import click
 
 from armtempo import __version__
+from armtempo.cli import messages
 from armtempo.cli.interrupts import raised_by_signals
 from armtempo.errors import INTERRUPTED, ArmtempoError
 
@@ -74,25 +75,32 @@ class LazyGroup(click.Group):
             with raised_by_signals():
                 return super().invoke(ctx)
         except ArmtempoError as error:
-            click.echo(f"armtempo: {error}", err=True)
+            messages.show(error)
             ctx.exit(error.exit_code)
         except OSError as error:
             if error.errno == errno.EPIPE:  # whoever read the output has gone: click ends quietly
                 raise
-            click.echo(f"armtempo: {_of_file(error)}", err=True)
+            messages.show(_of_file(error))
             ctx.exit(1)
         except MemoryError as error:
-            click.echo(f"armtempo: this takes more memory than there is: {error}".rstrip(": "), err=True)
+            messages.show(
+                ArmtempoError(
+                    f"this takes more memory than there is: {error}".rstrip(": "),
+                    "close other programs, or ask for less: lower refine, a smaller population",
+                )
+            )
             ctx.exit(1)
         except KeyboardInterrupt:
             click.echo("armtempo: interrupted", err=True)
             ctx.exit(INTERRUPTED)
 
 
-def _of_file(error: OSError) -> str:
+def _of_file(error: OSError) -> ArmtempoError:
     """The operating system's reason for an error with a file, and what to check."""
     where = f"{error.filename}: " if error.filename else ""
-    return f"{where}{error.strerror or error}; look after the path, its permissions and the room on the disk"
+    return ArmtempoError(
+        f"{where}{error.strerror or error}", "check the path, its permissions and the room on the disk"
+    )
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})

@@ -8,6 +8,7 @@ import click
 
 from armtempo.cli import options
 from armtempo.cli.progress import ProgressBar
+from armtempo.errors import InputError
 
 
 @click.command()
@@ -36,7 +37,7 @@ def command(mpy: bool, package: Path | None, firmware: Path | None, port: str) -
     from armtempo.deploy import package as packages
 
     if package is not None and firmware is not None:
-        raise click.UsageError("--package and --firmware exclude each other")
+        raise InputError("--package and --firmware exclude each other", "give one of them")
     if package is not None:
         packages.write(package)
         click.echo(f"written: {package}")

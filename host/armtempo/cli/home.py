@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from armtempo.cli import options, posture
+from armtempo.errors import InputError
 
 
 @click.command(context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
@@ -31,7 +32,10 @@ def command(
     joints that have a switch of known angle move: to it, off it, and slowly to it again.
     """
     if switches and where is not None:
-        raise click.UsageError("give either WHERE or --switches")
+        raise InputError(
+            "WHERE and --switches exclude each other",
+            "give WHERE where the arm stands, or --switches to drive to the limit switches",
+        )
     arm = options.load_arm(arm_path)
     angles_deg = None if where is None else posture.parse(where, arm, job_path)
     with options.board(port, log_traffic, arm) as board:

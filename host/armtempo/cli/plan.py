@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import messages, options
 from armtempo.cli.progress import ProgressBar
 
 
@@ -57,4 +57,4 @@ def command(job_path: Path | None, arm_path: Path | None, output: Path | None, *
     try:
         checks.check_held(plan.trajectory, arm)
     except PlanError as error:
-        click.echo(f"not for a board as it is: {error}", err=True)
+        messages.show(error, "not for a board as it is")

@@ -40,8 +40,8 @@ def parse(text: str, arm: Arm, job_path: Path | None) -> Array:
         angles_deg = [float(cell) for cell in text.split(",")]
     except ValueError:
         raise InputError(
-            f"{text!r} is no posture: give angles in degrees ('0,-60,40'), a via point of the job ('P0') "
-            "or a trajectory file"
+            f"{text!r} is no posture",
+            "give angles in degrees ('0,-60,40'), a via point of the job ('P0') or a trajectory file",
         ) from None
     return point_to_point.posture(angles_deg, arm)
 
@@ -63,5 +63,8 @@ def _via(index: int, arm: Arm, job_path: Path | None) -> Array:
     job = options.load_job(job_path, arm)
     via_deg, _ = planner.via_angles(arm, job)
     if index >= len(via_deg):
-        raise InputError(f"job {job.name!r} has the via points P0 to P{len(via_deg) - 1}, not P{index}")
+        raise InputError(
+            f"job {job.name!r} has no via point P{index}",
+            f"give one of P0 to P{len(via_deg) - 1}",
+        )
     return np.asarray(via_deg[index])

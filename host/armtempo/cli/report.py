@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from armtempo.cli import messages
+
 
 @click.command()
 @click.argument(
@@ -23,17 +25,20 @@ def command(runs: tuple[Path, ...], out: Path | None) -> None:
     is named there.
     """
     from armtempo import pipeline
-    from armtempo.errors import RunFolderError
+    from armtempo.errors import InputError, RunFolderError
     from armtempo.robot.run import Run
 
     if len(runs) == 1:
         if out is not None:
-            raise click.UsageError("--out goes with two or more runs")
+            raise InputError(
+                "--out goes with two or more runs",
+                "leave it out: the page of one run is report.html in its folder",
+            )
         click.echo(f"wrote {pipeline.report(Run.load(runs[0]))}")
         return
     for run in runs:
         try:
             click.echo(f"wrote {pipeline.report(Run.load(run))}")
         except RunFolderError as error:
-            click.echo(f"armtempo: {error}", err=True)
+            messages.show(error)
     click.echo(f"wrote {pipeline.compare(runs, out)}")

@@ -51,5 +51,11 @@ def lines(status: Status) -> list[str]:
     ):
         known = "" if status.joint_known(joint) else ", position unknown"
         found.append(f"joint {joint + 1}   {steps} steps, {counts} counts{known}")
-    found.append(f"link      {status.frames_bad} damaged stretches, {status.samples_lost} samples lost")
+    found.append(f"link      {_link(status)}")
     return found
+
+
+def _link(status: Status) -> str:
+    if not status.frames_bad and not status.samples_lost:
+        return "sound: no message arrived damaged, no sample was lost"
+    return f"messages damaged {status.frames_bad} times, {status.samples_lost} samples lost: check cable and plugs"

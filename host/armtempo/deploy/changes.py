@@ -35,19 +35,21 @@ def check_suitable(found: Survey) -> None:
     firmware.check_version(found.firmware_crc)
     if "STM32F4" not in found.machine:
         raise LinkError(
-            f"the board is a {found.machine}; armtempo needs an STM32F405 or F407 with MicroPython"
+            f"the board is a {found.machine}",
+            "connect an STM32F405 or F407 with MicroPython",
         )
     if found.version < LEAST_RELEASE:
         least = ".".join(map(str, LEAST_RELEASE))
-        raise LinkError(f"the board runs MicroPython {found.release}; install {least} or newer")
+        raise LinkError(f"the board runs MicroPython {found.release}", f"install {least} or newer")
     if found.sd_card:
         raise LinkError(
-            "an SD card is in the board, and the board starts from it; take it out, press reset, deploy again"
+            "an SD card is in the board, and the board starts from it",
+            "take it out, press reset, deploy again",
         )
     if found.free_heap < LEAST_HEAP:
         raise LinkError(
-            f"the board has {found.free_heap} bytes of free memory; {LEAST_HEAP} are needed: "
-            "is there a boot.py that loads something?"
+            f"the board has {found.free_heap} bytes of free memory; {LEAST_HEAP} are needed",
+            "look for a boot.py that loads something, remove it, press reset, deploy again",
         )
 
 
@@ -66,8 +68,11 @@ def choose(found: Survey, mpy: bool, tell: Tell) -> dict[str, bytes]:
         library = program_files.library(found.mpy)
     if not _fits(found, library):
         raise LinkError(
-            f"the program needs {_needed(found, library)} blocks of flash, the board has room for "
-            f"{_room(found)}; remove motions ('armtempo remove') or other files"
+            (
+                f"the program needs {_needed(found, library)} blocks of flash, the board has room for "
+                f"{_room(found)}; remove motions ('armtempo remove') or other files"
+            ),
+            "remove motions ('armtempo remove') or other files",
         )
     return library
 

@@ -36,10 +36,16 @@ def check_version(firmware_crc: int | None) -> None:
     """LinkError where a board's firmware has another version of the program; None: it has none."""
     if firmware_crc not in (None, own_crc()):
         raise LinkError(
-            f"the board's firmware has another version of the program built in ({firmware_crc:08x}, here "
-            f"{own_crc():08x}), and files in the flash do not replace it: build the firmware anew "
-            "('armtempo deploy --firmware FOLDER', board/docs/firmware.md) or flash the one of MicroPython, "
-            "then deploy again"
+            (
+                f"the board's firmware has another version of the program built in ({firmware_crc:08x}, here "
+                f"{own_crc():08x}), and files in the flash do not replace it: build the firmware anew ('armtempo "
+                "deploy --firmware FOLDER', board/docs/firmware.md) or flash the one of MicroPython, then deploy "
+                "again"
+            ),
+            (
+                "build the firmware anew ('armtempo deploy --firmware FOLDER', board/docs/firmware.md) or flash "
+                "the one of MicroPython, then deploy again"
+            ),
         )
 
 

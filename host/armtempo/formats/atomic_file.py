@@ -20,7 +20,7 @@ def replace_text(path: Path, text: str) -> None:
         else:
             _replace(path.resolve(), text)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {why(error)}; choose another place") from None
+        raise InputError(f"{path}: cannot be written: {why(error)}", "choose another place") from None
 
 
 def why(error: Exception) -> str:

@@ -13,6 +13,7 @@ from typing import Any
 
 from armtempo.errors import InputError
 from armtempo.formats.atomic_file import why
+from armtempo.formats.plain_text import is_plain
 
 _REQUIRED: Any = object()
 
@@ -25,9 +26,12 @@ def read(path: Path | str) -> Table:
     try:
         text = Path(path).read_text(encoding="utf-8-sig")  # some editors begin a file with a mark
     except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file") from None
+        raise InputError(f"{path}: there is no such file", "check the path") from None
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {why(error)}") from None
+        raise InputError(
+            f"{path}: cannot be read: {why(error)}",
+            "check that it is a text file in UTF-8 that you may read",
+        ) from None
     return parse(text, str(path))
 
 
@@ -36,7 +40,10 @@ def parse(text: str, file: str) -> Table:
     try:
         return Table(tomllib.loads(text), file)
     except (ValueError, RecursionError) as error:  # not all of tomllib's are its own: numbers of 5000 digits
-        raise InputError(f"{file}: not valid TOML: {error}") from None
+        raise InputError(
+            f"{file}: not valid TOML: {error}",
+            "correct that place; strings stand in quotes, tables in [brackets]",
+        ) from None
 
 
 class Table:
@@ -52,9 +59,9 @@ class Table:
         """The error for a key: say what is there and what is allowed."""
         name = f"{self._place}{key}"
         if key not in self._values:
-            return InputError(f"{self.file}: {name} is missing; it must be {allowed}")
+            return InputError(f"{self.file}: {name} is missing", f"write {name} = {allowed}")
         value = reprlib.repr(self._values[key])
-        return InputError(f"{self.file}: {name} = {value} is not allowed; it must be {allowed}")
+        return InputError(f"{self.file}: {name} = {value} is not allowed", f"give {allowed}")
 
     def has(self, key: str) -> bool:
         """Whether the key is given."""
@@ -104,10 +111,12 @@ class Table:
         return bool(self.choice(key, (True, False), default))
 
     def text(self, key: str, default: str = _REQUIRED) -> str:
-        """A text that is not empty."""
+        """A text that is not empty and has no control characters."""
         value = self._get(key, default, "a text")
         if not isinstance(value, str) or not value.strip():
             raise self.fail(key, "a text that is not empty")
+        if not is_plain(value):
+            raise self.fail(key, "a text on one line, without control characters")
         return value
 
     def numbers(self, key: str, count: int, default: Any = _REQUIRED) -> tuple[float, ...]:
@@ -152,9 +161,11 @@ class Table:
             if key in self._asked:
                 continue
             near = difflib.get_close_matches(key, self._asked, 1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            known = ", ".join(sorted(set(self._asked)))
-            raise InputError(f"{self.file}: {self._place}{key}: unknown key{hint} Known here: {known}")
+            known = f"known here: {', '.join(sorted(set(self._asked)))}"
+            raise InputError(
+                f"{self.file}: {self._place}{key}: unknown key",
+                f"did you mean {near[0]!r}? {known}" if near else known,
+            )
 
 
 def _is_number(value: Any) -> bool:

@@ -65,8 +65,11 @@ def _greeted(stack: ExitStack, transport: Transport) -> Client:
 def _check_program(board: Client) -> None:
     if board.info.program_crc != own_crc():
         raise LinkError(
-            f"the board on {board.session.transport.name} runs another version of the board program than the "
-            "one installed here; bring it up to date with 'armtempo deploy'"
+            (
+                f"the board on {board.session.transport.name} runs another version of the board program than the "
+                "one installed here"
+            ),
+            "bring it up to date with 'armtempo deploy'",
         )
 
 
@@ -98,4 +101,6 @@ def _virtual_port(port: str, arm: Arm | None) -> Iterator[str]:
             words = board.log().strip().splitlines()[-1:]
             if isinstance(error, BoardError) or not words:
                 raise
-            raise LinkError(f"{error}; the virtual board says: {words[0]}") from error
+            raise LinkError(
+                f"{error.problem}; the virtual board says: {words[0]}", f"{error.hint}"
+            ) from error

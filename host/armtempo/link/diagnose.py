@@ -24,21 +24,25 @@ def explain(transport: Transport, heard: bytes) -> LinkError:
     where = f"the board on {transport.name}"
     if any(sign in heard for sign in _REPL_SIGNS):
         return NoProgramError(
-            f"{where} runs MicroPython but not the armtempo program; install it with 'armtempo deploy'"
+            f"{where} runs MicroPython but not the armtempo program",
+            "install it with 'armtempo deploy'",
         )
     if any(sign in heard for sign in _FRAME_SIGNS):
         return DisturbedError(
-            f"{where} is mostly unreadable: pieces of armtempo's messages arrive, too few of them "
-            "whole; check cable and plugs"
+            f"{where} is mostly unreadable: pieces of armtempo's messages arrive, too few of them whole",
+            "check cable and plugs",
         )
     if heard:
         return LinkError(
-            f"something else than armtempo answers on {transport.name} (it says {_excerpt(heard)}); "
-            "'armtempo ports' lists the other ports"
+            f"something else than armtempo answers on {transport.name} (it says {_excerpt(heard)})",
+            "choose another port: 'armtempo ports' lists them",
         )
     return LinkError(
-        f"{where} does not answer within 2 s: check the cable, that the board is powered, and that this is "
-        "its port ('armtempo ports'); a board that hangs starts afresh with its reset button"
+        f"{where} does not answer within 2 s",
+        (
+            "check the cable, that the board is powered, and that this is its port ('armtempo ports'); a board "
+            "that hangs starts afresh with its reset button"
+        ),
     )
 
 

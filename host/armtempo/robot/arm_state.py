@@ -25,8 +25,8 @@ def configure(client: Client, arm: Arm, replace: bool) -> None:
         return
     if client.info.arm_crc and not replace:
         raise LinkError(
-            f"the board is set up for another arm than {arm.name!r} ({arm.source}); "
-            "name its arm file with --arm"
+            f"the board is set up for another arm than {arm.name!r} ({arm.source})",
+            "name its arm file with --arm",
         )
     client.upload(wire.ARM_RECORD_NAME, data)
     client.hello()
@@ -58,8 +58,8 @@ def posture_deg(client: Client, arm: Arm) -> Array:
     unknown = [joint.name for index, joint in enumerate(arm.driven) if not status.joint_known(index)]
     if unknown:
         raise LinkError(
-            f"the position of {', '.join(unknown)} is unknown; bring the arm to its home posture and run "
-            "'armtempo home'"
+            f"the position of {', '.join(unknown)} is unknown",
+            "bring the arm to its home posture and run 'armtempo home'",
         )
     return np.array(status.positions.commanded_steps, dtype=float) / _steps_per_deg(arm)
 

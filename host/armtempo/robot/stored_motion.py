@@ -56,7 +56,10 @@ def replay(
             client, follower, _Brake(client, stop), lambda sample: sink(sample, started.duration_s)
         )
     except OtherBoardError as error:
-        raise LinkError(f"{error}; what came after the last sample cannot be known") from error
+        raise LinkError(
+            f"{error.problem}; what came after the last sample cannot be known",
+            f"{error.hint}",
+        ) from error
 
 
 def _follow(client: Client, follower: Follower, brake: _Brake, take: Callable[[Sample], object]) -> RunEnd:
@@ -83,8 +86,11 @@ def _stop_after(client: Client, error: BaseException) -> None:
     """Stop what is moving because of ``error``, as far as the board can be reached."""
     if isinstance(error, BoardError) and error.code == wire.ERROR_CODES["no_session"]:
         raise LinkError(
-            "the board started anew during the motion: where the arm stands and what came after the last "
-            "sample cannot be known; find the cause, then 'armtempo home'"
+            (
+                "the board started anew during the motion: where the arm stands and what came after the last "
+                "sample cannot be known"
+            ),
+            "find the cause, then 'armtempo home'",
         ) from error
     client.session.reopen = None  # a cable that is out is not waited for
     with suppress(LinkError):  # the first error says more
@@ -115,7 +121,7 @@ class _Brake:
 
 
 def _does_not_stop() -> None:
-    raise LinkError("the board was told to stop and does not; switch off the motors' power")
+    raise LinkError("the board was told to stop and does not", "switch off the motors' power")
 
 
 def send_stop(client: Client, now: bool = False) -> None:
