@@ -55,7 +55,7 @@ print("@ own", gc.mem_alloc() - before)
 load_program()
 probe.tell("modules")
 """
-LIMIT_S = 60.0
+LIMIT_S = 300.0
 
 
 class Emulated:
