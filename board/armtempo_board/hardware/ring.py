@@ -19,7 +19,6 @@ _LASTS_MS = const(4)
 _LEAST_ENTRIES = const(64)
 _MOST_ENTRIES = const(1024)
 _FAR_KITICKS = const(1 << 20)
-_TIM5 = const(5)
 _FIRST_FED = const(1)  # entry that the stream begins with: entry 0 goes into the compare register by hand
 
 
@@ -69,7 +68,6 @@ class Ring:
 
         block, at = self._block, self._at
         self.state[isr.NDTR_AT] = (self._ndtr - stm.DMA1) // 4
-        block[at + isr.ON_TIM5] = timer == _TIM5
         block[at + isr.CCR_AT] = isr.CCR1 + compare - 1
         block[at + isr.CCMR_AT] = isr.CCMR1 + (compare - 1) // 2
         block[at + isr.MODE_SHIFT] = 12 if compare % 2 == 0 else 4

@@ -7,7 +7,7 @@ from array import array
 
 import micropython
 import stm
-from armtempo_shared.limits import MAX_JOINTS, SAMPLE_TICKS
+from armtempo_shared.limits import SAMPLE_TICKS
 from machine import mem32
 from micropython import const
 from pyb import Timer
@@ -24,8 +24,7 @@ class Sampler:
     """Owns the memory that the interrupts share. ``counters``: addresses of the encoder timers in use."""
 
     def __init__(self, joints: int, counters: "tuple[int, ...]") -> None:
-        words = isr.BLOCK_HEAD + MAX_JOINTS * isr.JOINT_WORDS
-        self.block = array("I", bytearray(4 * words))
+        self.block = array("I", bytearray(4 * isr.BLOCK_WORDS))
         self.raw = array("I", bytearray(4 * isr.RAW_WORDS * isr.RAW_ROOM))
         self.block[isr.JOINTS] = joints
         self.block[isr.ENCODERS] = len(counters)
@@ -58,7 +57,7 @@ class Sampler:
         for joint in range(block[isr.JOINTS]):
             at = self.joint_at(joint)
             block[at + isr.TURNS_OUT] = block[at + isr.TURNS_IN]
-        for word in (isr.RAW_IN, isr.RAW_OUT, isr.RAW_LOST, isr.FROZEN, isr.STEP_HIGH, isr.TURN_LATE):
+        for word in (isr.RAW_IN, isr.RAW_OUT, isr.RAW_LOST, isr.TURN_LATE):
             block[word] = 0
         block[isr.NEXT_SAMPLE] = 0
         self._regular = -(-duration_ticks // SAMPLE_TICKS)  # samples before the last

@@ -117,13 +117,14 @@ class Engine:
         self._braked = self._end_moves = False
         for number, joint in enumerate(self._joints):
             joint.load(motion, number)
-            self._inputs.watch(number, 1)
             self._prefill(joint)
+        self._inputs.watch(1)
         self.finished = False
 
     def _check(self, motion: Motion) -> None:
         if self.moving:
             raise Refused(codes.BUSY)
+        self._inputs.thaw()  # before it looks: a switch that trips from here on is found now or freezes the motion
         self._watch_idle()
         if self.fault:
             raise Refused(codes.FAULT_PENDING, self.fault_joint, self.fault)
@@ -248,8 +249,14 @@ class Engine:
             encoder.update()
         if self._inputs.estop_active():
             self._inputs.trip_estop()
+        self._note_trip()
         if self._block[isr.FAULT] and not self.fault:
             self._take_fault()
+
+    def _note_trip(self) -> None:
+        """A switch may have tripped: know of it, and that an E-stop released the drivers."""
+        if self._inputs.note_trip() and self._inputs.releases:
+            self.known = 0
 
     def freeze(self) -> None:
         """Stop all outputs now; not a fault."""
@@ -288,6 +295,7 @@ class Engine:
 
     def _fail(self, code: int, joint: int) -> None:
         self._inputs.freeze()
+        self._note_trip()
         isr.set_fault(self._block, code, joint)
         self._stopped()
 
@@ -300,13 +308,14 @@ class Engine:
         self._end_ticks = max(self.motion_ticks(), 0)
         self._clock()
         self._readings.convert(self._epoch, self._counter_kiticks)
-        high = self._block[isr.STEP_HIGH]
-        for number, joint in enumerate(self._joints):
-            joint.settle(high >> number & 1)
+        for joint in self._joints:
+            joint.settle()
         self._sampler.take_now()
         self._readings.convert(self._epoch, self._counter_kiticks)
         if self._block[isr.TURN_LATE]:
             self.known = 0
+        self._inputs.watch(0)  # a switch that bounces is noted once
+        self._note_trip()
         if self._block[isr.FAULT] == codes.LIMIT_SWITCH and self._homing:
             self._block[isr.FAULT] = 0
         if self._block[isr.FAULT]:
@@ -316,14 +325,12 @@ class Engine:
     def _take_fault(self) -> None:
         self.fault = self._block[isr.FAULT]
         self.fault_joint = self._block[isr.FAULT_JOINT]
-        if self.fault == codes.ESTOP and self._inputs.releases:
-            self.known = 0
 
     def _finish(self) -> None:
         self._stop_counters()
-        for number, joint in enumerate(self._joints):
+        for joint in self._joints:
             joint.empty()
-            self._inputs.watch(number, 0)
+        self._inputs.watch(0)
         self.moving = False
         self.finished = True
 

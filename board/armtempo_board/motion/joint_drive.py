@@ -157,13 +157,15 @@ class JointDrive:
         self._count_from(self.position(self.ring.matches()))
         self.ring.stop()
 
-    def settle(self, high: int) -> None:
-        """The outputs were frozen: count the last step. ``high``: STEP was high when they were.
+    def settle(self) -> None:
+        """The outputs were frozen: count the last step.
 
-        A rising edge that came after the last word from DMA is not in the ring's count, but the pin shows it.
+        A rising edge behind which DMA was too late is not in the ring's count, but the pin was high.
         """
+        block, at = self._sampler.block, self._words_at
+        port = block[isr.HIGH_B] if block[at + isr.ON_PORT_B] else block[isr.HIGH_A]
         matches = self.ring.matches()
-        if high and matches & 1 == 0:
+        if port >> block[at + isr.PIN_BIT] & 1 and matches & 1 == 0:
             self.position(matches)
             self._base += self._direction
         self.ring.release()

@@ -79,6 +79,7 @@ def undeploy(port: str, tell: Tell = LOG.info) -> None:
         tell(f"{path.removesuffix(KEPT_ASIDE)} is the one from before again")
     remote.run(each("os.rmdir", _folders(files)))
     remote.run(["reset"])
+    _await_port(port)
     tell(f"{len(files)} files of the library removed; stored motions are kept")
     if found.firmware_crc is not None:
         tell("the program stays a part of the board's firmware, but does not start")
@@ -161,6 +162,21 @@ def _verify(remote: Remote, library: Mapping[str, bytes]) -> None:
     wrong = difference(remote.survey(), library)
     if wrong.write:
         raise LinkError(f"{', '.join(wrong.write)}: reads back otherwise than written", "deploy again")
+
+
+def _await_port(port: str) -> None:
+    """Wait until a board that was reset has its port again, so that what is done next finds it."""
+    begin = time.monotonic()
+    while True:
+        time.sleep(_LOOK_S)
+        try:
+            with open_board(port, any_program=True):
+                return
+        except (PortError, InputError):
+            if time.monotonic() - begin > _START_S:
+                raise
+        except LinkError:
+            return  # it is there; whatever runs on it now
 
 
 def _confirm(port: str) -> None:

@@ -19,6 +19,8 @@ SILENCE_S = 30.0
 """Longest time without output of a step other than copying a file; mpremote itself would wait for ever."""
 SLOWEST_BYTES_S = 2000.0
 """Lowest speed at which a file is copied."""
+_NOT_ENTERED = "could not enter raw repl"
+"""mpremote's words for a board with which it has done nothing yet."""
 RECOVERY = "see host/docs/recovery.md"
 _SURVEY = Path(__file__).with_name("survey.txt")
 
@@ -56,7 +58,15 @@ class Remote:
         self.port = port
 
     def run(self, *commands: Sequence[str]) -> str:
-        """Run mpremote's commands one after the other in one session; gives what they print."""
+        """Run mpremote's commands one after the other in one session; gives what they print.
+
+        A board that is just being reset takes no prompt's keys: where mpremote has not got in, it tries once more.
+        """
+        try:
+            return "".join(self.lines(*commands))
+        except LinkError as error:
+            if _NOT_ENTERED not in str(error):
+                raise
         return "".join(self.lines(*commands))
 
     def lines(self, *commands: Sequence[str]) -> Iterator[str]:

@@ -178,12 +178,12 @@ class Pulses:
         self.last_fall = now
         self.falls += 1
 
-    def check_end(self, frozen=False):
-        """All pulses are whole, and DIR kept its times. After a freeze the last pulse may be longer."""
+    def check_end(self):
+        """All pulses are whole and none is longer, also the last one before a freeze; and DIR kept its times."""
         pulse = self._rig.head["pulse_ticks"]
         assert self.rises == self.falls, (self.rises, self.falls)
         assert self.shortest_pulse >= pulse, self.shortest_pulse
-        assert frozen or self.longest_pulse <= pulse, self.longest_pulse
+        assert self.longest_pulse <= pulse, self.longest_pulse
         assert self.shortest_hold >= self._rig.head["dir_hold_ticks"], self.shortest_hold
         assert self.shortest_setup >= self._rig.head["dir_setup_ticks"], self.shortest_setup
 

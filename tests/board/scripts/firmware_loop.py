@@ -313,7 +313,7 @@ def replace(settings):
     mem32[here["feed_ticks"]] = _FEED_TICKS
     still = uctypes.addressof(unmoved)
     sys.modules["pyb"] = Beyond(pyb, USB_VCP=Port, Timer=Timer)
-    sys.modules["os"] = Beyond(os, dupterm=nothing)
+    sys.modules["os"] = Beyond(os, dupterm=nothing, urandom=bytes)
     sys.modules["machine"] = Beyond(machine, unique_id=lambda: b"123456789012")
     addresses = {"DMA1": uctypes.addressof(dma), "TIM1": still, "TIM3": still, "TIM4": still, "TIM8": still}
     sys.modules["stm"] = Beyond(stm, **addresses)
