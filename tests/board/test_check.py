@@ -11,7 +11,7 @@ from armtempo_shared import codes, limits, motion
 from tests import interpreters
 from tests.board import motions, walking
 
-SCRIPT = Path(__file__).parent / "scripts" / "judge.py"
+SCRIPT = Path(__file__).parent / "scripts" / "probes" / "judge.py"
 FAR = 10_000_000
 Verdict = tuple[int, int, int] | None
 

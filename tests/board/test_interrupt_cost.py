@@ -8,7 +8,7 @@ from array import array
 import pytest
 
 from tests import interpreters
-from tests.benchmark.emulated import Machine
+from tests.board.emulated import Machine
 
 BOARD = interpreters.ROOT / "board" / "armtempo_board"
 

@@ -12,7 +12,7 @@ from armtempo.records import encode
 
 from tests import interpreters
 
-SCRIPT = Path(__file__).parent / "scripts" / "replay.py"
+SCRIPT = Path(__file__).parent / "scripts" / "probes" / "replay.py"
 
 
 @pytest.mark.parametrize("name", interpreters.AVAILABLE)

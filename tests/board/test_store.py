@@ -8,7 +8,7 @@ import pytest
 
 from tests import interpreters
 
-SCRIPT = Path(__file__).parent / "scripts" / "store_cuts.py"
+SCRIPT = Path(__file__).parent / "scripts" / "cases" / "store_cuts.py"
 
 
 @pytest.mark.parametrize("name", interpreters.AVAILABLE)

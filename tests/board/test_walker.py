@@ -20,26 +20,10 @@ MOTION_PATH = [
 QUICK = next(name for name in ("micropython", "cpython") if name in interpreters.AVAILABLE)
 """The interpreter for the long cases; that all give the same is shown on shorter ones."""
 
-NAMED = {
-    "feeding": motions.feeding,
-    "refined": lambda: motions.feeding(refine=8, slower=1.1),
-    "refined by three": lambda: motions.feeding(refine=3),
-    "cubic": lambda: motions.feeding(degree=3),
-    "cubic refined": lambda: motions.feeding(degree=3, refine=8),
-    "ten minutes": lambda: motions.feeding(slower=88.3, finer=4.0),
-    "333 000 steps/s": lambda: motions.cruise(333_000),
-    "thirtyfold microsteps": lambda: motions.feeding(finer=30.0),
-    "two steps": lambda: motions.record([np.array([0.0, 2.0])], [np.array([0.01])], 5),
-    "less than a step": lambda: motions.record([np.array([0.2, 0.45, 0.1])], [np.array([0.1, 0.1])], 5),
-    "no way at all": lambda: motions.record([np.array([7.0, 7.0])], [np.array([0.5])], 5),
-    "20 ms": lambda: motions.record([np.array([0.0, 700.0])], [np.array([0.02])], 5),
-    "to half steps": lambda: motions.record([np.array([0.0, 12.5, -3.5, 0.5])], [np.full(3, 0.2)], 5),
-}
 
-
-@pytest.mark.parametrize("name", NAMED)
+@pytest.mark.parametrize("name", motions.NAMED)
 def test_steps_are_where_the_spline_says(name: str, tmp_path: Path) -> None:
-    record = NAMED[name]()
+    record = motions.NAMED[name]()
     verdicts, steps = walking.walk(QUICK, tmp_path, [record])
     assert verdicts == ["None"]
     walking.verify(record, steps[0])
@@ -65,7 +49,12 @@ def test_two_hundred_motions_by_chance(tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def shared(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[bytes], list[bytes]]:
     """Some records and their steps on one interpreter."""
-    records = [NAMED["feeding"](), NAMED["cubic refined"](), NAMED["20 ms"](), *chance_records(25)]
+    records = [
+        motions.NAMED["feeding"](),
+        motions.NAMED["cubic refined"](),
+        motions.NAMED["20 ms"](),
+        *chance_records(25),
+    ]
     return records, walking.walk(QUICK, tmp_path_factory.mktemp("shared"), records, room=2)[1]
 
 

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from armtempo.model.arm import Limits
 from armtempo.planning.fitness import Fitness, stretch_of
 from armtempo.splines import bspline, extremes, time_axis
 from armtempo.splines.trajectory import JointSpline
 
-from tests.host.test_spline import FEEDING
-
-LIMITS = [Limits(50, 50, 150), Limits(40, 30, 120), Limits(60, 40, 150)]
+from tests.host.feeding import FEEDING, LIMITS
 
 
 def exact_ratios(points: np.ndarray, intervals: np.ndarray, degree: int) -> np.ndarray:

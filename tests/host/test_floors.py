@@ -10,8 +10,7 @@ from armtempo.model.arm import Limits
 from armtempo.planning import lower_bounds, rest_to_rest, topp
 from armtempo.splines import bspline
 
-from tests.host.test_fitness import LIMITS
-from tests.host.test_spline import FEEDING
+from tests.host.feeding import FEEDING, LIMITS
 
 
 def test_joint_1_from_rest_to_rest() -> None:

@@ -15,7 +15,7 @@ from armtempo.planning import lower_bounds, planner
 from armtempo_shared.limits import MAX_STEP_RATE
 
 from tests.host import problems
-from tests.host.test_extremes import dense
+from tests.host.feeding import dense
 
 ARM = Arm.paper()
 JOB = Job.paper(ARM)

@@ -11,8 +11,7 @@ from armtempo.planning.constraints import Constraints, Path, near_rows, peak_row
 from armtempo.splines import bspline, time_axis
 
 from tests.host import problems
-from tests.host.test_fitness import LIMITS
-from tests.host.test_spline import FEEDING
+from tests.host.feeding import FEEDING, LIMITS
 
 PROBLEMS = {problem.name: problem for problem in problems.load()}
 

@@ -313,12 +313,3 @@ class Rig:
     def stepped(self):
         """Where the pins have moved them."""
         return [pulses.net for pulses in self.pulses]
-
-
-def cases(functions):
-    """Run each of a script's cases, or those that the arguments name, and say its name."""
-    wanted = [name for name in sys.argv[1:] if name != "short"]
-    for function in functions:
-        if not wanted or function.__name__ in wanted:
-            function()
-            print(function.__name__)

@@ -5,6 +5,7 @@ Argument: a scratch folder.
 
 import sys
 
+import cases
 from virtual_board import (  # replaces time, os, uctypes, micropython; so before everything else
     machine_state,
     standalone,
@@ -388,8 +389,7 @@ def case_registers_by_the_chips_addresses():
         pass
 
 
-for name in sorted(globals()):
-    if name.startswith("case_"):
-        standalone.start(flash=SCRATCH + "/flash")
-        globals()[name]()
-        print(name)
+for name in cases.wanted(globals()):
+    standalone.start(flash=SCRATCH + "/flash")
+    globals()[name]()
+    print(name)

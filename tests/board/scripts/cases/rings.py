@@ -2,12 +2,12 @@
 
 from array import array
 
+import cases
 import uctypes
 import virtual_board.standalone  # noqa: F401
 from armtempo_board.hardware import isr
 from armtempo_board.hardware.ring import size
 from armtempo_board.stepgen import step_queue
-from engine_rig import cases
 
 BLOCK = isr.BLOCK_HEAD + 6 * isr.JOINT_WORDS
 
@@ -23,7 +23,7 @@ def ring_state(entries):
     return state
 
 
-def counting_matches():
+def case_counting_matches():
     """NDTR counts down and starts again; every match is counted whatever the number since the last look."""
     for entries, first in ((1024, 1024), (1024, 1023), (64, 64), (128, 127)):
         state, dma = ring_state(entries), words(60)
@@ -55,7 +55,7 @@ def ready(entries, made, matched, last, now):
     return block, state, dma, timer
 
 
-def when_to_write():
+def case_when_to_write():
     """Where a quarter is free and the last rising edge is 390 us to 37 ms ahead; a dry ring is fed no more."""
     guard, plenty = 32768 + 100, 3145728 + 100
     for entries, made, matched, last, now, hungry, fed in (
@@ -86,7 +86,7 @@ def when_to_write():
         assert isr.rings_to_refill(block, dma, timer) == -1
 
 
-def written_and_wrapped():
+def case_written_and_wrapped():
     """The far-away entry stands behind the newest, the first word is repeated behind the end; too late is told."""
     for entries in (64, 256, 1024):
         _, state, _, timer = ready(entries, 0, 0, 1000, 0)
@@ -109,7 +109,7 @@ def written_and_wrapped():
             assert ring[entries] == ring[0]
 
 
-def sizes():
+def case_sizes():
     """A ring lasts at least 4 ms at a joint's highest rate, or is of the largest size."""
     previous = 64
     for rate in (0, 1, 1796, 1900, 3592, 4100, 8000, 20_000, 34_000, 333_000):
@@ -120,7 +120,7 @@ def sizes():
     assert (size(0), size(7_000), size(8_000), size(333_000)) == (64, 64, 128, 1024)
 
 
-def times_across_the_wrap():
+def case_times_across_the_wrap():
     """Differences of times that straddle 2**32, and both halves of the range."""
     timer = words(18)
     times = words(1)
@@ -132,7 +132,7 @@ def times_across_the_wrap():
             assert isr.kiticks_until(timer, times, 0) == gap_kiticks, (now, gap_kiticks)
 
 
-def due_or_not():
+def case_due_or_not():
     """Turns and samples at, before and after the present, around the wrap; the soonest is armed."""
     for now in (0, 1000, 0x7FFFFFF0, 0xFFFFFFF0):
         block, timer, port, state = words(BLOCK), words(18), words(8), words(isr.STATE_WORDS)
@@ -166,7 +166,7 @@ def due_or_not():
         assert block[isr.NOW] == timer[isr.CNT]
 
 
-def turn_queue():
+def case_turn_queue():
     """Eight turns fit; the ninth waits."""
     block, state = words(BLOCK), words(isr.STATE_WORDS)
     for n in range(isr.TURN_ROOM):
@@ -177,7 +177,7 @@ def turn_queue():
     assert isr.add_turn(block, state, isr.BLOCK_HEAD, 5)
 
 
-def sample_times():
+def case_sample_times():
     """From 0 in steps of a tenth of a second to the end; raw samples that find no room are counted."""
     block, raw, dma, encoder = words(BLOCK), words(isr.RAW_ROOM * isr.RAW_WORDS), words(60), words(18)
     at = isr.BLOCK_HEAD + isr.RING
@@ -206,7 +206,7 @@ def sample_times():
     assert raw[0] == 1000
 
 
-def late_first_step():
+def case_late_first_step():
     """A channel is armed only while its first edge lies ahead, and behind a DIR turn and its set-up."""
     block, timer, ring = words(BLOCK), words(18), words(1)
     at = isr.BLOCK_HEAD
@@ -241,7 +241,7 @@ def late_first_step():
     assert timer[isr.DIER] == 1 << 4
 
 
-def counters_in_step():
+def case_counters_in_step():
     """Two counters that were read one after the other agree, or do not."""
     first, second = words(18), words(18)
     for a, b, agree in (
@@ -256,7 +256,7 @@ def counters_in_step():
         assert isr.counters_agree(first, second) == agree, (a, b)
 
 
-def towards_a_switch():
+def case_towards_a_switch():
     """Line, direction and movement all have to fit."""
     pairs = array("I", [8, 7, 1, 0, 1, 8, 10, 0, 2, 1, 9, 7, 0, 0, 0])
     port = words(8)
@@ -265,18 +265,4 @@ def towards_a_switch():
         assert isr.joint_towards(pairs, 3, line, isr.output_levels(port)) == found
 
 
-cases(
-    (
-        counting_matches,
-        when_to_write,
-        written_and_wrapped,
-        sizes,
-        times_across_the_wrap,
-        due_or_not,
-        turn_queue,
-        sample_times,
-        late_first_step,
-        counters_in_step,
-        towards_a_switch,
-    )
-)
+cases.run(globals())

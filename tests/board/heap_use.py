@@ -1,4 +1,4 @@
-"""The heap that the compiled board program needs, on 32-bit MicroPython: ``python -m tests.benchmark.memory``.
+"""The heap that the compiled board program needs, on 32-bit MicroPython: ``python -m tests.board.heap_use``.
 
 The shipped arm; files compiled for the Cortex-M4 as ``armtempo deploy`` does it; registers are plain memory. The
 interpreter keeps machine code outside of its heap, the chip within: its size is read from the files and added. The
@@ -23,9 +23,9 @@ from armtempo.records import encode
 from armtempo_shared import wire
 
 from tests import interpreters
-from tests.benchmark.emulated import machine_code_bytes
+from tests.board.emulated import machine_code_bytes
 
-SCRIPT = interpreters.ROOT / "tests" / "board" / "scripts" / "memory_use.py"
+SCRIPT = interpreters.ROOT / "tests" / "board" / "scripts" / "benchmarks" / "memory_use.py"
 INTERPRETER = "micropython-arm"
 SESSION = ("hello", "home", "start")
 HEAP = 103_400
