@@ -15,7 +15,8 @@ from tests.board import motions, oracle, walking
 BOARD = interpreters.ROOT / "board" / "armtempo_board"
 MOTION_PATH = [
     *sorted((BOARD / "stepgen").glob("*.py")),
-    *(BOARD / "motion" / f"{name}.py" for name in ("motion_check", "rate_check", "endpoints")),
+    *sorted((BOARD / "motion").glob("*.py")),
+    *sorted((BOARD / "hardware").glob("*.py")),
 ]
 QUICK = next(name for name in ("micropython", "cpython") if name in interpreters.AVAILABLE)
 """The interpreter for the long cases; that all give the same is shown on shorter ones."""

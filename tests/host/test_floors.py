@@ -56,7 +56,7 @@ def test_floor_falls_with_every_limit() -> None:
     base = rest_to_rest.floor_s(turns, LIMITS[1])
     for factors in ((2, 1, 1), (1, 2, 1), (1, 1, 2)):
         looser = Limits(*(value * factor for value, factor in zip(LIMITS[1].values, factors, strict=True)))
-        assert rest_to_rest.floor_s(turns, looser) <= base
+        assert rest_to_rest.floor_s(turns, looser) < 0.999 * base, factors
 
 
 def test_turns_of_the_paper_joints() -> None:
