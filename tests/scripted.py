@@ -27,7 +27,7 @@ class Case:
         """AssertionError with the script's traceback where the case does not hold; options of ``interpreters.run``."""
         options = {"heap": HEAP[self.interpreter], **options}
         output = interpreters.run(self.interpreter, self.script, *arguments, self.name, **options)  # type: ignore[arg-type]
-        assert output.split()[:1] == [self.name], output
+        assert output.splitlines()[-1].split()[:1] == [self.name], output
 
 
 def names(script: Path) -> list[str]:

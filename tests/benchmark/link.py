@@ -131,11 +131,11 @@ def longest_pause_s(arm: bytes) -> float:
 def power_cuts() -> tuple[int, int]:
     """How often the power was cut, and how often the flash failed or was full, at every change of the store."""
     lines = interpreters.run(interpreters.AVAILABLE[-1], CASES / "store_cuts.py").splitlines()
-    counts = {" cut ": 0, " error ": 0, " full ": 0}
-    for line in lines:
-        for word in counts:
-            counts[word] += len(line.rsplit(" ", 1)[1]) if word in line else 0
-    return counts.pop(" cut "), sum(counts.values())
+    counts = {"cut": 0, "error": 0, "full": 0}
+    for words in map(str.split, lines):
+        if words[0] in counts:
+            counts[words[0]] += len(words[-1]) - 1  # the last came when all was done
+    return counts.pop("cut"), sum(counts.values())
 
 
 def main() -> None:

@@ -89,6 +89,22 @@ def test_braking_stays_on_the_path(interpreter: str, start_s: float, length_s: f
         _verify_braked(Motion(record), joint, walking.steps_of(steps, joint), start, length)
 
 
+@pytest.mark.parametrize("room", [14, 512, 1024])
+@pytest.mark.parametrize(("start_s", "length_s"), BRAKES)
+def test_nothing_is_written_beyond_the_time_at_which_braking_begins(
+    start_s: float, length_s: float, room: int, tmp_path: Path
+) -> None:
+    """However much room there is, the edges are those that are written one by one."""
+    brake = round(start_s * walking.TICK_HZ), round(length_s * walking.TICK_HZ)
+    records = [motions.feeding(), motions.cruise(90_000)]
+    one_by_one = walking.walk(QUICK, tmp_path, records, room=2, brake=brake)[1]
+    for mine, other in zip(
+        walking.walk(QUICK, tmp_path, records, room=room, brake=brake)[1], one_by_one, strict=True
+    ):
+        edges, others = (np.frombuffer(data, dtype="<i4").reshape(-1, 5) for data in (mine, other))
+        np.testing.assert_array_equal(edges[:, [0, 1, 3, 4]], others[:, [0, 1, 3, 4]])
+
+
 def test_braking_from_full_speed(tmp_path: Path) -> None:
     start, length = round(0.9 * walking.TICK_HZ), round(0.8 * walking.TICK_HZ)
     record = motions.cruise(333_000)

@@ -130,6 +130,15 @@ def test_other_searches_make_plans_too(fitness: str, optimiser: str) -> None:
     check(planner.plan(ARM, job), optimiser)
 
 
+@pytest.mark.parametrize(("refine", "polish"), [(1, False), (1, True), (2, True)])
+def test_a_tiny_motion_takes_a_hundredth_of_a_second(refine: int, polish: bool) -> None:
+    """Limits alone would let it take a tenth of that; a tenth of the time between two samples is the least."""
+    arm = problems.make_arm([[100.0, 1e4, 1e8]])
+    job = Job("tiny", ((0.0,), (1e-6,), (2e-6,)), iterations=20, refine=refine, polish=polish)
+    plan = planner.plan(arm, job)
+    assert plan.trajectory.duration_s == pytest.approx(0.01, rel=1e-9)
+
+
 @pytest.mark.parametrize("refine", [1, 2])
 @pytest.mark.parametrize("polish", [False, True])
 def test_progress_grows_to_the_whole(refine: int, polish: bool) -> None:

@@ -8,6 +8,7 @@ import virtual_board.standalone  # noqa: F401
 from armtempo_board.hardware import isr
 from armtempo_board.hardware.ring import size
 from armtempo_board.stepgen import step_queue
+from engine_rig import Rig, arm
 
 BLOCK = isr.BLOCK_HEAD + 6 * isr.JOINT_WORDS
 
@@ -263,6 +264,41 @@ def case_towards_a_switch():
     for line, levels, found in ((8, 1 << 7, 1), (8, 1 << 10, 0), (8, 0, 3), (9, 0, 0), (10, 1 << 7, 0)):
         port[isr.ODR] = levels
         assert isr.joint_towards(pairs, 3, line, isr.output_levels(port)) == found
+
+
+def case_interrupts_wait_while_a_channel_is_armed_or_released():
+    """Registers that an interrupt writes too are read, changed and written back."""
+    from armtempo_board.hardware import ring
+    from machine import disable_irq, enable_irq
+
+    enabled = []
+
+    def watched(function):
+        def call(*arguments):
+            before = disable_irq()
+            enabled.append(bool(before))
+            result = function(*arguments)
+            enable_irq(before)
+            return result
+
+        return call
+
+    class Watched:
+        def __getattr__(self, name):
+            found = getattr(isr, name)
+            return watched(found) if name in ("arm_channel", "release_channel") else found
+
+    rig = Rig(arm(1))
+    each = rig.engine._joints[0].ring
+    ring.isr = Watched()
+    try:
+        each.run(words(step_queue.QUEUE_SIZE))
+        each.release()
+    finally:
+        ring.isr = isr
+    assert enabled == [False, False], enabled
+    assert disable_irq(), "interrupts stay off"
+    enable_irq(True)
 
 
 cases.run(globals())
