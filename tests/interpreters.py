@@ -38,9 +38,10 @@ def environment(name: str) -> dict[str, str]:
     return {**os.environ, variable: value, "PYTHONDONTWRITEBYTECODE": "1"}
 
 
-def run(name: str, script: Path | str, *arguments: str, timeout: float = 300.0, heap: str = "") -> str:
+def run(name: str, script: Path | str, *arguments: str, timeout: float = 1200.0, heap: str = "") -> str:
     """What the script prints; AssertionError with its error output where it fails.
 
+    ``timeout``: seconds, generous for a busy machine.
     ``heap``: heap size for MicroPython, as its ``-X heapsize=`` takes it.
     """
     command = [starter(name)]

@@ -87,7 +87,7 @@ def _run(folder: Path, heap: int) -> str:
     arguments = [str(folder), str(folder / "frames"), str(folder / "answers"), str(heap)]
     command = [interpreters.starter(INTERPRETER), "-X", "heapsize=2M", str(SCRIPT), *arguments]
     environment = {**os.environ, "MICROPYPATH": f"{folder / 'lib'}{os.pathsep}.frozen"}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=100, check=False)
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=1200, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 

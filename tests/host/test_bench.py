@@ -119,7 +119,7 @@ def test_goes_on_where_it_was_interrupted(tmp_path: Path) -> None:
             time.sleep(0.01)
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGINT)
-        said = process.communicate(timeout=60)[1]
+        said = process.communicate(timeout=600)[1]
     assert process.returncode == 130, said
     kept = file.read_bytes()
     count = kept.count(b"\n") - 1

@@ -19,6 +19,11 @@ CASES = [("shipped", name) for name in interpreters.AVAILABLE] + [
 ]
 
 
+def together(job: str) -> pytest.MarkDecorator:
+    """Tests of a job's replays run on one worker, which makes each replay once."""
+    return pytest.mark.xdist_group(f"replays of {job}")
+
+
 @pytest.fixture(scope="session")
 def plan_file(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     """Gives the trajectory file of a job of ``replays.JOBS``."""
@@ -36,7 +41,7 @@ def replay_of(
     )
 
 
-@pytest.fixture(params=CASES, ids="-".join)
+@pytest.fixture(params=[pytest.param(case, id="-".join(case), marks=together(case[0])) for case in CASES])
 def replay(request: pytest.FixtureRequest, replay_of: Callable[[str, str], Replay]) -> Replay:
     """Each job that is replayed, with its interpreter."""
     return replay_of(*request.param)

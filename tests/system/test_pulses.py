@@ -9,6 +9,7 @@ import pytest
 
 from tests import interpreters
 from tests.system import pulses
+from tests.system.conftest import together
 from tests.system.exact import TICK_HZ
 from tests.system.replays import Replay
 
@@ -91,6 +92,7 @@ def test_pulses_are_as_wide_and_as_far_apart_as_the_arm_file_says(replay: Replay
 
 
 @pytest.mark.parametrize("other", [name for name in interpreters.AVAILABLE if name != "cpython"])
+@together("shipped")
 def test_the_pin_log_is_that_of_cpython(replay_of: Callable[[str, str], Replay], other: str) -> None:
     ours, theirs = replay_of("shipped", "cpython"), replay_of("shipped", other)
     for joint in JOINTS:

@@ -8,6 +8,7 @@ import numpy as np
 
 from tests import interpreters
 from tests.system import pulses
+from tests.system.conftest import together
 from tests.system.exact import TICK_HZ
 from tests.system.replays import Replay
 
@@ -66,6 +67,7 @@ def test_encoders_follow_the_commanded_angle(replay: Replay) -> None:
         assert np.max(np.abs(off)) <= count_deg
 
 
+@together("shipped")
 def test_interpreters_agree(replay_of: Callable[[str, str], Replay]) -> None:
     first, *others = (replay_of("shipped", name).samples for name in interpreters.AVAILABLE)
     for other in others:

@@ -10,7 +10,7 @@ from virtual_board import machine_state, standalone
 from virtual_board.arm import motors
 
 TICK_HZ = 84_000_000
-FEWER = 3 if "short" in sys.argv else 1
+FEWER = 6 if "short" in sys.argv else 1
 """Repetitions are divided by it; the emulated interpreter is slow."""
 SLOTS = step_queue.QUEUE_SIZE - 13 * step_queue.CAPACITY
 
