@@ -14,9 +14,23 @@ from tests.system.replays import Replay
 
 FASTEST = "micropython" if "micropython" in interpreters.AVAILABLE else "cpython"
 """For jobs beside the shipped one: each interpreter has shown there that it makes the same pulses."""
-CASES = [("shipped", name) for name in interpreters.AVAILABLE] + [
-    (job, FASTEST) for job in replays.JOBS if job != "shipped"
+EMULATED = "micropython-arm"
+BY_JOB = {
+    "shipped": [name for name in interpreters.AVAILABLE if name != EMULATED],
+    "half": list(dict.fromkeys(name for name in (FASTEST, EMULATED) if name in interpreters.AVAILABLE)),
+    "refined": [FASTEST],
+    "cubic": [FASTEST],
+}
+"""The interpreters that replay a job."""
+CASES = [(job, name) for job, names in BY_JOB.items() for name in names]
+SAME = [
+    pytest.param(
+        job, names[0], other, id=f"{job}-{other}", marks=pytest.mark.xdist_group(f"replays of {job}")
+    )
+    for job, names in BY_JOB.items()
+    for other in names[1:]
 ]
+"""Pairs of interpreters that are to make the same of a job."""
 
 
 def together(job: str) -> pytest.MarkDecorator:
