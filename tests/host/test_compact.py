@@ -189,6 +189,7 @@ def test_what_nothing_uses_is_left_out() -> None:
     assert core.count("def ") == 1
 
 
+@pytest.mark.slow
 def test_the_most_used_names_come_first() -> None:
     """What gives them their numbers is the first thing in the file, and goes again."""
     body = ast.parse(program_files.compact_program().sources["armtempo_board.core"]).body
