@@ -1,5 +1,6 @@
 # make demo: plan the paper's feeding motion and replay it on the virtual board
 # make test: bring the interpreters, run all tests
+# make quick: those that take less than a minute together, for the inner loop of work
 # make check: lint and types
 # Each sets up its own environment in .venv; nothing outside the checkout is touched.
 
@@ -7,14 +8,17 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test check clean
+.PHONY: demo test quick check clean
 
 demo: $(VENV)/demo
 	"$(BIN)/armtempo" demo
 
 test: $(VENV)/test
 	"$(BIN)/python" .ci/get_micropython.py
-	"$(BIN)/python" -m pytest -n auto $(PYTEST_ARGS)
+	"$(BIN)/python" -m pytest -n auto --dist loadgroup $(PYTEST_ARGS)
+
+quick: $(VENV)/test
+	"$(BIN)/python" -m pytest -q -n auto --dist loadgroup -m "not slow" $(PYTEST_ARGS)
 
 check: $(VENV)/test .cache/typings
 	"$(BIN)/ruff" check .

@@ -59,7 +59,7 @@ def needed() -> None:
 def _run(page: Path, profile: Path, *options: str) -> str:
     assert BROWSER
     command = [BROWSER, *_QUIET, f"--user-data-dir={profile}", *options, page.as_uri()]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
     return done.stdout
 

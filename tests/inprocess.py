@@ -17,7 +17,7 @@ from unittest.mock import patch
 from armtempo.errors import LinkError
 from armtempo.link import Client, greet
 
-from tests.board.scripts import stand_in
+from tests.board.scripts.rigs import stand_in
 
 SHIMS = Path(__file__).parents[1] / "host" / "armtempo" / "simulator" / "cpython"
 FAULTS = ("lose", "double", "flip", "delay", "cut")

@@ -38,8 +38,8 @@ from armtempo_board.stepgen import (  # noqa: E402
 )
 from armtempo_shared.motion import Motion  # noqa: E402
 
-from tests.benchmark.emulated import Machine  # noqa: E402
 from tests.board import motions, oracle  # noqa: E402
+from tests.board.emulated import Machine  # noqa: E402
 
 CORE_HZ = 168_000_000
 CYCLES = 1.3

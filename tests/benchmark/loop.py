@@ -5,8 +5,8 @@
 MICROPYTHON as for tests/benchmark/firmware.py. The program is built into MicroPython's own firmware for the chip, and
 that is run by QEMU, which counts instructions: so long lasts the motion's time meanwhile, so a ring that the loop comes
 back to too late runs dry as on the chip. What stands in for timers, DMA, USB and encoders: loop_board.c and
-tests/board/scripts/firmware_loop.py. With ``files`` behind it only the costs of a turn, with the program in files; only
-what stands around it is built in, as its heap is not the program's.
+tests/board/scripts/benchmarks/firmware_loop.py. With ``files`` behind it only the costs of a turn, with the program in
+files; only what stands around it is built in, as its heap is not the program's.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from armtempo_shared.limits import TICK_HZ
 
 from tests.benchmark import firmware
 from tests.board import motions
-from tests.board.scripts.arm_rows import HEAD, row
+from tests.board.scripts.rigs.arm_rows import HEAD, row
 
 CORE_HZ = 168_000_000
 CYCLES = (1.3, 2.0, 2.5)

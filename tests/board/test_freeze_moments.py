@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 import pytest
 from unicorn import UC_HOOK_CODE, UC_HOOK_MEM_READ, UC_HOOK_MEM_WRITE, Uc
 
-from tests.benchmark.emulated import DATA_AT, Machine
 from tests.benchmark.freeze import ISR, block_at
+from tests.board.emulated import DATA_AT, Machine
 
 AT = block_at()
 TIM2, TIM5, PORT_A, PORT_B, WORDS = 0, 768, 1024, 1280, 2100

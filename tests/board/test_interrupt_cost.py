@@ -9,7 +9,7 @@ import pytest
 
 from tests import interpreters
 from tests.benchmark import freeze
-from tests.benchmark.emulated import Machine
+from tests.board.emulated import Machine
 
 BOARD = interpreters.ROOT / "board" / "armtempo_board"
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.benchmark import memory
+from tests.board import heap_use
 
 PEAK = 60_000
 MOTION = 55_000
@@ -11,7 +11,7 @@ MACHINE_CODE = 26_000
 
 def test_heap_of_the_compiled_program() -> None:
     """Measured on 32-bit MicroPython with the shipped arm; machine code is counted apart."""
-    stages = memory.measure()
+    stages = heap_use.measure()
     assert max(stages.values()) == stages["check"] <= PEAK, stages
     assert stages["motion"] <= MOTION, stages
     assert stages["machine code"] <= MACHINE_CODE, stages

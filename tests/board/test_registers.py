@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tests import interpreters
 
-SCRIPTS = Path(__file__).parent / "scripts"
+SCRIPT = Path(__file__).parent / "scripts" / "probes" / "register_image.py"
 
 # RM0090: TIMx_CCMRx OCxM forced inactive (18.4.7), TIMx_CCER CCxE (18.4.9), DMA_SxCR fields (10.5.5)
 _LOW_1, _LOW_2 = 0b100 << 4, 0b100 << 12
@@ -61,7 +61,7 @@ _PAGE = re.compile(r"(\d+)(?: or \d+)?")  # "583 or 584" is one page that is not
 
 
 def _image(interpreter: str) -> dict[str, int]:
-    lines = interpreters.run(interpreter, SCRIPTS / "register_image.py", heap="6M").splitlines()
+    lines = interpreters.run(interpreter, SCRIPT, heap="6M").splitlines()
     return {name: int(value, 16) for name, value in (line.split() for line in lines)}
 
 

@@ -419,6 +419,7 @@ def test_the_picture_shows_home_and_every_driven_joint(name: str) -> None:
     assert [title.split(":")[0] for title in titles[2:]] == [joint.name for joint in arm.driven]
 
 
+@pytest.mark.slow
 def test_the_picture_is_written_once(tmp_path: Path) -> None:
     path = tmp_path / "arm.png"
     assert run("--picture", path).exit_code == 0

@@ -53,6 +53,7 @@ def test_the_hash_covers_names_and_contents_in_all_packages(tmp_path: Path) -> N
     assert crc() in found
 
 
+@pytest.mark.slow
 def test_compiled_files_fit_the_smallest_board() -> None:
     told: list[str] = []
     library = changes.choose(BOARD, False, told.append)
@@ -146,6 +147,7 @@ def test_package_folder_lists_what_it_holds(tmp_path: Path) -> None:
         package.write(tmp_path / "new")
 
 
+@pytest.mark.slow
 def test_firmware_folder_holds_the_program_and_its_hash(tmp_path: Path) -> None:
     folder = tmp_path / "new"
     firmware.write(folder)

@@ -12,8 +12,7 @@ from armtempo.planning.fixed_path import FixedPath
 from armtempo.splines import bspline
 
 from tests.host import problems
-from tests.host.test_fitness import LIMITS
-from tests.host.test_spline import FEEDING
+from tests.host.feeding import FEEDING, LIMITS
 
 PROBLEMS = {problem.name: problem for problem in problems.load()}
 

@@ -16,7 +16,7 @@ from armtempo.planning.lower_bounds import Floor
 from armtempo_shared.limits import MAX_STEP_RATE
 
 from tests.host import problems
-from tests.host.test_extremes import dense
+from tests.host.feeding import dense
 
 ARM = Arm.paper()
 JOB = Job.paper(ARM)
@@ -129,6 +129,15 @@ def test_a_joint_that_rests_takes_the_longest_axis() -> None:
 def test_other_searches_make_plans_too(fitness: str, optimiser: str) -> None:
     job = replace(JOB, optimiser=optimiser, parameters={"fitness": fitness}, iterations=60)
     check(planner.plan(ARM, job), optimiser)
+
+
+@pytest.mark.parametrize(("refine", "polish"), [(1, False), (1, True), (2, True)])
+def test_a_tiny_motion_takes_a_hundredth_of_a_second(refine: int, polish: bool) -> None:
+    """Limits alone would let it take a tenth of that; a tenth of the time between two samples is the least."""
+    arm = problems.make_arm([[100.0, 1e4, 1e8]])
+    job = Job("tiny", ((0.0,), (1e-6,), (2e-6,)), iterations=20, refine=refine, polish=polish)
+    plan = planner.plan(arm, job)
+    assert plan.trajectory.duration_s == pytest.approx(0.01, rel=1e-9)
 
 
 @pytest.mark.parametrize("refine", [1, 2])

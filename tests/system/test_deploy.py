@@ -13,6 +13,7 @@ from armtempo.errors import LinkError
 from armtempo.simulator import LaunchOptions, VirtualBoard, edgelog, launch
 
 from tests import interpreters
+from tests.system import commandline
 from tests.system.boards import armtempo, small_plan
 
 SOURCES_BLOCKS = 600
@@ -54,7 +55,7 @@ def test_the_compiled_program_makes_the_same_pulses(tmp_path: Path) -> None:
 
 def mpremote(port: str, *arguments: str) -> str:
     command = [sys.executable, "-m", "mpremote", "connect", port, *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=commandline.SLOW_S)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 

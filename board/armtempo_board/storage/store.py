@@ -236,6 +236,7 @@ class Store:
             self._discard(_DEFAULT + _NEW)
             raise
         self._guard(file.close)
+        self._guard(_sync)  # before the rename: the old one is gone with it
         self._replace(_DEFAULT)
 
     def _other_case(self, file_name: str) -> None:

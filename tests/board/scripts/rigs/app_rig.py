@@ -1,4 +1,4 @@
-"""What the scripts of cases of the program above the engine share: a board that is ready, and how cases are run."""
+"""What the scripts of cases of the program above the engine share: a board that is ready."""
 
 import sys
 
@@ -48,11 +48,3 @@ def samples_of(host):
 
 def ends_of(host):
     return [(kind, fields) for kind, fields, _ in host.events if kind != "sample"]
-
-
-def run(names):
-    """Run all cases of a script's ``globals()``; each function asserts, its name is printed when it holds."""
-    for name in sorted(names):
-        if name.startswith("case_"):
-            names[name]()
-            print(name)

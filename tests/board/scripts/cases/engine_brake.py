@@ -2,8 +2,9 @@
 
 import random
 
+import cases
 from brake_motion import BRAKE_TICKS, path, record
-from engine_rig import FEWER, TICK_HZ, Rig, arm, cases
+from engine_rig import FEWER, TICK_HZ, Rig, arm
 
 SEED = 20262
 
@@ -14,7 +15,7 @@ def joints():
     return rows
 
 
-def whole_motion():
+def case_whole_motion():
     """Without braking it ends at the last points."""
     rig = Rig(joints(), planned=False)
     begin(rig, BRAKE_TICKS)
@@ -31,7 +32,7 @@ def begin(rig, brake_ticks):
     rig.engine.start()
 
 
-def anywhere():
+def case_anywhere():
     """The stop is on the path, the samples go on to it, and nothing comes after it."""
     random.seed(SEED)
     for number in range(15 // FEWER):
@@ -56,7 +57,7 @@ def anywhere():
         assert rig.samples[-1][2:5] == rig.commanded()
 
 
-def too_late():
+def case_too_late():
     """Asked for when the motion is nearly over, it ends as planned."""
     rig = Rig(joints(), planned=False)
     begin(rig, BRAKE_TICKS)
@@ -68,7 +69,7 @@ def too_late():
     assert [abs(a - b) <= 0.5 for a, b in zip(rig.commanded(), path(10.0))] == [True] * 3
 
 
-def not_planned_for():
+def case_not_planned_for():
     """A motion without a braking time is frozen."""
     rig = Rig(joints(), planned=False)
     begin(rig, 0)
@@ -79,11 +80,4 @@ def not_planned_for():
     assert rig.commanded() == [motor.position for motor in rig.arm.motors]
 
 
-cases(
-    (
-        whole_motion,
-        anywhere,
-        too_late,
-        not_planned_for,
-    )
-)
+cases.run(globals())

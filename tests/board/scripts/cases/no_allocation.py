@@ -8,7 +8,7 @@ import sys
 
 import micropython
 
-sys.path.insert(0, __file__.rsplit("/", 1)[0] + "/bare")
+sys.path.insert(0, __file__.rsplit("/", 2)[0] + "/rigs/bare")
 
 from array import array
 

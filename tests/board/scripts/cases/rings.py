@@ -2,12 +2,13 @@
 
 from array import array
 
+import cases
 import uctypes
 import virtual_board.standalone  # noqa: F401
 from armtempo_board.hardware import isr, pins
 from armtempo_board.hardware.ring import size
 from armtempo_board.stepgen import step_queue
-from engine_rig import cases
+from engine_rig import Rig, arm
 
 BLOCK = isr.BLOCK_HEAD + 6 * isr.JOINT_WORDS
 
@@ -23,7 +24,7 @@ def ring_state(entries):
     return state
 
 
-def counting_matches():
+def case_counting_matches():
     """NDTR counts down and starts again; every match is counted whatever the number since the last look."""
     for entries, first in ((1024, 1024), (1024, 1023), (64, 64), (128, 127)):
         state, dma = ring_state(entries), words(60)
@@ -55,7 +56,7 @@ def ready(entries, made, matched, last, now):
     return block, state, dma, timer
 
 
-def when_to_write():
+def case_when_to_write():
     """Where a quarter is free and the last rising edge is 390 us to 37 ms ahead; a dry ring is fed no more."""
     guard, plenty = 32768 + 100, 3145728 + 100
     for entries, made, matched, last, now, hungry, fed in (
@@ -86,7 +87,7 @@ def when_to_write():
         assert isr.rings_to_refill(block, dma, timer) == -1
 
 
-def written_and_wrapped():
+def case_written_and_wrapped():
     """The far-away entry stands behind the newest, the first word is repeated behind the end; too late is told."""
     for entries in (64, 256, 1024):
         _, state, _, timer = ready(entries, 0, 0, 1000, 0)
@@ -109,7 +110,7 @@ def written_and_wrapped():
             assert ring[entries] == ring[0]
 
 
-def sizes():
+def case_sizes():
     """A ring lasts at least 4 ms at a joint's highest rate, or is of the largest size."""
     previous = 64
     for rate in (0, 1, 1796, 1900, 3592, 4100, 8000, 20_000, 34_000, 333_000):
@@ -120,7 +121,7 @@ def sizes():
     assert (size(0), size(7_000), size(8_000), size(333_000)) == (64, 64, 128, 1024)
 
 
-def times_across_the_wrap():
+def case_times_across_the_wrap():
     """Differences of times that straddle 2**32, and both halves of the range."""
     timer = words(18)
     times = words(1)
@@ -132,7 +133,7 @@ def times_across_the_wrap():
             assert isr.kiticks_until(timer, times, 0) == gap_kiticks, (now, gap_kiticks)
 
 
-def due_or_not():
+def case_due_or_not():
     """Turns and samples at, before and after the present, around the wrap; the soonest is armed."""
     for now in (0, 1000, 0x7FFFFFF0, 0xFFFFFFF0):
         block, timer, port, state = words(BLOCK), words(18), words(8), words(isr.STATE_WORDS)
@@ -166,7 +167,7 @@ def due_or_not():
         assert block[isr.NOW] == timer[isr.CNT]
 
 
-def turn_queue():
+def case_turn_queue():
     """Eight turns fit; the ninth waits."""
     block, state = words(BLOCK), words(isr.STATE_WORDS)
     for n in range(isr.TURN_ROOM):
@@ -177,7 +178,7 @@ def turn_queue():
     assert isr.add_turn(block, state, isr.BLOCK_HEAD, 5)
 
 
-def sample_times():
+def case_sample_times():
     """From 0 in steps of a tenth of a second to the end; raw samples that find no room are counted."""
     block, raw, dma, encoder = words(BLOCK), words(isr.RAW_ROOM * isr.RAW_WORDS), words(60), words(18)
     at = isr.BLOCK_HEAD + isr.RING
@@ -206,7 +207,7 @@ def sample_times():
     assert raw[0] == 1000
 
 
-def late_first_step():
+def case_late_first_step():
     """A channel is armed only while its first edge lies ahead, and behind a DIR turn and its set-up."""
     block, timer, ring = words(BLOCK), words(18), words(1)
     at = isr.BLOCK_HEAD
@@ -241,7 +242,7 @@ def late_first_step():
     assert timer[isr.DIER] == 1 << 4
 
 
-def counters_in_step():
+def case_counters_in_step():
     """Two counters that were read one after the other agree, or do not."""
     first, second = words(18), words(18)
     for a, b, agree in (
@@ -291,7 +292,7 @@ def frozen(line, levels, high_a=0, high_b=0, runs=1, before=0):
     return block, registers
 
 
-def towards_a_switch():
+def case_towards_a_switch():
     """A limit switch freezes where a joint moves towards it, at one of its levels of DIR; E-stop and program always."""
     for line, levels, freezes in (
         (8, 1 << 7 | 1 << 10, 1),
@@ -311,7 +312,7 @@ def towards_a_switch():
         assert registers[PORT_E + isr.BSRR] == (1 << 28 if line == 15 else 0)
 
 
-def modes_of_a_freeze():
+def case_modes_of_a_freeze():
     """STEP pins that are low are held low, those that are high keep their falling edge; other pins do not matter."""
     both = 4 << 4 | 4 << 12
     for pin, place, mode in (
@@ -338,7 +339,7 @@ def modes_of_a_freeze():
             assert (block[isr.HIGH_A], block[isr.HIGH_B]) == (high_a, high_b)
 
 
-def freezing_again():
+def case_freezing_again():
     """What is frozen is left as it is, but an E-stop still releases the drivers; counters that stood stand."""
     block, registers = frozen(15, 0, high_a=2, before=1)
     assert block[isr.FROZEN] == 1
@@ -349,20 +350,39 @@ def freezing_again():
         assert frozen(15, 0, runs=runs)[1][isr.CR1] == runs
 
 
-cases(
-    (
-        counting_matches,
-        when_to_write,
-        written_and_wrapped,
-        sizes,
-        times_across_the_wrap,
-        due_or_not,
-        turn_queue,
-        sample_times,
-        late_first_step,
-        counters_in_step,
-        towards_a_switch,
-        modes_of_a_freeze,
-        freezing_again,
-    )
-)
+def case_interrupts_wait_while_a_channel_is_armed_or_released():
+    """Registers that an interrupt writes too are read, changed and written back."""
+    from armtempo_board.hardware import ring
+    from machine import disable_irq, enable_irq
+
+    enabled = []
+
+    def watched(function):
+        def call(*arguments):
+            before = disable_irq()
+            enabled.append(bool(before))
+            result = function(*arguments)
+            enable_irq(before)
+            return result
+
+        return call
+
+    class Watched:
+        def __getattr__(self, name):
+            found = getattr(isr, name)
+            return watched(found) if name in ("arm_channel", "release_channel") else found
+
+    rig = Rig(arm(1))
+    each = rig.engine._joints[0].ring
+    ring.isr = Watched()
+    try:
+        each.run(words(step_queue.QUEUE_SIZE))
+        each.release()
+    finally:
+        ring.isr = isr
+    assert enabled == [False, False], enabled
+    assert disable_irq(), "interrupts stay off"
+    enable_irq(True)
+
+
+cases.run(globals())

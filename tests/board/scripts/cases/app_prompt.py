@@ -1,6 +1,7 @@
 """How the program is left for MicroPython's prompt: by command or Ctrl-C, not by noise, not while moving."""
 
-from app_rig import connected, run, start
+import cases
+from app_rig import connected, start
 from armtempo_shared import wire
 
 CTRL_C = b"\r\x03\r\x01"
@@ -55,4 +56,4 @@ def case_leave_answers_first():
     assert app.left()
 
 
-run(globals())
+cases.run(globals())

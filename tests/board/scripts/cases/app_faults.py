@@ -1,6 +1,7 @@
 """Faults and exceptions: what moves is frozen, the host is told, and nothing starts before it is cleared."""
 
-from app_rig import connected, ends_of, run, start, state
+import cases
+from app_rig import connected, ends_of, start, state
 
 
 def case_fault_stays_until_cleared():
@@ -89,4 +90,4 @@ def case_watchdog_bite_is_reported():
     assert state(host) == "unhomed"
 
 
-run(globals())
+cases.run(globals())

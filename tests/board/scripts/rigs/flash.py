@@ -1,6 +1,7 @@
 """A flash in memory that loses power, fails or is full at the n-th change, to put under the store.
 
-Like FAT: a file that was open when the power went is empty afterwards; renaming over an existing file first
+Like FAT behind a cache: a file that was open when the power went is empty afterwards, and so is one that was not
+synced; what was made, renamed or removed since the last sync is done or undone. Renaming over an existing file first
 removes that one. A cut leaves the change it hits undone.
 """
 
@@ -12,16 +13,22 @@ class PowerCut(BaseException):
 
 
 class Flash:
-    """Takes the place of ``os`` and ``open`` in the store; ``error`` None cuts the power at ``fail_at``."""
+    """Takes the place of ``os`` and ``open`` in the store; ``error`` None cuts the power at ``fail_at``.
 
-    def __init__(self):
+    ``undone``: whether a cut undoes what the folder went through since the last sync.
+    """
+
+    def __init__(self, undone=False):
         self.root = ""
         self.files = {}
         self.opened = []
+        self.unsynced = []
         self.changes = 0
         self.fail_at = 0
         self.error = None
         self.free = 1 << 20
+        self.undone = undone
+        self._lasting = {}
 
     def change(self):
         """Count a change; fail where the test wants it."""
@@ -32,10 +39,13 @@ class Flash:
             raise OSError(self.error)
 
     def power_up(self):
-        """After a cut: what was being written is empty."""
-        for name in self.opened:
+        """After a cut: what was being written or was not synced is empty, or has never been there."""
+        for name in self.opened + self.unsynced:
             self.files[name] = b""
-        self.opened = []
+        if self.undone:
+            self.files = dict(self._lasting)
+        self.opened, self.unsynced = [], []
+        self._lasting = dict(self.files)
         self.fail_at = 0
 
     # os
@@ -60,6 +70,7 @@ class Flash:
         self.stat(path)
         self.change()
         del self.files[path]
+        self._forget(path)
 
     def rename(self, old, new):
         self.stat(old)
@@ -67,9 +78,17 @@ class Flash:
             self.remove(new)
         self.change()
         self.files[new] = self.files.pop(old)
+        if old in self.unsynced:
+            self._forget(old)
+            self.unsynced.append(new)
 
     def sync(self):
         self.change()
+        self.unsynced = []
+        self._lasting = dict(self.files)
+
+    def _forget(self, path):
+        self.unsynced = [name for name in self.unsynced if name != path]
 
     # open
 
@@ -77,6 +96,7 @@ class Flash:
         if "w" in mode:
             self.change()
             self.files[path] = b""
+            self._forget(path)
             self.opened.append(path)
         elif path not in self.files:
             raise OSError(ENOENT)
@@ -108,4 +128,5 @@ class File:
         if self.writing and self.path in self.flash.opened:
             self.flash.change()
             self.flash.opened.remove(self.path)
+            self.flash.unsynced.append(self.path)
             self.writing = False

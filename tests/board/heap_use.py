@@ -1,4 +1,4 @@
-"""The heap that the compiled board program needs, on 32-bit MicroPython: ``python -m tests.benchmark.memory``.
+"""The heap that the compiled board program needs, on 32-bit MicroPython: ``python -m tests.board.heap_use``.
 
 The shipped arm; files compiled for the Cortex-M4 as ``armtempo deploy`` does it; registers are plain memory. The
 interpreter keeps machine code outside of its heap, the chip within: its size is read from the files and added. The
@@ -23,9 +23,9 @@ from armtempo.records import encode
 from armtempo_shared import wire
 
 from tests import interpreters
-from tests.benchmark.emulated import machine_code_bytes
+from tests.board.emulated import machine_code_bytes
 
-SCRIPT = interpreters.ROOT / "tests" / "board" / "scripts" / "memory_use.py"
+SCRIPT = interpreters.ROOT / "tests" / "board" / "scripts" / "benchmarks" / "memory_use.py"
 INTERPRETER = "micropython-arm"
 SESSION = ("hello", "home", "start")
 HEAP = 103_400
@@ -87,7 +87,7 @@ def _run(folder: Path, heap: int) -> str:
     arguments = [str(folder), str(folder / "frames"), str(folder / "answers"), str(heap)]
     command = [interpreters.starter(INTERPRETER), "-X", "heapsize=2M", str(SCRIPT), *arguments]
     environment = {**os.environ, "MICROPYPATH": f"{folder / 'lib'}{os.pathsep}.frozen"}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=100, check=False)
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=1200, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 

@@ -1,6 +1,7 @@
 """Pulses on the pins are those that were computed: to the tick, none lost, none added."""
 
-from engine_rig import TICK_HZ, Motion, Rig, Steps, arm, cases
+import cases
+from engine_rig import TICK_HZ, Motion, Rig, Steps, arm
 
 
 def check(rig, motion, first=(0,)):
@@ -29,7 +30,7 @@ def check_samples(rig, motion):
             assert sample[2 + joint] == position, (number, joint, sample, position)
 
 
-def three_joints():
+def case_three_joints():
     """Fast, turning, slow; twice, from where the first time ended."""
     motion = Motion(
         TICK_HZ + 12345,
@@ -45,7 +46,7 @@ def three_joints():
     assert rig.commanded() == [2 * steps.total() for steps in motion.joints]
 
 
-def highest_rate():
+def case_highest_rate():
     """Three joints at a third of a million steps a second each, on both timers."""
     rig = Rig([dict(joint, channel=channel) for joint, channel in zip(arm(3), (0, 3, 5))], pulse_ticks=100)
     motion = Motion(TICK_HZ // 100, *[Steps((1000 + 7 * n, 252, 3000, 1 - 2 * (n & 1))) for n in range(3)])
@@ -53,7 +54,7 @@ def highest_rate():
     check(rig, motion)
 
 
-def six_joints():
+def case_six_joints():
     """All channels at once."""
     motion = Motion(
         TICK_HZ // 10,
@@ -65,7 +66,7 @@ def six_joints():
     check_samples(rig, motion)
 
 
-def long_rest():
+def case_long_rest():
     """Joints idle for longer than half the counter, for longer than all of it, and to the very end."""
     second = TICK_HZ
     motion = Motion(
@@ -81,7 +82,7 @@ def long_rest():
     assert len(rig.samples) == 1301
 
 
-def across_the_wrap():
+def case_across_the_wrap():
     """Steps at a good rate while the counter comes round, again and again."""
     wrap = 1 << 32
     motion = Motion(
@@ -94,7 +95,7 @@ def across_the_wrap():
     check(rig, motion)
 
 
-def many_turns():
+def case_many_turns():
     """To and fro, every other time with the shortest gap, more turns waiting than the queue holds."""
     gap = 2 * 8400 + 2 * 420 + 168
     blocks = []
@@ -110,7 +111,7 @@ def many_turns():
     assert rig.pulses[0].shortest_hold < 12000, rig.pulses[0].shortest_hold
 
 
-def steps_to_the_end():
+def case_steps_to_the_end():
     """The last edges are at the motion's end; a motion of a single step; a motion of none."""
     for motion in (
         Motion(100_000, Steps((100_000 - 168 - 5000, 1000, 6, 1))),
@@ -123,7 +124,7 @@ def steps_to_the_end():
         check_samples(rig, motion)
 
 
-def loaded_in_vain():
+def case_loaded_in_vain():
     """A motion that was loaded and never started leaves nothing behind."""
     rig = Rig(arm(2))
     rig.engine.load(Motion(100_000, Steps((5000, 400, 20, -1)), Steps((900, 300, 50, 1))))
@@ -132,15 +133,4 @@ def loaded_in_vain():
     check(rig, motion)
 
 
-cases(
-    (
-        three_joints,
-        highest_rate,
-        six_joints,
-        long_rest,
-        across_the_wrap,
-        many_turns,
-        steps_to_the_end,
-        loaded_in_vain,
-    )
-)
+cases.run(globals())

@@ -3,11 +3,12 @@
 Every case asserts, and its name is printed when it holds. Arguments: see ``whole_board.arguments``.
 """
 
+import cases
 import whole_board
 from armtempo_shared import wire
 from virtual_board import machine_state
 
-FLASHES, PROGRAM, HOME, DURATION, CASES = whole_board.arguments()
+FLASHES, PROGRAM, HOME, DURATION, _ = whole_board.arguments()
 GO = whole_board.read(FLASHES + "/finish/armtempo/go.atm")
 CONNECT = b"\r\x03"  # what mpremote sends first
 BITE_MS = 8000
@@ -195,8 +196,7 @@ def case_ctrl_c_stops_a_replay_wherever_it_comes(world):
         world.printed = bytearray()
 
 
-for name in sorted(globals()):
-    if name.startswith("case_") and (name in CASES or not CASES):
-        flash = FLASHES + ("/broken" if "broken" in name else "/finish")
-        whole_board.run(globals()[name], flash, PROGRAM)
-        whole_board.say(name)
+for name in cases.wanted(globals()):
+    flash = FLASHES + ("/broken" if "broken" in name else "/finish")
+    whole_board.run(globals()[name], flash, PROGRAM)
+    print(name)

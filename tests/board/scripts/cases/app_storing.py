@@ -1,7 +1,8 @@
 """Motions in the program's store: how they come in, under which names, and what is refused."""
 
+import cases
 import stand_in
-from app_rig import connected, flash, run, start
+from app_rig import connected, flash, start
 from armtempo_shared import wire
 
 
@@ -81,4 +82,4 @@ def case_damaged_file_in_flash_is_not_run():
     assert app.controller.engine.calls.count("load") == 0
 
 
-run(globals())
+cases.run(globals())

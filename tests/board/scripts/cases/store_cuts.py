@@ -1,8 +1,9 @@
 """Cuts the power, fails or fills the flash at every single change of every operation of the store.
 
-Prints per operation how many changes it makes and what is stored after a cut at each: o the old, n the new.
+What is stored afterwards is the old (o) or the new (n), and once it is the new it stays that.
 """
 
+import cases
 import flash
 import stand_in
 
@@ -25,20 +26,8 @@ def put(place, file_name, data):
     place.commit(wire.record_crc(data))
 
 
-OPERATIONS = (
-    ("put a new one", lambda place: put(place, "other", NEW)),
-    ("put over an old one", lambda place: put(place, "feed", NEW)),
-    ("put the arm record", lambda place: put(place, wire.ARM_RECORD_NAME, NEW_ARM)),
-    ("remove", lambda place: place.remove("feed")),
-    ("rename the default", lambda place: place.rename("feed", "food")),
-    ("rename another", lambda place: place.rename("spare", "food")),
-    ("set the default", lambda place: place.set_default("spare")),
-    ("no default", lambda place: place.set_default("")),
-)
-
-
-def fresh():
-    chip = flash.Flash()
+def fresh(undone=False):
+    chip = flash.Flash(undone)
     store.os = chip
     store.open = chip.open
     place = store.Store("/flash/armtempo")
@@ -46,6 +35,7 @@ def fresh():
     put(place, "spare", OLD)
     put(place, wire.ARM_RECORD_NAME, ARM)
     place.set_default("feed")
+    chip.sync()
     chip.changes = 0
     return chip, place
 
@@ -67,31 +57,44 @@ def letter(found, before, after):
     return "o"
 
 
-def run(title, operation):
+FAILURES = ((None, "cut", False), (None, "cut and undone", True), (flash.EIO, "error", False))
+FAILURES += ((flash.ENOSPC, "full", False),)
+
+
+def run(operation):
+    """The operation at every failure; prints what is stored after each."""
     chip, place = fresh()
     before = content(place)
     operation(place)
     changes = chip.changes
+    assert changes > 1
     after = content(place)
     assert before != after
-    for error, word in ((None, "cut"), (flash.EIO, "error"), (flash.ENOSPC, "full")):
+    for error, word, undone in FAILURES:
         letters = ""
-        for fail_at in range(1, changes + 1):
-            place = after_failure(operation, fail_at, error)
+        for fail_at in range(1, changes + 2):
+            place = after_failure(operation, fail_at, error, undone)
             letters += letter(content(place), before, after)
             again(operation, place, after)
-        print(title, word, letters)
+        print(word, letters)
+        assert letters[-1] == "n", "what was acknowledged is lost"
+        if error is None:
+            assert letters == "o" * letters.count("o") + "n" * letters.count("n"), letters
+            assert "o" in letters
 
 
-def after_failure(operation, fail_at, error):
-    """The store when the operation failed at that change; after a power cut, started again."""
-    chip, place = fresh()
+def after_failure(operation, fail_at, error, undone):
+    """The store when the operation failed at that change, the last being none of its; after a cut, started again."""
+    chip, place = fresh(undone)
     chip.fail_at = fail_at
     chip.error = error
     refused = attempt(operation, place, error)
     if error is None:
         return restarted(chip)
-    assert refused == (codes.FLASH_FULL if error == flash.ENOSPC else codes.FLASH_ERROR), refused
+    ended = chip.changes < fail_at
+    assert refused == (0 if ended else codes.FLASH_FULL if error == flash.ENOSPC else codes.FLASH_ERROR), (
+        refused
+    )
     return place
 
 
@@ -128,5 +131,36 @@ def again(operation, place, after):
     assert content(place) == after
 
 
-for title, operation in OPERATIONS:
-    run(title, operation)
+def case_put_a_new_one():
+    run(lambda place: put(place, "other", NEW))
+
+
+def case_put_over_an_old_one():
+    run(lambda place: put(place, "feed", NEW))
+
+
+def case_put_the_arm_record():
+    run(lambda place: put(place, wire.ARM_RECORD_NAME, NEW_ARM))
+
+
+def case_remove():
+    run(lambda place: place.remove("feed"))
+
+
+def case_rename_the_default():
+    run(lambda place: place.rename("feed", "food"))
+
+
+def case_rename_another():
+    run(lambda place: place.rename("spare", "food"))
+
+
+def case_set_the_default():
+    run(lambda place: place.set_default("spare"))
+
+
+def case_no_default():
+    run(lambda place: place.set_default(""))
+
+
+cases.run(globals())

@@ -1,5 +1,6 @@
 """The stepper model by itself, case by case; each asserts and prints its name."""
 
+import cases
 from virtual_board import standalone
 
 # isort: split
@@ -202,7 +203,4 @@ def case_noise_is_normal():
 
 
 standalone.start()
-for name in sorted(globals()):
-    if name.startswith("case_"):
-        globals()[name]()
-        print(name)
+cases.run(globals())

@@ -10,7 +10,7 @@ from virtual_board import machine_state, standalone
 from virtual_board.arm import motors
 
 TICK_HZ = 84_000_000
-FEWER = 3 if "short" in sys.argv else 1
+FEWER = 6 if "short" in sys.argv else 1
 """Repetitions are divided by it; the emulated interpreter is slow."""
 SLOTS = step_queue.QUEUE_SIZE - 13 * step_queue.CAPACITY
 
@@ -313,12 +313,3 @@ class Rig:
     def stepped(self):
         """Where the pins have moved them."""
         return [pulses.net for pulses in self.pulses]
-
-
-def cases(functions):
-    """Run each of a script's cases, or those that the arguments name, and say its name."""
-    wanted = [name for name in sys.argv[1:] if name != "short"]
-    for function in functions:
-        if not wanted or function.__name__ in wanted:
-            function()
-            print(function.__name__)

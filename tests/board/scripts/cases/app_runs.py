@@ -2,8 +2,9 @@
 
 import gc
 
+import cases
 import stand_in
-from app_rig import App, connected, ends_of, flash, run, samples_of, start, state
+from app_rig import App, connected, ends_of, flash, samples_of, start, state
 from armtempo_shared import armrecord, messages, motion, wire
 
 
@@ -154,4 +155,4 @@ def case_the_heap_is_collected_often_but_while_something_moves():
         assert 0 < gc.threshold() < (gc.mem_alloc() + gc.mem_free()) // 60
 
 
-run(globals())
+cases.run(globals())

@@ -2,8 +2,9 @@
 
 import random
 
+import cases
 from armtempo_shared import armrecord, codes
-from engine_rig import FEWER, HEAD, TICK_HZ, Evaluator, Motion, Rig, Steps, arm, cases, row
+from engine_rig import FEWER, HEAD, TICK_HZ, Evaluator, Motion, Rig, Steps, arm, row
 from virtual_board import machine_state
 from virtual_board.firmware import external_interrupts
 
@@ -49,7 +50,7 @@ def again(rig):
     assert rig.commanded() == [a + steps.total() for a, steps in zip(before, MOTION.joints)]
 
 
-def freeze_anywhere():
+def case_freeze_anywhere():
     """``freeze`` called at many moments."""
     random.seed(SEED)
     for number in range(30 // FEWER):
@@ -64,7 +65,7 @@ def freeze_anywhere():
             again(rig)
 
 
-def estop_anywhere():
+def case_estop_anywhere():
     """The E-stop's edge at exact ticks: just before, on and after edges, in pulses and between them."""
     random.seed(SEED)
     moments = [
@@ -96,7 +97,7 @@ def press():
     external_interrupts.set_level("E15", 0)
 
 
-def estop_at_rest():
+def case_estop_at_rest():
     """Pressed while nothing moves, or before the program ran."""
     rig = Rig(arm(1), flags=armrecord.FLAG_ESTOP_FITTED | armrecord.FLAG_ESTOP_ACTIVE_HIGH)
     rig.turn()
@@ -132,7 +133,7 @@ class Tapped:
         return MOTION.duration
 
 
-def estop_while_loading():
+def case_estop_while_loading():
     """A tap on the E-stop after the engine has looked at it, but before the start: nothing moves, and it is told."""
     for motion in (MOTION, Tapped()):
         rig = Rig(arm(3), flags=armrecord.FLAG_ESTOP_FITTED)
@@ -147,7 +148,7 @@ def estop_while_loading():
         assert (rig.engine.fault, rig.engine.known) == (codes.ESTOP, 7)
 
 
-def estop_behind_a_limit_switch():
+def case_estop_behind_a_limit_switch():
     """It releases the drivers whatever came before, so the position is unknown."""
     rig = Rig(
         [row(channel=0, limit_low=0, limit_active_high=1)],
@@ -166,7 +167,7 @@ def estop_behind_a_limit_switch():
     assert (rig.engine.fault, rig.engine.known) == (codes.LIMIT_SWITCH, 0)
 
 
-def underrun_anywhere():
+def case_underrun_anywhere():
     """The main loop stalls at many moments, for long enough and for not quite long enough."""
     random.seed(SEED)
     dry = 0
@@ -186,7 +187,7 @@ def underrun_anywhere():
     assert 0 < dry < 18 // FEWER, dry
 
 
-def written_too_late():
+def case_written_too_late():
     """The interrupt takes so long that the last edge has passed when new ones are written."""
     motion = Motion(LONG.duration, LONG.joints[0], Steps(), Steps())
     for moment in (-500_000, 9_000_000):
@@ -215,7 +216,7 @@ def with_slow_emit(rig):
     ring_feeder.emit = emit
 
 
-def interrupt_gone():
+def case_interrupt_gone():
     """TIM6 asks no more: the rings run dry, nothing wrong is stepped, and the fault says so."""
     for moment in (-500_000, 300_000, 9_000_000):
         rig = Rig(arm(3))
@@ -232,7 +233,7 @@ def interrupt_gone():
         assert rig.engine.known == 7
 
 
-def long_stall():
+def case_long_stall():
     """The main loop is away for nearly half the counter's range: the outputs stay where they stalled, 50 ms on."""
     rig = Rig(arm(3))
     rig.start(LONG)
@@ -245,7 +246,7 @@ def long_stall():
     stopped(rig, codes.UNDERRUN, rig.engine.fault_joint)
 
 
-def limit_switches():
+def case_limit_switches():
     """A switch stops a joint that moves towards it, not one that moves away; and ends a homing run."""
     joints = arm(3)
     joints[1] = row(channel=1, dir_inverted=1, limit_low=0, limit_high=2, limit_active_high=1)
@@ -264,7 +265,7 @@ def limit_switches():
                 assert rig.commanded() == [steps.total() for steps in MOTION.joints]
 
 
-def limit_tripped_before():
+def case_limit_tripped_before():
     """A joint that turns towards a switch that is tripped already is stopped by the main loop."""
     joints = [row(channel=0, limit_high=1)]
     rig = Rig(joints)
@@ -280,7 +281,7 @@ def stopped_one(rig, code):
     assert rig.commanded() == rig.stepped()
 
 
-def following():
+def case_following():
     """A blocked motor and a slipping coupling are noticed, and the joint's position is unknown."""
     for harm in ("block", "slip"):
         rig = Rig(arm(3))
@@ -300,7 +301,7 @@ def following():
         assert rig.engine.known == 7
 
 
-def start_failed():
+def case_start_failed():
     """The second counter does not follow the first."""
     rig = Rig(arm(3))
     rig.board.timers[2].follower = None
@@ -310,7 +311,7 @@ def start_failed():
     assert rig.stepped() == [0, 0, 0] == rig.commanded()
 
 
-def refusals():
+def case_refusals():
     """What a motion is refused for."""
     rig = Rig(arm(2))
     motion = Motion(TICK_HZ, Steps((1000, 400, 2000, 1)), Steps())
@@ -327,7 +328,7 @@ def refusals():
     assert rig.engine.fault == 0
 
 
-def enable():
+def case_enable():
     """Drivers are off until the first motion is loaded, then on, then off when the engine is closed."""
     for flags, on in ((0, 0), (armrecord.FLAG_ENABLE_HIGH, 1)):
         rig = Rig(arm(1), flags=flags)
@@ -339,7 +340,7 @@ def enable():
         assert line.level == 1 - on
 
 
-def close_and_anew():
+def case_close_and_anew():
     """Another engine takes the hardware over, inputs and all."""
     flags = armrecord.FLAG_ESTOP_FITTED
     first = Rig(arm(2), flags=flags)
@@ -360,23 +361,4 @@ def close_and_anew():
     assert engine.fault == codes.ESTOP
 
 
-cases(
-    (
-        freeze_anywhere,
-        estop_anywhere,
-        estop_at_rest,
-        estop_while_loading,
-        estop_behind_a_limit_switch,
-        underrun_anywhere,
-        written_too_late,
-        interrupt_gone,
-        long_stall,
-        limit_switches,
-        limit_tripped_before,
-        following,
-        start_failed,
-        refusals,
-        enable,
-        close_and_anew,
-    )
-)
+cases.run(globals())

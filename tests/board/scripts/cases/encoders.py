@@ -2,16 +2,17 @@
 
 import random
 
+import cases
 from armtempo_board.hardware import isr
 from armtempo_board.hardware.encoders import EncoderInput
 from armtempo_board.motion.following_error import FollowingError
-from engine_rig import TICK_HZ, Motion, Rig, Steps, arm, cases, row
+from engine_rig import TICK_HZ, Motion, Rig, Steps, arm, row
 from virtual_board import standalone
 
 SEED = 20263
 
 
-def both_ways_round():
+def case_both_ways_round():
     """Many rounds of the counter, to and fro, in jumps of up to 32 767 counts, inverted or not."""
     random.seed(SEED)
     for channel, timer in ((0, 1), (1, 3), (2, 8), (3, 4)):
@@ -29,7 +30,7 @@ def both_ways_round():
                 assert encoder.counts == total, (n, encoder.counts, total)
 
 
-def declared():
+def case_declared():
     """The count goes on from what was declared, also across the counter's zero."""
     board = standalone.start()
     encoder = EncoderInput(0, 0)
@@ -43,7 +44,7 @@ def declared():
     assert encoder.counts == -992
 
 
-def expected_counts():
+def case_expected_counts():
     """The quotient rounds down, wherever the joint stands; the sign of the ratio counts."""
     for numerator, denominator in ((5, 16), (-5, 16), (80, 256), (4000, 12800), (7, 1), (0, 5)):
         following = FollowingError(
@@ -57,7 +58,7 @@ def expected_counts():
     assert not FollowingError(row(following_counts=0, encoder=1)).is_exceeded(100, -1000)
 
 
-def at_full_speed():
+def case_at_full_speed():
     """300 000 steps a second with 4 counts a step, over many rounds of the counter, there and back."""
     joints = [row(channel=0, encoder=2, counts_num=4, counts_den=1, following_counts=300)]
     there = Steps((1000, 280, 12_000, 1))
@@ -73,7 +74,7 @@ def at_full_speed():
         assert rig.samples[-1][3] == 4 * rig.commanded()[0]
 
 
-def moved_by_hand():
+def case_moved_by_hand():
     """While nothing moves the encoders are followed too."""
     rig = Rig(arm(2))
     for _ in range(10):
@@ -88,7 +89,7 @@ def moved_by_hand():
     assert buffer == [0, 0, 0, 160, 200_000, 50], buffer
 
 
-def unread_counter():
+def case_unread_counter():
     """The counter of an encoder timer reads back as 16 bits."""
     board = standalone.start()
     encoder = EncoderInput(1, 0)
@@ -96,13 +97,4 @@ def unread_counter():
     assert isr.read_counter(encoder.address) == 0xFFFF
 
 
-cases(
-    (
-        both_ways_round,
-        declared,
-        expected_counts,
-        at_full_speed,
-        moved_by_hand,
-        unread_counter,
-    )
-)
+cases.run(globals())

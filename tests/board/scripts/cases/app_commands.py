@@ -1,7 +1,8 @@
 """Commands to the program above the engine: which are carried out, which refused, which are a repetition."""
 
+import cases
 import stand_in
-from app_rig import ROOT, App, connected, run, start, state
+from app_rig import ROOT, App, connected, start, state
 from armtempo_shared import wire
 
 
@@ -104,4 +105,4 @@ def case_only_a_few_commands_while_moving():
     assert app.controller.engine.calls[-1] == "start"
 
 
-run(globals())
+cases.run(globals())

@@ -1,13 +1,13 @@
 """Whatever goes wrong, at whatever moment of a motion: the defined state, its own code, no wrong position.
 
 Every case provokes one kind of fault at many moments; its name is printed with how its motions ended.
-Positions are compared with the pulses that were counted on the pins. Arguments: see ``whole_board.arguments``;
-the last may be a number by which the moments are fewer.
+Positions are compared with the pulses that were counted on the pins. Arguments: see ``whole_board.arguments``.
 """
 
 import struct
 from binascii import crc32
 
+import cases
 import traps
 import whole_board
 from armtempo_shared import wire
@@ -15,8 +15,7 @@ from virtual_board import machine_state
 from virtual_board.chip.flash import real_open
 from virtual_board.chip.processor import TICKS_PER_MS
 
-FLASHES, PROGRAM, HOME, DURATION, CASES = whole_board.arguments()
-FEWER = int(CASES.pop()) if CASES and CASES[-1].isdigit() else 1
+FLASHES, PROGRAM, HOME, DURATION, FEWER = whole_board.arguments()
 SEED = 20265
 KNOWN = 7
 LEAD_TICKS = 1_680_000
@@ -332,9 +331,8 @@ def told(case, found):
     return story
 
 
-for name in sorted(globals()):
-    if name.startswith("case_") and (name in CASES or not CASES):
-        found = {}
-        flash = FLASHES + ("/stop" if "stops" in name else "/finish")
-        whole_board.run(told(globals()[name], found), flash, PROGRAM)
-        whole_board.say(name, *["%s %d" % (key or "none", found[key]) for key in sorted(found)])
+for name in cases.wanted(globals()):
+    found = {}
+    flash = FLASHES + ("/stop" if "stops" in name else "/finish")
+    whole_board.run(told(globals()[name], found), flash, PROGRAM)
+    print(name, *["%s %d" % (key or "none", found[key]) for key in sorted(found)])

@@ -11,7 +11,7 @@ import gc
 import os
 import sys
 
-sys.path.insert(0, __file__.rsplit("/", 1)[0] + "/bare")
+sys.path.insert(0, __file__.rsplit("/", 2)[0] + "/rigs/bare")
 
 import struct
 

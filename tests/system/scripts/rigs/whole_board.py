@@ -237,13 +237,15 @@ class Numbers:
 
 
 def arguments():
-    """FLASHES PROGRAM HOME [NAME …]: a folder of flashes, the packages' folders, steps at home; names of cases.
+    """FLASHES PROGRAM HOME [FEWER] [CASE …]: a folder of flashes, the packages' folders, steps at home.
 
-    Gives them, and behind the steps how many ticks the motion ``go`` in the flashes lasts.
+    ``FEWER``: by which the moments that a case tries are divided. Gives the flashes, the packages' folders, the
+    steps, how many ticks the motion ``go`` in the flashes lasts, and the divisor.
     """
     flashes, program, home = sys.argv[1:4]
     ticks = int(read(flashes + "/ticks"))
-    return flashes, program.split(":"), [int(steps) for steps in home.split(",")], ticks, sys.argv[4:]
+    fewer = int(sys.argv[4]) if sys.argv[4:] and sys.argv[4].isdigit() else 1
+    return flashes, program.split(":"), [int(steps) for steps in home.split(",")], ticks, fewer
 
 
 def to_int(data):
