@@ -12,7 +12,7 @@ PAGE = (Path(__file__).parents[2] / "host" / "docs" / "cli.md").read_text(encodi
 STORE = ("upload", "list", "show", "remove", "rename")
 MOTION = ("home", "goto", "run", "fetch", "stop", "status", "clear")
 ARMS = ("check", "import-urdf")
-BOARD = ("monitor", "deploy", "undeploy", "ports", "virtual-board")
+BOARD = ("monitor", "deploy", "undeploy", "firmware", "flash", "ports", "virtual-board")
 
 
 @pytest.mark.parametrize("name", [*STORE, *MOTION, *ARMS, *BOARD])

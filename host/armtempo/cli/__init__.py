@@ -42,6 +42,8 @@ COMMANDS = (
     "rename",
     "deploy",
     "undeploy",
+    "firmware",
+    "flash",
     "ports",
     "virtual-board",
     "monitor",

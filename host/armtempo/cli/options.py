@@ -70,6 +70,29 @@ out = click.option(
     help="Where run folders go; each run makes a new one.",
 )
 
+flash_port = click.option(
+    "--port",
+    envvar="ARMTEMPO_PORT",
+    show_envvar=True,
+    metavar="PORT",
+    help="Where the board answers now; without it the board is in its bootloader, or an ST-LINK is connected.",
+)
+flash_tool = click.option(
+    "--tool",
+    type=click.Choice(["dfu-util", "st-flash"]),
+    help="What flashes: over USB, or through an ST-LINK; without it the one that is installed.",
+)
+
+
+def flash(folder: Path, port: str | None, tool: str | None) -> None:
+    """Put the firmware in ``folder`` on the board, and say what comes next."""
+    from armtempo.cli.progress import ProgressBar
+    from armtempo.deploy.firmware.flash import flash as put
+
+    with ProgressBar("flashing") as progress:
+        put(folder, port, tool, click.echo, progress)
+    click.echo(f"flashed; the start files are next: armtempo deploy --port {port or 'PORT'}")
+
 
 def load_arm(given: Path | None) -> Arm:
     """The arm of ``--arm``."""

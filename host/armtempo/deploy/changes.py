@@ -6,9 +6,10 @@ import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from armtempo.deploy import firmware, program_files
+from armtempo.deploy import program_files
 from armtempo.deploy.remote import Survey
 from armtempo.errors import LinkError
+from armtempo.link.program_version import own_crc
 
 LEAST_RELEASE = (1, 20)
 LEAST_HEAP = 83_500
@@ -32,7 +33,7 @@ class Change:
 
 def check_suitable(found: Survey) -> None:
     """LinkError, with the reason, where the program cannot run on this firmware."""
-    firmware.check_version(found.firmware_crc)
+    check_version(found.firmware_crc)
     if "STM32F4" not in found.machine:
         raise LinkError(
             f"the board is a {found.machine}; armtempo needs an STM32F405 or F407 with MicroPython"
@@ -48,6 +49,16 @@ def check_suitable(found: Survey) -> None:
         raise LinkError(
             f"the board has {found.free_heap} bytes of free memory; {LEAST_HEAP} are needed: "
             "is there a boot.py that loads something?"
+        )
+
+
+def check_version(firmware_crc: int | None) -> None:
+    """LinkError where a board's firmware has another version of the program; None: it has none."""
+    if firmware_crc not in (None, own_crc()):
+        raise LinkError(
+            f"a new firmware is due: the board's has another version of the program in it ({firmware_crc:08x}, "
+            f"here {own_crc():08x}), and files in the flash do not replace it; 'armtempo firmware' builds one and "
+            "flashes it (board/docs/firmware.md), then deploy again; or flash MicroPython's own"
         )
 
 

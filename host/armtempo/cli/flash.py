@@ -1,0 +1,22 @@
+"""``armtempo flash``: put a built firmware on a board."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from armtempo.cli import options
+
+
+@click.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@options.flash_port
+@options.flash_tool
+def command(folder: Path, port: str | None, tool: str | None) -> None:
+    """Put a firmware on a board: FOLDER as 'armtempo firmware' makes it, or a release brings it.
+
+    The board of --port is put in its bootloader first, which is refused while it moves; without --port one that
+    is there already, or has an ST-LINK, is flashed. Files in its flash are kept.
+    """
+    options.flash(folder, port, tool)
