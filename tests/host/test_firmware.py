@@ -37,6 +37,7 @@ TEXT1_ADDR = 0x08020000
 endif
 """
 HEADER = '#define MICROPY_HW_BOARD_NAME "F4DISC"\n#define MICROPY_HW_MCU_NAME "STM32F407"\n'
+ROOT = Path(__file__).parents[2]
 HEAD = str(shutil.which("head"))
 MACHINE = "F4DISC with STM32F407"
 
@@ -160,6 +161,25 @@ def test_a_build_makes_a_whole_folder(micropython: Path, tools: Callable[..., Pa
     assert "FROZEN_MANIFEST=" in port
     with pytest.raises(InputError, match="there already"):
         build.build(micropython, "STM32F4DISC", out, no_progress)
+
+
+def test_a_chip_without_the_programs_pins_is_told(
+    micropython: Path, tools: Callable[..., Path], tmp_path: Path
+) -> None:
+    tools()
+    code, said = outcome(
+        "firmware", "--board", "PYBV11", "--micropython", micropython, "--out", tmp_path / "out"
+    )
+    assert code == 0
+    assert "cannot drive an arm: its chip has 64 pins" in said
+
+
+def test_releases_bring_the_boards_that_are_named() -> None:
+    workflow = (ROOT / ".github" / "workflows" / "firmware.yml").read_text()
+    assert f"board: [{', '.join(checkout.BOARDS)}]" in workflow
+    page = (ROOT / "board" / "docs" / "firmware.md").read_text()
+    assert all(f"`{name}`" in page for name in (*checkout.BOARDS, "PYBV11"))
+    assert f"--branch {checkout.RELEASE} " in page
 
 
 def test_a_board_definition_of_ones_own_is_taken(

@@ -14,7 +14,7 @@ from armtempo.cli.progress import ProgressBar
 @click.option(
     "--board",
     metavar="NAME",
-    help="STM32F4DISC, OLIMEX_E407, VCC_GND_F407ZG, PYBV11, another board of MicroPython with an STM32F405 or "
+    help="STM32F4DISC, OLIMEX_H407, VCC_GND_F407ZG, PYBV11, another board of MicroPython with an STM32F405 or "
     "F407, or a folder that defines one.",
 )
 @click.option(
@@ -65,6 +65,7 @@ def command(
             f"written: {program}; for MicroPython's make: FROZEN_MANIFEST={program.resolve() / frozen.MANIFEST}"
         )
         return
+    from armtempo.deploy import changes
     from armtempo.deploy.firmware import build, checkout
 
     if board is None or micropython is None:
@@ -78,6 +79,8 @@ def command(
     click.echo(
         f"{folder}: MicroPython {made.micropython} for {made.machine}, with the program {made.program_crc:08x}"
     )
+    if changes.lacks_pins(made.machine):
+        click.echo(f"it cannot drive an arm: {changes.NO_PINS}", err=True)
     if flash_too:
         options.flash(folder, port, tool)
     else:

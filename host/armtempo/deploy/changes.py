@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -18,6 +19,13 @@ _SOURCES_HEAP = 160_000
 """The same for sources, which the board compiles."""
 _RESERVE_BLOCKS = 8
 """For folders, the arm's record and a motion."""
+
+NO_PINS = (
+    "its chip has 64 pins, and none of the ports D and E, on which the program has DIR, ENABLE, E-stop, limit "
+    "switches and an encoder (board/docs/hardware.md); use a board whose chip has 100 pins or more"
+)
+_64_PINS = re.compile("F40[57]R")
+"""In the chip's name (data sheet, ordering information)."""
 
 Tell = Callable[[str], None]
 """Called with messages for the user."""
@@ -38,6 +46,8 @@ def check_suitable(found: Survey) -> None:
         raise LinkError(
             f"the board is a {found.machine}; armtempo needs an STM32F405 or F407 with MicroPython"
         )
+    if lacks_pins(found.machine):
+        raise LinkError(f"the board is a {found.machine}: {NO_PINS}")
     if found.version < LEAST_RELEASE:
         least = ".".join(map(str, LEAST_RELEASE))
         raise LinkError(f"the board runs MicroPython {found.release}; install {least} or newer")
@@ -50,6 +60,11 @@ def check_suitable(found: Survey) -> None:
             f"the board has {found.free_heap} bytes of free memory; {LEAST_HEAP} are needed: "
             "is there a boot.py that loads something?"
         )
+
+
+def lacks_pins(machine: str) -> bool:
+    """Whether a board, by what its firmware says that it runs on, has not all pins that the program uses."""
+    return _64_PINS.search(machine) is not None
 
 
 def check_version(firmware_crc: int | None) -> None:

@@ -12,8 +12,8 @@ from armtempo.errors import InputError
 
 RELEASE = "v1.28.0"
 """MicroPython's tag that the firmwares of armtempo's releases are built from."""
-BOARDS = ("STM32F4DISC", "OLIMEX_E407", "VCC_GND_F407ZG", "PYBV11")
-"""Boards that are built for releases; any other of the port with an STM32F405 or F407 can be."""
+BOARDS = ("STM32F4DISC", "OLIMEX_H407", "VCC_GND_F407ZG")
+"""Boards that releases bring a firmware for; any other of the port with an STM32F405 or F407 can be built."""
 _CHIPS = ("STM32F405xx", "STM32F407xx")
 _FLASH_KB = {"E": 512, "G": 1024}
 """By the letter behind the number of pins in the chip's name (data sheet, ordering information)."""

@@ -1,0 +1,226 @@
+"""The shipped motion on MicroPython's own stm32 firmware, driven by this host: the figures of board/docs/firmware.md.
+
+    python -m tests.benchmark.firmware_run MICROPYTHON [FOLDER]
+
+MICROPYTHON: a checkout as ``armtempo firmware`` takes it. That command builds the firmware with the program; one
+without is built beside it, and gets the compiled files that ``armtempo deploy`` copies. QEMU (7.2 or newer) runs each;
+the host reaches it over TCP, sends the arm, homes it, uploads the motion and runs it, as with any board. What stands
+in for timers, DMA, USB and encoders (loop_board.c, firmware_loop.py and firmware_host.py of tests/board/scripts) is a
+part of both firmwares, so that it takes little of the heap. FOLDER keeps what was built.
+"""
+
+from __future__ import annotations
+
+import re
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from armtempo.deploy import program_files
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
+from armtempo.model.plan import Plan
+from armtempo.planning import planner
+from armtempo.robot.board import connect
+
+from tests.benchmark import firmware, loop
+
+PROBES = ("firmware_loop.py", "firmware_host.py")
+MANIFEST = 'include("$(PORT_DIR)/boards/manifest.py")\n' + "".join(f'module("{name}")\n' for name in PROBES)
+CYCLES = 1.3
+PATIENCE_S = 120.0
+START = """import gc
+
+gc.collect()
+before = gc.mem_alloc()
+import firmware_host
+
+firmware_host.replace(%r)
+gc.collect()
+print("@ own", gc.mem_alloc() - before)
+from armtempo_board import load_program
+
+program = load_program()
+firmware_host.loop.hook()
+program.main(firmware_host.ROOT)
+"""
+
+
+@dataclass(frozen=True)
+class Heap:
+    """Bytes: in use by firmware and program, and the largest free block."""
+
+    used: int
+    largest: int
+
+
+def in_files() -> dict[str, Any]:
+    """Where the stand-ins find in the compact program what they take the place of."""
+    known = program_files.compact_program().functions
+
+    def place(label: str) -> tuple[str, str]:
+        (short,) = {key for key, found in known.items() for one in found if one.label == label}
+        return f"armtempo_board.{short[0]}", short[1]
+
+    return {
+        "engine": "armtempo_board.core",
+        "matches": place("isr.matches"),
+        "set_interval": place("newton.set_interval"),
+    }
+
+
+def define_board(micropython: Path, folder: Path) -> Path:
+    """The definition of the emulated board, with the stand-ins as modules of its firmware."""
+    source = Path(__file__).with_name("loop_board.c").read_text()
+    board = firmware.define_board(micropython, folder, source)
+    for name in PROBES:
+        (board / name).write_bytes((firmware.SCRIPTS / name).read_bytes())
+    (board / "manifest.py").write_text(MANIFEST)
+    with (board / "mpconfigboard.mk").open("a") as make:
+        make.write("FROZEN_MANIFEST ?= $(BOARD_DIR)/manifest.py\n")
+    return board
+
+
+def build_with_program(micropython: Path, board: Path, out: Path) -> Path:
+    """By the command; the firmware's ELF file."""
+    if not out.exists():
+        command = [
+            sys.executable,
+            "-m",
+            "armtempo",
+            "firmware",
+            "--board",
+            board,
+            "--micropython",
+            micropython,
+            "--out",
+            out,
+        ]
+        subprocess.run(list(map(str, command)), check=True)
+    return out / "firmware.elf"
+
+
+def flash(folder: Path, elf: Path, with_library: bool) -> Path:
+    """The image of a flash whose main.py starts the program between the stand-ins."""
+    places = firmware.symbols(elf)
+    scale = round(2 * loop._INSTRUCTION_NS / CYCLES)
+    settings: dict[str, Any] = {
+        name: places[name] for name in ("allocated", "at_compare", "at_feed", "feed_ticks", "looks_per_ms")
+    }
+    settings |= in_files() if with_library else loop.IN_FIRMWARE
+    settings |= {
+        "prescaler": scale - 1,
+        "millisecond": round(loop.CORE_HZ / 1000 / CYCLES * loop._INSTRUCTION_NS * loop.CORE_HZ / 1e9),
+    }
+    tree = folder / ("files" if with_library else "no-files")
+    files = program_files.start_files()
+    if with_library:
+        files |= program_files.library(firmware.STM32F4) | {program_files.STAMP_PATH: program_files.stamp()}
+    for path, data in files.items():
+        local = tree / path.removeprefix(f"{program_files.ROOT}/")
+        local.parent.mkdir(parents=True, exist_ok=True)
+        local.write_bytes(data)
+    before, found, _ = (tree / "main.py").read_text().partition(firmware.START)
+    assert found
+    (tree / "main.py").write_text(before + START % settings)
+    return firmware.make_image(tree)
+
+
+@contextmanager
+def running(elf: Path, image: Path) -> Iterator[tuple[str, list[str]]]:
+    """A board that runs: its port for the host, and the lines that it has printed until now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        number = probe.getsockname()[1]
+    serial = f"tcp:127.0.0.1:{number},server=on,wait=off,nodelay=on"
+    with tempfile.NamedTemporaryFile() as cut:
+        cut.write(bytes(4))
+        cut.flush()
+        command = firmware.emulator(elf, image, Path(cut.name), "-icount", f"shift={loop._SHIFT}")
+        command += ["-serial", serial]
+        said: list[str] = []
+        with subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        ) as process:
+            threading.Thread(target=lambda: said.extend(process.stdout or ()), daemon=True).start()
+            try:
+                _wait(said, "@ started")
+                yield f"socket://127.0.0.1:{number}", said
+            finally:
+                process.kill()
+
+
+def _wait(said: list[str], words: str) -> None:
+    begin = time.monotonic()
+    while not any(words in line for line in said):
+        assert time.monotonic() - begin < PATIENCE_S, "".join(said)
+        time.sleep(0.2)
+
+
+def heaps(said: list[str]) -> dict[str, Heap]:
+    """By stage."""
+    text = "".join(said).replace("\r", "")
+    (own,) = re.findall(r"@ own (\d+)", text)
+    found = re.findall(r"@ (\w+)\nstack.*\nGC: total: \d+, used: (\d+).*\n.*max free sz: (\d+)", text)
+    return {name: Heap(int(used) - int(own), 16 * int(free)) for name, used, free in found}
+
+
+def shipped() -> tuple[Arm, Plan]:
+    """The shipped arm and motion; nothing turns the encoders here, so they are not watched."""
+    arm = Arm.paper()
+    joints = tuple(
+        replace(joint, encoder=replace(joint.encoder, following_error_deg=0.0)) if joint.encoder else joint
+        for joint in arm.joints
+    )
+    arm = replace(arm, joints=joints)
+    return arm, planner.plan(arm, replace(Job.paper(arm), population=5, iterations=20))
+
+
+def run(elf: Path, image: Path) -> dict[str, Heap]:
+    """Drive a board through the motion by the host's own link; AssertionError where it does not end well."""
+    arm, plan = shipped()
+    with running(elf, image) as (port, said), tempfile.TemporaryDirectory() as runs:
+        with connect(port) as board:
+            board.home(arm)
+            board.goto(plan)
+            done = board.run(plan, out=runs)
+            status = board.status()
+        wanted = [
+            round(float(angle) * joint.steps_per_deg)
+            for angle, joint in zip(plan.trajectory(plan.total_s), arm.driven, strict=True)
+        ]
+        assert list(status.positions.commanded_steps) == wanted, status
+        print(
+            f"    {plan.job.name}: {plan.total_s:.3f} s, {len(done.samples)} samples, steps as planned: {wanted}"
+        )
+        _wait(said, "@ ended")
+        return heaps(said)
+
+
+def main(micropython: Path, folder: Path) -> None:
+    """Print the figures."""
+    board = define_board(micropython, folder)
+    kinds = (
+        ("in the firmware", build_with_program(micropython, board, folder / "with-program"), False),
+        ("files, compiled", firmware.build_at(micropython, board, folder / "stock"), True),
+    )
+    for title, elf, with_library in kinds:
+        print(title, flush=True)
+        for stage, heap in run(elf, flash(folder, elf, with_library)).items():
+            print(f"    {stage:<10}in use {heap.used:>7}, largest free block {heap.largest:>7}", flush=True)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 2:
+        main(Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve())
+    else:
+        with tempfile.TemporaryDirectory() as name:
+            main(Path(sys.argv[1]).resolve(), Path(name))
