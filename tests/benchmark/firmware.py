@@ -15,6 +15,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from threading import Timer
 
@@ -122,21 +123,28 @@ def emulate(elf: Path, image: Path, cut: Path, *options: str) -> str:
     return "".join(said)
 
 
-def define_board(micropython: Path, folder: Path, board_c: str = BOARD_C) -> Path:
-    """The definition of the emulated board, a folder as MicroPython's build takes it."""
+def define_board(
+    micropython: Path, folder: Path, board_c: str = BOARD_C, more: Mapping[str, str] | None = None
+) -> Path:
+    """The definition of the emulated board, a folder as MicroPython's build takes it; ``more`` files, by their names.
+
+    A file that is there as it should be is not written again, so that it is not compiled again.
+    """
     port = micropython / "ports" / "stm32"
     board = folder / "EMULATED"
-    board.mkdir(parents=True, exist_ok=True)
-    for file in (port / "boards" / BOARD).iterdir():
-        (board / file.name).write_bytes(file.read_bytes())
-    with (board / "mpconfigboard.h").open("a") as header:
-        header.write(HEADER)
-    (board / "board.c").write_text(board_c)
+    files = {file.name: file.read_text() for file in (port / "boards" / BOARD).iterdir()}
+    files["mpconfigboard.h"] += HEADER
     layout = (port / "boards" / "stm32f405.ld").read_text()
     layout = re.sub(r"(FLASH_FS .*ORIGIN =) \w+, LENGTH = \w+", rf"\1 {FLASH_AT:#x}, LENGTH = 256K", layout)
-    (board / "layout.ld").write_text(layout.replace("LENGTH = 896K", "LENGTH = 512K"))
-    make = (board / "mpconfigboard.mk").read_text()
-    (board / "mpconfigboard.mk").write_text(make.replace("boards/stm32f405.ld", str(board / "layout.ld")))
+    make = files["mpconfigboard.mk"].replace("boards/stm32f405.ld", str(board / "layout.ld"))
+    files |= {"layout.ld": layout.replace("LENGTH = 896K", "LENGTH = 512K"), "board.c": board_c}
+    files |= {"mpconfigboard.mk": make, **(more or {})}
+    if "manifest.py" in files:
+        files["mpconfigboard.mk"] += "FROZEN_MANIFEST ?= $(BOARD_DIR)/manifest.py\n"
+    board.mkdir(parents=True, exist_ok=True)
+    for name, text in files.items():
+        if not (board / name).exists() or (board / name).read_text() != text:
+            (board / name).write_text(text)
     return board
 
 

@@ -85,5 +85,5 @@ def nothing(*arguments):
 def replace():
     """Put the port, and what the emulator has not, into place."""
     sys.modules["pyb"] = Beyond(pyb, USB_VCP=Port)
-    sys.modules["os"] = Beyond(os, dupterm=nothing)
+    sys.modules["os"] = Beyond(os, dupterm=nothing, urandom=bytes)
     sys.modules["machine"] = Beyond(machine, unique_id=lambda: b"123456789012")

@@ -266,9 +266,7 @@ class Port:
         elif self._frames and self._turns > _BEFORE:
             self._feed()
             if len(self._frames) == self._session:
-                mem32[stm.TIM2 + _PSC] = mem32[stm.TIM5 + _PSC] = (
-                    0xFFFF  # as good as standing: see start_clock
-                )
+                hold_clock()
         elif self._turns > _BEHIND:
             print("@ end")
             sys.exit()
@@ -289,6 +287,11 @@ class Port:
         print()
 
 
+def hold_clock():
+    """From here on the counters as good as stand, also when they are started: see ``start_clock``."""
+    mem32[stm.TIM2 + _PSC] = mem32[stm.TIM5 + _PSC] = 0xFFFF
+
+
 def start_clock(us):
     """In the place of the short wait behind the start of the counters: from here on they run."""
     mem32[stm.TIM2 + _PSC] = mem32[stm.TIM5 + _PSC] = here["prescaler"]
@@ -305,13 +308,16 @@ def nothing(*arguments):
 
 
 class Chip:
-    """Addresses, as quick to look up as those of the module."""
+    """The addresses that the program asks for while it moves are as quick to look up as those of the module."""
 
     def __init__(self, **names):
-        for name in dir(stm):
+        for name in ("TIM2", "TIM5", "TIM6"):
             setattr(self, name, getattr(stm, name))
         for name in names:
             setattr(self, name, names[name])
+
+    def __getattr__(self, name):
+        return getattr(stm, name)
 
 
 def replace(settings, port=Port):
@@ -323,7 +329,7 @@ def replace(settings, port=Port):
     mem32[here["feed_ticks"]] = _FEED_TICKS
     still = uctypes.addressof(unmoved)
     sys.modules["pyb"] = Beyond(pyb, USB_VCP=port, Timer=Timer)
-    sys.modules["os"] = Beyond(os, dupterm=nothing)
+    sys.modules["os"] = Beyond(os, dupterm=nothing, urandom=bytes)
     sys.modules["machine"] = Beyond(machine, unique_id=lambda: b"123456789012")
     sys.modules["stm"] = Chip(DMA1=uctypes.addressof(dma), TIM1=still, TIM3=still, TIM4=still, TIM8=still)
     sys.modules["time"] = Beyond(time, sleep_us=start_clock)
