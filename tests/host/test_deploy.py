@@ -122,7 +122,14 @@ def test_full_flash_is_refused() -> None:
         changes.choose(replace(BOARD, free_blocks=20), True, quiet)
 
 
-@pytest.mark.parametrize("mpy", [0, 9 | 7 << 10, 6 | 3 << 8])
+def test_a_board_under_cpython_takes_no_compiled_files() -> None:
+    with pytest.raises(LinkError, match="interpreter is CPython") as caught:
+        program_files.library(0)
+    assert caught.value.hint.startswith("deploy without --mpy, ")
+    assert "version 0.0" not in str(caught.value)
+
+
+@pytest.mark.parametrize("mpy", [9 | 7 << 10, 6 | 3 << 8])
 def test_compiled_files_of_another_version_are_refused(mpy: int) -> None:
     with pytest.raises(LinkError, match="takes compiled files of version"):
         program_files.library(mpy)

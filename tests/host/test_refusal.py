@@ -15,17 +15,32 @@ from armtempo_shared.meanings import VALUES
 from tests.host.linked import ready
 from tests.inprocess import Pipe
 
+OF_A_JOINT = {
+    "too_fast": "the motion is faster than the joint's speed limit in the arm file that the board has"
+}
+
 
 @pytest.mark.parametrize("name", VALUES)
 def test_every_number_is_said_with_what_it_is(name: str) -> None:
     code = wire.ERROR_CODES[name]
     _, meaning, cure = wire.ERRORS[code]
+    meaning = OF_A_JOINT.get(name, meaning)
     error = refusal("no", code, 1, 4711)
     assert error.code == code
     text = str(error)
     assert text.startswith(f"no: {meaning} (joint 2) [")
     assert text.endswith(f" 4711]; {cure}")
     assert "[4711]" not in text
+
+
+def test_a_limit_of_the_arm_is_not_taken_for_one_of_the_board() -> None:
+    code = wire.ERROR_CODES["too_fast"]
+    assert "speed limit in the arm file that the board has (joint 2) [steps/s needed: 395]; " in str(
+        refusal("no", code, 1, 395)
+    )
+    assert "together need more steps per second than the board can make [steps/s needed: 3950]; " in str(
+        refusal("no", code, 255, 3950)
+    )
 
 
 def test_what_has_no_number_or_joint_says_none() -> None:

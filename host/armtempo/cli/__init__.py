@@ -13,8 +13,10 @@ from typing import Any
 import click
 
 from armtempo import __version__
+from armtempo.cli import messages
 from armtempo.cli.interrupts import raised_by_signals
 from armtempo.errors import INTERRUPTED, ArmtempoError
+from armtempo.formats.spelling import did_you_mean
 
 COMMANDS = (
     "demo",
@@ -31,6 +33,7 @@ COMMANDS = (
     "import",
     "import-urdf",
     "check",
+    "configure",
     "goto",
     "home",
     "stop",
@@ -46,7 +49,9 @@ COMMANDS = (
     "flash",
     "ports",
     "virtual-board",
+    "watch",
     "monitor",
+    "config",
 )
 """In the order of the help page. Each is ``command`` in its module: '-' as '_', a keyword with '_' behind."""
 
@@ -66,6 +71,15 @@ class LazyGroup(click.Group):
         command: click.Command = module.command
         return command
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command that is meant; the error for one that there is not names the nearest."""
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            near = did_you_mean(args[0], COMMANDS) or ". 'armtempo --help' lists them"
+            ctx.fail(f"no command {args[0]!r}{near}")
+        return super().resolve_command(ctx, args)
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; an error that the user can correct is one message, without a traceback."""
         for stream in (sys.stdout, sys.stderr):
@@ -76,25 +90,32 @@ class LazyGroup(click.Group):
             with raised_by_signals():
                 return super().invoke(ctx)
         except ArmtempoError as error:
-            click.echo(f"armtempo: {error}", err=True)
+            messages.show(error)
             ctx.exit(error.exit_code)
         except OSError as error:
             if error.errno == errno.EPIPE:  # whoever read the output has gone: click ends quietly
                 raise
-            click.echo(f"armtempo: {_of_file(error)}", err=True)
+            messages.show(_of_file(error))
             ctx.exit(1)
         except MemoryError as error:
-            click.echo(f"armtempo: this takes more memory than there is: {error}".rstrip(": "), err=True)
+            messages.show(
+                ArmtempoError(
+                    f"this takes more memory than there is: {error}".rstrip(": "),
+                    "close other programs, or ask for less: lower refine, a smaller population",
+                )
+            )
             ctx.exit(1)
-        except KeyboardInterrupt:
-            click.echo("armtempo: interrupted", err=True)
+        except KeyboardInterrupt as error:
+            click.echo(f"armtempo: interrupted{': ' if error.args else ''}{error}", err=True)
             ctx.exit(INTERRUPTED)
 
 
-def _of_file(error: OSError) -> str:
+def _of_file(error: OSError) -> ArmtempoError:
     """The operating system's reason for an error with a file, and what to check."""
     where = f"{error.filename}: " if error.filename else ""
-    return f"{where}{error.strerror or error}; look after the path, its permissions and the room on the disk"
+    return ArmtempoError(
+        f"{where}{error.strerror or error}", "check the path, its permissions and the room on the disk"
+    )
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})

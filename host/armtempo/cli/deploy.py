@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import chosen, options
 from armtempo.cli.progress import ProgressBar
 
 
@@ -19,7 +19,7 @@ from armtempo.cli.progress import ProgressBar
     help="Instead write FOLDER for 'mpremote mip install --target /flash FOLDER/package.json'.",
 )
 @options.port
-def command(mpy: bool, package: Path | None, port: str) -> None:
+def command(mpy: bool, package: Path | None, port: str | None) -> None:
     """Put the board program on a board, or bring it up to date.
 
     mpremote copies what differs below /flash/lib; every file is read back. A boot.py or main.py that was
@@ -33,5 +33,5 @@ def command(mpy: bool, package: Path | None, port: str) -> None:
         click.echo(f"written: {package}")
         return
     with ProgressBar("copying") as progress:
-        deploy(port, mpy, click.echo, progress)
+        deploy(chosen.port(port), mpy, click.echo, progress)
     click.echo("the board runs armtempo")

@@ -7,7 +7,9 @@ from pathlib import Path
 import click
 
 from armtempo.cli import options
+from armtempo.cli.flash import put_on_board
 from armtempo.cli.progress import ProgressBar
+from armtempo.errors import InputError
 
 
 @click.command()
@@ -69,9 +71,9 @@ def command(
     from armtempo.deploy.firmware import build, checkout
 
     if board is None or micropython is None:
-        raise click.UsageError(
-            "--board and --micropython are needed; a checkout of MicroPython: "
-            f"{checkout.how_to_get(micropython or Path('micropython'))}"
+        raise InputError(
+            "--board and --micropython are needed",
+            f"give both; a checkout of MicroPython: {checkout.how_to_get(micropython or Path('micropython'))}",
         )
     folder = out or Path(f"firmware-{Path(board).name}")
     with ProgressBar("building") as progress:
@@ -80,8 +82,8 @@ def command(
         f"{folder}: MicroPython {made.micropython} for {made.machine}, with the program {made.program_crc:08x}"
     )
     if changes.lacks_pins(made.machine):
-        click.echo(f"it cannot drive an arm: {changes.NO_PINS}", err=True)
+        click.echo(f"it cannot drive an arm: {changes.NO_PINS}; {changes.MORE_PINS}", err=True)
     if flash_too:
-        options.flash(folder, port, tool)
+        put_on_board(folder, port, tool)
     else:
         click.echo(f"onto the board: armtempo flash {folder} --port PORT; then armtempo deploy --port PORT")

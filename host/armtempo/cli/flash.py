@@ -7,6 +7,8 @@ from pathlib import Path
 import click
 
 from armtempo.cli import options
+from armtempo.cli.progress import ProgressBar
+from armtempo.project.settings import PORT, ProjectSettings
 
 
 @click.command()
@@ -19,4 +21,14 @@ def command(folder: Path, port: str | None, tool: str | None) -> None:
     The board of --port is put in its bootloader first, which is refused while it moves; without --port one that
     is there already, or has an ST-LINK, is flashed. Files in its flash are kept.
     """
-    options.flash(folder, port, tool)
+    put_on_board(folder, port, tool)
+
+
+def put_on_board(folder: Path, port: str | None, tool: str | None) -> None:
+    """Put the firmware in ``folder`` on the board, and say what comes next."""
+    from armtempo.deploy.firmware.flash import flash
+
+    found = ProjectSettings().get(PORT, port).value or None
+    with ProgressBar("flashing") as progress:
+        flash(folder, found, tool, click.echo, progress)
+    click.echo(f"flashed; the start files are next: armtempo deploy --port {found or 'PORT'}")

@@ -22,8 +22,9 @@ _RESERVE_BLOCKS = 8
 
 NO_PINS = (
     "its chip has 64 pins, and none of the ports D and E, on which the program has DIR, ENABLE, E-stop, limit "
-    "switches and an encoder (board/docs/hardware.md); use a board whose chip has 100 pins or more"
+    "switches and an encoder (board/docs/hardware.md)"
 )
+MORE_PINS = "use a board whose chip has 100 pins or more"
 _64_PINS = re.compile("F40[57]R")
 """In the chip's name (data sheet, ordering information)."""
 
@@ -44,21 +45,23 @@ def check_suitable(found: Survey) -> None:
     check_version(found.firmware_crc)
     if "STM32F4" not in found.machine:
         raise LinkError(
-            f"the board is a {found.machine}; armtempo needs an STM32F405 or F407 with MicroPython"
+            f"the board is a {found.machine}",
+            "connect an STM32F405 or F407 with MicroPython",
         )
     if lacks_pins(found.machine):
-        raise LinkError(f"the board is a {found.machine}: {NO_PINS}")
+        raise LinkError(f"the board is a {found.machine}: {NO_PINS}", MORE_PINS)
     if found.version < LEAST_RELEASE:
         least = ".".join(map(str, LEAST_RELEASE))
-        raise LinkError(f"the board runs MicroPython {found.release}; install {least} or newer")
+        raise LinkError(f"the board runs MicroPython {found.release}", f"install {least} or newer")
     if found.sd_card:
         raise LinkError(
-            "an SD card is in the board, and the board starts from it; take it out, press reset, deploy again"
+            "an SD card is in the board, and the board starts from it",
+            "take it out, press reset, deploy again",
         )
     if found.free_heap < LEAST_HEAP:
         raise LinkError(
-            f"the board has {found.free_heap} bytes of free memory; {LEAST_HEAP} are needed: "
-            "is there a boot.py that loads something?"
+            f"the board has {found.free_heap} bytes of free memory; {LEAST_HEAP} are needed",
+            "look for a boot.py that loads something, remove it, press reset, deploy again",
         )
 
 
@@ -72,8 +75,9 @@ def check_version(firmware_crc: int | None) -> None:
     if firmware_crc not in (None, own_crc()):
         raise LinkError(
             f"a new firmware is due: the board's has another version of the program in it ({firmware_crc:08x}, "
-            f"here {own_crc():08x}), and files in the flash do not replace it; 'armtempo firmware' builds one and "
-            "flashes it (board/docs/firmware.md), then deploy again; or flash MicroPython's own"
+            f"here {own_crc():08x}), and files in the flash do not replace it",
+            "build and flash it ('armtempo firmware', board/docs/firmware.md), or flash MicroPython's own, then "
+            "deploy again",
         )
 
 
@@ -92,8 +96,11 @@ def choose(found: Survey, mpy: bool, tell: Tell) -> dict[str, bytes]:
         library = program_files.library(found.mpy)
     if not _fits(found, library):
         raise LinkError(
-            f"the program needs {_needed(found, library)} blocks of flash, the board has room for "
-            f"{_room(found)}; remove motions ('armtempo remove') or other files"
+            (
+                f"the program needs {_needed(found, library)} blocks of flash, the board has room for "
+                f"{_room(found)}; remove motions ('armtempo remove') or other files"
+            ),
+            "remove motions ('armtempo remove') or other files",
         )
     return library
 

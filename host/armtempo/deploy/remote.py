@@ -78,8 +78,11 @@ class Remote:
                     (text.strip() for text in reversed(said) if text.strip()), "the board fell silent"
                 )
                 raise LinkError(
-                    f"mpremote failed on {self.port}: {last}; what was begun is repaired by doing it again; "
-                    f"where that fails too: {RECOVERY}"
+                    (
+                        f"mpremote failed on {self.port}: {last}; what was begun is repaired by doing it again; "
+                        f"where that fails too: {RECOVERY}"
+                    ),
+                    f"what was begun is repaired by doing it again; where that fails too: {RECOVERY}",
                 )
 
     def survey(self) -> Survey:
@@ -91,7 +94,8 @@ class Remote:
             return Survey(**found | {"files": files, "version": tuple(found["version"])})
         except (ValueError, IndexError, KeyError, TypeError) as error:
             raise LinkError(
-                f"{self.port}: the board answers mpremote, but not as MicroPython should"
+                f"{self.port}: the board answers mpremote, but not as MicroPython should",
+                f"press the board's reset button and try again; where that fails too: {RECOVERY}",
             ) from error
 
 

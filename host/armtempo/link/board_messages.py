@@ -9,6 +9,9 @@ from typing import Any
 from armtempo_shared import wire
 from armtempo_shared.limits import TICK_HZ
 
+from armtempo.formats.plain_text import visible
+from armtempo.virtual_id import is_virtual
+
 
 @dataclass(frozen=True)
 class Hello:
@@ -27,6 +30,11 @@ class Hello:
     program_crc: int
     boot: int
     board_id: str
+
+    @property
+    def virtual(self) -> bool:
+        """Whether it is a virtual board."""
+        return is_virtual(self.board_id)
 
 
 @dataclass(frozen=True)
@@ -141,8 +149,13 @@ def event(number: int, payload: bytes) -> Event:
     entry = wire.EVENT_BY_ID.get(number)
     if entry is None:
         raise wire.WireError("not an event")
+    return _event(entry[0], *decode(entry, payload))
+
+
+def decode(entry: tuple[Any, ...], payload: bytes) -> tuple[tuple[Any, ...], Any]:
+    """Values and tail of a payload, control characters spelt out; WireError where it does not fit."""
     values, tail = wire.decode(entry, payload)
-    return _event(entry[0], values, tail)
+    return values, visible(tail) if isinstance(tail, str) else tail
 
 
 def _event(name: str, values: tuple[Any, ...], tail: Any) -> Event:

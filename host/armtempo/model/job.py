@@ -57,15 +57,21 @@ class Job:
         return job_file.load(path, arm)
 
     @classmethod
-    def from_csv(cls, path: Path | str, arm: Arm, radians: bool = False) -> Job:
+    def from_csv(
+        cls, path: Path | str, arm: Arm, radians: bool = False, tolerance_deg: float | None = None
+    ) -> Job:
         """A job through the via points of a CSV file: a line for each point, a column for each driven joint.
 
-        It has the file's name. Raises InputError with line and value for what is no angle.
+        It has the file's name. A table with a column ``time_s``, as ``Plan.to_csv`` writes, is a sampled motion and
+        thinned to ``tolerance_deg`` (0.1 unless given), and its joints pass the points together. Raises InputError
+        with line and value for what is no angle.
         """
         from armtempo.model import exchange
 
         file = Path(path)
-        return cls(file.stem, via_deg=exchange.via_from_csv(file, arm, radians).tolist())
+        found = exchange.via_from_csv(file, arm, radians, tolerance_deg)
+        timing = cls.timing if found.thinned_to_deg is None else "shared"
+        return cls(file.stem, via_deg=found.via_deg.tolist(), timing=timing)
 
     @classmethod
     def paper(cls, arm: Arm | None = None) -> Job:

@@ -8,13 +8,20 @@ from armtempo.model.plan import Plan
 from armtempo.planning import path_deviation
 from armtempo.report import html_page
 
+_EXTREMES = {
+    "joint": "",
+    "motion time (s)": "when the joint arrives",
+    "floor (s)": "no motion of this joint along its path keeps the limits in less time",
+    "speed (°/s)": "the largest magnitude in the plan, exact, of what the arm file allows",
+    "acceleration (°/s²)": "the same",
+    "jerk (°/s³)": "the same",
+}
+
 
 def extremes(sheet: html_page.Page, plan: Plan) -> None:
     """Motion times with their lower bounds and exact extremes beside the limits; then the planner's notes."""
     rows = [_extremes_row(plan, joint) for joint in range(len(plan.extremes))]
-    header = ("joint", "motion time (s)", "floor (s)", "speed (°/s)", "acceleration (°/s²)", "jerk (°/s³)")
-    caption = "Motion time, the least that the limits allow, and exact extremes of the plan beside the limits"
-    sheet.table(header, rows, caption)
+    sheet.table(tuple(_EXTREMES), rows, "Motion time, and largest magnitudes beside the limits", _EXTREMES)
     for note in plan.notes:
         sheet.note(f"Note: {note}")
 

@@ -27,7 +27,7 @@ def basis(degree: int) -> Array:
     Raises InputError for a degree other than 3 or 5.
     """
     if degree not in BASIS:
-        raise InputError(f"spline degree {degree}: there are 3 (cubic) and 5 (quintic)")
+        raise InputError(f"splines of degree {degree} are not known", "choose 3 (cubic) or 5 (quintic)")
     matrix = np.array(BASIS[degree], dtype=float) / FACTORIAL[degree]
     matrix.setflags(write=False)
     return matrix
@@ -45,7 +45,10 @@ def fit(points_deg: ArrayLike, degree: int) -> Array:
     points = np.asarray(points_deg, dtype=float)
     row = basis(degree)[0, :-1]
     if len(points) < 2 or not np.all(np.isfinite(points)):
-        raise InputError("a spline needs at least two points, all of them finite")
+        raise InputError(
+            "a spline through fewer than two points, or through a point that is not finite",
+            "give at least two points, all of them finite",
+        )
     edge = (degree - 1) // 2
     right = np.zeros((len(points) + degree - 1, *points.shape[1:]))
     right[edge : edge + len(points)] = points

@@ -36,7 +36,7 @@ def build(micropython: Path, board: str, out: Path, progress: Progress) -> image
     checkout.check_submodules(found, definition.name)
     toolchain.check(with_mpy_cross=not toolchain.has_mpy_cross(found.folder))
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise InputError(f"{out} is there already; name a new folder with --out")
+        raise InputError(f"{out} is there already", "name a new folder with --out")
     built = _make(found, definition, progress)
     made = image.Image(
         definition.name,
@@ -109,10 +109,9 @@ def _run(command: list[str], step: Callable[[], None]) -> None:
             raise
     if process.returncode:
         raise ToolError(
-            "MicroPython's build failed:\n  "
-            + "\n  ".join(said)
-            + f"\nthe whole of it: {' '.join(command)}; with another version of MicroPython or of the compiler "
-            f"than {checkout.RELEASE} and gcc 12 to 14, try those"
+            "MicroPython's build failed:\n  " + "\n  ".join(said),
+            f"see the whole of it with {' '.join(command)}; with another version of MicroPython or of the compiler "
+            f"than {checkout.RELEASE} and gcc 12 to 14, try those",
         )
 
 
@@ -122,8 +121,8 @@ def _check_room(built: Path, made: image.Image, definition: BoardDefinition) -> 
     end = last.address + (built / last.file).stat().st_size
     if end > definition.flash_end:
         raise ToolError(
-            f"the firmware is {end - definition.flash_end} bytes larger than the flash of {definition.machine}; "
-            "use the program as files, with MicroPython's own firmware ('armtempo deploy')"
+            f"the firmware is {end - definition.flash_end} bytes larger than the flash of {definition.machine}",
+            "use the program as files, with MicroPython's own firmware ('armtempo deploy')",
         )
 
 

@@ -66,14 +66,19 @@ def look(folder: Path) -> Checkout:
         text = (folder / "py" / "mpconfig.h").read_text(encoding="utf-8", errors="replace")
         numbers = [re.findall(rf"define MICROPY_VERSION_{part} (\d+)", text)[0] for part in _PARTS]
     except (OSError, IndexError):
-        raise InputError(f"{folder} is no checkout of MicroPython; get one: {how_to_get(folder)}") from None
+        raise InputError(
+            f"{folder} is no checkout of MicroPython", f"get one: {how_to_get(folder)}"
+        ) from None
     found = Checkout(folder.resolve(), (int(numbers[0]), int(numbers[1]), int(numbers[2])))
     if found.version[:2] < LEAST_RELEASE:
         raise InputError(
-            f"{folder} is MicroPython {found.release}, which is too old; {how_to_get(Path('DIR'))}"
+            f"{folder} is MicroPython {found.release}, which is too old",
+            f"get a newer one: {how_to_get(Path('DIR'))}",
         )
     if " " in str(found.folder):
-        raise InputError(f"{found.folder}: MicroPython's build takes no path with a space; move the checkout")
+        raise InputError(
+            f"{found.folder}: MicroPython's build takes no path with a space", "move the checkout"
+        )
     return found
 
 
@@ -85,11 +90,13 @@ def board(checkout: Checkout, name: str) -> BoardDefinition:
         header = (folder / "mpconfigboard.h").read_text(encoding="utf-8", errors="replace")
     except OSError:
         raise InputError(
-            f"MicroPython {checkout.release} knows no board {name}; boards that suit: {', '.join(suitable(checkout))}"
+            f"MicroPython {checkout.release} knows no board {name}",
+            f"give one that suits: {', '.join(suitable(checkout))}",
         ) from None
     if _setting(make, "CMSIS_MCU") not in _CHIPS:
         raise InputError(
-            f"{name} has no STM32F405 or F407; boards that suit: {', '.join(suitable(checkout))}"
+            f"{name} has no STM32F405 or F407",
+            f"give one that suits: {', '.join(suitable(checkout))}",
         )
     manifest = _setting(make, "FROZEN_MANIFEST")
     chip = _text(header, "MICROPY_HW_MCU_NAME")
@@ -123,8 +130,8 @@ def check_submodules(checkout: Checkout, name: str) -> None:
     missing = sorted(path for path in needed if not any((checkout.folder / path).glob("*")))
     if missing:
         raise InputError(
-            f"{checkout.folder} lacks submodules ({', '.join(missing)}); get them: "
-            f"make -C {checkout.port} BOARD={name} submodules"
+            f"{checkout.folder} lacks submodules ({', '.join(missing)})",
+            f"get them: make -C {checkout.port} BOARD={name} submodules",
         )
 
 

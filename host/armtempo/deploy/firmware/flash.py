@@ -19,8 +19,8 @@ from armtempo.deploy.firmware.image import Image, Piece
 from armtempo.deploy.install import end_program
 from armtempo.deploy.remote import Remote
 from armtempo.errors import InputError, LinkError, ToolError
-from armtempo.link.ports import is_sim
 from armtempo.link.program_version import own_crc
+from armtempo.ports.names import is_sim
 from armtempo.progress import Progress
 
 DFU, STLINK = "dfu-util", "st-flash"
@@ -69,24 +69,21 @@ def _choose(tool: str | None) -> str:
     found = next((name for name in wanted if shutil.which(name)), None)
     if found is None:
         ways = "; ".join(f"{name}: {_INSTALL[name]}" for name in wanted)
-        raise ToolError(
-            f"{' and '.join(wanted)} not installed; one of them puts a firmware on a board: {ways}"
-        )
+        raise ToolError(f"{' and '.join(wanted)} not installed, and needed to flash", f"install one: {ways}")
     return found
 
 
 def _prepare(port: str, firmware: Image, tool: str, tell: Tell) -> None:
     """See that the board at ``port`` is the right one and stands still; with dfu-util, put it in its bootloader."""
     if is_sim(port):
-        raise InputError("a virtual board has no flash for a firmware; --port names a real one")
+        raise InputError("a virtual board has no flash for a firmware", "name a real one with --port")
     end_program(port, tell)
     remote = Remote(port)
     machine = remote.survey().machine
     if machine != firmware.machine:
         raise LinkError(
-            f"the board at {port} is a {machine}, the firmware is for a {firmware.machine}, and would not start "
-            f"there: other crystal, other pins; build one for that board ('armtempo firmware --board'), or, "
-            f"if the board runs the wrong firmware now: {_BY_HAND}"
+            f"the board at {port} is a {machine}, the firmware is for a {firmware.machine}, and would not start there",
+            f"build one for that board ('armtempo firmware --board'), or, if it runs a wrong firmware: {_BY_HAND}",
         )
     if tool == DFU:
         remote.run(["bootloader"])
@@ -100,7 +97,9 @@ def _wait_for_bootloader(patience_s: float) -> None:
         time.sleep(_LOOK_S)
     if count != 1:
         seen = "no board in its bootloader" if count == 0 else f"{count} boards in their bootloader"
-        raise ToolError(f"{DFU} sees {seen} on USB; connect one, by the socket wired to the chip; {_BY_HAND}")
+        raise ToolError(
+            f"{DFU} sees {seen} on USB", f"connect one, by the socket wired to the chip; {_BY_HAND}"
+        )
 
 
 def _bootloaders() -> int:
@@ -128,6 +127,6 @@ def _run(command: list[str]) -> None:
     if done.returncode:
         said = "\n  ".join(done.stdout.strip().splitlines()[-5:])
         raise ToolError(
-            f"{' '.join(command)} failed:\n  {said}\nthe board has no whole firmware now; flash again: "
-            + ("is the ST-LINK connected?" if command[0] == STLINK else _BY_HAND)
+            f"{' '.join(command)} failed, and the board has no whole firmware now:\n  {said}",
+            "flash again: " + ("is the ST-LINK connected?" if command[0] == STLINK else _BY_HAND),
         )

@@ -49,13 +49,13 @@ def read(folder: Path) -> Image:
         image = Image(**found | {"program_crc": int(found["program_crc"], 16), "pieces": pieces})
     except FileNotFoundError:
         raise InputError(
-            f"{folder} holds no firmware (no {ABOUT}); 'armtempo firmware' makes such a folder"
+            f"{folder} holds no firmware (no {ABOUT})", "make one with 'armtempo firmware'"
         ) from None
     except (ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{folder / ABOUT} cannot be read: {error}; build the firmware anew") from None
+        raise InputError(f"{folder / ABOUT} cannot be read: {error}", "build the firmware anew") from None
     missing = [piece.file for piece in pieces if not (folder / piece.file).is_file()]
     if missing or not pieces:
         raise InputError(
-            f"{folder} is not whole: {', '.join(missing) or 'no pieces'}; build the firmware anew"
+            f"{folder} is not whole: {', '.join(missing) or 'no pieces'}", "build the firmware anew"
         )
     return image

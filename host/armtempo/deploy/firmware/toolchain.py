@@ -10,7 +10,7 @@ from armtempo.errors import ToolError
 
 CROSS = "arm-none-eabi-gcc"
 INSTALL = (
-    "on Debian and Ubuntu: sudo apt install make gcc gcc-arm-none-eabi libnewlib-arm-none-eabi; on macOS: "
+    "install it, on Debian and Ubuntu: sudo apt install make gcc gcc-arm-none-eabi libnewlib-arm-none-eabi; on macOS: "
     "brew install --cask gcc-arm-embedded; else: Arm GNU Toolchain, arm-none-eabi, from developer.arm.com"
 )
 _TRIAL = "#include <math.h>\n#include <string.h>\n"
@@ -22,12 +22,12 @@ def check(with_mpy_cross: bool) -> None:
     needed = ["make", CROSS, *(["gcc"] if with_mpy_cross else [])]
     missing = [name for name in needed if shutil.which(name) is None]
     if missing:
-        raise ToolError(f"{', '.join(missing)}: not installed, and needed to build a firmware; {INSTALL}")
+        raise ToolError(f"{', '.join(missing)}: not installed, and needed to build a firmware", INSTALL)
     done = subprocess.run(
         [CROSS, "-xc", "-E", "-"], input=_TRIAL, capture_output=True, text=True, check=False
     )
     if done.returncode:
-        raise ToolError(f"{CROSS} has no C library (newlib); {INSTALL}")
+        raise ToolError(f"{CROSS} has no C library (newlib)", INSTALL)
 
 
 def version() -> str:

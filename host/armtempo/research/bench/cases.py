@@ -78,13 +78,17 @@ def problem_of(arm: Arm, job: Job, joint: int, fitness: str, iterations: int) ->
     Raises InputError where there is no such joint, or it does not move in this job.
     """
     if not 1 <= joint <= len(arm.driven):
-        raise InputError(f"joint {joint}: arm {arm.name!r} has the driven joints 1 to {len(arm.driven)}")
+        raise InputError(
+            f"joint {joint}: arm {arm.name!r} has no such driven joint",
+            f"give one of 1 to {len(arm.driven)}",
+        )
     driven = arm.driven[joint - 1]
     angles_deg, _ = planner.via_angles(arm, job)
     via = angles_deg[:, joint - 1]
     if np.ptp(via) == 0.0:
         raise InputError(
-            f"job {job.name!r}: {driven.name} does not move, so there is nothing to search; choose another"
+            f"job {job.name!r}: {driven.name} does not move, so there is nothing to search",
+            "choose another joint",
         )
     angles = tuple(float(angle) for angle in via)
     return Problem(driven.name, angles, job.degree, driven.limits, job.bounds_s, fitness, iterations)
