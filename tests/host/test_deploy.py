@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from armtempo.deploy import changes, firmware, package, program_files
+from armtempo.deploy import changes, package, program_files
 from armtempo.deploy.remote import Remote, Survey
 from armtempo.errors import InputError, LinkError, MissingPackageError
 from armtempo.link.program_version import PACKAGES, own_crc, package_folder
@@ -97,10 +97,11 @@ def test_completeness_needs_stamp_and_start_files() -> None:
     ("change", "words"),
     [
         ({"machine": "PYBD-SF6W with STM32F767IIK"}, "is a PYBD"),
+        ({"machine": "PYBv1.1 with STM32F405RG"}, "64 pins, and none of the ports D and E"),
         ({"version": (1, 12, 0)}, "MicroPython 1.12.0; install 1.20"),
         ({"sd_card": True}, "SD card"),
         ({"free_heap": 20_000}, "20000 bytes of free memory"),
-        ({"firmware_crc": own_crc() ^ 1}, "another version of the program built in"),
+        ({"firmware_crc": own_crc() ^ 1}, "a new firmware is due"),
     ],
 )
 def test_unsuitable_boards_are_refused(change: dict[str, object], words: str) -> None:
@@ -145,22 +146,6 @@ def test_package_folder_lists_what_it_holds(tmp_path: Path) -> None:
     assert names[-1] == "main.py"
     with pytest.raises(InputError, match="not empty"):
         package.write(tmp_path / "new")
-
-
-@pytest.mark.slow
-def test_firmware_folder_holds_the_program_and_its_hash(tmp_path: Path) -> None:
-    folder = tmp_path / "new"
-    firmware.write(folder)
-    files = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
-    assert files == {*program_files.compact_files(), "armtempo_shared/firmware.py", "manifest.py"}
-    frozen: list[tuple[str, int]] = []
-    made = {"include": lambda path: None, "package": lambda name, opt: frozen.append((name, opt))}
-    exec((folder / "manifest.py").read_text(), made)
-    assert frozen == [("armtempo_board", 3), ("armtempo_shared", 3)]
-    told: dict[str, int] = {}
-    exec((folder / "armtempo_shared" / "firmware.py").read_text(), told)
-    assert told["CRC"] == own_crc()
-    assert "import CRC" in (folder / "armtempo_shared" / "program_hash.py").read_text()
 
 
 def test_missing_compiler_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -45,6 +45,8 @@ COMMANDS = (
     "rename",
     "deploy",
     "undeploy",
+    "firmware",
+    "flash",
     "ports",
     "virtual-board",
     "watch",

@@ -15,6 +15,7 @@ from armtempo_shared.program_hash import STAMP
 from armtempo_shared.table import rows
 
 from armtempo import simulator
+from armtempo.deploy import plain_frames
 from armtempo.deploy.compact import Compact, compact, frames
 from armtempo.errors import LinkError, MissingPackageError
 from armtempo.link.program_version import PACKAGES, own_crc, package_folder
@@ -120,8 +121,13 @@ def compact_program(hash_module: str = "") -> Compact:
 
 
 def in_full(traceback: str) -> str:
-    """A traceback from the board, with the sources' names behind the short ones of the compiled program."""
-    return frames.in_full(traceback, compact_program().functions)
+    """A traceback from the board by the sources' files and functions, whichever way the program got there.
+
+    With compiled files the lines are not known: the board does not keep them.
+    """
+    sources = {name: path.read_text(encoding="utf-8") for name, path in modules().items()}
+    plain = plain_frames.in_full(traceback, sources)
+    return frames.in_full(plain, compact_program().functions, {Path(name).stem: name for name in sources})
 
 
 def _handlers() -> set[str]:
