@@ -9,7 +9,7 @@
     stepgen/   from splines to the times of steps; integers only, no hardware
     hardware/  timers, DMA, pins, interrupts
 
-Each imports only from those below it, and from ``errors``, ``buffers`` and ``heap``. The functions here are for
+Each imports only from those below it, and from ``errors``, ``buffers``, ``memory`` and ``heap``. The functions here are for
 ``boot.py``, ``main.py`` and the prompt; nothing in the packages uses them.
 """
 

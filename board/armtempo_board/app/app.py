@@ -22,6 +22,7 @@ from armtempo_board.app.events import Events
 from armtempo_board.link.serial_link import SerialLink
 
 _EXTRA_SERVICES_PER_TURN = const(3)  # of the engine, while something moves
+_SPARE_BYTES = const(1536)  # kept for telling of a failure: a traceback as text, as bytes, and its end for the host
 _MOST_FAILURES = const(10)  # turns of the loop that fail one after the other; then the program gives up
 
 
@@ -38,6 +39,7 @@ class App:
         self.events = Events(self.controller, self.link)
         self.turns = self._failed = 0  # turns of the loop, and the last of them that failed
         self._failures = 0
+        self._spare: "bytearray | None" = bytearray(_SPARE_BYTES)
         heap.forget()
         self.controller.configure()
 
@@ -89,8 +91,13 @@ class App:
         self._failures = self._failures + 1 if again else 1
         self._failed = self.turns
         self.controller.fail()
-        self.events.note(_traceback(error))
         self.events.note_fault(codes.INTERNAL)
+        self._spare = None
+        try:
+            self.events.note(_traceback(error))
+            self._spare = bytearray(_SPARE_BYTES)
+        except MemoryError:
+            self.events.note_bytes(b"MemoryError, and no memory left to say where")
         if self._failures >= _MOST_FAILURES:
             raise error
 

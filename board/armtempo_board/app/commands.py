@@ -70,6 +70,12 @@ class Commands:
             self._dispatch(number)
         except Refused as refused:
             self._refuse(number, refused.code, refused.joint, refused.value)
+        except MemoryError:
+            self._refuse(number, codes.NO_MEMORY)
+            raise
+        except Exception:
+            self._refuse(number, codes.FAILED)
+            raise
 
     def _dispatch(self, number: int) -> None:
         row = self._table.get(number)
@@ -150,6 +156,9 @@ class Commands:
             controller.arm_crc,
             controller.program_crc,
             controller.boot,
+            controller.engine_room(),
+            controller.arm_problem,
+            controller.arm_value,
         )
         return self.reply_tail(size, controller.board_id)
 

@@ -26,6 +26,11 @@ class Hello:
     arm_crc: int
     program_crc: int
     boot: int
+    engine_room: int
+    """Bytes that the engine for an arm can have (``armtempo_shared.engine_memory``)."""
+    arm_problem: int
+    """Code of what is wrong with the stored arm record; 0 where it is in force or there is none."""
+    arm_value: int
     board_id: str
 
 
