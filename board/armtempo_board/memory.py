@@ -1,4 +1,4 @@
-"""Memory that is taken once, in one piece, and handed out in parts again and again."""
+"""Memory that is taken once, in some blocks, and handed out in parts again and again."""
 
 from array import array
 
@@ -12,25 +12,34 @@ _PIECE_WORDS = const(64)
 
 
 class Memory:
-    """``words``: so many, of 32 bits. MemoryError where the heap has them not in one piece."""
+    """``blocks``: so many words of 32 bits each. MemoryError where the heap has one of them not in one piece."""
 
-    def __init__(self, words: int) -> None:
-        self._words = array("i")
-        for begin in range(0, words, _PIECE_WORDS):  # it grows in place: made of a buffer, it would take its size twice
-            self._words.extend(array("i", bytes(4 * min(_PIECE_WORDS, words - begin))))
-        self.size = words
-        self._taken = 0
+    def __init__(self, blocks: "list[int]") -> None:
+        self._blocks = [_zeros(words) for words in blocks]
+        self._taken = [0] * len(blocks)
+        self.size = sum(blocks)
 
     def release(self) -> None:
         """Take all parts back; who has one uses it no more."""
-        self._taken = 0
+        for number in range(len(self._taken)):
+            self._taken[number] = 0
 
     def take(self, words: int) -> "Any":
-        """A part of so many words, signed, all 0."""
-        begin = self._taken
-        self._taken += words
-        if self._taken > self.size:
-            raise MemoryError
-        for word in range(begin, self._taken):
-            self._words[word] = 0
-        return memoryview(self._words)[begin : self._taken]
+        """A part of so many words, signed, all 0, from the first block that has them; MemoryError where none has."""
+        for number, block in enumerate(self._blocks):
+            begin = self._taken[number]
+            end = begin + words
+            if end <= len(block):
+                self._taken[number] = end
+                for word in range(begin, end):
+                    block[word] = 0
+                return memoryview(block)[begin:end]
+        raise MemoryError
+
+
+def _zeros(words: int) -> "array[int]":
+    """It grows in place: made of a buffer, it would need its size twice."""
+    block = array("i")
+    for begin in range(0, words, _PIECE_WORDS):
+        block.extend(array("i", bytes(4 * min(_PIECE_WORDS, words - begin))))
+    return block

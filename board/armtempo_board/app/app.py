@@ -13,6 +13,7 @@ import sys
 import time
 
 from armtempo_shared import codes
+from armtempo_shared.messages import MAX_PAYLOAD
 from micropython import const
 
 from armtempo_board import heap
@@ -22,7 +23,7 @@ from armtempo_board.app.events import Events
 from armtempo_board.link.serial_link import SerialLink
 
 _EXTRA_SERVICES_PER_TURN = const(3)  # of the engine, while something moves
-_SPARE_BYTES = const(1536)  # kept for telling of a failure: a traceback as text, as bytes, and its end for the host
+_SPARE_BYTES = const(1024)  # kept for telling of a failure: a traceback, and its end for the host
 _MOST_FAILURES = const(10)  # turns of the loop that fail one after the other; then the program gives up
 
 
@@ -103,6 +104,8 @@ class App:
 
 
 def _traceback(error: "BaseException") -> str:
+    """The end of it, as it says what is wrong."""
     text = io.StringIO()
     sys.print_exception(error, text)
-    return str(text.getvalue())
+    text.seek(max(0, text.tell() - MAX_PAYLOAD))
+    return str(text.read())

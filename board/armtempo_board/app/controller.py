@@ -57,7 +57,10 @@ class Controller:
         self.boot = int.from_bytes(os.urandom(_BOOT_BYTES), "little")  # another number after each power-up
         self.joints = 0
         self.arm_crc = 0
-        self.arm_problem = 0  # code: why the stored arm record is not in force, 0 where it is or there is none,
+        self.arm_waits = False  # an arm record has been stored, and is to be taken
+        self.arm_problem = (
+            0  # code: why the stored arm record is not in force, 0 where it is or there is none,
+        )
         self.arm_value = 0  # and its value
         self.free_flash = 0
         self.free_heap = 0
@@ -139,22 +142,30 @@ class Controller:
 
         What stands in the flash never keeps the program from starting: ``arm_problem`` says what is wrong with it.
         """
+        self.arm_waits = False
         self.arm_problem = self.arm_value = 0
         try:
-            self._take_arm(self.judged(self.store().read(ARM_RECORD_NAME)))
+            self._take_arm(self._stored_arm())
         except Refused as refused:
             if refused.code != codes.NOT_FOUND:
                 self.arm_problem, self.arm_value = refused.code, refused.value
         except Exception as error:
             self._drop_engine()
             self.arm_problem = codes.NO_MEMORY if isinstance(error, MemoryError) else codes.FAILED
-        self.forget_store()
+        heap.forget()
+
+    def _stored_arm(self) -> "ArmRecord":
+        """Its frames are gone when the engine is made: what they leave on the stack would keep the store in memory."""
+        try:
+            return self.judged(self.store().read(ARM_RECORD_NAME))
+        finally:
+            self.forget_store()
 
     def judged(self, data: bytes) -> "ArmRecord":
         """An arm record that can be taken: head, joints, crc32; else Refused, and the one in force stays that."""
         from armtempo_board.motion import arm_check  # here, so that it can be forgotten
 
-        return arm_check.checked(data, self._workspace.memory.size)
+        return arm_check.checked(data, self._workspace.memory.size, self._workspace.joints)
 
     def _take_arm(self, record: "ArmRecord") -> None:
         from armtempo_shared.armrecord import FLAG_STOP_ON_LINK_LOSS  # here, so that it can be forgotten
@@ -162,10 +173,10 @@ class Controller:
         head, joints, crc = record
         if crc == self.arm_crc:
             return
-        self.forget_store()
         self._drop_engine()
         self.engine = Engine(head, joints, self._workspace)
-        self._silence_ms = head["link_timeout_ms"] if head["flags"] & FLAG_STOP_ON_LINK_LOSS else _NEVER_MS
+        stops = head["flags"] & FLAG_STOP_ON_LINK_LOSS
+        self._silence_ms = head["link_timeout_ms"] if stops else _NEVER_MS
         self.joints = len(joints)
         self.arm_crc = crc
         self._raw = array("i", [0] * (COMMANDED + 2 * self.joints))
@@ -183,8 +194,12 @@ class Controller:
         gc.collect()
 
     def engine_room(self) -> int:
-        """Bytes that an engine can have (``armtempo_shared.engine_memory``)."""
+        """Bytes of memory that an engine can have (``armtempo_shared.engine_memory``)."""
         return int(4 * self._workspace.memory.size)
+
+    def engine_joints(self) -> int:
+        """Joints that an engine can have."""
+        return int(self._workspace.joints)
 
     def check_ready(self) -> None:
         """Refuses while a fault is pending or no arm is configured."""

@@ -1,18 +1,18 @@
 """How the heap is shared out when the program starts: to the engine, to samples, to the rest.
 
-The rest are the modules that come and go (storage, the check of a motion, commands about the store), what they need
-while they are at work, and the objects of an engine: figures in docs/memory.md.
+The rest are link and commands, the modules that come and go (storage, commands about the store, the check of a motion),
+and what these need while they are at work: docs/memory.md.
 """
 
 import gc
 
 from armtempo_shared import engine_memory
+from armtempo_shared.limits import MAX_JOINTS
 
 from armtempo_board.motion.workspace import Workspace
 
-RESERVE = 16_384
-"""Bytes that must stay free beside the memory of the engine: for six joints' objects, and the rest."""
-
+_RESERVE = 15_488  # bytes of heap for the rest
+_USUAL_JOINTS = 3  # there is heap for their objects before there is memory for larger rings
 _MOST_SAMPLES = 4096  # bytes of the sample buffer at most,
 _LEAST_SAMPLES = 1024  # and at least;
 _SAMPLES_SHARE = 16  # between them, this part of the free heap
@@ -21,15 +21,20 @@ _STEP_WORDS = 64
 
 def workspace() -> "Workspace":
     """For the largest arm that fits."""
-    words = engine_memory.LARGEST_WORDS
     gc.collect()
     free = _free()
-    if free:
-        words = min(words, max(free - RESERVE, 0) // 4)
+    if not free:
+        return Workspace(engine_memory.LARGEST_WORDS, MAX_JOINTS)
+    room = max(free - _RESERVE, 0)
+    words = max(room - engine_memory.object_bytes(_USUAL_JOINTS), 0) // 4
+    words = min(words, engine_memory.LARGEST_WORDS)
+    joints = 0
+    while joints < MAX_JOINTS and 4 * words + engine_memory.object_bytes(joints + 1) <= room:
+        joints += 1
     while True:
         try:
-            return Workspace(words)
-        except MemoryError:  # there is no such piece
+            return Workspace(words, joints)
+        except MemoryError:  # the heap has no such blocks
             words -= _STEP_WORDS
             gc.collect()
 

@@ -48,13 +48,10 @@ def put_data(commands: "Caller", row: tuple, length: int) -> int:
 
 
 def put_commit(commands: "Caller", row: tuple, length: int) -> None:
-    """Check it and put it in place; an arm record is taken at once."""
+    """Check it and put it in place; an arm record is taken when this has returned."""
     (crc,) = commands.fields(row)
     controller = commands.controller
-    if controller.store().commit(crc, controller.judged) == ARM_RECORD_NAME:
-        controller.configure()
-        if controller.arm_problem:
-            raise Refused(controller.arm_problem, value=controller.arm_value)
+    controller.arm_waits = controller.store().commit(crc, controller.judged) == ARM_RECORD_NAME
 
 
 def list(commands: "Caller", row: tuple, length: int) -> int:

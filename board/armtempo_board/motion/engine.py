@@ -64,14 +64,11 @@ class Engine:
     ``workspace``: what the engine before worked in and this one takes over; MemoryError where it is too small.
     """
 
-    def __init__(
-        self, head: "dict[str, int]", joints: "list[dict[str, int]]", workspace: Workspace
-    ) -> None:
+    def __init__(self, head: "dict[str, int]", joints: "list[dict[str, int]]", workspace: Workspace) -> None:
         from armtempo_shared import armrecord  # here, so that they can be forgotten
 
         from armtempo_board.hardware import registers
 
-        workspace.memory.release()
         self._feeder = workspace.feeder
 
         rows = [row for row in joints if row["encoder"] != armrecord.NONE]
@@ -82,8 +79,10 @@ class Engine:
         self._sampler.connect()
         registers.apply(registers.CLOCKS)
         registers.apply(registers.TIMERS)
+        rings = workspace.rings([row["max_rate"] for row in joints])
+        arm = head, joints
         self._joints = [
-            JointDrive(n, head, row, self._sampler, workspace.memory) for n, row in enumerate(joints)
+            JointDrive(n, arm, self._sampler, ring, workspace.memory) for n, ring in enumerate(rings)
         ]
         self._encoders = [fitted[rows.index(row)] if row in rows else NoEncoder() for row in joints]
         slots = [isr.RAW_ENCODERS + rows.index(row) if row in rows else 0 for row in joints]

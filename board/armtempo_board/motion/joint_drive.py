@@ -33,20 +33,26 @@ _TURNS = const(8)
 
 
 class JointDrive:
-    """``head`` and ``row``: the arm record's; ``sampler`` has the memory that the interrupts read, ``memory`` the rest."""
+    """``arm``: head and joints of the arm record; ``sampler`` has the memory that the interrupts read.
+
+    ``ring_words``: see ``Ring``; ``memory``: where the step generator takes its words from.
+    """
 
     def __init__(
-        self, number: int, head: "dict[str, int]", row: "dict[str, int]", sampler: Sampler, memory: Memory
+        self,
+        number: int,
+        arm: "tuple[dict[str, int], list[dict[str, int]]]",
+        sampler: Sampler,
+        ring_words: "memoryview",
+        memory: Memory,
     ) -> None:
-        from armtempo_shared.engine_memory import ring_entries  # here, so that they can be forgotten
+        from armtempo_board.hardware import pins  # here, so that it can be forgotten
 
-        from armtempo_board.hardware import pins
-
+        head, row = arm[0], arm[1][number]
         self._sampler = sampler
         block = sampler.block
         self._words_at = sampler.joint_at(number)
-        words = memory.take(ring_entries(row["max_rate"]) + 1)
-        self.ring = Ring(row["channel"], block, self._words_at, words)
+        self.ring = Ring(row["channel"], block, self._words_at, ring_words)
         self.generator = StepGenerator(memory)
         self._inverted = row["dir_inverted"]
         self._turn_delay = head["dir_hold_ticks"] + _TURN_SLACK_TICKS

@@ -30,7 +30,6 @@ from armtempo_board.stepgen.subdivision import (
     MOST,
     SCALE,
 )
-from armtempo_board.stepgen.subintervals import Subintervals
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -38,8 +37,7 @@ if TYPE_CHECKING:
 
     from armtempo_shared.motion import MotionHead
 
-GAP_TICKS = const(25200)
-"""Least time between opposite steps that is assumed where none is given: 0.3 ms."""
+    from armtempo_board.stepgen.subintervals import Subintervals
 
 _SHORT_TICKS = const(1024)
 _POINT_BYTES = const(8)
@@ -51,8 +49,8 @@ _SPLIT = const(-1)
 def check(
     motion: "MotionHead",
     joints: "list[dict[str, int]]",
-    gap_ticks: int = GAP_TICKS,
-    interval: "Subintervals | None" = None,
+    gap_ticks: int,
+    interval: "Subintervals",
 ) -> None:
     """Refused for the first thing that is wrong, with the joint and a value.
 
@@ -61,7 +59,6 @@ def check(
     The value is, by code: time_order, the control point; too_long, ticks or steps of 2**28; out_of_range, the position
     in steps; too_fast, steps/s; too_abrupt, steps/s**2.
     """
-    interval = interval or Subintervals()
     try:
         for joint in range(motion.joints):
             _check_numbers(motion, joint)

@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from typing import Any
 
 _KEPT = const(5)  # points of the piece before: as many as a quintic segment shares with the next
-_FRESH = const(8)  # points read at once
-WINDOW_WORDS = const(26)
+_FRESH = const(5)  # points read at once
+WINDOW_WORDS = const(20)
 """Words of a window: two a point."""
 _FRESH_AT = const(10)  # word
 

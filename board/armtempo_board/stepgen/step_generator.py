@@ -38,7 +38,7 @@ from armtempo_board.stepgen.step_queue import (
     put_single,
 )
 from armtempo_board.stepgen.subdivision import END, NOT_YET, SCALE
-from armtempo_board.stepgen.subintervals import SUBINTERVALS_WORDS, Subintervals
+from armtempo_board.stepgen.subintervals import Subintervals
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -54,10 +54,6 @@ _FIRST_CUBIC_STEPS = const(16)  # tried first in a motion
 _FAR = const(1 << 16)  # in 4096 ticks: longer than any subinterval and gap, and a small integer in ticks
 
 
-GENERATOR_WORDS = SUBINTERVALS_WORDS + newton.SOLVER_SIZE + step_queue.QUEUE_SIZE
-"""Words of memory for one ``StepGenerator``."""
-
-
 class StepGenerator:
     """Goes through one joint's motion.
 
@@ -66,13 +62,11 @@ class StepGenerator:
     ``subintervals`` is free for the check of the next.
     """
 
-    def __init__(self, memory: "Memory | None" = None) -> None:
-        """``memory``: where its words are taken from; None: from memory of its own."""
-        memory = memory or Memory(GENERATOR_WORDS)
-        self.subintervals = Subintervals(memory)
-        self._solver = memory.take(newton.SOLVER_SIZE)
+    def __init__(self, memory: Memory) -> None:
+        """``memory``: where its words are taken from (``armtempo_shared.engine_memory`` counts them)."""
         self.queue = memory.take(step_queue.QUEUE_SIZE)
-        self.queue[IN] = self.queue[step_queue.OUT] = 0
+        self._solver = memory.take(newton.SOLVER_SIZE)
+        self.subintervals = Subintervals(memory)
         self.direction = self._heading = 1
         self.at_turn = False
         self.ended = True

@@ -20,10 +20,6 @@ if TYPE_CHECKING:
 _START_LEVEL = const(4)
 
 
-SUBINTERVALS_WORDS = 2 * (PIECES_SIZE + MEASURES_SIZE + WINDOW_WORDS)
-"""Words of memory for one ``Subintervals``."""
-
-
 class Subintervals:
     """Walks through a joint's motion.
 
@@ -32,15 +28,14 @@ class Subintervals:
     this that comes back to the position where it began is passed over.
     """
 
-    def __init__(self, memory: "Memory | None" = None) -> None:
-        """``memory``: where its words are taken from; None: from memory of its own."""
-        memory = memory or Memory(SUBINTERVALS_WORDS)
+    def __init__(self, memory: Memory) -> None:
+        """``memory``: where its words are taken from (``armtempo_shared.engine_memory`` counts them)."""
         self.angle = memory.take(PIECES_SIZE)
         self.time = memory.take(PIECES_SIZE)
-        self.angle_measures = memory.take(MEASURES_SIZE)
-        self.time_measures = memory.take(MEASURES_SIZE)
         self._angle_points = ControlPoints(memory.take(WINDOW_WORDS))
         self._time_points = ControlPoints(memory.take(WINDOW_WORDS))
+        self.angle_measures = memory.take(MEASURES_SIZE)
+        self.time_measures = memory.take(MEASURES_SIZE)
         self.min_ticks = 0
 
     def load(self, motion: "MotionHead", joint: int) -> None:

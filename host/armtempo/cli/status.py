@@ -24,13 +24,26 @@ def command(port: str, log_traffic: Path | None) -> None:
 
 
 def _identity(info: Hello) -> list[str]:
+    from armtempo.robot import engine_room
+
     return [
         f"board     {info.board_id}",
         f"program   {info.program_crc:08x}, protocol {info.protocol}{_other(info)}",
-        f"arm       {f'{info.joints} joints, record {info.arm_crc:08x}' if info.joints else 'none yet'}",
+        f"arm       {_arm(info)}",
         f"free      {info.free_flash} bytes of flash, {info.free_heap} of heap",
         f"fastest   {info.max_rate} steps/s one joint, {info.max_rate_sum} all together",
+        *engine_room.lines(info),
     ]
+
+
+def _arm(info: Hello) -> str:
+    from armtempo.link.refusal import refusal
+
+    if info.joints:
+        return f"{info.joints} joints, record {info.arm_crc:08x}"
+    if info.arm_problem:
+        return str(refusal("none; the stored record is not used", info.arm_problem, value=info.arm_value))
+    return "none yet"
 
 
 def _other(info: Hello) -> str:

@@ -12,13 +12,14 @@ from armtempo.link import Client
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
 from armtempo.records import encode
+from armtempo.robot import engine_room
 
 
 def configure(client: Client, arm: Arm, replace: bool) -> None:
     """Make sure the board has this arm's record; a new one makes all positions unknown.
 
-    Raises LinkError where the board is set up for another arm and ``replace`` is false, BoardError where
-    it is moving.
+    Raises InputError where the arm does not fit the board, which keeps the one it has; LinkError where the board is set
+    up for another arm and ``replace`` is false; BoardError where it is moving.
     """
     data = encode.arm_record(arm)
     if client.info.arm_crc == wire.record_crc(data):
@@ -28,6 +29,7 @@ def configure(client: Client, arm: Arm, replace: bool) -> None:
             f"the board is set up for another arm than {arm.name!r} ({arm.source}); "
             "name its arm file with --arm"
         )
+    engine_room.check(arm, client.info)
     client.upload(wire.ARM_RECORD_NAME, data)
     client.hello()
 

@@ -6,7 +6,6 @@ from array import array
 from arm_rows import HEAD, arm, row  # noqa: F401
 from armtempo_board.errors import Refused
 from armtempo_board.stepgen import bezier, step_generator, step_queue
-from armtempo_shared import engine_memory
 from virtual_board import machine_state, standalone
 from virtual_board.arm import motors
 
@@ -249,14 +248,15 @@ class Rig:
             Pulses(self, joint, pins.STEP[joint["channel"]][0], pins.DIR[joint["channel"]])
             for joint in joints
         ]
-        self.engine = armtempo_board.motion.engine.Engine(self.head, joints, self._workspace())
+        self.workspace = self._workspace()
+        self.engine = armtempo_board.motion.engine.Engine(self.head, joints, self.workspace)
         self.engine.home((1 << len(joints)) - 1, [0] * len(joints))
 
     @staticmethod
     def _workspace():
         from armtempo_board.motion.workspace import Workspace
 
-        return Workspace(6 * (engine_memory.GENERATOR_WORDS + 1025))
+        return Workspace(12 * 1026, 6)
 
     # a world for the board
 

@@ -6,7 +6,7 @@ import uctypes
 import virtual_board.standalone  # noqa: F401
 from armtempo_board.hardware import isr
 from armtempo_board.stepgen import step_queue
-from armtempo_shared.engine_memory import ring_entries
+from armtempo_shared.engine_memory import ring_words
 from engine_rig import cases
 
 BLOCK = isr.BLOCK_HEAD + 6 * isr.JOINT_WORDS
@@ -110,14 +110,14 @@ def written_and_wrapped():
 
 
 def sizes():
-    """A ring lasts at least 4 ms at a joint's highest rate, or is of the largest size."""
+    """A ring lasts at least 3 ms at a joint's highest rate, or is of the largest size."""
     previous = 64
     for rate in (0, 1, 1796, 1900, 3592, 4100, 8000, 20_000, 34_000, 333_000):
-        entries = ring_entries(rate)
+        entries = ring_words(rate) - 1
         assert entries in (64, 128, 256, 512, 1024) and entries >= previous
-        assert entries == 1024 or (entries - 8) * 1000 >= 2 * rate * 4, rate
+        assert entries == 1024 or (entries - 8) * 1000 >= 2 * rate * 3, rate
         previous = entries
-    assert (ring_entries(0), ring_entries(7_000), ring_entries(8_000), ring_entries(333_000)) == (64, 64, 128, 1024)
+    assert [ring_words(rate) for rate in (0, 9_300, 9_400, 333_000)] == [65, 65, 129, 1025]
 
 
 def times_across_the_wrap():

@@ -72,6 +72,8 @@ class Workspace:
     class memory:
         size = engine_memory.LARGEST_WORDS
 
+    joints = 6
+
 
 class Engine:
     """Moves when told, ends when told; remembers what was asked of it."""
