@@ -1,8 +1,8 @@
 """How much memory the engine for an arm takes on the board: one formula for both sides.
 
 The board takes the memory of its engines once, when its program starts, and states in hello how much that is
-(``engine_room``), and for how many joints' objects there is heap besides (``engine_joints``). The memory is made of
-blocks, because a heap has few large ones. For each joint the engine takes from it a ring of edge times, and what the step
+(``engine_room``), and for how many joints' objects there is heap besides (``engine_joints``). It consists of blocks,
+because a heap has few large ones. For each joint the engine takes from it a ring of edge times, and what the step
 generator works in.
 """
 

@@ -37,6 +37,7 @@ from armtempo_board.stepgen import (  # noqa: E402
     subdivision,
     subintervals,
 )
+from armtempo_shared import engine_memory  # noqa: E402
 from armtempo_shared.motion import Motion  # noqa: E402
 
 from tests.benchmark.emulated import Machine  # noqa: E402

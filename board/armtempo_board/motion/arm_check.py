@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 def checked(data: bytes, room_words: int, most_joints: int) -> "Record":
     """(head, joints, crc32) of an arm record, as ``armrecord.unpack`` gives them.
 
-    ``room_words``, ``most_joints``: what an engine can have. Refused: BAD_RECORD where it is damaged, of another version, or names
-    what the board has not; NO_ROOM with the bytes needed where the engine for it does not fit.
+    ``room_words``, ``most_joints``: what an engine can have. Refused: BAD_RECORD where it is damaged, of another
+    version, or names what the board has not; NO_ROOM with the bytes needed.
     """
     try:
         head, joints, crc = armrecord.unpack(data)

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 class Workspace:
-    """``words``: of memory for rings and step generators; ``joints``: so many at most (``armtempo_shared.engine_memory``).
+    """``words`` of memory for rings and step generators, ``joints`` at most: see ``armtempo_shared.engine_memory``.
 
     The interrupts' callbacks belong to it, so they never hold what an engine had before.
     """
