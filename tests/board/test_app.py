@@ -19,7 +19,7 @@ def test_first_words_to_last_sample(name: str, tmp_path: Path) -> None:
     assert lines == expected
 
 
-@pytest.mark.parametrize("subject", ["commands", "storing", "runs", "faults", "prompt"])
+@pytest.mark.parametrize("subject", ["commands", "storing", "runs", "faults", "prompt", "start"])
 @pytest.mark.parametrize("name", interpreters.AVAILABLE)
 def test_cases(name: str, subject: str, tmp_path: Path) -> None:
     """Each case asserts by itself and prints its name when it holds."""
