@@ -1,4 +1,4 @@
-"""Who asks for MicroPython's prompt: a Ctrl-C (of mpremote, or typed twice) that is no noise and in no host's frames."""
+"""Whether MicroPython's prompt is asked for: a Ctrl-C (of mpremote, or typed twice) that is no noise, in no frame."""
 
 import os
 import time

@@ -17,7 +17,7 @@ SEED = 12
 
 @pytest.mark.parametrize("name", [name for name in interpreters.AVAILABLE if name == "micropython"])
 def test_arms_one_after_the_other(name: str, tmp_path: Path) -> None:
-    """Uploads, runs and removals of random arms, those that do not fit refused; ``tests.benchmark.room`` has a thousand."""
+    """Uploads, runs and removals of random arms; those that do not fit are refused."""
     print("seed", SEED)
     output = interpreters.run(name, SCRIPT, str(tmp_path / "flash"), str(CHANGES), str(SEED), heap="1M")
     used, largest, used_then, largest_then, taken, refused = map(int, output.split())

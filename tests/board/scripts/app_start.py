@@ -4,6 +4,7 @@ import struct
 import sys
 
 import stand_in
+
 from app_rig import ROOT, run  # isort: skip  it puts the stand-ins into place
 
 from armtempo_board.app import controller
