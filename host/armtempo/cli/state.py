@@ -17,6 +17,7 @@ def lines(state: BoardState) -> list[str]:
         f"arm       {_arm(state)}",
         f"free      {state.free_flash} bytes of flash, {state.free_heap} of heap",
         f"fastest   {state.max_rate} steps/s one joint, {state.max_rate_sum} all together",
+        f"engine    {state.room}",
         *motion_lines(state),
     ]
 
@@ -48,6 +49,8 @@ def _link(state: BoardState) -> str:
 
 
 def _arm(state: BoardState) -> str:
+    if state.arm_problem:
+        return state.arm_problem
     if not state.arm_crc:
         return "none yet; 'armtempo configure' sets the board up for one"
     record = f"{len(state.joints)} joints, record {state.arm_crc:08x}"

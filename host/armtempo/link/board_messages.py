@@ -29,6 +29,13 @@ class Hello:
     arm_crc: int
     program_crc: int
     boot: int
+    engine_room: int
+    """Bytes of memory that the engine for an arm can have (``armtempo_shared.engine_memory``)."""
+    engine_joints: int
+    """Joints that an engine can have."""
+    arm_problem: int
+    """Code of what is wrong with the stored arm record; 0 where it is in force or there is none."""
+    arm_value: int
     board_id: str
 
     @property

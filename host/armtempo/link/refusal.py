@@ -27,8 +27,6 @@ def refusal(what: str, code: int, joint: int = 255, value: int = 0) -> BoardErro
 def _words(name: str, where: str, value: int) -> str:
     if name == "too_long" and where:
         return f"its numbers reach {value}"
-    if name == "too_long" and value < MAX_MOTION_BYTES:
-        return f"{value} bytes, for which it has no memory free in one piece"
     if name == "too_long":
         return f"it takes {MAX_MOTION_BYTES} bytes at most"
     return f"{VALUES[name]}: {value}" if name in VALUES else str(value)

@@ -30,6 +30,11 @@ def arm_record(arm: Arm) -> bytes:
     return armrecord.pack(_head(arm), [_joint(joint) for joint in arm.driven])
 
 
+def step_rates(arm: Arm) -> list[int]:
+    """The highest step rates of the joints in the arm record, steps/s."""
+    return [_max_rate(joint) for joint in arm.driven]
+
+
 def motion_record(trajectory: Trajectory, arm: Arm, brake_s: float = 0.0) -> bytes:
     """The motion record (layout: ``armtempo_shared.motion``), tied to the arm by the checksum of its record.
 

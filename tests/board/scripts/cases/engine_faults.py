@@ -348,7 +348,7 @@ def case_close_and_anew():
     first.run_to(1_000_000)
     first.engine.close()
     assert first.commanded() == first.stepped()
-    engine = type(first.engine)(dict(HEAD, flags=flags), arm(2))
+    engine = type(first.engine)(dict(HEAD, flags=flags), arm(2), first.workspace)
     first.engine = engine
     engine.home(3, [0, 0])
     for pulses in first.pulses:

@@ -6,8 +6,8 @@ import cases
 import uctypes
 import virtual_board.standalone  # noqa: F401
 from armtempo_board.hardware import isr, pins
-from armtempo_board.hardware.ring import size
 from armtempo_board.stepgen import step_queue
+from armtempo_shared.engine_memory import ring_words
 from engine_rig import Rig, arm
 
 BLOCK = isr.BLOCK_HEAD + 6 * isr.JOINT_WORDS
@@ -111,14 +111,14 @@ def case_written_and_wrapped():
 
 
 def case_sizes():
-    """A ring lasts at least 4 ms at a joint's highest rate, or is of the largest size."""
+    """A ring lasts at least 3 ms at a joint's highest rate, or is of the largest size."""
     previous = 64
     for rate in (0, 1, 1796, 1900, 3592, 4100, 8000, 20_000, 34_000, 333_000):
-        entries = size(rate)
+        entries = ring_words(rate) - 1
         assert entries in (64, 128, 256, 512, 1024) and entries >= previous
-        assert entries == 1024 or (entries - 8) * 1000 >= 2 * rate * 4, rate
+        assert entries == 1024 or (entries - 8) * 1000 >= 2 * rate * 3, rate
         previous = entries
-    assert (size(0), size(7_000), size(8_000), size(333_000)) == (64, 64, 128, 1024)
+    assert [ring_words(rate) for rate in (0, 9_300, 9_600, 333_000)] == [65, 65, 129, 1025]
 
 
 def case_times_across_the_wrap():

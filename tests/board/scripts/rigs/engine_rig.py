@@ -57,13 +57,16 @@ class StepGenerator:
     latest_kiticks = step_generator.StepGenerator.latest_kiticks
     write = step_generator.StepGenerator.write
 
-    def __init__(self):
+    def __init__(self, memory):
         self.ended = True
         self.at_turn = False
         self.direction = 1
         self.queue = array("i", bytes(4 * step_queue.QUEUE_SIZE))
 
     subintervals = None
+
+    def close(self):
+        """There is no file."""
 
     def load(self, motion, joint, position, pulse, gap):
         """Stand before the first step."""
@@ -245,8 +248,15 @@ class Rig:
             Pulses(self, joint, pins.STEP[joint["channel"]][0], pins.DIR[joint["channel"]])
             for joint in joints
         ]
-        self.engine = armtempo_board.motion.engine.Engine(self.head, joints)
+        self.workspace = self._workspace()
+        self.engine = armtempo_board.motion.engine.Engine(self.head, joints, self.workspace)
         self.engine.home((1 << len(joints)) - 1, [0] * len(joints))
+
+    @staticmethod
+    def _workspace():
+        from armtempo_board.motion.workspace import Workspace
+
+        return Workspace(12 * 1026, 6)
 
     # a world for the board
 
