@@ -25,6 +25,7 @@ ORDER = (
     "planning",  # from a job to a plan
     "records",  # arm and motion as the board takes them
     "arm_check",  # what looks wrong about an arm and a job
+    "new_project",  # a folder for an arm of one's own
     "simulator",  # the virtual board
     "link",  # port, session, commands, samples of a run
     "deploy",  # the board program onto a board

@@ -18,6 +18,7 @@ from armtempo.errors import INTERRUPTED, ArmtempoError
 
 COMMANDS = (
     "demo",
+    "new",
     "plan",
     "ik",
     "fk",

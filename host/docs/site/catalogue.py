@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import click
+from armtempo.cli import main
+from armtempo_shared import meanings
 from docutils import nodes
 from docutils.parsers.rst import Directive
 from sphinx.application import Sphinx
-
-from armtempo.cli import main
-from armtempo_shared import meanings
 
 
 class BoardCodes(Directive):
@@ -17,7 +16,8 @@ class BoardCodes(Directive):
     def run(self) -> list[nodes.Node]:
         """One table."""
         rows = [
-            (str(code), name, meaning, cure) for code, (name, meaning, cure) in sorted(meanings.ERRORS.items())
+            (str(code), name, meaning, cure)
+            for code, (name, meaning, cure) in sorted(meanings.ERRORS.items())
         ]
         return [table(("number", "name", "what it means", "what to do"), rows)]
 
@@ -36,7 +36,9 @@ class Commands(Directive):
         context = click.Context(command, info_name=name, parent=group)
         section = nodes.section(ids=[nodes.make_id(name)], names=[name])
         section += nodes.title(text=name)
-        section += nodes.literal_block(text=command.get_usage(context).removeprefix("Usage: "), language="text")
+        section += nodes.literal_block(
+            text=command.get_usage(context).removeprefix("Usage: "), language="text"
+        )
         for paragraph in (command.help or "").split("\n\n"):
             section += nodes.paragraph(text=" ".join(paragraph.replace("\b", "").split()))
         records = [parameter.get_help_record(context) for parameter in command.params]
@@ -50,7 +52,9 @@ def table(heads: tuple[str, ...], rows: list[tuple[str, ...]]) -> nodes.table:
     group = nodes.tgroup(cols=len(heads))
     group += [nodes.colspec(colwidth=1) for _ in heads]
     group += nodes.thead("", row([nodes.Text(head) for head in heads]))
-    group += nodes.tbody("", *(row([nodes.literal(text=name), *map(nodes.Text, rest)]) for name, *rest in rows))
+    group += nodes.tbody(
+        "", *(row([nodes.literal(text=name), *map(nodes.Text, rest)]) for name, *rest in rows)
+    )
     return nodes.table("", group)
 
 
