@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 from armtempo import deploy
 from armtempo.errors import InputError, LinkError
-from armtempo.link import diagnose, ports
+from armtempo.link import diagnose
 from armtempo.link.transport import SerialTransport
+from armtempo.ports import listing, names
 
 
 class Silent:
@@ -25,6 +26,8 @@ class Silent:
         return data
 
     def write(self, data: bytes) -> None: ...
+
+    def wake(self) -> None: ...
 
     def close(self) -> None: ...
 
@@ -70,7 +73,7 @@ def test_port_in_use() -> None:
 
 
 def test_found_ports_put_boards_first() -> None:
-    found = ports.find_ports()
+    found = listing.find_ports()
     assert [port.board for port in found] == sorted([port.board for port in found], reverse=True)
 
 
@@ -81,4 +84,4 @@ def test_what_is_no_serial_port_is_said_to_be_none(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=f"{path} is not a serial port"):
             SerialTransport(str(path))
     with pytest.raises(InputError, match="names no folder"):
-        ports.sim_flash("sim:")
+        names.sim_flash("sim:")

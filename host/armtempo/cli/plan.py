@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import chosen, options
 from armtempo.cli.progress import ProgressBar
 
 
@@ -19,8 +19,10 @@ from armtempo.cli.progress import ProgressBar
     "--output",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="Trajectory file to write; without it the job's name with .json.",
+    help="Trajectory file to write; without it the job's name with .json. An existing FILE is only replaced where "
+    "it is an earlier plan of the same job for the same arm, by their names.",
 )
+@options.force("any other FILE too")
 @click.option("--timing", type=click.Choice(["per-joint", "shared"]), help="Instead of the job's timing.")
 @click.option("--degree", type=click.Choice(["3", "5"]), help="Instead of the job's spline degree.")
 @click.option(
@@ -33,24 +35,31 @@ from armtempo.cli.progress import ProgressBar
 @click.option("--population", type=click.IntRange(4), help="Instead of the job's population.")
 @click.option("--iterations", type=click.IntRange(1), help="Instead of the job's iterations.")
 @click.option("--seed", type=click.IntRange(0), help="Instead of the job's seed.")
-def command(job_path: Path | None, arm_path: Path | None, output: Path | None, **changes: Any) -> None:
-    """Plan a job and write its trajectory file."""
+def command(
+    job_path: Path | None, arm_path: Path | None, output: Path | None, force: bool, **changes: Any
+) -> None:
+    """Plan a job and write its trajectory file.
+
+    Where neither an arm nor a job is named, this plans the demo's job for the arm that ships with armtempo.
+    """
     from dataclasses import replace
 
     from armtempo import pipeline
     from armtempo.errors import PlanError
+    from armtempo.formats.atomic_file import check_not_input
     from armtempo.planning import checks
 
-    arm = options.load_arm(arm_path)
-    job = options.load_job(job_path, arm)
+    arm, job = chosen.arm_and_job(arm_path, job_path)
     given = {name: value for name, value in changes.items() if value is not None}
     if "degree" in given:
         given["degree"] = int(given["degree"])
     job = replace(job, **given)
+    target = output or Path(f"{job.name}.json")
+    check_not_input(target, (job.source, arm.source))
     with ProgressBar("planning") as progress:
         plan = pipeline.plan(arm, job, progress)
-    target = output or Path(f"{job.name}.json")
-    plan.save(target)
+    plan.save(target, force)
+    click.echo(f"arm: {chosen.words(arm)}")
     for line in pipeline.summary(plan):
         click.echo(line)
     click.echo(f"written: {target}")

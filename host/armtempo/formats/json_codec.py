@@ -16,6 +16,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from armtempo.errors import InputError
+from armtempo.formats.spelling import did_you_mean
 
 ADDED = {"added": True}
 """Metadata of a dataclass field that older files do not have; its default is what they meant."""
@@ -107,7 +108,8 @@ def _dataclass(kind: Any, value: Any, where: str) -> Any:
     missing = {name for name, added in fields.items() if name not in value and not added}
     for what, keys in (("unknown", value.keys() - fields.keys()), ("missing", missing)):
         if keys:
-            raise InputError(f"{where}: {what} key {', '.join(sorted(keys))}")
+            meant = did_you_mean(min(keys), fields) if what == "unknown" else ""
+            raise InputError(f"{where}: {what} key {', '.join(sorted(keys))}{meant}")
     hints = _hints(kind)
     return kind(
         **{name: decode(hints[name], value[name], f"{where}.{name}") for name in fields if name in value}

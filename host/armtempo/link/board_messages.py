@@ -9,6 +9,8 @@ from typing import Any
 from armtempo_shared import wire
 from armtempo_shared.limits import TICK_HZ
 
+from armtempo.virtual_id import is_virtual
+
 
 @dataclass(frozen=True)
 class Hello:
@@ -27,6 +29,11 @@ class Hello:
     program_crc: int
     boot: int
     board_id: str
+
+    @property
+    def virtual(self) -> bool:
+        """Whether it is a virtual board."""
+        return is_virtual(self.board_id)
 
 
 @dataclass(frozen=True)

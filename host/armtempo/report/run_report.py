@@ -218,8 +218,10 @@ def _origin(sheet: html_page.Page, found: Evaluation) -> None:
     meta = found.run.meta
     sheet.heading("How to repeat it")
     sheet.code("armtempo run trajectory.json --repeat " + str(len(found.run.repetitions)))
-    known = [(key, meta[key]) for key in ("port", "board") if key in meta]
-    plan_section.origin(sheet, found.plan, [(key, _flat(value)) for key, value in known])
+    known: list[tuple[str, str]] = [(key, _flat(meta[key])) for key in ("port", "board") if key in meta]
+    if "virtual" in meta:
+        known.append(("virtual board", "yes" if meta["virtual"] else "no"))
+    plan_section.origin(sheet, found.plan, known)
 
 
 def _flat(value: object) -> str:
