@@ -36,6 +36,7 @@ ORDER = (
     "runs",  # run folders and what the samples say
     "report",  # pages, plots, tables
     "robot",  # a board in use: home, go, run, stop
+    "doctor",  # what a fault report needs to know
     "pipeline",  # plan, load, run, report
     "research",  # comparison of searches, the paper repeated
     "cli",
