@@ -18,6 +18,7 @@ LEAVES = {
     "pen.py": "pen.png",
     "ros_trajectory.py": "feed.yaml",
     "sweep.py": "sweep.csv",
+    "animate.py": "arm.gif",
     "plan_and_plot.ipynb": "reach.png",
 }
 ARGUMENTS = {"sweep.py": ["--jobs", "6"]}
