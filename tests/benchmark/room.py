@@ -192,6 +192,8 @@ def changes(elf: Path, with_library: bool, count: int, seed: int = 12) -> None:
     outcome = drive(elf, with_library, session, limit_s=3600.0)
     told = [(used, free) for name, used, free in outcome.stages if name == "changed"]
     memory = sum(code in ("no_memory", "failed") for _, code, _ in outcome.refusals)
+    if memory:
+        print(re.sub(r"@ answer.*\n", "", outcome.said)[:0], outcome.refusals[:8])
     print(f"seed {seed}: {len(told)} arms; first {told[0]}, last {told[-1]}; out of memory {memory} times")
 
 
