@@ -304,7 +304,7 @@ class Controller:
 
     def load(self, name: str, crc: "int | None" = None) -> "MotionFile":
         """The stored motion, checked as far as its head and checksum go, or refused."""
-        motion = self.store().motion(name)
+        motion: MotionFile = self.store().motion(name)
         if crc is not None and motion.crc != crc:
             raise Refused(codes.BAD_CHECKSUM)
         if motion.arm_crc != self.arm_crc:
