@@ -61,7 +61,7 @@ ALL = (*COMPILED, subintervals, interval_steps, step_generator)
 
 
 class Arrays:
-    """In the place of ``armtempo_board.memory.Memory``: every part is an array of its own, as the emulator maps them."""
+    """In the place of ``armtempo_board.memory.Memory``: every part is an array of its own, as the emulator wants it."""
 
     def take(self, words: int) -> Any:
         """So many words."""
