@@ -4,10 +4,6 @@ from array import array
 
 from micropython import const
 
-TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from typing import Any
-
 _PIECE_WORDS = const(64)
 
 
@@ -24,7 +20,7 @@ class Memory:
         for number in range(len(self._taken)):
             self._taken[number] = 0
 
-    def take(self, words: int) -> "Any":
+    def take(self, words: int) -> "memoryview[int]":
         """A part of so many words, signed, all 0, from the first block that has them; MemoryError where none has."""
         for number, block in enumerate(self._blocks):
             begin = self._taken[number]

@@ -137,4 +137,5 @@ class Motion(MotionHead):
 
     def stream(self, offset: int) -> "BinaryIO":
         """See ``MotionHead``."""
-        return io.BytesIO(self.data[offset:])
+        found: BinaryIO = io.BytesIO(self.data[offset:])
+        return found

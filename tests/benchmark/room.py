@@ -81,6 +81,7 @@ class Session:
         self.command("start", (0, wire.record_crc(motion)), b"go")
         self.stage("moving")
         self.command("stop", (1,))
+        self.command("clear")
 
 
 def arm_record(rates: list[int]) -> bytes:
@@ -159,6 +160,8 @@ def _outcome(said: str) -> Outcome:
         name, *_ = entry = wire.EVENT_BY_ID[number]
         if name in ("ok", "error"):
             replies.append((name, wire.decode(entry, payload)[0]))
+        elif name == "notice":
+            print(payload.decode())
     return Outcome(
         [(name, int(used) - int(own[1]), 16 * int(free)) for name, used, free in found], replies, said
     )
@@ -186,12 +189,15 @@ def changes(elf: Path, with_library: bool, count: int, seed: int = 12) -> None:
         arm = arm_record([rng.randrange(1_000, 240_001) for _ in range(rng.randrange(1, 7))])
         if number % (count - 1) == 0:
             arm = arm_record([20_000] * 3)
-        session.run(arm, motion_record(arm, rng.randrange(5, 60)))
+        session.run(arm, motion_record(arm, rng.randrange(5, 16)))
         session.command("remove", (), b"go")
         session.stage("changed")
     outcome = drive(elf, with_library, session, limit_s=3600.0)
     told = [(used, free) for name, used, free in outcome.stages if name == "changed"]
     memory = sum(code in ("no_memory", "failed") for _, code, _ in outcome.refusals)
+    for number, code, _ in outcome.refusals:
+        if code in ("no_memory", "failed"):
+            print(f"command {number}, {session.sent[number]}: {code}")
     print(f"seed {seed}: {len(told)} arms; first {told[0]}, last {told[-1]}; out of memory {memory} times")
 
 

@@ -23,8 +23,7 @@ def test_arms_one_after_the_other(name: str, tmp_path: Path) -> None:
     used, largest, used_then, largest_then, taken, refused = map(int, output.split())
     assert used_then - used < 1024
     assert largest_then >= largest - 64
-    assert taken > 5
-    assert refused > 5
+    assert min(taken, refused) > 5
 
 
 def test_what_fits() -> None:

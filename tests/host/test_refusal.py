@@ -71,7 +71,6 @@ def test_what_has_no_number_or_joint_says_none() -> None:
 @pytest.mark.parametrize(
     ("joint", "value", "words"),
     [
-        (255, 9352, "9352 bytes, for which it has no memory free in one piece"),
         (255, MAX_MOTION_BYTES, "it takes 16384 bytes at most"),
         (0, 1 << 38, "its numbers reach 274877906944"),
     ],

@@ -94,15 +94,9 @@ class Commands:
         handler = row[_HANDLER]
         size = self._store(handler, row, length) if isinstance(handler, str) else handler(row, length)
         if self.controller.arm_waits:
-            self._take_arm()
+            self.controller.take_new_arm()
         self.controller.refill()
         self._link.answer(self._ok, _ANSWER_AT - PAYLOAD_AT + (size or 0))
-
-    def _take_arm(self) -> None:
-        controller = self.controller
-        controller.configure()
-        if controller.arm_problem:
-            raise Refused(controller.arm_problem, value=controller.arm_value)
 
     def _store(self, name: str, row: tuple, length: int) -> "int | None":
         from armtempo_board.app import store_commands  # here, so that it can be forgotten

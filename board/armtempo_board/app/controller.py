@@ -154,15 +154,54 @@ class Controller:
             self.arm_problem = codes.NO_MEMORY if isinstance(error, MemoryError) else codes.FAILED
         heap.forget()
 
-    def _stored_arm(self) -> "ArmRecord":
-        """Its frames are gone when the engine is made: what they leave on the stack would keep the store in memory."""
+    def take_new_arm(self) -> None:
+        """Take the arm record that was uploaded; Refused where it cannot be, and the one in force stays that.
+
+        Step by step, so that never more than one of store, check and engine needs memory. Each step is a function of
+        its own: what its frame leaves on the stack would keep its modules in memory.
+        """
+        self.arm_waits = False
+        data = self._new_arm()
         try:
-            return self.judged(self.store().read(ARM_RECORD_NAME))
+            record = self._judged(data)
+        except Refused:
+            self._decide(False)
+            raise
+        self._decide(True)
+        self.arm_problem = self.arm_value = 0
+        try:
+            self._take_arm(record)
+        except Exception:
+            self._drop_engine()
+            raise
+        heap.forget()
+
+    def _new_arm(self) -> bytes:
+        try:
+            return bytes(self.store().new_arm())
+        finally:
+            self._store = None
+            heap.forget()
+
+    def _decide(self, is_fit: bool) -> None:
+        heap.forget()
+        from armtempo_board.storage import store  # here, so that it can be forgotten
+
+        store.Store(self._root, recover=False).take_arm(is_fit)
+        heap.forget()
+
+    def _stored_arm(self) -> "ArmRecord":
+        return self._judged(self._stored_bytes())
+
+    def _stored_bytes(self) -> bytes:
+        try:
+            return bytes(self.store().read(ARM_RECORD_NAME))
         finally:
             self.forget_store()
+            heap.forget()
 
-    def judged(self, data: bytes) -> "ArmRecord":
-        """An arm record that can be taken: head, joints, crc32; else Refused, and the one in force stays that."""
+    def _judged(self, data: bytes) -> "ArmRecord":
+        """An arm record that can be taken: head, joints, crc32; else Refused."""
         from armtempo_board.motion import arm_check  # here, so that it can be forgotten
 
         return arm_check.checked(data, self._workspace.memory.size, self._workspace.joints)
@@ -265,7 +304,7 @@ class Controller:
 
     def load(self, name: str, crc: "int | None" = None) -> "MotionFile":
         """The stored motion, checked as far as its head and checksum go, or refused."""
-        motion = self.store().motion(name)
+        motion: MotionFile = self.store().motion(name)
         if crc is not None and motion.crc != crc:
             raise Refused(codes.BAD_CHECKSUM)
         if motion.arm_crc != self.arm_crc:

@@ -51,7 +51,7 @@ def put_commit(commands: "Caller", row: tuple, length: int) -> None:
     """Check it and put it in place; an arm record is taken when this has returned."""
     (crc,) = commands.fields(row)
     controller = commands.controller
-    controller.arm_waits = controller.store().commit(crc, controller.judged) == ARM_RECORD_NAME
+    controller.arm_waits = controller.store().commit(crc) == ARM_RECORD_NAME
 
 
 def list(commands: "Caller", row: tuple, length: int) -> int:

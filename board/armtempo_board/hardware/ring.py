@@ -99,7 +99,7 @@ class Ring:
         self.state[isr.MATCHED] = 0
         self.state[isr.NDTR_AT_START] = self.entries
 
-    def run(self, queue: "array[int]") -> int:
+    def run(self, queue: "memoryview[int]") -> int:
         """Take in what was written from entry 0 on, switch the stream on and let the output toggle.
 
         1 where the first entry came too late. ``queue``: see step_queue.py.

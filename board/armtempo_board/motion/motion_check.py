@@ -33,8 +33,6 @@ from armtempo_board.stepgen.subdivision import (
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from array import array
-
     from armtempo_shared.motion import MotionHead
 
     from armtempo_board.stepgen.subintervals import Subintervals
@@ -178,7 +176,7 @@ class Judge:
         return codes.TOO_ABRUPT
 
 
-def _acceleration(angle: "array[int]", time: "array[int]") -> "tuple[int, int]":
+def _acceleration(angle: "memoryview[int]", time: "memoryview[int]") -> "tuple[int, int]":
     """An upper bound of |angle'' / time'**2 - angle' time'' / time'**3|, steps/tick**2: (numerator, denominator)."""
     least = time[LEAST] - DIFFERENCE_BIAS
     most = max(abs(angle[LEAST] - DIFFERENCE_BIAS), abs(angle[MOST] - DIFFERENCE_BIAS))
@@ -188,6 +186,6 @@ def _acceleration(angle: "array[int]", time: "array[int]") -> "tuple[int, int]":
     return (numerator << scale, denominator) if scale >= 0 else (numerator, denominator << -scale)
 
 
-def _second_difference(measures: "array[int]") -> int:
+def _second_difference(measures: "memoryview[int]") -> int:
     """The greatest second difference of the points, absolute."""
     return max([abs(measures[i + 1] - measures[i]) for i in range(FIRST_DIFFERENCE, LAST_DIFFERENCE)])

@@ -19,6 +19,7 @@ from armtempo_board.stepgen.step_queue import emit
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from array import array
+    from typing import Any
 
 _PERIOD_TICKS = const(42000)
 _CR1 = const(0)  # of TIM6
@@ -35,7 +36,7 @@ class RingFeeder:
 
     def connect(self, inputs: Inputs, joints: "list[JointDrive]") -> None:
         """Feed the joints' rings; ``inputs`` freezes all where one was written too late."""
-        self._inputs: "Inputs | None" = inputs
+        self._inputs: "Any" = inputs
         self._words = [joint.ring.words for joint in joints]
         self._masks = [joint.ring.entries - 1 for joint in joints]
         self._states = [joint.ring.state for joint in joints]

@@ -31,7 +31,7 @@ class ControlPoints:
 
     def __init__(self, words: "memoryview") -> None:
         self.words = words
-        self._fresh = words[_FRESH_AT:]
+        self._fresh = memoryview(words)[_FRESH_AT:]
         self._stream: "Any" = None
         self._end = 0
         self._degree = 0

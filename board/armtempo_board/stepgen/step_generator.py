@@ -124,7 +124,7 @@ class StepGenerator:
                 return False
         return True
 
-    def write(self, ring: "array[int]", mask: int, head: int, room: int) -> int:
+    def write(self, ring: "array[int] | memoryview[int]", mask: int, head: int, room: int) -> int:
         """Write up to ``room`` edge times (rise, fall, ...; ticks modulo 2**32) to ``ring`` from ``head`` on.
 
         ``ring``: array('I') of ``mask`` + 1 entries, ``head`` even. Returns how many were written.
@@ -132,11 +132,11 @@ class StepGenerator:
         queue = self.queue
         queue[step_queue.HEAD] = head
         emit(room, ring, queue, mask)
-        return queue[step_queue.HEAD] - head
+        return int(queue[step_queue.HEAD] - head)
 
     def latest_kiticks(self) -> int:
         """Time of the last step in the queue."""
-        return self.queue[LATEST_KITICKS]
+        return int(self.queue[LATEST_KITICKS])
 
     def waits(self) -> bool:
         """Whether steps wait in the queue."""

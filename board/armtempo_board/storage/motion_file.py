@@ -28,7 +28,7 @@ class MotionFile(MotionHead):
 
     def stream(self, offset: int) -> "BinaryIO":
         """See ``MotionHead``."""
-        file = open(self._path, "rb")  # noqa: SIM115  who asked closes it
+        file: BinaryIO = open(self._path, "rb")  # noqa: SIM115  who asked closes it
         file.seek(offset)
         return file
 
@@ -40,7 +40,7 @@ def stated_crc(path: str, length: int) -> int:
     left = length - _CRC_BYTES
     with open(path, "rb") as file:
         while left > 0:
-            count = file.readinto(piece[: min(left, _PIECE)])  # type: ignore[attr-defined]
+            count = file.readinto(piece[: min(left, _PIECE)])
             if not count:
                 raise MotionError("too short")
             crc = crc32(piece[:count], crc)

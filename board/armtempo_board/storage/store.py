@@ -67,13 +67,15 @@ def _check_crc(data: bytes, crc: int) -> None:
 class Store:
     """The folder ``root``; every method refuses with FLASH_ERROR or FLASH_FULL where the flash fails."""
 
-    def __init__(self, root: str) -> None:
+    def __init__(self, root: str, recover: bool = True) -> None:
+        """``recover``: nothing is under way that another object began."""
         self._root = root
         self._file: "Any" = None  # the upload under way,
         self._target = ""  # its file name,
         self._size = 0  # bytes announced
         self._received = 0  # and received so far
-        self.recover()
+        if recover:
+            self.recover()
 
     def recover(self) -> None:
         """Make the folder if it is missing, finish or undo what a power cut interrupted."""
@@ -127,10 +129,10 @@ class Store:
             self._received += len(fresh)
         return self._received
 
-    def commit(self, crc: int, judge: "Callable[[bytes], object]") -> str:
+    def commit(self, crc: int) -> str:
         """Check the upload as it stands in the flash and put it in place; returns the record's name.
 
-        ``judge``: is called with an arm record before it takes the old one's place, and may refuse it.
+        An arm record is not put in place before it is judged: see ``take_arm``.
         """
         if not self._file or self._received != self._size:
             raise Refused(codes.BAD_OFFSET, value=self._received)
@@ -138,16 +140,27 @@ class Store:
         try:
             self._close()
             if name == _ARM:
-                data = self._read(name + _NEW)
-                _check_crc(data, crc)
-                judge(data)
+                _check_crc(self._read(name + _NEW), crc)
             else:
                 self._check_motion(name + _NEW, crc)
         except Refused:
             self._discard(name + _NEW)
             raise
+        if name == _ARM:
+            return ARM_RECORD_NAME
         self._replace(name)
-        return ARM_RECORD_NAME if name == _ARM else name[: -len(_MOTION)]
+        return name[: -len(_MOTION)]
+
+    def new_arm(self) -> bytes:
+        """The arm record that was uploaded and waits to be judged."""
+        return self._read(_ARM + _NEW)
+
+    def take_arm(self, is_fit: bool) -> None:
+        """Put it in place, or give it up."""
+        if is_fit:
+            self._replace(_ARM)
+        else:
+            self._discard(_ARM + _NEW)
 
     def abandon(self) -> None:
         """Give up the upload under way, if any."""

@@ -23,7 +23,8 @@ def put(place, file_name, data):
     place.begin(file_name, len(data))
     for at in range(0, len(data), 100):
         place.write(at, data[at : at + 100])
-    place.commit(wire.record_crc(data), lambda record: None)
+    if place.commit(wire.record_crc(data)) == wire.ARM_RECORD_NAME:
+        place.take_arm(True)
 
 
 def fresh(undone=False):
