@@ -61,11 +61,27 @@ def faults(plan: Plan, at_via_deg: float = 1e-7, points: int = POINTS) -> list[s
         if at.angle_deg.min() < low - 1e-9 * size or at.angle_deg.max() > high + 1e-9 * size:
             found.append(f"{joint.name}: leaves its range")
         found += _at_vias(plan, number, at_via_deg * size)
+        found += _at_stops(plan, number)
         ends = np.abs(at.rates[: 2 if spline.degree == 5 else 1][:, [0, -1]])
         if np.any(ends > 1e-5 * np.array(joint.limits.values)[: len(ends), None]):
             found.append(f"{joint.name}: is not at rest at its ends")
         if shared and not np.array_equal(spline.time_points_s, plan.trajectory.joints[0].time_points_s):
             found.append(f"{joint.name}: has a time axis of its own")
+    return found
+
+
+def _at_stops(plan: Plan, number: int) -> list[str]:
+    """Dwells that are shorter than asked for, or in which the joint moves."""
+    spline, found = plan.trajectory.joints[number], []
+    time = _bspline(spline.time_points_s, spline.degree, 1.0)
+    angle = _bspline(spline.angle_points_deg, spline.degree, 1.0)
+    for stop in plan.job.stops:
+        if stop.dwell_s and spline.via_segments:
+            u = float(spline.via_segments[stop.via]) + np.linspace(0.0, 5.0, 21)
+            lasts_s = float(time(u[-1]) - time(u[0]))
+            moves_deg = float(np.ptp(angle(u)))
+            if lasts_s < stop.dwell_s * (1 - 1e-9) or moves_deg > 1e-9 * max(1.0, np.abs(angle(u)).max()):
+                found.append(f"joint {number + 1}: dwells for {lasts_s:.9g} s and moves {moves_deg:.2e} deg")
     return found
 
 

@@ -39,9 +39,11 @@ def test_the_shipped_motion_is_5_percent_faster_and_keeps_everything() -> None:
     assert plan.searches[0].floor_kind == "vias"
 
 
-@pytest.mark.parametrize("seed", [1, 3, 4, 5, 8, 12])
+@pytest.mark.parametrize("seed", [1, 3, 5, 12, 79, 83, 92])
 def test_random_jobs_keep_their_limits_and_pass_their_via_points(seed: int) -> None:
-    """More of them: tests/benchmark/random_plans.py."""
+    """More of them: tests/benchmark/random_plans.py. The last three have repeated via points, and a dwell at angles
+    that hardly differ; there rounding exceeded limits, and the dwell came out too short.
+    """
     arm, job = problems.random_free_problem(seed)
     if np.all(np.ptp(job.via, axis=0) == 0):
         return

@@ -18,7 +18,7 @@ from armtempo.planning import angle_bounds, collocation
 from armtempo.planning.collocation import Curve, Points
 from armtempo.planning.layout import DEGREE, DWELL_SEGMENTS, Layout, Vias
 from armtempo.planning.limit_rows import LimitRows
-from armtempo.planning.motion_program import Block, MotionProgram, time_weights
+from armtempo.planning.motion_program import Block, MotionProgram, mean_slopes, time_weights
 from armtempo.planning.tool import Tool
 from armtempo.planning.tool_rows import ToolRows, ToolTargets
 from armtempo.planning.variables import MotionVariables, time_points
@@ -34,6 +34,9 @@ _AWAY = 1.01
 """Time is stretched by this before each solve, so that it starts within the limits."""
 _SMOOTHING, _SMOOTHED = 0.075, 0.1
 """Weight of steps between time differences in the first solve, for one segment and via point; part of it later."""
+_LEAST_STEP = 1e-3
+"""Least difference of time control points, as a part of their mean: where time all but stands still, what rounding does
+to the angles is divided by its cube."""
 _FIRST = Schedule(first_barrier=1e-2, last_barrier=1e-4, curvature=False)
 _AGAIN = Schedule(first_barrier=1e-3, last_barrier=1e-4, curvature=False)
 _AT_END = 1e-6
@@ -130,8 +133,17 @@ class FreeMotion:
         return self.slower(self.curve(limits).stretch())
 
     def slower(self, factor: float) -> FreeMotion:
-        """The same with time scaled."""
-        return replace(self, differences_s=self.differences_s * factor)
+        """The same with time scaled, but not in dwells, which the one difference that acts on them alone makes up for.
+
+        Where that would have to be below 0, the dwell lasts longer.
+        """
+        differences = self.differences_s * factor
+        weights = np.convolve(np.ones(DWELL_SEGMENTS), mean_slopes(DEGREE))
+        for knot, dwell_s in self.layout.dwells.items():
+            own = knot + DEGREE - 1
+            lasts_s = float(weights @ differences[knot : knot + len(weights)])
+            differences[own] = max(differences[own] + dwell_s - lasts_s, _LEAST_STEP * differences[own])
+        return replace(self, differences_s=differences)
 
 
 def bounds(demand: Demand, layout: Layout) -> tuple[Array, Array]:
@@ -254,10 +266,10 @@ class Improver:
         if self._targets is not None and self.demand.tool is not None:
             blocks.append(ToolRows(self.variables, self.demand.tool, self._targets, self._size))
         smoothing = self._smoothing() * (1.0 if first else _SMOOTHED)
-        program = MotionProgram(self.variables, blocks, self.equalities(unit_s), smoothing)
-        start = self.variables.pack(
-            motion.angle_points_deg / self._size, motion.differences_s / unit_s * _AWAY
-        )
+        steps = motion.differences_s / unit_s * _AWAY
+        least = min(_LEAST_STEP, 0.5 * float(steps.min()))
+        program = MotionProgram(self.variables, blocks, self.equalities(unit_s), smoothing, least)
+        start = self.variables.pack(motion.angle_points_deg / self._size, steps)
         x = interior_point.minimise(program, start, _FIRST if first else _AGAIN).x
         x = met(self.variables, program.equalities, x)
         return replace(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from armtempo_shared import motion as record
 from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS
@@ -22,12 +24,15 @@ from armtempo.planning.time_parameterization import MIN_DURATION_S
 from armtempo.planning.tool import Tool
 from armtempo.planning.variables import time_points
 from armtempo.progress import Progress, part
+from armtempo.splines import extremes
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
 _BEYOND = 2.0
 """A free path is kept within so many times what its via points span on each side of them."""
 _WORTH_USING = 1e-3
 """A tolerance of less than so many mm or degrees is not made use of."""
+_ROUNDED = 1.001
+"""Time is stretched by no more than this for what rounding does."""
 _WIDER = 0.5 * checks.TOLERANCE
 """Ranges are widened by so much of themselves, so that a via point at their end is inside."""
 
@@ -48,7 +53,7 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
             pieces = free_path.automatic_pieces(len(via_deg) - 1, most)
         effort = Effort(pieces, most, job.starts, np.random.default_rng([job.seed, joints[0]]))
         found.append(free_path.shortest(demand, effort, part(progress, number, len(groups)) or progress))
-    trajectory = _trajectory(job, via_deg, groups, found)
+    trajectory = _kept(arm, _trajectory(job, via_deg, groups, found))
     points = np.stack([joint.angle_points_deg for joint in trajectory.joints], axis=1)
     checks.check_ranges(arm, points, DEGREE)
     searches = tuple(
@@ -126,6 +131,21 @@ def _trajectory(job: Job, via_deg: Array, groups: list[list[int]], found: list[S
             still = np.full(longest.layout.segments + DEGREE, via_deg[0, joint])
             joints.append(_spline(longest, still))
     return Trajectory(job.name, tuple(joints), job.timing == "shared")
+
+
+def _kept(arm: Arm, trajectory: Trajectory) -> Trajectory:
+    """The same, slower by the little that rounding of its control points may have done to its limits."""
+    factors = []
+    for spline, joint in zip(trajectory.joints, arm.driven, strict=True):
+        excess = extremes.of_joints((spline,))[0].values / np.array(joint.limits.values)
+        factors.append(float(np.max(excess ** (1.0 / np.arange(1, 4)))))
+    if trajectory.shared:
+        factors = [max(factors)] * len(factors)
+    joints = (
+        replace(spline, time_points_s=spline.time_points_s * factor) if 1.0 < factor < _ROUNDED else spline
+        for spline, factor in zip(trajectory.joints, factors, strict=True)
+    )
+    return replace(trajectory, joints=tuple(joints))
 
 
 def _joint(motion: FreeMotion, column: int) -> JointSpline:

@@ -39,7 +39,8 @@ class MotionProgram:
     """Motion time a segment plus the squared steps between neighbouring time differences, weighted.
 
     Angle and time may be traded against each other wherever the arm does not notice; the ``smoothing`` of each
-    step, (S + k - 2,), decides between such motions. ``blocks``: the inequalities besides differences above 0.
+    step, (S + k - 2,), decides between such motions. ``blocks``: the inequalities besides time differences above
+    ``least``.
     """
 
     def __init__(
@@ -48,11 +49,14 @@ class MotionProgram:
         blocks: Sequence[Block],
         equalities: Equalities,
         smoothing: Array | None = None,
+        least: float = 0.0,
     ) -> None:
         self.variables, self.equalities = variables, equalities
         index = variables.difference_index
-        above = np.zeros(len(index))
-        positive = LinearRows(variables.size, index[:, None], np.ones((len(index), 1)), above, above + np.inf)
+        above = np.full(len(index), least)
+        positive = LinearRows(
+            variables.size, index[:, None], np.ones((len(index), 1)), above, np.full(len(index), np.inf)
+        )
         self.blocks: list[Block] = [*blocks, positive]
         self._smoothing = np.zeros(len(index) - 1) if smoothing is None else smoothing
         self._time = np.zeros(variables.size)
