@@ -1,20 +1,25 @@
 # make demo: plan the paper's feeding motion and replay it on the virtual board
 # make test: bring the interpreters, run all tests
+# make quick: those that take less than a minute together, for the inner loop of work
 # make check: lint and types
+# make docs: the documentation site, in build/site
 # Each sets up its own environment in .venv; nothing outside the checkout is touched.
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test check clean
+.PHONY: demo test quick check docs clean
 
 demo: $(VENV)/demo
 	"$(BIN)/armtempo" demo
 
 test: $(VENV)/test
 	"$(BIN)/python" .ci/get_micropython.py
-	"$(BIN)/python" -m pytest -n auto $(PYTEST_ARGS)
+	"$(BIN)/python" -m pytest -n auto --dist loadgroup $(PYTEST_ARGS)
+
+quick: $(VENV)/test
+	"$(BIN)/python" -m pytest -q -n auto --dist loadgroup -m "not slow" $(PYTEST_ARGS)
 
 check: $(VENV)/test .cache/typings
 	"$(BIN)/ruff" check .
@@ -30,7 +35,7 @@ $(VENV)/demo: pyproject.toml | $(BIN)/python
 	@touch $@
 
 $(VENV)/test: pyproject.toml | $(BIN)/python
-	"$(BIN)/python" -m pip install --quiet --disable-pip-version-check -e '.[plot,cluster,mpy,urdf]' -r tests/requirements.txt
+	"$(BIN)/python" -m pip install --quiet --disable-pip-version-check -e '.[plot,cluster,mpy,urdf,docs]' -r tests/requirements.txt
 	@touch $@ $(VENV)/demo
 
 .cache/typings: board/mypy.ini | $(VENV)/test
@@ -39,6 +44,10 @@ $(VENV)/test: pyproject.toml | $(BIN)/python
 	sed -i.old 's/def viper(_func: Callable\[_Param, _Ret\], \/) -> Callable\[_Param, _Ret\]/def viper(_func: Callable[_Param, _Ret], \/) -> Callable[..., _Ret]/' $@/micropython.pyi
 	grep -q 'Callable\[..., _Ret\]' $@/micropython.pyi
 	@touch $@
+
+docs: $(VENV)/test
+	"$(BIN)/python" -m sphinx -q -W --keep-going -c host/docs/site . build/site
+	@echo "build/site/index.html"
 
 clean:
 	rm -rf $(VENV) .cache build dist

@@ -36,6 +36,22 @@ def interpreter(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
+def pytest_xdist_auto_num_workers() -> int:
+    """One more than there are cores: a test that waits for its board leaves its core to another."""
+    return (os.cpu_count() or 1) + 1
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What takes long comes first, so that all workers end at the same time; ``make quick`` leaves it out."""
+    for item in items:
+        if (
+            item.path.is_relative_to(interpreters.ROOT / "tests" / "system")
+            or "micropython-arm" in item.nodeid
+        ):
+            item.add_marker(pytest.mark.slow)
+    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+
+
 def pytest_sessionstart(session: pytest.Session) -> None:
     """In CI nothing may be left out."""
     if interpreters.MISSING and os.environ.get("CI"):

@@ -17,7 +17,7 @@ from unittest.mock import patch
 from armtempo.errors import LinkError
 from armtempo.link import Client, greet
 
-from tests.board.scripts import stand_in
+from tests.board.scripts.rigs import stand_in
 
 SHIMS = Path(__file__).parents[1] / "host" / "armtempo" / "simulator" / "cpython"
 FAULTS = ("lose", "double", "flip", "delay", "cut")
@@ -26,7 +26,9 @@ _SAMPLE_S = 0.1
 _TURNS = 3
 _IMPORTED_LATER = (
     "armtempo_board.heap",
+    "armtempo_board.motion.arm_check",
     "armtempo_board.motion.endpoints",
+    "armtempo_board.storage.motion_file",
     "armtempo_board.storage.store",
     "armtempo_board.app.store_commands",
 )
@@ -103,6 +105,7 @@ class Pipe:
         with board_modules():
             from armtempo_board.app import store_commands  # noqa: F401  the program imports them when it needs them
             from armtempo_board.app.app import App
+            from armtempo_board.motion import arm_check  # noqa: F401
             from armtempo_board.storage import store  # noqa: F401  the program imports them when it needs them
 
             self._later = {name: sys.modules[name] for name in _IMPORTED_LATER}

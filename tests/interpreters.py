@@ -18,6 +18,7 @@ _STARTERS = {
 AVAILABLE = [name for name, starter in _STARTERS.items() if starter.exists()]
 MISSING = [name for name in _STARTERS if name not in AVAILABLE]
 _BOARD_PATH = [ROOT / "shared", ROOT / "board", VIRTUAL / "hardware"]
+_RIGS = [ROOT / "tests" / folder for folder in ("rigs", "board/scripts/rigs", "system/scripts/rigs")]
 
 
 def starter(name: str) -> str:
@@ -26,8 +27,8 @@ def starter(name: str) -> str:
 
 
 def environment(name: str) -> dict[str, str]:
-    """Environment in which board code finds its packages and the simulated hardware."""
-    path = list(_BOARD_PATH)
+    """Environment in which scripts of board code find its packages, the simulated hardware and the tests' rigs."""
+    path = [*_BOARD_PATH, *_RIGS]
     if name == "cpython":
         path.append(VIRTUAL / "cpython")
     variable = "PYTHONPATH" if name == "cpython" else "MICROPYPATH"
@@ -37,9 +38,10 @@ def environment(name: str) -> dict[str, str]:
     return {**os.environ, variable: value, "PYTHONDONTWRITEBYTECODE": "1"}
 
 
-def run(name: str, script: Path | str, *arguments: str, timeout: float = 300.0, heap: str = "") -> str:
+def run(name: str, script: Path | str, *arguments: str, timeout: float = 1200.0, heap: str = "") -> str:
     """What the script prints; AssertionError with its error output where it fails.
 
+    ``timeout``: seconds, generous for a busy machine.
     ``heap``: heap size for MicroPython, as its ``-X heapsize=`` takes it.
     """
     command = [starter(name)]

@@ -20,8 +20,6 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
-
 __all__ = [
     "Arm",
     "ArmtempoError",
@@ -58,6 +56,8 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
+    __version__: str
+
     from armtempo import deploy, optimise, simulator
     from armtempo.errors import (
         ArmtempoError,
@@ -119,10 +119,23 @@ def __getattr__(name: str) -> Any:
     """A public name, imported when it is first used (PEP 562)."""
     if name in _MODULES:
         return import_module(f"{__name__}.{name}")
-    if name not in _HOME_OF:
+    if name == "__version__":
+        value = _installed_version()
+    elif name in _HOME_OF:
+        value = getattr(import_module(_HOME_OF[name]), name)
+    else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = globals()[name] = getattr(import_module(_HOME_OF[name]), name)
+    globals()[name] = value
     return value
+
+
+def _installed_version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("armtempo")
+    except PackageNotFoundError:  # run from a folder that was never installed
+        return "0+unknown"
 
 
 def __dir__() -> list[str]:

@@ -22,15 +22,18 @@ from armtempo.model import trajectory_file
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
-from armtempo.planning import planner
-from armtempo.progress import Progress
+from armtempo.planning import checks, planner
+from armtempo.planning import corridor_curve as corridors
+from armtempo.planning import split as cut
+from armtempo.planning.corridor_curve import CorridorTime
+from armtempo.progress import Progress, part
 from armtempo.records import encode
 from armtempo.report import comparison, text_summary
 from armtempo.robot.connect import connect
 from armtempo.robot.recording import Watcher
 from armtempo.robot.run import Run
 
-__all__ = ["compare", "connect", "load", "plan", "report", "run", "summary"]
+__all__ = ["compare", "connect", "corridor_curve", "load", "plan", "report", "run", "split", "summary"]
 
 
 def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
@@ -40,6 +43,27 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     job and arm do not fit each other, PlanError where there is no motion under these limits and ranges.
     """
     return planner.plan(arm, job, progress)
+
+
+def split(arm: Arm, job: Job, progress: Progress | None = None) -> list[Plan]:
+    """Plans of the job's parts from rest to rest, each short enough for the board; one where the whole is.
+
+    On the spline through the via points, which rests at its ends only, a part for each stretch between stops. Raises
+    PlanError where a part is still too long or there is no stop; else as ``plan``.
+    """
+    if checks.is_free(job) or not job.stops:
+        whole = planner.plan(arm, job, progress)
+        if whole.total_s <= cut.LONGEST_S:
+            return [whole]
+        parts = cut.at_few_stops(job, whole.via_deg, whole.trajectory)
+    else:
+        parts = cut.at_all_stops(job, planner.via_angles(arm, job)[0])
+    return [planner.plan(arm, one, part(progress, number, len(parts))) for number, one in enumerate(parts)]
+
+
+def corridor_curve(arm: Arm, job: Job, progress: Progress | None = None) -> list[CorridorTime]:
+    """Motion time against corridor, for a job whose path is free; see ``planning.corridor_curve.curve``."""
+    return corridors.curve(arm, job, progress or (lambda _done, _whole: None))
 
 
 def summary(plan: Plan) -> list[str]:
@@ -56,7 +80,8 @@ def load(path: Path | str, arm: Arm | None = None, altered: bool = False) -> Pla
     found = trajectory_file.load(path, altered)
     if arm is not None and encode.arm_record(arm) != encode.arm_record(found.arm):
         raise InputError(
-            f"{path} was planned for another arm than {arm.name!r} ({arm.source}); plan it again with this arm"
+            f"{path} was planned for another arm than {arm.name!r} ({arm.source})",
+            "plan it again with this arm",
         )
     return found
 

@@ -38,8 +38,8 @@ from armtempo_board.stepgen import (  # noqa: E402
 )
 from armtempo_shared.motion import Motion  # noqa: E402
 
-from tests.benchmark.emulated import Machine  # noqa: E402
 from tests.board import motions, oracle  # noqa: E402
+from tests.board.emulated import Machine  # noqa: E402
 
 CORE_HZ = 168_000_000
 CYCLES = 1.3
@@ -58,6 +58,14 @@ CALL = 250
 
 COMPILED = (bezier, subdivision, newton, cubics, step_queue, time_law)
 ALL = (*COMPILED, subintervals, interval_steps, step_generator)
+
+
+class Arrays:
+    """In the place of ``armtempo_board.memory.Memory``: every part is an array of its own, as the emulator wants it."""
+
+    def take(self, words: int) -> Any:
+        """So many words."""
+        return array("i", bytes(4 * words))
 
 
 class Count:
@@ -96,7 +104,7 @@ class Count:
     def walk(self, record: bytes, joint: int, skip: int, steps: int, batch: int = 512) -> dict[str, float]:
         """Instructions per step of ``steps`` steps behind the first ``skip``, in batches of entries."""
         motion = Motion(record)
-        subject = step_generator.StepGenerator()
+        subject = step_generator.StepGenerator(Arrays())
         ring = array("I", bytes(4096))
         subject.load(motion, joint, oracle.start_steps(motion, joint), 168, 20_000)
         head = self._fill(subject, ring, 0, skip, batch)

@@ -28,13 +28,15 @@ from armtempo.simulator import launch
 from armtempo_shared import armrecord, motion, wire
 
 from tests import interpreters
-from tests.board import test_fuzz, test_store
-from tests.board.scripts import stand_in
+from tests.board.scripts.rigs import stand_in
 from tests.inprocess import FAULTS, Noise, Pipe, connect
 
 ARM = stand_in.arm(3)
 UPLOADS = 50
 RUNS = 10
+FUZZED_FRAMES = 100_000
+FUZZ_SEED = 20261121
+CASES = interpreters.ROOT / "tests" / "board" / "scripts" / "cases"
 
 
 def motion_record(numbers: random.Random, arm: bytes = ARM, segments: int = 6) -> bytes:
@@ -128,12 +130,12 @@ def longest_pause_s(arm: bytes) -> float:
 
 def power_cuts() -> tuple[int, int]:
     """How often the power was cut, and how often the flash failed or was full, at every change of the store."""
-    lines = interpreters.run(interpreters.AVAILABLE[-1], test_store.SCRIPT).splitlines()
-    counts = {" cut ": 0, " error ": 0, " full ": 0}
-    for line in lines:
-        for word in counts:
-            counts[word] += len(line.rsplit(" ", 1)[1]) if word in line else 0
-    return counts.pop(" cut "), sum(counts.values())
+    lines = interpreters.run(interpreters.AVAILABLE[-1], CASES / "store_cuts.py").splitlines()
+    counts = {"cut": 0, "error": 0, "full": 0}
+    for words in map(str.split, lines):
+        if words[0] in counts:
+            counts[words[0]] += len(words[-1]) - 1  # the last came when all was done
+    return counts.pop("cut"), sum(counts.values())
 
 
 def main() -> None:
@@ -154,8 +156,8 @@ def main() -> None:
         print(f"{joints} joints    {longest_pause_s(stand_in.arm(joints)):5.1f} s")
     print("\nframes fuzzed      given     acted on")
     for name in interpreters.AVAILABLE:
-        words = str(test_fuzz.FRAMES[name]), str(test_fuzz.SEED)
-        given, acted = interpreters.run(name, test_fuzz.SCRIPT, *words).split()[:2]
+        words = str(FUZZED_FRAMES), str(FUZZ_SEED)
+        given, acted = interpreters.run(name, CASES / "fuzz.py", *words).split()[:2]
         print(f"{name:<16}{given:>8}{acted:>13}")
     cuts, failures = power_cuts()
     print(f"\npower cuts, one at each change of each operation of the store: {cuts}")

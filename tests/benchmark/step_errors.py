@@ -16,7 +16,6 @@ import numpy as np
 from armtempo_shared.motion import Motion
 
 from tests.board import motions, walking
-from tests.board.test_walker import NAMED
 
 _BATCH = 50
 
@@ -30,7 +29,7 @@ def main() -> None:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        for case, make in NAMED.items():
+        for case, make in motions.NAMED.items():
             _report(case, _errors(options.interpreter, folder, [make()]))
         rng = np.random.default_rng(options.seed)
         found = []

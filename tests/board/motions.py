@@ -91,3 +91,20 @@ def chance(rng: np.random.Generator) -> bytes:
 
 def _fixed(values: Array, bits: int) -> list[int]:
     return [int(value) for value in np.rint(values * 2.0**bits)]
+
+
+NAMED = {
+    "feeding": feeding,
+    "refined": lambda: feeding(refine=8, slower=1.1),
+    "refined by three": lambda: feeding(refine=3),
+    "cubic": lambda: feeding(degree=3),
+    "cubic refined": lambda: feeding(degree=3, refine=8),
+    "ten minutes": lambda: feeding(slower=88.3, finer=4.0),
+    "333 000 steps/s": lambda: cruise(333_000),
+    "thirtyfold microsteps": lambda: feeding(finer=30.0),
+    "two steps": lambda: record([np.array([0.0, 2.0])], [np.array([0.01])], 5),
+    "less than a step": lambda: record([np.array([0.2, 0.45, 0.1])], [np.array([0.1, 0.1])], 5),
+    "no way at all": lambda: record([np.array([7.0, 7.0])], [np.array([0.5])], 5),
+    "20 ms": lambda: record([np.array([0.0, 700.0])], [np.array([0.02])], 5),
+    "to half steps": lambda: record([np.array([0.0, 12.5, -3.5, 0.5])], [np.full(3, 0.2)], 5),
+}

@@ -9,9 +9,9 @@ import pytest
 from armtempo_shared import codes, limits, motion
 
 from tests import interpreters
-from tests.board import motions, walking
+from tests.board import motions, oracle, walking
 
-SCRIPT = Path(__file__).parent / "scripts" / "judge.py"
+SCRIPT = Path(__file__).parent / "scripts" / "probes" / "judge.py"
 FAR = 10_000_000
 Verdict = tuple[int, int, int] | None
 
@@ -47,6 +47,46 @@ def test_range(interpreter: str, tmp_path: Path) -> None:
     code, joint, position = judge(interpreter, tmp_path, record, low=lowest + 40)[0] or (0, 0, 0)
     assert (code, joint) == (codes.OUT_OF_RANGE, 1)
     assert lowest - 5 < position < lowest + 40
+
+
+def extremes(record: bytes, joint: int) -> tuple[float, float]:
+    """Lowest and highest position of a joint, in steps."""
+    places = np.linspace(0.0, 1.0, 4001)
+    found = [
+        piece.first_steps + np.polynomial.polynomial.polyval(places, piece.angle)
+        for piece in oracle.pieces(motion.Motion(record), joint)
+    ]
+    return float(np.min(found)), float(np.max(found))
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize(
+    "bend", [(10.0, 10.0, -40.0, 90.0, 70.0, 10.0), (10.0, 15.0, -60.0, 95.0, 80.0, 10.0)]
+)
+def test_range_where_the_extremes_lie_between_the_knots(
+    interpreter: str, sign: int, bend: tuple[float, ...], tmp_path: Path
+) -> None:
+    """One step beyond each extreme is enough, one within it is too little."""
+    record = straight([-0.1, 0.0, 0.1, 0.2, 0.3, 0.4], [sign * 37.0 * angle for angle in bend])
+    lowest, highest = extremes(record, 0)
+    ends = [position for at in (0.0, 1.0) for position in ends_of_pieces(record, at)]
+    assert lowest < min(ends) - 3, "no extreme between the knots"
+    assert highest > max(ends) + 3, "no extreme between the knots"
+    low, high = int(np.floor(lowest)) - 1, int(np.ceil(highest)) + 1
+    assert judge(interpreter, tmp_path, record, low=low, high=high) == [None]
+    for bounds, extreme in (({"low": low + 3}, lowest), ({"high": high - 3}, highest)):
+        verdict = judge(interpreter, tmp_path, record, **bounds)[0]
+        assert verdict is not None, bounds
+        assert verdict[:2] == (codes.OUT_OF_RANGE, 0)
+        assert abs(verdict[2] - extreme) <= 2
+
+
+def ends_of_pieces(record: bytes, at: float) -> list[float]:
+    """Positions of joint 1 at the beginnings (0) or ends (1) of all time segments."""
+    return [
+        float(piece.first_steps + np.polynomial.polynomial.polyval(at, piece.angle))
+        for piece in oracle.pieces(motion.Motion(record), 0)
+    ]
 
 
 @pytest.mark.parametrize("name", ["feeding", "cubic", "refined"])

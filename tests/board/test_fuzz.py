@@ -8,7 +8,7 @@ import pytest
 
 from tests import interpreters
 
-SCRIPT = Path(__file__).parent / "scripts" / "fuzz.py"
+SCRIPT = Path(__file__).parent / "scripts" / "cases" / "fuzz.py"
 FRAMES = {"cpython": 1_000_000, "micropython": 100_000, "micropython-arm": 10_000}
 SEED = 20261121
 

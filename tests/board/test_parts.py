@@ -7,7 +7,7 @@ from pathlib import Path
 from tests import interpreters
 from tests.board import motions
 
-SCRIPT = Path(__file__).parent / "scripts" / "halves.py"
+SCRIPT = Path(__file__).parent / "scripts" / "probes" / "halves.py"
 
 
 def test_parts_are_the_segments_halves_whatever_way_leads_to_them(interpreter: str, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from armtempo.records import encode
 
 from tests import interpreters
 
-SCRIPT = Path(__file__).parent / "scripts" / "replay.py"
+SCRIPT = Path(__file__).parent / "scripts" / "probes" / "replay.py"
 
 
 @pytest.mark.parametrize("name", interpreters.AVAILABLE)
@@ -24,7 +24,7 @@ def test_replay_from_the_repl(name: str, tmp_path: Path) -> None:
     (tmp_path / "armtempo").mkdir()
     (tmp_path / "armtempo" / "arm.ata").write_bytes(encode.arm_record(paper_arm))
     (tmp_path / "armtempo" / "go.atm").write_bytes(encode.motion_record(trajectory, paper_arm))
-    lines = interpreters.run(name, SCRIPT, str(tmp_path), "go", heap="4M", timeout=60).splitlines()
+    lines = interpreters.run(name, SCRIPT, str(tmp_path), "go", heap="4M").splitlines()
     assert lines[0] == "taking the posture of the arm as the start of go"
     assert lines[1] == f"done at steps {_steps(trajectory, paper_arm)}"
     assert lines[2].split()[:4] == ["refused:", "wrong_start", "joint", "1"]

@@ -15,31 +15,16 @@ from tests.board import motions, oracle, walking
 BOARD = interpreters.ROOT / "board" / "armtempo_board"
 MOTION_PATH = [
     *sorted((BOARD / "stepgen").glob("*.py")),
-    *(BOARD / "motion" / f"{name}.py" for name in ("motion_check", "rate_check", "endpoints")),
+    *sorted((BOARD / "motion").glob("*.py")),
+    *sorted((BOARD / "hardware").glob("*.py")),
 ]
 QUICK = next(name for name in ("micropython", "cpython") if name in interpreters.AVAILABLE)
 """The interpreter for the long cases; that all give the same is shown on shorter ones."""
 
-NAMED = {
-    "feeding": motions.feeding,
-    "refined": lambda: motions.feeding(refine=8, slower=1.1),
-    "refined by three": lambda: motions.feeding(refine=3),
-    "cubic": lambda: motions.feeding(degree=3),
-    "cubic refined": lambda: motions.feeding(degree=3, refine=8),
-    "ten minutes": lambda: motions.feeding(slower=88.3, finer=4.0),
-    "333 000 steps/s": lambda: motions.cruise(333_000),
-    "thirtyfold microsteps": lambda: motions.feeding(finer=30.0),
-    "two steps": lambda: motions.record([np.array([0.0, 2.0])], [np.array([0.01])], 5),
-    "less than a step": lambda: motions.record([np.array([0.2, 0.45, 0.1])], [np.array([0.1, 0.1])], 5),
-    "no way at all": lambda: motions.record([np.array([7.0, 7.0])], [np.array([0.5])], 5),
-    "20 ms": lambda: motions.record([np.array([0.0, 700.0])], [np.array([0.02])], 5),
-    "to half steps": lambda: motions.record([np.array([0.0, 12.5, -3.5, 0.5])], [np.full(3, 0.2)], 5),
-}
 
-
-@pytest.mark.parametrize("name", NAMED)
+@pytest.mark.parametrize("name", motions.NAMED)
 def test_steps_are_where_the_spline_says(name: str, tmp_path: Path) -> None:
-    record = NAMED[name]()
+    record = motions.NAMED[name]()
     verdicts, steps = walking.walk(QUICK, tmp_path, [record])
     assert verdicts == ["None"]
     walking.verify(record, steps[0])
@@ -65,7 +50,12 @@ def test_two_hundred_motions_by_chance(tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def shared(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[bytes], list[bytes]]:
     """Some records and their steps on one interpreter."""
-    records = [NAMED["feeding"](), NAMED["cubic refined"](), NAMED["20 ms"](), *chance_records(25)]
+    records = [
+        motions.NAMED["feeding"](),
+        motions.NAMED["cubic refined"](),
+        motions.NAMED["20 ms"](),
+        *chance_records(25),
+    ]
     return records, walking.walk(QUICK, tmp_path_factory.mktemp("shared"), records, room=2)[1]
 
 
@@ -97,6 +87,22 @@ def test_braking_stays_on_the_path(interpreter: str, start_s: float, length_s: f
     steps = walking.walk(interpreter, tmp_path, [record], brake=(start, length))[1][0]
     for joint in range(3):
         _verify_braked(Motion(record), joint, walking.steps_of(steps, joint), start, length)
+
+
+@pytest.mark.parametrize("room", [14, 512, 1024])
+@pytest.mark.parametrize(("start_s", "length_s"), BRAKES)
+def test_nothing_is_written_beyond_the_time_at_which_braking_begins(
+    start_s: float, length_s: float, room: int, tmp_path: Path
+) -> None:
+    """However much room there is, the edges are those that are written one by one."""
+    brake = round(start_s * walking.TICK_HZ), round(length_s * walking.TICK_HZ)
+    records = [motions.feeding(), motions.cruise(90_000)]
+    one_by_one = walking.walk(QUICK, tmp_path, records, room=2, brake=brake)[1]
+    for mine, other in zip(
+        walking.walk(QUICK, tmp_path, records, room=room, brake=brake)[1], one_by_one, strict=True
+    ):
+        edges, others = (np.frombuffer(data, dtype="<i4").reshape(-1, 5) for data in (mine, other))
+        np.testing.assert_array_equal(edges[:, [0, 1, 3, 4]], others[:, [0, 1, 3, 4]])
 
 
 def test_braking_from_full_speed(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tests import interpreters
 from tests.board import oracle
 
-SCRIPT = Path(__file__).parent / "scripts" / "walk.py"
+SCRIPT = Path(__file__).parent / "scripts" / "probes" / "walk.py"
 PULSE_TICKS = 168
 GAP_TICKS = 20_000
 

@@ -9,7 +9,7 @@ from armtempo.link.board_messages import Sample
 from armtempo.link.follow import Follower, RunEnd
 from armtempo_shared import motion, wire
 
-from tests.board.scripts import stand_in
+from tests.board.scripts.rigs import stand_in
 from tests.inprocess import Pipe, connect
 
 ARM = stand_in.arm(3)

@@ -419,6 +419,7 @@ def test_the_picture_shows_home_and_every_driven_joint(name: str) -> None:
     assert [title.split(":")[0] for title in titles[2:]] == [joint.name for joint in arm.driven]
 
 
+@pytest.mark.slow
 def test_the_picture_is_written_once(tmp_path: Path) -> None:
     path = tmp_path / "arm.png"
     assert run("--picture", path).exit_code == 0
@@ -436,3 +437,4 @@ def test_a_dollar_in_a_name_is_no_formula(tmp_path: Path) -> None:
     path = changed(tmp_path, ('name = "joint 1"', 'name = "$$ \\\\theta"'), ('"paper-1to5"', '"$x^$"'))
     result = run("--arm", path, "--picture", tmp_path / "arm.svg")
     assert result.exit_code == 0, result.output
+    assert ">$$ \\theta: " in (tmp_path / "arm.svg").read_text()

@@ -30,6 +30,7 @@ def braked_excess(plan: Plan, brake_s: float, starts: int = 60) -> tuple[float, 
     return float(worst[0]), float(worst[1:].max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["feeding", "feeding-shared", "there-and-back"])
 def test_braking_keeps_its_limits_and_no_shorter_time_does(name: str) -> None:
     plan = planner.plan(PROBLEMS[name].arm, replace(PROBLEMS[name].job, iterations=100))

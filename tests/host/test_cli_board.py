@@ -172,7 +172,7 @@ def test_arm_is_not_replaced_silently(run: Run, file: str, tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("where", "words"),
     [
-        ("P9", "via points P0 to P6"),
+        ("P9", "give one of P0 to P6"),
         ("here", "is no posture"),
         ("1,2", "3 angles, not 2"),
         ("-11,0,0", "outside of its range"),

@@ -7,6 +7,8 @@ import pytest
 from armtempo.splines import bernstein, bspline, extremes, time_axis
 from armtempo.splines.trajectory import JointSpline
 
+from tests.host.feeding import dense
+
 
 def random_joint(seed: int) -> JointSpline:
     """A joint with any path and a time axis that may change pace by a factor of 100."""
@@ -15,24 +17,6 @@ def random_joint(seed: int) -> JointSpline:
     points = bspline.fit(rng.normal(0, 50, count + 1), degree)
     axis = time_axis.control_points(10.0 ** rng.uniform(-1.5, 0.5, count * refine), degree)
     return JointSpline(degree, refine, points, axis)
-
-
-def dense(joint: JointSpline, order: int, count: int = 400) -> float:
-    """Largest magnitude on a fine grid of u, both sides of each knot."""
-    u = np.tile(np.linspace(0, 1, count), len(joint.time_polynomials))
-    segment = np.repeat(np.arange(len(joint.time_polynomials)), count)
-
-    def at(pieces: np.ndarray, n: int) -> np.ndarray:
-        return bspline.evaluate(bspline.derivative(pieces, n), segment, u)
-
-    q = [at(joint.angle_polynomials, n) for n in range(4)]
-    t = [at(joint.time_polynomials, n) for n in range(4)]
-    values = [
-        q[1] / t[1],
-        (q[2] * t[1] - q[1] * t[2]) / t[1] ** 3,
-        (q[3] * t[1] ** 2 - 3 * q[2] * t[1] * t[2] + 3 * q[1] * t[2] ** 2 - q[1] * t[1] * t[3]) / t[1] ** 5,
-    ]
-    return float(np.abs(values[order - 1]).max())
 
 
 @pytest.mark.parametrize("seed", range(60))

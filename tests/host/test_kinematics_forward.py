@@ -6,19 +6,7 @@ import numpy as np
 import pytest
 from armtempo.kinematics import Geometry, forward, postures
 
-from tests.host.published_arms import NAMED, PAPER, PAPER_FULL_SIZE, drawn
-
-EQ_16 = np.array([[0, 0, -1, -268.202], [0, 1, 0, 0], [1, 0, 0, 217.349], [0, 0, 0, 1]])
-TABLE_2 = (
-    (180.0, -38.0, -52.0, 0.0, 0.0, 0.0),
-    (180.0, -38.0, -52.0, 180.0, 0.0, 180.0),
-    (180.0, -16.1, -91.1, 0.0, 17.3, 0.0),
-    (180.0, -16.1, -91.1, 180.0, -17.3, 180.0),  # printed with theta6 = 0, a misprint
-    (0.0, -93.2, -157.5, 0.0, -19.2, 180.0),
-    (0.0, -93.2, -157.5, 180.0, 19.2, 0.0),
-    (0.0, 168.3, 14.4, 0.0, 267.3, 180.0),
-    (0.0, 168.3, 14.4, 180.0, 92.8, 0.0),
-)
+from tests.host.published_arms import EQ_16, NAMED, PAPER, PAPER_FULL_SIZE, TABLE_2, drawn
 
 
 def product(geometry: Geometry, angles: np.ndarray) -> np.ndarray:

@@ -9,22 +9,10 @@ from armtempo.kinematics import BRANCHES, Geometry, branch_of, forward, inverse,
 from armtempo.kinematics.inverse import CHUNK
 from armtempo.kinematics.solutions import OK, WRIST_STRAIGHT
 
-from tests.host.published_arms import NAMED, PAPER, PAPER_FULL_SIZE, drawn
-from tests.host.test_kinematics_forward import EQ_16, TABLE_2
+from tests.host.poses import turned, worst_error
+from tests.host.published_arms import EQ_16, NAMED, PAPER, PAPER_FULL_SIZE, TABLE_2, drawn
 
 ACCURACY = 1e-9
-
-
-def worst_error(geometry: Geometry, angles: np.ndarray, poses: np.ndarray) -> float:
-    """Largest element of forward(angles) - pose, lengths relative to the reach; NaN postures left out."""
-    difference = np.abs(forward(geometry, angles) - poses[:, None])
-    difference[..., :3, 3] /= geometry.reach
-    return float(np.nanmax(difference))
-
-
-def turned(difference: np.ndarray) -> np.ndarray:
-    """Size of an angle, whole turns taken off."""
-    return np.abs(np.remainder(difference + np.pi, 2 * np.pi) - np.pi)
 
 
 @pytest.mark.parametrize("name", NAMED)

@@ -15,6 +15,7 @@ from armtempo.kinematics.solver import PoseSolver
 from armtempo.model.arm import Arm
 from armtempo.model.tool_pose import WHOLE, Pose
 
+from tests.host.poses import turned
 from tests.host.published_arms import NAMED
 from tests.host.small_arms import (
     FITTING,
@@ -30,7 +31,6 @@ from tests.host.small_arms import (
     asked,
     drawn_posture,
 )
-from tests.host.test_kinematics_inverse import turned
 
 WIDE = 2 * np.pi
 

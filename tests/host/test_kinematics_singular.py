@@ -19,17 +19,8 @@ from armtempo.kinematics.solutions import (
     WRIST_STRAIGHT,
 )
 
+from tests.host.poses import SHAPE, turned, with_wrist_at, worst_error
 from tests.host.published_arms import NAMED, PAPER
-from tests.host.test_kinematics_inverse import turned, worst_error
-
-SHAPE = Shape.of(PAPER)
-
-
-def with_wrist_at(planar: float, up: float, turn: float = 0.0) -> np.ndarray:
-    """A pose of the paper's arm with its wrist centre there and the tool pointing up."""
-    pose = np.eye(4)
-    pose[:3, 3] = planar * np.cos(turn), planar * np.sin(turn), SHAPE.height + up + 40.0
-    return pose
 
 
 def test_wrist_centre_on_axis_1_keeps_joint_1() -> None:

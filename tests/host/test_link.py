@@ -53,6 +53,7 @@ def test_repeated_command_acts_once(tmp_path: Path) -> None:
     assert (run, pipe.app.controller.engine.calls.count("start")) == (1, 1)
 
 
+@pytest.mark.slow
 def test_ten_minutes_to_a_host_that_pauses_two_seconds_lose_nothing(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
     pipe.run_samples = 6000
@@ -117,6 +118,7 @@ def test_homing_motion_starts_anywhere_and_leaves_nothing_known(tmp_path: Path) 
     assert board.status().known == 1
 
 
+@pytest.mark.slow
 def test_a_motion_that_does_not_end_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pipe = Pipe(tmp_path / "flash")
     follower = started(pipe)

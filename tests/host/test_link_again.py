@@ -52,6 +52,7 @@ def test_trouble_is_told_once_and_its_end_once(tmp_path: Path, trouble: str) -> 
     assert end.samples_lost == 0
 
 
+@pytest.mark.slow
 def test_a_board_that_stays_silent_is_given_up_after_a_minute(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
     board, stored = prepared(pipe)

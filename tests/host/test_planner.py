@@ -12,10 +12,11 @@ from armtempo.model.arm import Arm, Limits
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.planning import lower_bounds, planner
+from armtempo.planning.lower_bounds import Floor
 from armtempo_shared.limits import MAX_STEP_RATE
 
 from tests.host import problems
-from tests.host.test_extremes import dense
+from tests.host.feeding import dense
 
 ARM = Arm.paper()
 JOB = Job.paper(ARM)
@@ -81,7 +82,7 @@ def test_problem(problem: problems.Problem) -> None:
 @pytest.mark.parametrize("thousand", range(10))
 def test_random_jobs_keep_their_limits_or_say_why_not(thousand: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """10 000 jobs; floors, which a plan only quotes, have their own test."""
-    monkeypatch.setattr(lower_bounds, "floor", lambda *_: (math.ulp(0.0), "rests"))
+    monkeypatch.setattr(lower_bounds, "of_path", lambda *_: Floor(math.ulp(0.0), "rests"))
     planned = 0
     for seed in range(1000 * thousand, 1000 * thousand + 1000):
         arm, job = problems.random_problem(seed)
@@ -128,6 +129,15 @@ def test_a_joint_that_rests_takes_the_longest_axis() -> None:
 def test_other_searches_make_plans_too(fitness: str, optimiser: str) -> None:
     job = replace(JOB, optimiser=optimiser, parameters={"fitness": fitness}, iterations=60)
     check(planner.plan(ARM, job), optimiser)
+
+
+@pytest.mark.parametrize(("refine", "polish"), [(1, False), (1, True), (2, True)])
+def test_a_tiny_motion_takes_a_hundredth_of_a_second(refine: int, polish: bool) -> None:
+    """Limits alone would let it take a tenth of that; a tenth of the time between two samples is the least."""
+    arm = problems.make_arm([[100.0, 1e4, 1e8]])
+    job = Job("tiny", ((0.0,), (1e-6,), (2e-6,)), iterations=20, refine=refine, polish=polish)
+    plan = planner.plan(arm, job)
+    assert plan.trajectory.duration_s == pytest.approx(0.01, rel=1e-9)
 
 
 @pytest.mark.parametrize("refine", [1, 2])

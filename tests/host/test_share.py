@@ -22,7 +22,7 @@ from armtempo.share.server import Server
 def handle(request: Message) -> Message:
     """Answers as a board's owner might."""
     if request.get("refuse"):
-        raise BoardError("refused", 7)
+        raise BoardError("refused", "ask again", 7)
     return {"echo": request.get("text")}
 
 
@@ -39,6 +39,7 @@ def test_a_request_is_answered_and_a_refusal_keeps_its_code(server: Server) -> N
         with pytest.raises(BoardError, match="refused") as refused:
             other.ask("echo", 5.0, refuse=True)
         assert refused.value.code == 7
+        assert refused.value.hint == "ask again"
         with pytest.raises(LinkError, match="no request 'nonsense'"):
             other.ask("nonsense", 5.0)
 

@@ -7,18 +7,7 @@ import pytest
 from armtempo.errors import InputError
 from armtempo.splines import bspline
 
-FEEDING = np.array(
-    [
-        [0, -60, 40],
-        [20, -75, 50],
-        [40, -110, 70],
-        [90, -85, 40],
-        [130, -60, 10],
-        [160, -45, -20],
-        [180, -38, -52],
-    ],
-    dtype=float,
-)
+from tests.host.feeding import FEEDING
 
 
 @pytest.mark.parametrize("degree", [3, 5])

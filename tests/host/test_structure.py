@@ -29,12 +29,14 @@ ORDER = (
     "planning",  # from a job to a plan
     "records",  # arm and motion as the board takes them
     "arm_check",  # what looks wrong about an arm and a job
+    "new_project",  # a folder for an arm of one's own
     "simulator",  # the virtual board
     "link",  # port, session, commands, samples of a run
     "deploy",  # the board program onto a board
     "runs",  # run folders and what the samples say
     "report",  # pages, plots, tables
     "robot",  # a board in use: home, go, run, stop
+    "doctor",  # what a fault report needs to know
     "pipeline",  # plan, load, run, report
     "research",  # comparison of searches, the paper repeated
     "cli",

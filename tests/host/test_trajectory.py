@@ -7,7 +7,7 @@ import pytest
 from armtempo.splines import bspline, time_axis
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
-from tests.host.test_spline import FEEDING
+from tests.host.feeding import FEEDING
 
 TABLE_6 = (1.514, 0.498, 1.638, 0.713, 0.257, 1.413)
 

@@ -13,8 +13,9 @@ import pytest
 from armtempo.errors import InputError
 from armtempo.model import trajectory_file
 from armtempo.model.arm import Arm
-from armtempo.model.job import Job, Pose
+from armtempo.model.job import Job
 from armtempo.model.plan import Plan
+from armtempo.model.tool_pose import Pose
 from armtempo.planning import planner
 
 ARM = Arm.paper()
@@ -98,6 +99,15 @@ def edited(path: Path, edit: Callable[[Any], None]) -> Path:
     [
         (lambda c: c.update(format="gcode"), "not a trajectory file"),
         (lambda c: c.update(version=3), "version 3"),
+        (lambda c: c["plan"]["job"].update(refine="some"), "a number or 'auto'"),
+        (
+            lambda c: c["plan"]["trajectory"]["joints"][0].update(via_segments=[0, 1, 1, 3, 4, 5, 6]),
+            "do not increase",
+        ),
+        (
+            lambda c: c["plan"]["trajectory"]["joints"][0].update(via_segments=[0, 6]),
+            "must name 7 via points",
+        ),
         (lambda c: c.update(extra=1), "unknown or missing key"),
         (lambda c: c["plan"].update(colour="red"), "plan: unknown key colour"),
         (lambda c: c["plan"]["job"].pop("seed"), "plan.job: missing key seed"),

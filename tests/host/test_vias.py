@@ -12,8 +12,9 @@ from armtempo.errors import InputError, PlanError
 from armtempo.kinematics import Geometry, forward
 from armtempo.model import arm_file, trajectory_file
 from armtempo.model.arm import Arm
-from armtempo.model.job import Job, Pose
+from armtempo.model.job import Job
 from armtempo.model.pose import from_rpy
+from armtempo.model.tool_pose import Pose
 from armtempo.planning import planner, via_points
 from click.testing import CliRunner
 

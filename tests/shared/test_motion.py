@@ -20,7 +20,7 @@ def packed(
     return motion.pack(degree, angles, times, refine, 4711, ARM_CRC)
 
 
-@pytest.mark.parametrize(("joints", "axes"), [(1, 1), (3, 3), (6, 6), (3, 1), (6, 1)])
+@pytest.mark.parametrize(("joints", "axes"), [(1, 1), (2, 1), (2, 2), (3, 3), (6, 6), (3, 1), (6, 1)])
 @pytest.mark.parametrize("degree", [3, 5])
 def test_every_point_is_found_at_its_offset(degree: int, joints: int, axes: int) -> None:
     data = packed(degree, joints, axes)

@@ -6,7 +6,7 @@ import importlib.util
 from pathlib import Path
 from types import ModuleType
 
-from armtempo_shared import codes, meanings
+from armtempo_shared import codes, meanings, messages
 from armtempo_shared.table import rows
 
 SCRIPT = Path(__file__).parents[2] / "shared" / "docs" / "make_protocol.py"
@@ -41,3 +41,11 @@ def test_numbers_are_used_once_and_answers_match_their_commands() -> None:
     numbers = [row[1] for row in commands + others]
     assert len(set(numbers)) == len(numbers)
     assert [row[:2] for row in commands] == [row[:2] for row in answers]
+
+
+def test_flags_and_numbers_are_those_that_are_explained() -> None:
+    assert f"`flags` {messages.START_HOMING}:" in meanings.COMMANDS["start"]
+    assert f"`flags` {messages.SAMPLE_BRAKING}:" in meanings.EVENTS["sample"]
+    for event in ("fault", "error"):
+        assert f"`joint` {messages.NO_JOINT} where" in meanings.EVENTS[event]
+    assert messages.ARM_RECORD_NAME in meanings.COMMANDS["put_begin"]

@@ -14,9 +14,28 @@ from tests.system.replays import Replay
 
 FASTEST = "micropython" if "micropython" in interpreters.AVAILABLE else "cpython"
 """For jobs beside the shipped one: each interpreter has shown there that it makes the same pulses."""
-CASES = [("shipped", name) for name in interpreters.AVAILABLE] + [
-    (job, FASTEST) for job in replays.JOBS if job != "shipped"
+EMULATED = "micropython-arm"
+BY_JOB = {
+    "shipped": [name for name in interpreters.AVAILABLE if name != EMULATED],
+    "half": list(dict.fromkeys(name for name in (FASTEST, EMULATED) if name in interpreters.AVAILABLE)),
+    "refined": [FASTEST],
+    "cubic": [FASTEST],
+}
+"""The interpreters that replay a job."""
+CASES = [(job, name) for job, names in BY_JOB.items() for name in names]
+SAME = [
+    pytest.param(
+        job, names[0], other, id=f"{job}-{other}", marks=pytest.mark.xdist_group(f"replays of {job}")
+    )
+    for job, names in BY_JOB.items()
+    for other in names[1:]
 ]
+"""Pairs of interpreters that are to make the same of a job."""
+
+
+def together(job: str) -> pytest.MarkDecorator:
+    """Tests of a job's replays run on one worker, which makes each replay once."""
+    return pytest.mark.xdist_group(f"replays of {job}")
 
 
 @pytest.fixture(scope="session")
@@ -36,7 +55,7 @@ def replay_of(
     )
 
 
-@pytest.fixture(params=CASES, ids="-".join)
+@pytest.fixture(params=[pytest.param(case, id="-".join(case), marks=together(case[0])) for case in CASES])
 def replay(request: pytest.FixtureRequest, replay_of: Callable[[str, str], Replay]) -> Replay:
     """Each job that is replayed, with its interpreter."""
     return replay_of(*request.param)

@@ -8,11 +8,13 @@ import sys
 from pathlib import Path
 
 import pytest
-from armtempo.deploy import deploy, firmware, package, remote
+from armtempo.deploy import deploy, package, remote
+from armtempo.deploy.firmware import frozen
 from armtempo.errors import LinkError
 from armtempo.simulator import LaunchOptions, VirtualBoard, edgelog, launch
 
 from tests import interpreters
+from tests.system import commandline
 from tests.system.boards import armtempo, small_plan
 
 SOURCES_BLOCKS = 600
@@ -54,7 +56,7 @@ def test_the_compiled_program_makes_the_same_pulses(tmp_path: Path) -> None:
 
 def mpremote(port: str, *arguments: str) -> str:
     command = [sys.executable, "-m", "mpremote", "connect", port, *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=commandline.SLOW_S)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -113,7 +115,7 @@ def test_mip_installs_the_package(tmp_path: Path) -> None:
 def test_program_in_the_firmware_needs_only_start_files(tmp_path: Path) -> None:
     """What is in the firmware is found before /flash/lib; here the root of the flash stands for it."""
     flash = tmp_path / "flash"
-    firmware.write(tmp_path / "firmware")
+    frozen.write(tmp_path / "firmware")
     shutil.copytree(tmp_path / "firmware", flash)
     old = flash / "lib" / "armtempo_board" / "app.py"
     old.parent.mkdir(parents=True)
@@ -129,5 +131,5 @@ def test_program_in_the_firmware_needs_only_start_files(tmp_path: Path) -> None:
         assert "up to date" in armtempo("deploy", "--port", port, cwd=tmp_path)
         assert "does not start" in armtempo("undeploy", "--port", port, cwd=tmp_path)
         (flash / "armtempo_shared" / "firmware.py").write_text("CRC = 1\n")
-        assert "deploy --firmware" in armtempo("deploy", "--port", port, cwd=tmp_path, code=1)
+        assert "a new firmware is due" in armtempo("deploy", "--port", port, cwd=tmp_path, code=1)
         assert not (flash / "main.py").exists()

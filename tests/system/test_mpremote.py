@@ -45,7 +45,7 @@ def flash(tmp_path: Path) -> Path:
 def mpremote(port: str, *arguments: str) -> str:
     """What mpremote prints."""
     command = [sys.executable, "-m", "mpremote", "connect", port, *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=commandline.SLOW_S)
     assert done.returncode == 0, (done.stdout, done.stderr)
     return done.stdout
 

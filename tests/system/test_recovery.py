@@ -119,7 +119,7 @@ class Bench:
         assert words[0] == "mpremote", command
         words = [sys.executable, "-m", *words]
         ended = subprocess.run(
-            words, cwd=self.folder, capture_output=True, text=True, timeout=60, check=False
+            words, cwd=self.folder, capture_output=True, text=True, timeout=commandline.SLOW_S, check=False
         )
         return ended.returncode, ended.stdout + ended.stderr
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 
-from tests import interpreters
 from tests.system import pulses
+from tests.system.conftest import SAME
 from tests.system.exact import TICK_HZ
 from tests.system.replays import Replay
 
@@ -66,8 +67,8 @@ def test_encoders_follow_the_commanded_angle(replay: Replay) -> None:
         assert np.max(np.abs(off)) <= count_deg
 
 
-def test_interpreters_agree(replay_of: Callable[[str, str], Replay]) -> None:
-    first, *others = (replay_of("shipped", name).samples for name in interpreters.AVAILABLE)
-    for other in others:
-        assert np.max(np.abs(first.time_s - other.time_s)) <= LATE_S
-        assert np.max(np.abs(first.commanded_steps - other.commanded_steps)) <= 1
+@pytest.mark.parametrize(("job", "name", "other"), SAME)
+def test_interpreters_agree(replay_of: Callable[[str, str], Replay], job: str, name: str, other: str) -> None:
+    one, two = replay_of(job, name).samples, replay_of(job, other).samples
+    assert np.max(np.abs(one.time_s - two.time_s)) <= LATE_S
+    assert np.max(np.abs(one.commanded_steps - two.commanded_steps)) <= 1

@@ -120,11 +120,11 @@ def test_an_interrupt_waits_for_the_end_of_an_import(tmp_path: Path, monkeypatch
 
     def import_and_sleep() -> None:
         assert not import_module("swallowing").swallowed
-        time.sleep(60.0)
+        time.sleep(1200.0)
 
     handler = signal.getsignal(signal.SIGINT)
     begin_s = time.monotonic()
     with pytest.raises(KeyboardInterrupt), raised_by_signals():
         import_and_sleep()
-    assert time.monotonic() - begin_s < 30.0
+    assert time.monotonic() - begin_s < 600.0
     assert signal.getsignal(signal.SIGINT) == handler

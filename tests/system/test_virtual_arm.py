@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from armtempo.link import open_board
 from armtempo.link.board_messages import Sample
 from armtempo.model.arm import Arm, JointModel, LimitSwitches
@@ -18,18 +18,17 @@ from armtempo.robot.stop_request import StopRequest
 from armtempo.simulator import LaunchOptions, edgelog, launch
 from armtempo_shared.limits import TICK_HZ
 
-from tests import interpreters
+from tests import scripted
 from tests.system import boards
 
-SCRIPT = Path(__file__).parent / "scripts" / "virtual_arm.py"
+SCRIPT = Path(__file__).parent / "scripts" / "cases" / "virtual_arm.py"
 FINE_COUNTS = 400_000
 """Counts per revolution of an encoder that shows what the paper's cannot."""
 
 
-def test_motor_cases(interpreter: str) -> None:
-    """Each case asserts by itself and prints its name when it holds."""
-    lines = interpreters.run(interpreter, SCRIPT, heap="4M").splitlines()
-    assert lines == sorted(re.findall(r"def (case_\w+)", SCRIPT.read_text()))
+@pytest.mark.parametrize("case", scripted.cases(SCRIPT), ids=str)
+def test_motor(case: scripted.Case) -> None:
+    case.run()
 
 
 def first_joint(arm: Arm, **changed: object) -> Arm:

@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -16,6 +15,7 @@ from armtempo.link.connect import open_board
 from armtempo.simulator import LaunchOptions, launch, launcher
 
 from tests import interpreters
+from tests.system import commandline
 
 
 def test_answers_on_its_port_again_and_again(interpreter: str) -> None:
@@ -68,10 +68,7 @@ def test_goes_with_its_launcher(tmp_path: Path) -> None:
         assert parent.stdout
         pid = int(parent.stdout.readline())
         parent.kill()
-    limit = time.monotonic() + 10
-    while _alive(pid) and time.monotonic() < limit:
-        time.sleep(0.02)
-    assert not _alive(pid)
+    commandline.wait_for(lambda: not _alive(pid), "the end of the board's process")
 
 
 def _alive(pid: int) -> bool:
@@ -96,10 +93,7 @@ def test_something_else_than_an_interpreter() -> None:
 def test_a_program_that_fails_is_logged(tmp_path: Path) -> None:
     (tmp_path / "main.py").write_text("raise ValueError('broken')\n")
     with launch(LaunchOptions(tmp_path, deployed=True)) as board:
-        limit = time.monotonic() + 10
-        while "ValueError: broken" not in board.log() and time.monotonic() < limit:
-            time.sleep(0.02)
-        assert "ValueError: broken" in board.log()
+        commandline.wait_for(lambda: "ValueError: broken" in board.log(), "the traceback in the log")
         assert board.running()
 
 
@@ -118,7 +112,7 @@ def test_command_prints_the_port_and_ends_with_ctrl_c(tmp_path: Path) -> None:
         with open_board(port) as link:
             assert link.status().state == "unconfigured"
         process.send_signal(signal.SIGINT)
-        _, error = process.communicate(timeout=20)
+        _, error = process.communicate(timeout=commandline.SLOW_S)
     assert process.returncode == 130
     assert "Traceback" not in error
     with pytest.raises(serial.SerialException):

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
-from tests import interpreters
+import pytest
 
-SCRIPT = Path(__file__).parent / "scripts" / "virtual_hardware.py"
+from tests import scripted
+
+SCRIPT = Path(__file__).parent / "scripts" / "cases" / "virtual_hardware.py"
 
 
-def test_cases(interpreter: str, tmp_path: Path) -> None:
-    """Each case asserts by itself and prints its name when it holds."""
+@pytest.mark.parametrize("case", scripted.cases(SCRIPT), ids=str)
+def test_case(case: scripted.Case, tmp_path: Path) -> None:
     (tmp_path / "flash").mkdir()
-    lines = interpreters.run(interpreter, SCRIPT, str(tmp_path)).splitlines()
-    assert lines == sorted(re.findall(r"def (case_\w+)", SCRIPT.read_text()))
+    case.run(str(tmp_path), heap="")

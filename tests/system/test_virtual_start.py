@@ -14,12 +14,13 @@ from armtempo.simulator import LaunchOptions, VirtualBoard, edgelog, launch
 from armtempo.simulator.temporary_folder import PREFIX
 
 from tests import interpreters
+from tests.system import commandline
 from tests.system.commandline import wait_for
 
 
 def ask(board: VirtualBoard, code: str, soft_reset: bool = False) -> str:
     """What an expression is at the board's prompt, or its traceback."""
-    with serial.Serial(board.port, timeout=10) as port:
+    with serial.Serial(board.port, timeout=commandline.SLOW_S) as port:
         port.write(b"\r\x03\x01")
         port.read_until(b"raw REPL; CTRL-B to exit\r\n>")
         if soft_reset:

@@ -1,8 +1,7 @@
-"""Whole virtual boards in one process with a scripted host and world: see ``scripts/whole_board.py``."""
+"""Whole virtual boards in one process with a scripted host and world: see ``scripts/rigs/whole_board.py``."""
 
 from __future__ import annotations
 
-import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -16,11 +15,11 @@ from armtempo.planning import planner
 from armtempo.records import encode, encoded_motion
 from armtempo_shared.limits import TICK_HZ
 
-from tests import interpreters
+from tests import interpreters, scripted
 
-SCRIPTS = Path(__file__).parent / "scripts"
+CASES = Path(__file__).parent / "scripts" / "cases"
+SCRIPTS = [CASES / f"{name}.py" for name in ("standalone", "faults", "prompt")]
 PROGRAM = f"{interpreters.ROOT / 'board'}:{interpreters.ROOT / 'shared'}"
-HEAP = {"cpython": "", "micropython": "16M", "micropython-arm": "6M"}
 ARM = Arm.paper()
 HOME_DEG = np.array(ARM.home_deg)
 HOME_STEPS = [round(angle * joint.steps_per_deg) for angle, joint in zip(HOME_DEG, ARM.driven, strict=True)]
@@ -28,22 +27,32 @@ AWAY_DEG = ([3.0, 2.0, -2.0], [-1.0, 1.0, 2.0])
 FEWER = {"micropython": 3, "cpython": 10, "micropython-arm": 12}
 """What the moments are divided by; each interpreter has others."""
 CHOSEN = {
-    ("micropython-arm", "standalone_cases"): [
+    ("micropython-arm", "standalone"): {
         "case_button_starts_the_default_and_a_host_fetches_its_samples",
         "case_level_present_at_power_up",
-    ],
-    ("micropython-arm", "prompt_cases"): ["case_boot_leaves_a_serial_port_only"],
-    ("micropython-arm", "fault_cases"): ["case_interrupt_dies", "case_stop", "case_underrun"],
-    ("cpython", "prompt_cases"): ["case_replay_typed_at_the_prompt"],
+    },
+    ("micropython-arm", "prompt"): {"case_boot_leaves_a_serial_port_only"},
+    ("micropython-arm", "faults"): {"case_interrupt_dies", "case_stop", "case_underrun"},
+    ("cpython", "prompt"): {"case_replay_typed_at_the_prompt"},
 }
 """The emulated interpreter is slow, and CPython has no prompt of its own on a board: what they are to run."""
-SCRIPTED = ("standalone_cases", "fault_cases", "prompt_cases")
 INSIDE = {
     "case_a_failing_start_is_a_fault_not_the_end",
     "case_ctrl_c_stops_a_replay_wherever_it_comes",
     "case_exception_anywhere",
 }
 """They reach into the program by the names in its sources."""
+QUICKEST = "micropython" if "micropython" in interpreters.AVAILABLE else "cpython"
+
+
+def chosen(*names: str) -> list[scripted.Case]:
+    """The cases that these interpreters are to run."""
+    found = scripted.cases(*SCRIPTS, on=names)
+    for (interpreter, script), cases in CHOSEN.items():
+        assert cases <= set(scripted.names(CASES / f"{script}.py")), (interpreter, script)
+    return [
+        case for case in found if case.name in CHOSEN.get((case.interpreter, case.script.stem), {case.name})
+    ]
 
 
 @pytest.fixture(scope="session")
@@ -82,32 +91,19 @@ def compact(tmp_path_factory: pytest.TempPathFactory) -> str:
     return str(folder)
 
 
-def play(
-    interpreter: str, script: str, cases: list[str], flashes: Path, tmp_path: Path, folders: str = PROGRAM
-) -> None:
-    """Each case asserts by itself and prints its name when it holds."""
+def play(case: scripted.Case, flashes: Path, tmp_path: Path, program: str = PROGRAM) -> None:
     copied = shutil.copytree(flashes, tmp_path / "flashes")
     home = ",".join(map(str, HOME_STEPS))
-    fewer = [str(FEWER[interpreter])] if script == "fault_cases" else []
-    path = SCRIPTS / f"{script}.py"
-    output = interpreters.run(
-        interpreter, path, str(copied), folders, home, *cases, *fewer, heap=HEAP[interpreter]
-    )
-    assert [line.split()[0] for line in output.splitlines()] == cases
+    case.run(str(copied), program, home, str(FEWER[case.interpreter]))
 
 
-def every_case(script: str) -> list[str]:
-    """The names of a script's cases."""
-    return sorted(re.findall(r"def (case_\w+)", (SCRIPTS / f"{script}.py").read_text()))
+@pytest.mark.parametrize("case", chosen(*interpreters.AVAILABLE), ids=str)
+def test_case(case: scripted.Case, flashes: Path, tmp_path: Path) -> None:
+    play(case, flashes, tmp_path)
 
 
-@pytest.mark.parametrize("script", SCRIPTED)
-def test_cases(interpreter: str, script: str, flashes: Path, tmp_path: Path) -> None:
-    play(interpreter, script, CHOSEN.get((interpreter, script), every_case(script)), flashes, tmp_path)
-
-
-@pytest.mark.parametrize("script", SCRIPTED)
-def test_cases_with_the_compact_program(script: str, flashes: Path, compact: str, tmp_path: Path) -> None:
-    interpreter = "micropython" if "micropython" in interpreters.AVAILABLE else "cpython"
-    cases = CHOSEN.get((interpreter, script), every_case(script))
-    play(interpreter, script, [case for case in cases if case not in INSIDE], flashes, tmp_path, compact)
+@pytest.mark.parametrize("case", [case for case in chosen(QUICKEST) if case.name not in INSIDE], ids=str)
+def test_case_with_the_compact_program(
+    case: scripted.Case, flashes: Path, compact: str, tmp_path: Path
+) -> None:
+    play(case, flashes, tmp_path, compact)

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from armtempo.cli import chosen, options
+from armtempo.cli import chosen, messages, options
 from armtempo.cli.progress import ProgressBar
-from armtempo.errors import INTERRUPTED, MissingPackageError
+from armtempo.errors import INTERRUPTED, InputError, MissingPackageError
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -23,12 +23,15 @@ if TYPE_CHECKING:
 
 def _names(ctx: click.Context, parameter: click.Parameter, value: str) -> list[str]:
     """Algorithms, separated by commas."""
-    from armtempo.optimise import ALGORITHMS
+    from armtempo.model.job_file import OPTIMISERS
 
     names = [name.strip().lower() for name in value.split(",")]
     for name in names:
-        if name not in ALGORITHMS:
-            raise click.BadParameter(f"{name!r} is not one of {', '.join(sorted(ALGORITHMS))}")
+        if name not in OPTIMISERS:
+            raise InputError(
+                f"--algorithms: {name!r} is not known",
+                f"give some of {', '.join(sorted(OPTIMISERS))}, separated by commas",
+            )
     return names
 
 
@@ -39,10 +42,16 @@ def _sizes(ctx: click.Context, parameter: click.Parameter, value: str) -> list[i
     try:
         sizes = [int(size) for size in value.split(",")]
     except ValueError:
-        raise click.BadParameter(f"{value!r} must be whole numbers separated by commas") from None
+        raise InputError(
+            f"--populations: {value!r} is not a list of whole numbers",
+            "write whole numbers separated by commas, such as 20,50",
+        ) from None
     least, most = POPULATION
     if min(sizes) < least or max(sizes) > most:
-        raise click.BadParameter(f"a population is from {least} to {most}")
+        raise InputError(
+            f"--populations: {value} goes beyond what a search takes",
+            f"give populations from {least} to {most}",
+        )
     return sizes
 
 
@@ -139,12 +148,12 @@ def _write(out: Path, found: Sequence[Row], with_paper: bool, plot: bool) -> Non
 
 def _plot(path: Path, found: Sequence[Row]) -> list[str]:
     """Draws the curves; without matplotlib it says so, and the tables stand."""
-    from armtempo.report import plots
+    from armtempo.report import drawing
     from armtempo.research.bench import result_plot
 
     try:
-        plots.save(result_plot.convergence(found), path)
+        drawing.save(result_plot.convergence(found), path)
     except MissingPackageError as error:
-        click.echo(f"no plot: {error}", err=True)
+        messages.show(error, "no plot")
         return []
     return [path.name]

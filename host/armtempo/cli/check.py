@@ -50,13 +50,17 @@ def command(
 
 
 def _check_picture(picture: Path | None, force: bool) -> None:
-    """Raise UsageError where the picture cannot be written as asked."""
+    """Raise InputError where the picture cannot be written as asked."""
+    from armtempo.errors import InputError
+
     if picture is None:
         return
     if picture.suffix not in (".png", ".svg"):
-        raise click.UsageError(f"--picture {picture}: give a name that ends in .png or .svg")
+        raise InputError(
+            f"--picture {picture}: not a kind of picture", "give a name that ends in .png or .svg"
+        )
     if picture.exists() and not force:
-        raise click.UsageError(f"--picture {picture}: is there already; choose another name, or add --force")
+        raise InputError(f"--picture {picture}: is there already", "choose another name, or add --force")
 
 
 def _print_text(path: Path, arm: Arm | None, joints: tuple[JointFigures, ...], found: list[Finding]) -> None:
@@ -95,7 +99,7 @@ def _print_json(path: Path, arm: Arm | None, joints: tuple[JointFigures, ...], f
 
 
 def _draw(arm: Arm, picture: Path) -> None:
-    from armtempo.report import arm_picture, plots
+    from armtempo.report import arm_picture, drawing
 
-    plots.save(arm_picture.arm_picture(arm), picture)
+    drawing.save(arm_picture.arm_picture(arm), picture)
     click.echo(f"wrote {picture}", err=True)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from armtempo.cli import chosen, options
+from armtempo.cli import chosen, messages, options
 from armtempo.cli.progress import ProgressBar
 from armtempo.cli.run import run_and_tell
 from armtempo.ports.names import SIM
@@ -28,7 +28,7 @@ def command(out: Path | None, port: str, log_traffic: Path | None) -> None:
     Without --port a virtual board replays it, faster than in real time, whatever is plugged in.
     """
     from armtempo import pipeline
-    from armtempo.errors import MissingPackageError
+    from armtempo.errors import ArmtempoError, MissingPackageError
     from armtempo.model.arm import Arm
     from armtempo.model.job import Job
 
@@ -42,4 +42,6 @@ def command(out: Path | None, port: str, log_traffic: Path | None) -> None:
     try:
         click.echo(f"report: {pipeline.report(run)}")
     except MissingPackageError as error:
-        click.echo(f"no report: {error}, then: armtempo report {run.path}", err=True)
+        messages.show(
+            ArmtempoError(error.problem, f"{error.hint}, then: armtempo report {run.path}"), "no report"
+        )

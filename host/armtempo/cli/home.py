@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from armtempo.cli import chosen, options, posture
+from armtempo.errors import InputError
 
 
 @click.command(context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
@@ -35,7 +36,10 @@ def command(
     the joints that have a switch of known angle move: to it, off it, and slowly to it again.
     """
     if switches and where != posture.HOME:
-        raise click.UsageError("give either WHERE or --switches")
+        raise InputError(
+            "WHERE and --switches exclude each other",
+            "give WHERE where the arm stands, or --switches to drive to the limit switches",
+        )
     wanted = posture.NamedPosture.of(where, arm_path, altered)
     with chosen.board(port, log_traffic, wanted.arm) as board:
         arm = chosen.arm_of_board(board, wanted.arm)

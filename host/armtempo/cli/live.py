@@ -11,6 +11,7 @@ import numpy as np
 from armtempo_shared.limits import TICK_HZ
 
 from armtempo.arrays import Array
+from armtempo.cli import messages
 from armtempo.cli.progress import ProgressBar
 from armtempo.errors import ArmtempoError
 from armtempo.link.board_messages import Sample
@@ -56,7 +57,7 @@ class Live(Watcher):
         try:
             return LivePlot(self._motion.trajectory, [joint.name for joint in self._motion.arm.driven])
         except ArmtempoError as error:
-            click.echo(f"no live plot: {error}", err=True)
+            messages.show(error, "no live plot")
             return None
 
     def _angles_deg(self, sample: Sample) -> Array:

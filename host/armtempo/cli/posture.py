@@ -44,6 +44,8 @@ class NamedPosture:
         if text.endswith(".json"):
             plan = chosen.load_plan(Path(text), arm_path, altered)
             return cls(text, plan.arm, plan)
+        if not is_named(text):
+            _numbers(text)  # what is no posture is said before a port is opened
         return cls(text, chosen.named_arm(arm_path), None)
 
     def angles_deg(self, arm: Arm, job_path: Path | None) -> Array:
@@ -56,14 +58,17 @@ class NamedPosture:
             return point_to_point.posture(arm.home_deg, arm)
         if is_via(self.text):
             return via_deg(self.text, arm, chosen.load_job(job_path, arm))
-        try:
-            angles_deg = [float(cell) for cell in self.text.split(",")]
-        except ValueError:
-            raise InputError(
-                f"{self.text!r} is no posture: give 'home', angles in degrees ('0,-60,40'), a via point of the job "
-                "('P0') or a trajectory file"
-            ) from None
-        return point_to_point.posture(angles_deg, arm)
+        return point_to_point.posture(_numbers(self.text), arm)
+
+
+def _numbers(text: str) -> list[float]:
+    try:
+        return [float(cell) for cell in text.split(",")]
+    except ValueError:
+        raise InputError(
+            f"{text!r} is no posture",
+            "give angles in degrees ('0,-60,40'), 'home', a via point of the job ('P0') or a trajectory file",
+        ) from None
 
 
 def say_where_it_is(board: Board) -> None:
@@ -95,5 +100,7 @@ def via_deg(text: str, arm: Arm, job: Job) -> Array:
     points_deg, _ = planner.via_angles(arm, job)
     index = int(text[1:])
     if index >= len(points_deg):
-        raise InputError(f"job {job.name!r} has the via points P0 to P{len(points_deg) - 1}, not P{index}")
+        raise InputError(
+            f"job {job.name!r} has no via point P{index}", f"give one of P0 to P{len(points_deg) - 1}"
+        )
     return np.asarray(points_deg[index])

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import messages, options
 
 
 @click.command()
@@ -27,13 +27,16 @@ def command(runs: tuple[Path, ...], out: Path | None, force: bool) -> None:
     is named there.
     """
     from armtempo import pipeline
-    from armtempo.errors import RunFolderError
+    from armtempo.errors import InputError, RunFolderError
     from armtempo.formats.atomic_file import check_replaceable
     from armtempo.robot.run import Run
 
     if len(runs) == 1:
         if out is not None:
-            raise click.UsageError("--out goes with two or more runs")
+            raise InputError(
+                "--out goes with two or more runs",
+                "leave it out: the page of one run is report.html in its folder",
+            )
         click.echo(f"wrote {pipeline.report(Run.load(runs[0]))}")
         return
     if out is not None:
@@ -42,7 +45,7 @@ def command(runs: tuple[Path, ...], out: Path | None, force: bool) -> None:
         try:
             click.echo(f"wrote {pipeline.report(Run.load(run))}")
         except RunFolderError as error:
-            click.echo(f"armtempo: {error}", err=True)
+            messages.show(error)
     click.echo(f"wrote {pipeline.compare(runs, out)}")
 
 

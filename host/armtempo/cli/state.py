@@ -17,6 +17,7 @@ def lines(state: BoardState) -> list[str]:
         f"arm       {_arm(state)}",
         f"free      {state.free_flash} bytes of flash, {state.free_heap} of heap",
         f"fastest   {state.max_rate} steps/s one joint, {state.max_rate_sum} all together",
+        f"engine    {state.room}",
         *motion_lines(state),
     ]
 
@@ -27,7 +28,7 @@ def motion_lines(state: BoardState) -> list[str]:
     if state.fault:
         found.append(f"fault     {state.fault}; see 'armtempo clear'")
     found += [f"          {line}" for line in joint_lines(state)]
-    found.append(f"link      {state.frames_bad} damaged messages, {state.samples_lost} samples lost")
+    found.append(f"link      {_link(state)}")
     return found
 
 
@@ -45,7 +46,17 @@ def joint_lines(state: BoardState) -> list[str]:
     return [row.rstrip() for row in aligned(rows, (12, 10, 1, 1))] if rows else []
 
 
+def _link(state: BoardState) -> str:
+    if not state.frames_bad and not state.samples_lost:
+        return "sound: no message arrived damaged, no sample was lost"
+    return (
+        f"messages damaged {state.frames_bad} times, {state.samples_lost} samples lost: check cable and plugs"
+    )
+
+
 def _arm(state: BoardState) -> str:
+    if state.arm_problem:
+        return state.arm_problem
     if not state.arm_crc:
         return "none yet; 'armtempo configure' sets the board up for one"
     record = f"{len(state.joints)} joints, record {state.arm_crc:08x}"

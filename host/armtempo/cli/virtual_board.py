@@ -84,4 +84,7 @@ def command(
         while board.running():
             time.sleep(_LOOK_S)
         tail = board.log().strip().splitlines()[-1:]
-        raise LinkError(f"the virtual board ended: {' '.join(tail) or 'it says nothing'}")
+        raise LinkError(
+            f"the virtual board ended: {' '.join(tail) or 'it says nothing'}",
+            "start it again; with the same --flash its files are kept",
+        )

@@ -22,7 +22,7 @@ def replace_text(path: Path, text: str) -> None:
         else:
             _replace(path.resolve(), text)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {why(error)}; choose another place") from None
+        raise InputError(f"{path}: cannot be written: {why(error)}", "choose another place") from None
 
 
 def check_not_input(target: Path, inputs: Iterable[Path | str]) -> None:
@@ -31,7 +31,7 @@ def check_not_input(target: Path, inputs: Iterable[Path | str]) -> None:
         with suppress(OSError):
             if file and target.exists() and os.path.samefile(target, file):
                 raise InputError(
-                    f"{target} is what this is made from and is not written over; choose another name"
+                    f"{target} is what this is made from and is not written over", "choose another name"
                 )
 
 
@@ -44,7 +44,8 @@ def check_replaceable(target: Path, text: str, force: bool, rule: str = "") -> N
         return
     kept = f" ({rule})" if rule else ""
     raise InputError(
-        f"{target} exists and has other content, so it is kept{kept}; --force replaces it, or choose another name"
+        f"{target} exists and has other content, so it is kept{kept}",
+        "choose another name, or replace it with --force",
     )
 
 

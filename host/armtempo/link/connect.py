@@ -72,15 +72,17 @@ def _check_owner(port: str, tell: Callable[[str], object]) -> PortClaim | None:
     state = ownership(claim)
     if state is Ownership.LIVES:
         raise PortError(
-            f"port {port} is in use by {claim.who}; 'armtempo status', 'stop', 'watch' and 'monitor' go through "
-            "that program, other commands have to wait for its end"
+            f"port {port} is in use by {claim.who}",
+            "wait for its end, or end it with 'armtempo stop'; 'armtempo status' and 'watch' look on meanwhile",
         )
     if state is Ownership.DIED:
         tell(f"{claim.who} has ended without giving up {port}; what it had started may still move")
         claim.remove()
         return None
     if not claims.LOCAL_SOCKETS:  # the operating system opens a port once only
-        raise PortError(f"{claim.who} has port {port} and does not answer; end that process, then try again")
+        raise PortError(
+            f"{claim.who} has port {port} and does not answer", "end that process, then try again"
+        )
     tell(f"{claim.who} has port {port} and does not answer; taking the port over")
     return claim
 
@@ -96,8 +98,11 @@ def _greeted(stack: ExitStack, transport: Transport) -> Client:
 def _check_program(board: Client) -> None:
     if board.info.program_crc != own_crc():
         raise LinkError(
-            f"the board on {board.session.transport.name} runs another version of the board program than the "
-            "one installed here; bring it up to date with 'armtempo deploy'"
+            (
+                f"the board on {board.session.transport.name} runs another version of the board program than the "
+                "one installed here"
+            ),
+            "bring it up to date with 'armtempo deploy'",
         )
 
 
@@ -129,4 +134,6 @@ def _virtual_port(port: str, arm: Arm | None) -> Iterator[str]:
             words = board.log().strip().splitlines()[-1:]
             if isinstance(error, BoardError) or not words:
                 raise
-            raise LinkError(f"{error}; the virtual board says: {words[0]}") from error
+            raise LinkError(
+                f"{error.problem}; the virtual board says: {words[0]}", f"{error.hint}"
+            ) from error

@@ -30,26 +30,30 @@ def explain(transport: Transport, heard: bytes) -> LinkError:
         transport.write(_ASK)
         if _HERE in _listen(transport):
             return NoProgramError(
-                f"{where} runs MicroPython but not the armtempo program, which is on it: mpremote or an IDE ended it. "
-                f"Press the board's reset button, or: mpremote connect {transport.name} reset. If it does not start "
-                "then: 'armtempo deploy'"
+                f"{where} runs MicroPython but not the armtempo program, which is on it: mpremote or an IDE ended it",
+                f"press the board's reset button, or: mpremote connect {transport.name} reset; if it does "
+                "not start then: armtempo deploy",
             )
         return NoProgramError(
-            f"{where} runs MicroPython but not the armtempo program; install it with 'armtempo deploy'"
+            f"{where} runs MicroPython but not the armtempo program",
+            "install it with 'armtempo deploy'",
         )
     if any(sign in heard for sign in _FRAME_SIGNS):
         return DisturbedError(
-            f"{where} is mostly unreadable: pieces of armtempo's messages arrive, too few of them "
-            "whole; check cable and plugs"
+            f"{where} is mostly unreadable: pieces of armtempo's messages arrive, too few of them whole",
+            "check cable and plugs",
         )
     if heard:
         return LinkError(
-            f"something else than armtempo answers on {transport.name} (it says {_excerpt(heard)}); "
-            "'armtempo ports' lists the other ports"
+            f"something else than armtempo answers on {transport.name} (it says {_excerpt(heard)})",
+            "choose another port: 'armtempo ports' lists them",
         )
     return LinkError(
-        f"{where} does not answer within 2 s: check the cable, that the board is powered, and that this is "
-        "its port ('armtempo ports'); a board that hangs starts afresh with its reset button"
+        f"{where} does not answer within 2 s",
+        (
+            "check the cable, that the board is powered, and that this is its port ('armtempo ports'); a board "
+            "that hangs starts afresh with its reset button"
+        ),
     )
 
 

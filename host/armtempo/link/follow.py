@@ -86,7 +86,7 @@ class Follower:
     def end(self) -> RunEnd:
         """How the run ended; LinkError before it has."""
         if self._end is None:
-            raise LinkError("the run has not ended yet")
+            raise LinkError("the run has not ended yet", "take the samples to their end first")
         return self._end
 
     def samples(self, between: Callable[[], None] = lambda: None) -> Iterator[Sample]:
@@ -183,7 +183,10 @@ class Follower:
                     status.run, status.ticks, status.path_ticks, 0, status.samples_lost, status.positions
                 )
         elif self._stuck(status.ticks):
-            raise LinkError("the board says that it moves, but its motion clock stands still; reset it")
+            raise LinkError(
+                "the board says that it moves, but its motion clock stands still",
+                "press its reset button, then 'armtempo home'",
+            )
 
     def _stuck(self, value: int) -> bool:
         """Whether ``value``, which should increase, has been the same MOST_REPEATS times."""

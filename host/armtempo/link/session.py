@@ -118,7 +118,7 @@ class Session:
                 now_s - self._heard_s >= silence_timeout_s and not self.frames_bad
             )  # on a disturbed line all may be lost
             if silent or now_s - begin_s >= answer_timeout_s:
-                raise NoAnswerError(self._no_answer(name, now_s - begin_s))
+                raise self._no_answer(name, now_s - begin_s)
             self.repeats += 1
 
     def poll(self, timeout_s: float) -> board_messages.Event | None:
@@ -147,11 +147,12 @@ class Session:
         with self.turns.in_a_hurry(timeout_s) as mine:
             yield mine
 
-    def _no_answer(self, name: str, waited_s: float) -> str:
-        what = f"the board on {self.transport.name} did not answer '{name}' within {waited_s:.1f} s"
+    def _no_answer(self, name: str, waited_s: float) -> NoAnswerError:
+        problem = f"the board on {self.transport.name} did not answer '{name}' within {waited_s:.1f} s"
         if self.frames_bad:
-            return f"{what}; {self.frames_bad} damaged stretches received: check the cable"
-        return f"{what}; check the cable and that the board is powered"
+            problem += f", and messages arrived damaged ({self.frames_bad} times)"
+            return NoAnswerError(problem, "check cable and plugs, or try another cable")
+        return NoAnswerError(problem, "check the cable and that the board is powered")
 
     def _next_sequence(self) -> int:
         """The next of 255: a board that is just starting would take a 3 for Ctrl-C."""
@@ -205,7 +206,7 @@ class Session:
         """
         if self.reopen is None:
             raise reason
-        self.tell(f"{reason}; waiting for it to come back")
+        self.tell(f"{reason.problem}; waiting for it to come back")
         self.transport.close()
         limit_s = self.clock() + RECONNECT_S
         while not self._found_again(self.reopen):
@@ -222,8 +223,8 @@ class Session:
         if not self.stopping():
             return reason
         return LinkError(
-            f"{reason}; it could not be told to stop: what was moving may move on, see 'armtempo status' once it is "
-            "back"
+            f"{reason.problem}; it could not be told to stop: what was moving may move on",
+            "see 'armtempo status' once it is back",
         )
 
     def _found_again(self, reopen: Callable[[], Transport]) -> bool:
@@ -263,10 +264,10 @@ def _answer(name: str, reply: wire.Frame) -> Answer:
         values, tail = wire.decode(wire.EVENT_BY_ID[reply.number], reply.payload)
         if wire.EVENT_BY_ID[reply.number][0] == "error":
             raise refusal(f"the board refused '{name}'", *values[1:])
-        answer: Answer = wire.decode(wire.ANSWER[name], tail)
+        answer: Answer = board_messages.decode(wire.ANSWER[name], tail)
     except wire.WireError as error:
         raise LinkError(
-            f"the board's answer to '{name}' does not fit protocol {wire.PROTOCOL_VERSION} ({error}); "
-            "run 'armtempo deploy'"
+            f"the board's answer to '{name}' does not fit protocol {wire.PROTOCOL_VERSION} ({error})",
+            "run 'armtempo deploy'",
         ) from error
     return answer

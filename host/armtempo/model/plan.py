@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from armtempo.arrays import Array
+from armtempo.formats import json_codec
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.splines.extremes import Extremes
@@ -28,13 +31,17 @@ class Search:
     evaluations: int
     """Fitness evaluations of the search."""
     history_s: Array
-    """Best fitness of the first population and after each iteration, (iterations + 1,)."""
+    """Best fitness of the first population and after each iteration, (iterations + 1,); of a gradient search the best
+    motion time after each start."""
     optimum_s: float
     """Where polished: lower bound of the local optimum with as many intervals; else 0."""
     floor_s: float
-    """Lower bound of the motion time of every time law along this path (kind "path": to about 1 ms)."""
+    """Proven lower bound of the motion time, whatever the time law along this path; for a free path, whatever the path
+    through the via points."""
     floor_kind: str
-    """How the lower bound was found, see ``lower_bounds.floor``."""
+    """How the lower bound was found, see ``lower_bounds.Floor``."""
+    starts_s: Array = field(default_factory=lambda: np.empty(0), metadata=json_codec.ADDED)
+    """Of a gradient search, the motion time that each start led to on few segments; else empty."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,10 @@ def sim_flash(port: str) -> Path | None:
     if port == SIM:
         return None
     if port == SIM + ":":
-        raise InputError(f"port '{port}' names no folder; 'sim:FOLDER' keeps the flash there, 'sim' nowhere")
+        raise InputError(
+            f"port '{port}' names no folder",
+            "write sim:FOLDER to keep the flash there, or sim to keep it nowhere",
+        )
     return Path(port[len(SIM) + 1 :])
 
 

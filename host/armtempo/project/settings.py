@@ -92,8 +92,9 @@ def variable_of(name: str) -> str:
 def nothing_set(name: str, what: str) -> InputError:
     """The error where a command needs a setting and nothing gives it; ``what``: it needs what for what."""
     return InputError(
-        f'{what}: give {OPTIONS[name]}, or set {variable_of(name)}, or write {name} = "…" into an {FILE} '
-        "in this folder or above it ('armtempo config' shows what is set)"
+        what,
+        f'give {OPTIONS[name]}, or set {variable_of(name)}, or write {name} = "…" into an {FILE} '
+        "in this folder or above it ('armtempo config' shows what is set)",
     )
 
 

@@ -259,7 +259,7 @@ class Board:
 
     def _known_arm(self) -> Arm:
         if self.arm is None:
-            raise InputError("say first which arm the board moves: home(arm) or configure(arm)")
+            raise InputError("no arm is known to move", "say which with home(arm) or configure(arm)")
         return self.arm
 
     def _posture(self, where: Where) -> Array:
@@ -281,7 +281,10 @@ class Board:
         for entry in self.client.stored():
             if entry.default:
                 return entry.name
-        raise InputError("the board's button starts nothing: name the motion that was run")
+        raise InputError(
+            "no motion was named, and no stored motion is set as the one that the board's button starts",
+            "say which motion's samples these are: armtempo fetch NAME; 'armtempo list' shows the names",
+        )
 
     def _bring_to_start(self, motion: EncodedMotion, stop: StopRequest) -> None:
         """Store the motion; bring a virtual arm to its start, and refuse where a real one is elsewhere."""
@@ -291,7 +294,8 @@ class Board:
             goto.go_to(self.client, motion.arm, motion.start_deg, stop)
         elif not arm_state.is_at(self.client, motion.arm, motion.start_deg):
             raise LinkError(
-                f"the arm does not stand where {motion.name!r} begins; bring it there with 'armtempo goto'"
+                f"the arm does not stand where {motion.name!r} begins",
+                "bring it there with 'armtempo goto'",
             )
 
     def _home_virtual_arm(self, arm: Arm) -> None:

@@ -14,6 +14,7 @@ from armtempo.errors import LinkError
 
 if TYPE_CHECKING:
     from armtempo.link import Client
+    from armtempo.link.board_messages import Hello
     from armtempo.model.arm import Arm
 
 
@@ -59,6 +60,10 @@ class BoardState:
     """Steps/s of one joint."""
     max_rate_sum: int
     """Steps/s of all joints together."""
+    room: str
+    """What engines its memory has room for, in words."""
+    arm_problem: str
+    """Why a stored arm record is not used; "" where it is, or there is none."""
     state: str
     """One of ``armtempo_shared.messages.STATES``."""
     moving: bool
@@ -84,7 +89,7 @@ class BoardState:
             return cls(**{**values, "joints": joints})
         except (TypeError, KeyError) as error:
             raise LinkError(
-                "the program that has the port is of another version of armtempo; end it and start it again"
+                "the program that has the port is of another version of armtempo", "end it and start it again"
             ) from error
 
     def named(self, arm: Arm | None) -> BoardState:
@@ -106,6 +111,7 @@ class BoardState:
 def read(client: Client, port: str) -> BoardState:
     """What the board says now, in steps and counts."""
     from armtempo.link.program_version import own_crc
+    from armtempo.robot import engine_room
     from armtempo.robot.stored_motion import fault_name
 
     info, status = client.info, client.status()
@@ -124,6 +130,8 @@ def read(client: Client, port: str) -> BoardState:
         free_heap=info.free_heap,
         max_rate=info.max_rate,
         max_rate_sum=info.max_rate_sum,
+        room=engine_room.words(info),
+        arm_problem=_arm_problem(info),
         state=status.state,
         moving=status.moving,
         speed_percent=status.rate / 10,
@@ -135,6 +143,15 @@ def read(client: Client, port: str) -> BoardState:
             for number, (steps, counts) in enumerate(pairs, 1)
         ),
     )
+
+
+def _arm_problem(info: Hello) -> str:
+    """Why the record in the board's flash is not used."""
+    if not info.arm_problem:
+        return ""
+    from armtempo.link.refusal import refusal
+
+    return str(refusal("the stored arm record is not used", info.arm_problem, value=info.arm_value))
 
 
 def record_crc(arm: Arm) -> int:

@@ -55,7 +55,7 @@ class SharedBoard:
         limit_s = time.monotonic() + REST_S
         while (state := self.state()).moving:
             if time.monotonic() > limit_s:
-                raise LinkError("the board was told to stop and does not; switch off the motors' power")
+                raise LinkError("the board was told to stop and does not", "switch off the motors' power")
             time.sleep(_LOOK_S)
         return state
 
@@ -105,6 +105,6 @@ def attach(port: str | None = None) -> SharedBoard:
     found = find(chosen.value)
     if found is None:
         raise LinkError(
-            f"no armtempo program that answers has port {chosen.value}; armtempo.connect opens it by itself"
+            f"no armtempo program that answers has port {chosen.value}", "open it with armtempo.connect"
         )
     return found

@@ -91,7 +91,8 @@ class Sharing:
         with self._client.session.in_a_hurry(TURN_S) as mine:
             if not mine:
                 raise NoAnswerError(
-                    "the board does not answer the program that has its port; it is told to stop as soon as it does"
+                    "the board does not answer the program that has its port",
+                    "it is told to stop as soon as it does; where that takes too long, switch off the motors' power",
                 )
             moving = send_stop(self._client, now)
         if self._server is not None:
@@ -111,7 +112,7 @@ class Sharing:
     def _read(self) -> BoardState:
         with self._client.session.in_a_hurry(TURN_S) as mine:
             if not mine:
-                raise NoAnswerError("the program that has the port waits for the board's answer; try again")
+                raise NoAnswerError("the program that has the port waits for the board's answer", "try again")
             return self._state()
 
     # what is handed out

@@ -46,8 +46,8 @@ def store(
     if found is not None and found.joints and not replace and not name.startswith(TEMPORARY):
         button = ", which its button starts" if found.default else ""
         raise LinkError(
-            f"the board keeps another motion {name!r}{button} ({found.duration_s:.3f} s, checksum {found.crc:08x}); "
-            "--force replaces it, 'armtempo upload --name' stores this one under another name"
+            f"the board keeps another motion {name!r}{button} ({found.duration_s:.3f} s, checksum {found.crc:08x})",
+            "replace it with --force, or store this one under another name with 'armtempo upload --name'",
         )
     client.upload(name, data, progress)
     return key
@@ -74,7 +74,10 @@ def replay(
     try:
         return _follow(client, follower, _Brake(client, stop), lambda sample: sink(sample, motion_s))
     except OtherBoardError as error:
-        raise LinkError(f"{error}; what came after the last sample cannot be known") from error
+        raise LinkError(
+            f"{error.problem}; what came after the last sample cannot be known",
+            f"{error.hint}",
+        ) from error
 
 
 def _follow(client: Client, follower: Follower, brake: _Brake, take: Callable[[Sample], object]) -> RunEnd:
@@ -101,8 +104,11 @@ def _stop_after(client: Client, error: BaseException) -> None:
     """Stop what is moving because of ``error``, as far as the board can be reached."""
     if isinstance(error, BoardError) and error.code == wire.ERROR_CODES["no_session"]:
         raise LinkError(
-            "the board started anew during the motion: where the arm stands and what came after the last "
-            "sample cannot be known; find the cause, then 'armtempo home'"
+            (
+                "the board started anew during the motion: where the arm stands and what came after the last "
+                "sample cannot be known"
+            ),
+            "find the cause, then 'armtempo home'",
         ) from error
     client.session.reopen = None  # a cable that is out is not waited for
     with suppress(LinkError):  # the first error says more
@@ -133,7 +139,7 @@ class _Brake:
 
 
 def _does_not_stop() -> None:
-    raise LinkError("the board was told to stop and does not; switch off the motors' power")
+    raise LinkError("the board was told to stop and does not", "switch off the motors' power")
 
 
 def send_stop(client: Client, now: bool = False) -> bool:

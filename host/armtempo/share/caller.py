@@ -19,6 +19,7 @@ HANGS_S = 2.0
 """A program that has not answered ``hello`` for so long counts as hanging."""
 _REMEMBERED_S = 5.0
 """That it hangs is not tried again for so long."""
+_END = "end that process, or let a command that needs the port take it over"
 _hung: dict[str, float] = {}
 """When a claim's program was last found to hang, by the claim's number."""
 
@@ -77,7 +78,7 @@ class Caller:
         while True:
             message = self._receive(max(0.0, limit_s - time.monotonic()))
             if message is None:
-                raise NoAnswerError(f"{self.claim.who} has {self.claim.port} and does not answer")
+                raise NoAnswerError(f"{self.claim.who} has {self.claim.port} and does not answer", _END)
             if "topic" in message:
                 self._published.append(message)
             elif message.get("id") in (number, None):
@@ -121,7 +122,9 @@ class Caller:
             self._socket.settimeout(HANGS_S)
             self._socket.sendall(line)
         except TimeoutError:
-            raise NoAnswerError(f"{self.claim.who} has {self.claim.port} and takes no requests") from None
+            raise NoAnswerError(
+                f"{self.claim.who} has {self.claim.port} and takes no requests", _END
+            ) from None
         except OSError as error:
             raise self._gone() from error
 
@@ -139,7 +142,7 @@ class Caller:
         return message
 
     def _gone(self) -> LinkError:
-        return LinkError(f"{self.claim.who} has given up {self.claim.port}")
+        return LinkError(f"{self.claim.who} has given up {self.claim.port}", "try again: the port is free")
 
 
 def _connect(claim: PortClaim) -> socket.socket:
@@ -154,10 +157,10 @@ def _connect(claim: PortClaim) -> socket.socket:
         found.connect(address)
     except (TimeoutError, BlockingIOError):
         found.close()
-        raise NoAnswerError(f"{claim.who} has {claim.port} and takes no connection") from None
+        raise NoAnswerError(f"{claim.who} has {claim.port} and takes no connection", _END) from None
     except OSError as error:
         found.close()
-        raise LinkError(f"{claim.who} had {claim.port} and is gone") from error
+        raise LinkError(f"{claim.who} had {claim.port} and is gone", "try again: the port is free") from error
     return found
 
 
@@ -165,6 +168,7 @@ def _checked(message: Message) -> Message:
     if message.get("ok"):
         return message
     text = str(message.get("error", "refused without a reason"))
+    hint = str(message.get("hint", ""))
     if isinstance(message.get("code"), int):
-        raise BoardError(text, message["code"])
-    raise LinkError(text)
+        raise BoardError(text, hint, message["code"])
+    raise LinkError(text, hint)

@@ -29,7 +29,9 @@ class LineReader:
         """
         while b"\n" not in self._data:
             if len(self._data) > LONGEST_LINE:
-                raise LinkError(f"a line of more than {LONGEST_LINE} bytes; a message is a line of JSON")
+                raise LinkError(
+                    f"a line of more than {LONGEST_LINE} bytes", "send messages of a line of JSON each"
+                )
             piece = self._connection.recv(_PIECE)
             if not piece:
                 return None
@@ -50,5 +52,5 @@ def _parse(line: bytes) -> Message:
     except (ValueError, RecursionError):
         found = None
     if not isinstance(found, dict):
-        raise LinkError("not a message: a message is a JSON object in one line")
+        raise LinkError("not a message", "send a JSON object in one line")
     return found

@@ -72,8 +72,8 @@ class Server:
         taken_by = self.claim.taken_by()
         if taken_by is not None:
             raise PortError(
-                f"{taken_by.who} has taken {self.claim.port} over, as this program did not answer; "
-                "'armtempo status' says what became of the motion"
+                f"{taken_by.who} has taken {self.claim.port} over, as this program did not answer",
+                "ask 'armtempo status' what became of the motion",
             )
 
     def close(self) -> None:
@@ -161,10 +161,12 @@ class _Connection:
     def _answer(self, request: Message) -> Message:
         name = request.get("request")
         if not self._known and name != "hello":
-            return _failed(LinkError("say hello with the token first"))
+            return _failed(LinkError("nobody has said hello yet", "say hello with the token first"))
         handler = self._handlers.get(name) if isinstance(name, str) else None
         if handler is None:
-            return _failed(LinkError(f"no request {name!r}; there are {', '.join(sorted(self._handlers))}"))
+            return _failed(
+                LinkError(f"no request {name!r}", f"there are {', '.join(sorted(self._handlers))}")
+            )
         try:
             return {"ok": True, **handler(request)}
         except ArmtempoError as error:
@@ -172,7 +174,7 @@ class _Connection:
 
     def _hello(self, request: Message) -> Message:
         if not compare_digest(str(request.get("token", "")).encode(), self._claim.token.encode()):
-            raise LinkError("wrong token; it stands in the file of the claim")
+            raise LinkError("wrong token", "take it from the file of the claim")
         self._known = True
         claim = self._claim
         return {"version": VERSION, "port": claim.port, "program": claim.program, "pid": claim.pid}
@@ -180,7 +182,7 @@ class _Connection:
     def _subscribe(self, request: Message) -> Message:
         topics = request.get("topics")
         if not isinstance(topics, list) or not set(map(str, topics)) <= set(TOPICS):
-            raise LinkError(f"topics must be a list of some of {', '.join(TOPICS)}")
+            raise LinkError("topics must be a list", f"give some of {', '.join(TOPICS)}")
         self.topics = frozenset(topics)
         return {"topics": sorted(self.topics)}
 
@@ -203,4 +205,4 @@ def _listen(claim: PortClaim) -> socket.socket:
 
 def _failed(error: ArmtempoError) -> Message:
     code = {"code": error.code} if isinstance(error, BoardError) else {}
-    return {"ok": False, "error": str(error), **code}
+    return {"ok": False, "error": error.problem, "hint": error.hint, **code}

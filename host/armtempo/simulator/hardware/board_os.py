@@ -80,6 +80,7 @@ def rmdir(path):
 
 def sync():
     """Bring the flash up to date."""
+    machine_state.flash.sync()
     machine_state.board.spend(100)
 
 

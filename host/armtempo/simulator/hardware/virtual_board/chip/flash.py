@@ -5,7 +5,8 @@ A second folder may be an SD card, seen as ``/sd``: without limits of size, and 
 Each change (a file opened for writing, a piece written, a close, a rename, a removal, a new folder) is one
 flash operation. A power cut can be injected at the n-th of them: it leaves that operation half done (a
 piece of the data written; a rename over an existing file stopped after the old one is gone, as FAT does it),
-files still open for writing empty, and the board starts again.
+files still open for writing empty, and files that were closed but not synced since, whatever their name now; and the
+board starts again. The chip writes through a cache: only ``sync`` makes what was written last.
 """
 
 import os
@@ -41,6 +42,7 @@ class FlashFolder:
         self._stall = stall
         self._cut_at = cut_at
         self._writing = []
+        self._unsynced = []
         self.renamed = None
 
     def real(self, path):
@@ -77,10 +79,13 @@ class FlashFolder:
         return self.operations == self._cut_at
 
     def power_fails(self):
-        """Files that were being written are left empty; the board starts again."""
+        """Files that were being written, or were not synced, are left empty; the board starts again."""
         for file in self._writing:
             file.cut()
+        for path in self._unsynced:
+            real_open(path, "wb").close()
         self._writing = []
+        self._unsynced = []
         raise Reset(_POWER_ON)
 
     def blocks(self, path):
@@ -130,6 +135,11 @@ class FlashFolder:
             if self.operation(_CLOSE_MS):
                 self.power_fails()
             self._writing.remove(file)
+            self._unsynced.append(file.path)
+
+    def sync(self):
+        """What was written lasts."""
+        self._unsynced = []
 
     def rename(self, old, new):
         """As FAT does it: an existing file of the new name is removed first."""
@@ -141,9 +151,11 @@ class FlashFolder:
             if self.operation():
                 self.power_fails()
             os.remove(new)
+            self._unsynced = [path for path in self._unsynced if path != new]
         if self.operation():
             self.power_fails()
         os.rename(old, new)
+        self._unsynced = [new if path == old else path for path in self._unsynced]
         if self.renamed:
             self.renamed()
 
@@ -155,6 +167,7 @@ class FlashFolder:
         if self.operation():
             self.power_fails()
         function(real)
+        self._unsynced = [path for path in self._unsynced if exists(path)]
 
 
 class Written:
@@ -163,7 +176,7 @@ class Written:
     def __init__(self, flash, file, path):
         self._flash = flash
         self._file = file
-        self._path = path
+        self.path = path
 
     def write(self, data):
         """Write; OSError(ENOSPC) where the flash is full."""
@@ -171,16 +184,16 @@ class Written:
             self._file.write(data[: len(data) // 2])
             self._flash.power_fails()
         self._file.flush()
-        size = os.stat(self._path)[6]
+        size = os.stat(self.path)[6]
         needed = -(-(size + len(data)) // BLOCK) - -(-size // BLOCK)
-        if self._path.startswith(self._flash.root + "/") and needed > self._flash.free_blocks():
+        if self.path.startswith(self._flash.root + "/") and needed > self._flash.free_blocks():
             raise OSError(_ENOSPC)
         return self._file.write(data)
 
     def cut(self):
         """The power failed: the directory still has the length 0."""
         self._file.close()
-        real_open(self._path, "wb").close()
+        real_open(self.path, "wb").close()
 
     def close(self):
         """Finish the file."""

@@ -1,0 +1,243 @@
+"""Changes of speed, pauses and stops at random moments of random motions, on simulated hardware.
+
+Every step of the path comes once and in order, at the time that the law of the changes gives it; samples say the
+motion's own time. What is expected are the steps of the same motion without a change. A number as an argument is how
+many motions are tried.
+"""
+
+import random
+import sys
+
+import cases
+from armtempo_board.errors import Refused
+from armtempo_shared import codes
+from armtempo_shared.limits import LONGEST_RUN_TICKS
+from armtempo_shared.messages import RESUME
+from brake_motion import BRAKE_TICKS, record
+from engine_rig import FEWER, TICK_HZ, Rig, arm
+
+SEED = 20263
+CHANGES = 6
+LONGEST_STOP_TICKS = 2 * (BRAKE_TICKS + TICK_HZ // 13)
+"""A change that has just been asked for begins 75 ms later, and the stop 75 ms behind its end."""
+MOTIONS = int(([word for word in sys.argv[1:] if word.isdigit()] or [6 // FEWER])[0])
+
+
+class Recorder:
+    """Keeps the rising edges of a joint: time since the motion's time 0, direction."""
+
+    def __init__(self, rig, joint):
+        self._rig = rig
+        self._inverted = joint["dir_inverted"]
+        self._step = rig.board.pins.line(rig.pins.STEP[joint["channel"]][0])
+        self._dir = rig.board.pins.line(rig.pins.DIR[joint["channel"]])
+        self._step.sinks.append(self)
+        self.steps = []
+
+    def edges(self, line, before, count, times, origin):
+        """STEP toggled."""
+        for time in times:
+            if not before:
+                direction = (self._dir.level ^ self._inverted) * 2 - 1
+                self.steps.append((origin + time - self._rig.zero(), direction))
+            before ^= 1
+
+
+def joints():
+    rows = arm(3)
+    for row in rows:
+        row["following_counts"] = 0
+    return rows
+
+
+def some_motion():
+    """Three joints by chance, at rest at both ends."""
+    segments = random.randrange(4, 9)
+    times = [0.0]
+    for _ in range(segments + 4):
+        times.append(times[-1] + random.randrange(60, 200) / 1000)
+    times = [time - 2 * times[1] for time in times]
+    times = [(time - times[2]) for time in times]
+    angles = []
+    for _ in range(3):
+        size = 10 ** (random.randrange(5, 33) / 10)
+        inner = [(random.random() - 0.5) * size for _ in range(segments - 5)] if segments > 5 else []
+        last = (random.random() - 0.5) * size
+        angles.append([0.0] * 5 + inner + [last] * (segments - len(inner)))
+    return record(BRAKE_TICKS, angles, times)
+
+
+def begin(motion, rate=1000):
+    """A rig that has started a motion, and recorders of its joints."""
+    rig = Rig(joints(), planned=False)
+    rig.trusting()
+    recorders = [Recorder(rig, joint) for joint in rig.joints]
+    rig.laws = [(0, 0, 0, rate, rate)]
+    ramp = rig.engine._override.ramp
+
+    def watched(from_ticks, to):
+        override = rig.engine._override
+        before = override.rate
+        ramp(from_ticks, to)
+        length = override._ramp_ticks
+        start = override._real_ticks - length
+        passed = override._motion_ticks - (before + to) * (length // 2000)
+        assert start >= from_ticks
+        rig.laws.append((start, passed, length, before, to))
+
+    rig.engine._override.ramp = watched
+    rig.engine.load(motion, rate)
+    rig.engine.start()
+    return rig, recorders
+
+
+def motion_ticks(laws, ticks):
+    """The motion's own time at a real time: the law in words of paper."""
+    start, passed, length, before, after = [law for law in laws if law[0] <= max(ticks, 0)][-1]
+    if ticks >= start + length:
+        return passed + (before + after) * length / 2000 + (ticks - start - length) * after / 1000
+    x = (ticks - start) / length
+    return passed + length * (before * x + (after - before) * x**4 * (2.5 - 3 * x + x * x)) / 1000
+
+
+def check_steps(rig, recorders, expected):
+    """Each step once, in order, when the law has it."""
+    near = 4 + 12 * BRAKE_TICKS / 2**30
+    for recorder, plain in zip(recorders, expected):
+        for number, ((ticks, direction), (exact, towards)) in enumerate(zip(recorder.steps, plain)):
+            off = motion_ticks(rig.laws, ticks) - exact
+            assert direction == towards, (number, ticks)
+            assert abs(off) < near, (number, ticks, exact, off, rig.laws)
+    return [len(recorder.steps) for recorder in recorders]
+
+
+def check_samples(rig):
+    """Both times of each sample belong together, and there is one every 0.1 s."""
+    for number, sample in enumerate(rig.samples):
+        ticks = (sample[0] & 0xFFFFFFFF) + (sample[1] << 32)
+        path = (sample[2] & 0xFFFFFFFF) + (sample[3] << 32)
+        assert abs(path - motion_ticks(rig.laws, ticks)) < 4, (number, ticks, path, rig.laws)
+        if number < len(rig.samples) - 1:
+            assert 0 <= ticks - number * TICK_HZ // 10 < 2000, (number, ticks)
+
+
+def change(rig):
+    """Another rate, a pause or the end of one, and some time with it."""
+    engine = rig.engine
+    slow = engine.rate < 200
+    rate = (
+        random.choice((1000, RESUME, random.randrange(300, 1000)))
+        if slow
+        else random.choice((0, 10, random.randrange(10, 1000), random.randrange(10, 1000)))
+    )
+    engine.change_rate(rate)
+    rig.run_to(rig.board.now - rig.zero() + random.randrange(TICK_HZ // 3))
+
+
+def case_whole_path():
+    """Whatever the speed, the whole path is stepped."""
+    random.seed(SEED)
+    for number in range(MOTIONS):
+        motion = some_motion()
+        plain, recorders = begin(motion)
+        plain.run_to(4 * TICK_HZ)
+        end = plain.engine.duration_ticks
+        expected = [recorder.steps for recorder in recorders]
+        rate = random.choice((1000, 1000, 500, random.randrange(200, 1000)))
+        rig, recorders = begin(motion, rate)
+        rig.run_to(random.randrange(-TICK_HZ // 50, end))
+        for _ in range(CHANGES):
+            if rig.engine.moving:
+                change(rig)
+        if rig.engine.moving:
+            rig.engine.change_rate(1000)
+        rig.run_to(rig.board.now - rig.zero() + 5 * TICK_HZ)
+        assert not rig.engine.moving and rig.engine.fault == 0, (number, rig.engine.fault)
+        rig.turn()
+        counts = check_steps(rig, recorders, expected)
+        assert counts == [len(steps) for steps in expected], (number, counts, rig.laws)
+        assert rig.commanded() == plain.commanded() == [motor.position for motor in rig.arm.motors]
+        check_samples(rig)
+        assert (rig.samples[-1][2] & 0xFFFFFFFF) >= end, number
+
+
+def case_stops():
+    """A stop, whatever the speed is and is becoming, ends on the path."""
+    random.seed(SEED)
+    for number in range(max(MOTIONS // 2, 1)):
+        motion = some_motion()
+        plain, recorders = begin(motion)
+        plain.run_to(4 * TICK_HZ)
+        expected = [recorder.steps for recorder in recorders]
+        rig, recorders = begin(motion, random.choice((1000, 300)))
+        rig.run_to(random.randrange(plain.engine.duration_ticks // 2))
+        for _ in range(random.randrange(3)):
+            if rig.engine.moving:
+                change(rig)
+        rig.engine.brake()
+        asked = rig.board.now - rig.zero()
+        rig.run_to(asked + 5 * TICK_HZ)
+        assert not rig.engine.moving and rig.engine.fault == 0, number
+        assert rig.engine._end_ticks - asked < LONGEST_STOP_TICKS, (number, rig.engine._end_ticks - asked)
+        rig.turn()
+        counts = check_steps(rig, recorders, expected)
+        rest = motion_ticks(rig.laws, rig.engine._end_ticks)
+        for count, steps in zip(counts, expected):
+            due = len([None for ticks, _ in steps if ticks < rest])
+            assert abs(count - due) <= 1, (number, count, due)
+        assert rig.commanded() == [motor.position for motor in rig.arm.motors]
+        check_samples(rig)
+
+
+def case_long_pause():
+    """A pause longer than the counter's round, then on; and one that is too long ends the run."""
+    motion = record(BRAKE_TICKS)
+    plain, recorders = begin(motion)
+    plain.run_to(4 * TICK_HZ)
+    expected = [recorder.steps for recorder in recorders]
+    end = plain.commanded()
+    rig, recorders = begin(motion)
+    rig.turn_ticks = TICK_HZ // 1000
+    rig.run_to(plain.engine.duration_ticks // 2)
+    rig.engine.change_rate(0)
+    rig.run_to(TICK_HZ)
+    rig.turn_ticks = TICK_HZ // 20
+    rig.run_to(60 * TICK_HZ)
+    assert rig.engine.moving
+    standing = rig.commanded()
+    rig.turn_ticks = TICK_HZ // 1000
+    rig.engine.change_rate(RESUME)
+    rig.run_to(65 * TICK_HZ)
+    assert not rig.engine.moving
+    assert rig.commanded() == end != standing
+    assert check_steps(rig, recorders, expected) == [len(steps) for steps in expected]
+
+
+def case_refused():
+    """What cannot change its speed says so, and goes on."""
+    rig, _ = begin(record(0))
+    for rate in (0, 500, RESUME):
+        assert refusal(rig, rate) == codes.FIXED_SPEED
+    rig.run_to(3 * TICK_HZ)
+    assert refusal(rig, 500) == codes.NOT_MOVING
+    motion = record(BRAKE_TICKS)
+    rig = Rig(joints(), planned=False)
+    rig.trusting()
+    rig.engine.load(motion)
+    rig.engine.start()
+    rig.run_to(TICK_HZ // 2)
+    rig.engine._override._duration_ticks = LONGEST_RUN_TICKS // 50
+    assert refusal(rig, 10) == codes.TOO_LONG
+    rig.engine.brake()
+    assert refusal(rig, 500) == codes.BUSY
+
+
+def refusal(rig, rate):
+    try:
+        rig.engine.change_rate(rate)
+    except Refused as refused:
+        return refused.code
+    return None
+
+
+cases.run(globals())

@@ -1,0 +1,137 @@
+"""Pulses on the pins are those that were computed: to the tick, none lost, none added."""
+
+import cases
+from armtempo_board.buffers import COMMANDED
+from engine_rig import TICK_HZ, Motion, Rig, Steps, arm
+
+
+def check(rig, motion, first=(0,)):
+    total = [steps.total() for steps in motion.joints]
+    assert rig.engine.fault == 0, (rig.engine.fault, rig.engine.fault_joint)
+    assert rig.engine.finished
+    for pulses in rig.pulses:
+        pulses.check_end()
+        assert pulses.all_came(), pulses.rises
+    assert rig.commanded() == total == rig.stepped(), (rig.commanded(), total)
+
+
+def check_samples(rig, motion):
+    count = -(-motion.duration // (TICK_HZ // 10)) + 1
+    assert len(rig.samples) == count, (len(rig.samples), count)
+    for number, sample in enumerate(rig.samples):
+        planned = min(number * (TICK_HZ // 10), motion.duration)
+        late = (sample[0] & 0xFFFFFFFF) + (sample[1] << 32) - planned
+        assert 0 <= late < 84 * 10, (number, late)
+        for joint, steps in enumerate(motion.joints):
+            position = 0
+            place = [0, 0]
+            while steps.at(place) and steps.at(place)[0] <= planned + late:
+                position += steps.at(place)[1]
+                steps.go_on(place)
+            assert sample[COMMANDED + joint] == position, (number, joint, sample, position)
+
+
+def case_three_joints():
+    """Fast, turning, slow; twice, from where the first time ended."""
+    motion = Motion(
+        TICK_HZ + 12345,
+        Steps((1000, 400, 3000, 1)),
+        Steps((500, 5000, 200, 1), (1060000, 5000, 150, -1), (1830000, 5000, 9, 1)),
+        Steps((700, 20_000_000, 4, -1)),
+    )
+    rig = Rig(arm(3))
+    rig.run(motion)
+    check(rig, motion)
+    check_samples(rig, motion)
+    rig.run(motion)
+    assert rig.commanded() == [2 * steps.total() for steps in motion.joints]
+
+
+def case_highest_rate():
+    """Three joints at a third of a million steps a second each, on both timers."""
+    rig = Rig([dict(joint, channel=channel) for joint, channel in zip(arm(3), (0, 3, 5))], pulse_ticks=100)
+    motion = Motion(TICK_HZ // 100, *[Steps((1000 + 7 * n, 252, 3000, 1 - 2 * (n & 1))) for n in range(3)])
+    rig.run(motion)
+    check(rig, motion)
+
+
+def case_six_joints():
+    """All channels at once."""
+    motion = Motion(
+        TICK_HZ // 10,
+        *[Steps((900 + n, 3000 + 17 * n, 500, 1), (4_000_000, 2000 + n, 700, -1)) for n in range(6)],
+    )
+    rig = Rig(arm(6))
+    rig.run(motion)
+    check(rig, motion)
+    check_samples(rig, motion)
+
+
+def case_long_rest():
+    """Joints idle for longer than half the counter, for longer than all of it, and to the very end."""
+    second = TICK_HZ
+    motion = Motion(
+        130 * second,
+        Steps((100, 5000, 10, 1), (30 * second, 5000, 3, 1), (125 * second, 40_000, 5, -1)),
+        Steps((60 * second, 3000, 20, -1), (60 * second + 100_000, 3000, 20, 1)),
+        Steps((50, 20_000, 2, 1)),
+        Steps(),
+    )
+    rig = Rig(arm(4), turn_us=20000)
+    rig.run(motion)
+    check(rig, motion)
+    assert len(rig.samples) == 1301
+
+
+def case_across_the_wrap():
+    """Steps at a good rate while the counter comes round, again and again."""
+    wrap = 1 << 32
+    motion = Motion(
+        3 * wrap + TICK_HZ,
+        Steps(*[(n * wrap - 2_000_000, 4000, 1000, 1) for n in (1, 2, 3)]),
+        Steps((wrap - 1, 10_000, 30, 1), (2 * wrap, 10_000, 30, -1), (3 * wrap - 30_000 * 7, 30_000, 15, 1)),
+    )
+    rig = Rig(arm(2), turn_us=20000)
+    rig.run(motion)
+    check(rig, motion)
+
+
+def case_many_turns():
+    """To and fro, every other time with the shortest gap, more turns waiting than the queue holds."""
+    gap = 2 * 8400 + 2 * 420 + 168
+    blocks = []
+    time = 1000
+    for n in range(120):
+        count = 1 + n % 3
+        blocks.append((time, 400, count, 1 - 2 * (n & 1)))
+        time += 400 * (count - 1) + (200_000 if n & 1 else gap)
+    motion = Motion(time + 1000, Steps(*blocks), Steps(*[(t + 77, g, c, -d) for t, g, c, d in blocks]))
+    rig = Rig(arm(2))
+    rig.run(motion)
+    check(rig, motion)
+    assert rig.pulses[0].shortest_hold < 12000, rig.pulses[0].shortest_hold
+
+
+def case_steps_to_the_end():
+    """The last edges are at the motion's end; a motion of a single step; a motion of none."""
+    for motion in (
+        Motion(100_000, Steps((100_000 - 168 - 5000, 1000, 6, 1))),
+        Motion(40_000, Steps((39_000, 1, 1, -1))),
+        Motion(5_000, Steps()),
+    ):
+        rig = Rig(arm(1))
+        rig.run(motion)
+        check(rig, motion)
+        check_samples(rig, motion)
+
+
+def case_loaded_in_vain():
+    """A motion that was loaded and never started leaves nothing behind."""
+    rig = Rig(arm(2))
+    rig.engine.load(Motion(100_000, Steps((5000, 400, 20, -1)), Steps((900, 300, 50, 1))))
+    motion = Motion(8_000_000, Steps((7_000_000, 400, 20, 1)), Steps())
+    rig.run(motion)
+    check(rig, motion)
+
+
+cases.run(globals())

@@ -1,0 +1,90 @@
+"""Check motion records and walk every joint of them; runs on all interpreters.
+
+Arguments: pulse ticks, gap ticks, room, start and length of braking in ticks (0 0: none), then records. Prints
+what the check says of each, and writes its steps beside it (.steps), little endian int32 each: joint,
+direction, time of it or of the one before in 1024 ticks, rising edge, falling edge.
+"""
+
+import struct
+import sys
+from array import array
+
+import micropython
+from armtempo_board.errors import Refused
+from armtempo_board.memory import Memory
+from armtempo_board.motion import motion_check as checking
+from armtempo_board.motion import rate_check
+from armtempo_board.motion.override import Override
+from armtempo_board.stepgen.step_generator import StepGenerator
+from armtempo_shared import engine_memory
+from armtempo_shared.motion import Motion
+
+MASK = 1023
+OVERRIDE = Override()
+NEVER = 1 << 28
+checking.MAX_STEP_RATE = 333_000  # the evaluator is tried beyond what the program's loop keeps up with
+rate_check.MAX_STEP_RATE_SUM = 1_000_000
+FREE = {"min_steps": -50000000, "max_steps": 50000000, "max_rate": 336330}
+
+
+def walk(motion, joint, generator, out, pulse, gap, room, start, length):
+    """All steps of one joint; nothing may be allocated on the way."""
+    ring = array("I", bytes(4 * (MASK + 1)))
+    generator.load(motion, joint, first_position(motion, joint), pulse, gap)
+    head = 0
+    braked = not length
+    OVERRIDE.begin(1000, length, 1 << 38)
+    start_kiticks = start >> 10
+    lock, unlock = heap_lock, heap_unlock
+    while generator.waits() or not generator.ended:
+        lock()
+        if generator.at_turn and not generator.waits():
+            generator.turn()
+        generator.prepare(NEVER if braked else start_kiticks)
+        near = generator.next_kiticks()
+        brake_now = not braked and near >= start_kiticks
+        count = 0 if brake_now else generator.write(ring, MASK, head, room)
+        unlock()
+        if brake_now:
+            OVERRIDE.ramp(start, 0)
+            generator.follow(OVERRIDE.law, True)
+            braked = True
+        for i in range(0, count, 2):
+            rise = ring[(head + i) & MASK]
+            fall = ring[(head + i + 1) & MASK]
+            out.write(struct.pack("<iiiII", joint, generator.direction, near, rise, fall))
+        head = (head + count) & MASK
+
+
+def first_position(motion, joint):
+    """Where the joint stands before: its first angle, rounded."""
+    first = struct.unpack_from("<%dq" % motion.degree, motion.data, motion.angle_offset(joint))
+    weights = (1, 26, 66, 26, 1) if motion.degree == 5 else (20, 80, 20)
+    total = sum([value * weight for value, weight in zip(first, weights)])
+    return (total // 60 + (1 << 28)) >> 29
+
+
+def main(pulse, gap, room, start, length, *records):
+    """Walk all with one generator, as the board reuses them."""
+    generator = StepGenerator(Memory(list(engine_memory.GENERATOR_PARTS)))
+    for record in records:
+        with open(record, "rb") as file:
+            motion = Motion(file.read())
+        wrong = None
+        try:
+            checking.check(motion, [FREE] * motion.joints, int(gap), generator.subintervals)
+        except Refused as refused:
+            wrong = (refused.code, refused.joint, refused.value)
+        print(wrong)
+        with open(record + ".steps", "wb") as out:
+            for joint in range(0 if wrong else motion.joints):
+                walk(motion, joint, generator, out, int(pulse), int(gap), int(room), int(start), int(length))
+
+
+def nothing():
+    """There is no heap to lock on CPython."""
+
+
+heap_lock = getattr(micropython, "heap_lock", nothing)
+heap_unlock = getattr(micropython, "heap_unlock", nothing)
+main(*sys.argv[1:])

@@ -1,0 +1,250 @@
+"""The board by itself: button, LEDs, and the samples for a host that comes later.
+
+Every case asserts, and its name is printed when it holds. Arguments: see ``whole_board.arguments``.
+"""
+
+import sys
+
+import cases
+import whole_board
+from armtempo_shared import armrecord, wire
+from virtual_board import machine_state
+
+FLASHES, PROGRAM, HOME, *_ = whole_board.arguments()
+STEADY_MS = 30
+SEED = 20264
+
+
+def ready(world, default="go"):
+    """A homed board whose host is gone again."""
+    yield from world.hello()
+    yield from world.ask("set_default", (), default)
+    yield from world.home(HOME)
+    yield from world.wait(100)
+    assert world.led() == "idle"
+
+
+def tap(world):
+    """Press the button and let go."""
+    world.press()
+    yield from world.wait(2 * STEADY_MS)
+    world.press(0)
+    yield from world.wait(2 * STEADY_MS)
+
+
+def moved(world, runs):
+    """So many runs in all, each there and back; nothing moves."""
+    yield from world.wait(100)
+    yield from world.still()
+    yield from world.wait(300)
+    assert not machine_state.board.timers[2].running
+    status = yield from world.status()
+    assert status["run"] == runs, status
+    start = HOME if status["known"] else [0, 0, 0]
+    assert [start[joint] + steps for joint, steps in enumerate(world.steps())] == status["steps"]
+
+
+def unmoved(world, runs=0):
+    """Nothing moves or has moved for a while."""
+    before = world.steps()
+    yield from world.wait(300)
+    yield from moved(world, runs)
+    assert world.steps() == before
+
+
+def moves_when_pressed_anew(world, runs=0):
+    """The button, held until now, does nothing when let go; the next press starts a run."""
+    world.press(0)
+    yield from unmoved(world, runs)
+    yield from tap(world)
+    yield from moved(world, runs + 1)
+
+
+def notices(world):
+    """What the board has said in words since the last time."""
+    words = [tail for kind, _, tail in world.events if kind == "notice"]
+    world.events = [event for event in world.events if event[0] != "notice"]
+    return words
+
+
+def case_button_starts_the_default_and_a_host_fetches_its_samples(world):
+    assert world.led() == "unhomed"
+    yield from ready(world)
+    yield from tap(world)
+    assert world.led() == "moving"
+    yield from world.still()
+    yield from world.wait(50)
+    assert world.led() == "idle"
+    world.events.clear()
+    yield from world.hello(2)
+    status = yield from world.status()
+    assert (status["run"], status["state"], status["samples_lost"]) == (1, "idle", 0)
+    (first, kept), _ = yield from world.ask("samples", (0, 0))
+    assert (first, kept) == (0, status["samples_kept"])
+    assert kept > 10
+    yield from world.ask("samples", (0, kept))
+    yield from world.until(lambda: len(world.events) >= kept)
+    assert [(kind, fields[1]) for kind, fields, _ in world.events] == [("sample", n) for n in range(kept)]
+    last = world.events[-1]
+    assert last[1][2] >= status["ticks"] - 1000
+    assert [whole_board.to_int(last[2][8 * joint : 8 * joint + 4]) for joint in range(3)] == status["steps"]
+
+
+def case_a_level_that_stays_starts_it_once(world):
+    yield from ready(world)
+    world.press()
+    yield from world.wait(100)
+    assert world.led() == "moving"
+    yield from moved(world, 1)
+    yield from unmoved(world, 1)
+    yield from moves_when_pressed_anew(world, 1)
+
+
+def case_before_homing_nothing_moves(world):
+    yield from world.hello()
+    yield from world.ask("set_default", (), "go")
+    yield from world.wait(2 * STEADY_MS)
+    world.press()
+    yield from unmoved(world)
+    told = notices(world)
+    assert told == ["button: refused, error %d" % wire.ERROR_CODES["unhomed"]], told
+    yield from world.home(HOME)
+    yield from unmoved(world)
+    yield from moves_when_pressed_anew(world)
+
+
+def case_while_it_moves_the_button_does_nothing(world):
+    """Pressed again on the way, for a moment or to beyond the end, in a run of its own or of the host's."""
+    yield from ready(world)
+    crc = wire.record_crc(whole_board.read(FLASHES + "/finish/armtempo/go.atm"))
+    for run in (1, 3):
+        if run == 1:
+            yield from tap(world)
+        else:
+            yield from world.ask("start", (0, crc), "go")
+        yield from world.wait(300)
+        yield from tap(world)
+        yield from world.wait(300)
+        world.press()
+        yield from moved(world, run)
+        yield from unmoved(world, run)
+        yield from moves_when_pressed_anew(world, run)
+
+
+def case_with_a_fault_pending_nothing_moves(world):
+    yield from ready(world)
+    machine_state.board.crash = True
+    yield from world.wait(50)
+    assert world.led() == "fault"
+    notices(world)
+    world.press()
+    yield from unmoved(world)
+    assert world.led() == "fault"
+    assert notices(world) == ["button: refused, error %d" % wire.ERROR_CODES["fault_pending"]]
+    yield from world.ask("clear")
+    yield from unmoved(world)
+    assert world.led() == "idle"
+    world.press(0)
+    yield from world.wait(100)
+    yield from tap(world)
+    yield from moved(world, 1)
+
+
+def bounce(world, level, ms, numbers):
+    """The contact goes to and fro before it stays at a level; each time for less than it takes to count."""
+    end = machine_state.board.now + ms * whole_board.TICKS_PER_MS
+    while machine_state.board.now < end:
+        level = 1 - level
+        world.press(level)
+        yield from world.wait(numbers.randrange(1, STEADY_MS - 5))
+
+
+def case_a_bouncing_button_starts_one_run(world):
+    numbers = whole_board.Numbers(SEED)
+    yield from ready(world)
+    for run in range(1, 4):
+        yield from bounce(world, 1, 60, numbers)
+        world.press(1)
+        yield from moved(world, run)
+        yield from bounce(world, 0, 200, numbers)
+        world.press(0)
+        yield from unmoved(world, run)
+
+
+def case_spikes_start_nothing(world):
+    numbers = whole_board.Numbers(SEED + 1)
+    yield from ready(world)
+    for _ in range(20):
+        world.press(1)
+        yield from world.wait(numbers.randrange(1, STEADY_MS - 5))
+        world.press(0)
+        yield from world.wait(numbers.randrange(1, 100))
+    yield from unmoved(world)
+
+
+def case_no_default(world):
+    yield from ready(world, "")
+    yield from tap(world)
+    yield from unmoved(world)
+    assert notices(world) == ["button: refused, error %d" % wire.ERROR_CODES["not_found"]]
+
+
+def case_default_that_was_removed_or_renamed(world):
+    data = whole_board.read(FLASHES + "/finish/armtempo/go.atm")
+    yield from world.hello()
+    yield from upload(world, "other", data)
+    yield from ready(world, "other")
+    yield from world.ask("rename", (5,), "otherthird")
+    yield from tap(world)
+    yield from moved(world, 1)
+    yield from world.ask("remove", (), "third")
+    yield from tap(world)
+    yield from unmoved(world, 1)
+    assert notices(world) == ["button: refused, error %d" % wire.ERROR_CODES["not_found"]]
+    yield from upload(world, "third", data)  # the default is a name: it stands for what has it
+    yield from tap(world)
+    yield from moved(world, 2)
+
+
+def upload(world, name, data):
+    yield from world.ask("put_begin", (len(data), wire.record_crc(data)), name)
+    for at in range(0, len(data), 200):
+        yield from world.ask("put_data", (at,), data[at : at + 200])
+    yield from world.ask("put_commit", (wire.record_crc(data),))
+
+
+def case_a_run_by_button_needs_no_host(world):
+    """Although this arm record says that a host that falls silent stops a motion."""
+    yield from world.hello()
+    assert world.arm[0]["flags"] & armrecord.FLAG_STOP_ON_LINK_LOSS
+    assert world.arm[0]["link_timeout_ms"] < 1500
+    yield from ready(world)
+    yield from world.wait(3000)
+    yield from tap(world)
+    yield from world.wait(2 * world.arm[0]["link_timeout_ms"])
+    assert world.led() == "moving"
+    yield from moved(world, 1)
+
+
+def case_level_present_at_power_up(world):
+    yield from ready(world)
+    yield from unmoved(world)
+    assert notices(world) == []  # it is not even taken for a press
+    yield from moves_when_pressed_anew(world)
+
+
+def case_a_failing_start_is_a_fault_not_the_end(world):
+    """The button's start raises something unforeseen: the program goes on and says so."""
+    yield from ready(world)
+    sys.modules["armtempo_board.app.controller"].Controller.store = None
+    yield from tap(world)
+    status = yield from world.status()
+    assert (status["fault"], world.led()) == ("internal", "fault")
+    yield from unmoved(world)
+
+
+for name in cases.wanted(globals()):
+    held = (lambda world: world.press()) if "power_up" in name else None
+    flash = FLASHES + ("/stop" if "no_host" in name else "/finish")
+    whole_board.run(globals()[name], flash, PROGRAM, held)
+    print(name)

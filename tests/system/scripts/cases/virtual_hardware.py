@@ -1,0 +1,426 @@
+"""The simulated hardware, case by case; each asserts by itself and prints its name.
+
+Argument: a scratch folder.
+"""
+
+import sys
+
+import cases
+from virtual_board import (  # replaces time, os, uctypes, micropython; so before everything else
+    machine_state,
+    standalone,
+)
+from virtual_board.chip.flash import real_open
+from virtual_board.chip.processor import TICKS_PER_US
+from virtual_board.chip.reset import Reset
+from virtual_board.firmware.external_interrupts import set_level
+
+# isort: split
+import os
+import struct
+import time
+from array import array
+
+import machine
+import micropython
+import pyb
+import stm
+import uctypes
+from machine import mem32
+
+SCRATCH = sys.argv[1]
+LEAD = 8400
+RING = 64
+STREAM_MODE = 2 << 13 | 2 << 11 | 1 << 10 | 1 << 8 | 1 << 6
+
+
+@micropython.viper
+def put(block: ptr32, word: int, value: int):
+    """Write a register as board code does."""
+    block[word] = value
+
+
+def edges(path):
+    """{pin: [ticks]} of an edge log, and the tick of TIM2's last start."""
+    machine_state.edges.flush()
+    with real_open(path, "rb") as file:
+        data = file.read()
+    at, found, start = 4, {}, None
+    while at < len(data):
+        kind, pin, before, _, count, base = struct.unpack_from("<BBBBIq", data, at)
+        at += 16
+        if kind == 2 and pin == 2 and before:
+            start = base
+        if kind in (1, 3):
+            for _ in range(count):
+                found.setdefault(pin, []).append(base + struct.unpack_from("<I", data, at)[0])
+                at += 4
+    return found, start
+
+
+def counters():
+    """TIM2 and TIM5 set up to count all 32 bits, from a little before 0, TIM5 waiting for TIM2."""
+    timers = []
+    for number in (2, 5):
+        timer = pyb.Timer(number, prescaler=0, period=0x3FFFFFFF)
+        timers.append(timer)
+    channels = (
+        timers[0].channel(1, pyb.Timer.OC_TOGGLE, pin=pyb.Pin("A15")),
+        timers[1].channel(3, pyb.Timer.OC_TOGGLE, pin=pyb.Pin("A2")),
+    )
+    for timer, base in zip(timers, (stm.TIM2, stm.TIM5)):
+        mem32[base + stm.TIM_CR1] = 0x80
+        timer.period(-1)
+        mem32[base + stm.TIM_EGR] = 1
+        timer.counter(-LEAD)
+    mem32[stm.TIM5 + stm.TIM_SMCR] = 6
+    mem32[stm.TIM2 + stm.TIM_CR2] = 1 << 4
+    mem32[stm.RCC + stm.RCC_AHB1ENR] |= 1 << 21
+    return channels
+
+
+def feed(number, selection, compare, ring):
+    """A DMA1 stream from a ring to a compare register."""
+    stream = stm.DMA1 + 0x10 + 0x18 * number
+    mem32[stream + 4] = len(ring)
+    mem32[stream + 8] = compare
+    mem32[stream + 12] = uctypes.addressof(ring)
+    mem32[stream] = selection << 25 | STREAM_MODE | 1
+
+
+def left(number):
+    """NDTR of a stream."""
+    return mem32[stm.DMA1 + 0x10 + 0x18 * number + 4]
+
+
+def times(count):
+    """Edge times with uneven gaps."""
+    now, made = 0, []
+    for index in range(count):
+        now += 100 + index * 37 % 91
+        made.append(now)
+    return made
+
+
+def case_dma_feeds_two_timers_exactly():
+    log = SCRATCH + "/dma"
+    board = standalone.start(edge_log=log)
+    wanted = times(1000)
+    ring = array("I", wanted[1 : 1 + RING])
+    counters()
+    feed(5, 3, stm.TIM2 + stm.TIM_CCR1, ring)
+    feed(0, 6, stm.TIM5 + stm.TIM_CCR3, ring)
+    put(stm.TIM2, 13, wanted[0])
+    put(stm.TIM5, 15, wanted[0])
+    mem32[stm.TIM2 + stm.TIM_DIER] = 1 << 9
+    mem32[stm.TIM5 + stm.TIM_DIER] = 1 << 11
+    mem32[stm.TIM2 + stm.TIM_CR1] |= 1
+    assert mem32[stm.TIM5 + stm.TIM_CR1] & 1
+    made = 1 + RING
+    while mem32[stm.TIM2 + stm.TIM_CNT] < wanted[-1]:
+        board.spend(1500)
+        assert mem32[stm.TIM2 + stm.TIM_CNT] == mem32[stm.TIM5 + stm.TIM_CNT]
+        while made < len(wanted) and (RING - left(5) - (made - 1)) % RING > 4:
+            ring[(made - 1) % RING] = wanted[made]
+            made += 1
+    found, start = edges(log)
+    for pin in (15, 2):
+        assert [tick - start - LEAD for tick in found[pin][:1000]] == wanted, pin
+
+
+def match_count(preload, late):
+    """Matches of three when the third entry is written after the first match (``late``) or before."""
+    board = standalone.start(edge_log=SCRATCH + "/preload", dma_preload=preload)
+    ring = array("I", [2000, 0, 0, 0])
+    counters()
+    feed(5, 3, stm.TIM2 + stm.TIM_CCR1, ring)
+    put(stm.TIM2, 13, 1000)
+    mem32[stm.TIM2 + stm.TIM_DIER] = 1 << 9
+    mem32[stm.TIM2 + stm.TIM_CR1] |= 1
+    if not late:
+        ring[1] = 3000
+    board.spend(0)  # what the calls before owe
+    board.spend(1500 - machine_state.board.timers[2].count(board.timers[2].total) + (1 << 32))
+    ring[1] = 3000
+    board.spend(3000)
+    return len(edges(SCRATCH + "/preload")[0][15])
+
+
+def case_dma_fetches_one_word_ahead():
+    assert match_count(preload=True, late=False) == 3
+    assert match_count(preload=True, late=True) == 2
+    assert match_count(preload=False, late=True) == 3
+
+
+def case_stale_ring_entries_do_not_match():
+    board = standalone.start(edge_log=SCRATCH + "/stale")
+    counters()
+    feed(5, 3, stm.TIM2 + stm.TIM_CCR1, array("I", [500, 400, 300, 200]))
+    put(stm.TIM2, 13, 100)
+    mem32[stm.TIM2 + stm.TIM_DIER] = 1 << 9
+    mem32[stm.TIM2 + stm.TIM_CR1] |= 1
+    board.spend(84_000)
+    assert len(edges(SCRATCH + "/stale")[0][15]) == 2
+
+
+def case_forced_modes_act_at_once():
+    standalone.start()
+    counters()
+    line = machine_state.board.pins.line("A15")
+    mode = stm.TIM2 + stm.TIM_CCMR1
+    for setting, level in ((5, 1), (0, 1), (4, 0), (0, 0)):
+        mem32[mode] = setting << 4
+        assert line.level == level
+        assert mem32[stm.GPIOA + stm.GPIO_IDR] >> 15 & 1 == level
+    mem32[mode] = 5 << 4
+    mem32[stm.TIM2 + stm.TIM_CCER] = 0
+    assert line.level == 0
+
+
+def case_prescaler_period_and_update_callback():
+    board = standalone.start()
+    seen = []
+    timer = pyb.Timer(7, freq=1000, callback=lambda timer: seen.append(board.now))
+    begun = board.now
+    board.spend(10 * 84_000 + 42_000)
+    assert len(seen) == 10, seen
+    for number, tick in enumerate(seen):
+        assert 0 < tick - begun - (number + 1) * 84_000 + 1700 < 2000, (number, tick - begun)
+    timer.deinit()
+    board.spend(84_000 * 3)
+    assert len(seen) == 10
+    slow = pyb.Timer(3, prescaler=83, period=0xFFFF)
+    slow.counter(0)
+    board.spend(84 * 500)
+    assert 499 <= slow.counter() <= 510, slow.counter()
+
+
+def case_compare_interrupt_comes_soon_and_gets_the_timer():
+    board = standalone.start()
+    seen = []
+    timer = pyb.Timer(2, prescaler=0, period=0x3FFFFFFF)
+    channel = timer.channel(
+        4, pyb.Timer.OC_TIMING, compare=50_000, callback=lambda t: seen.append((t, t.counter()))
+    )
+    timer.counter(0)
+    board.spend(60_000)
+    assert len(seen) == 1 and seen[0][0] is timer
+    assert 50_000 < seen[0][1] < 50_000 + 5 * TICKS_PER_US
+    channel.callback(None)
+
+
+def case_an_exception_in_a_callback_switches_it_off():
+    board = standalone.start()
+    calls = []
+
+    def fail(timer):
+        calls.append(1)
+        raise ValueError("on purpose")
+
+    pyb.Timer(6, freq=1000, callback=fail)
+    board.spend(5 * 84_000)
+    assert len(calls) == 1
+
+
+def case_encoder_counter_wraps():
+    board = standalone.start()
+    timer = pyb.Timer(3, prescaler=0, period=0xFFFF)
+    timer.channel(1, pyb.Timer.ENC_AB, pin=pyb.Pin("B4"))
+    timer.counter(0)
+    board.timers[3].turn(-3)
+    assert timer.counter() == 0xFFFD
+    board.timers[3].turn(5)
+    assert timer.counter() == 2
+    board.spend(100_000)
+    assert timer.counter() == 2
+
+
+def case_pins():
+    standalone.start(edge_log=SCRATCH + "/pins")
+    pin = pyb.Pin("PE7", pyb.Pin.OUT_PP, value=1)
+    assert pin.value() == 1 and mem32[stm.GPIOE + stm.GPIO_ODR] == 1 << 7
+    mem32[stm.GPIOE + stm.GPIO_BSRR] = 1 << 8 | 1 << (16 + 7)
+    assert pin() == 0 and mem32[stm.GPIOE + stm.GPIO_ODR] == 1 << 8
+    pin.high()
+    pull = pyb.Pin("D8", pyb.Pin.IN, pyb.Pin.PULL_UP)
+    assert pull.value() == 1
+    set_level("PD8", 0)
+    assert pull.value() == 0
+    set_level("PD8", None)
+    assert pull.value() == 1
+    found, _ = edges(SCRATCH + "/pins")
+    assert len(found[4 * 16 + 7]) == 3 and len(found[3 * 16 + 8]) == 2
+
+
+def case_step_1_is_low_from_the_first_line_on():
+    """A reset pulls PA15 up, as it is one of JTAG's pins; boot.py drives it low before anything else."""
+    board = standalone.start()
+    line = board.pins.line("A15")
+    assert line.read() == 1
+    with open(__file__.rsplit("/tests/", 1)[0] + "/board/armtempo_board/boot.py") as file:
+        first = next(text for text in file.read().split("\n") if text.startswith("pyb."))
+    exec(first, {"pyb": pyb})
+    board.spend(1)
+    assert line.mode() == 1 and line.read() == 0
+
+
+def case_external_interrupt_within_20_us():
+    board = standalone.start()
+    seen = []
+    pin = pyb.Pin("PE15", pyb.Pin.IN, pyb.Pin.PULL_UP)
+    pyb.ExtInt(pin, pyb.ExtInt.IRQ_FALLING, pyb.Pin.PULL_UP, lambda line: seen.append((line, board.now)))
+    at = board.now + 123_456
+    board.at(at, lambda: set_level("PE15", 0))
+    board.at(at + 50_000, lambda: set_level("PE15", 1))
+    board.spend(400_000)
+    assert [line for line, _ in seen] == [15]
+    assert 0 <= seen[0][1] - at < 20 * TICKS_PER_US
+
+
+def case_interrupts_wait_while_off():
+    board = standalone.start()
+    seen = []
+    pyb.Timer(6, freq=10_000, callback=lambda timer: seen.append(1))
+    before = machine.disable_irq()
+    board.spend(84_000)
+    assert not seen
+    machine.enable_irq(before)
+    assert len(seen) == 1
+
+
+def case_usb_buffers():
+    standalone.start()
+    port, line = pyb.USB_VCP(), machine_state.serial
+    line.received.extend(b"hello")
+    assert port.any() and port.recv(3, timeout=0) == b"hel"
+    buffer = bytearray(8)
+    assert port.readinto(buffer, 8) == 2 and buffer[:2] == b"lo"
+    assert port.read(5) is None and port.recv(2, timeout=3) == b""
+    assert port.send(b"abc") == 3 and bytes(line.sending) == b"abc"
+    port.init(flow=pyb.USB_VCP.RTS | pyb.USB_VCP.CTS)
+    assert port.write(bytes(2000)) == 1021
+    assert port.write(b"x") is None
+
+
+def case_flash_is_as_big_as_the_chips():
+    os.mkdir("data")
+    free = os.statvfs("/flash")[3]
+    assert 180 < free <= 190
+    with open("/flash/data/big", "wb") as file:
+        try:
+            for _ in range(400):
+                file.write(bytes(512))
+            raise AssertionError("flash has no end")
+        except OSError as error:
+            assert error.args[0] == 28
+    assert os.statvfs("/flash")[3] == 0
+    os.remove("data/big")
+    assert os.statvfs("/flash")[3] == free
+    assert os.listdir("/flash") == ["data"] and os.listdir("/") == ["flash"]
+    assert [entry[0] for entry in os.ilistdir()] == ["data"]
+    os.rmdir("data")
+    try:
+        os.stat("/elsewhere")
+        raise AssertionError("outside the flash")
+    except OSError as error:
+        assert error.args[0] == 2
+
+
+def write_aside(name, data, synced=True):
+    """Write a file and rename it into its place."""
+    with open(name + ".new", "wb") as file:
+        file.write(data)
+    if synced:
+        os.sync()
+    os.rename(name + ".new", name)
+
+
+def case_power_cuts():
+    operations = 5  # open, write, close, removal of the old one, rename
+    states = []
+    for cut in range(1, operations + 2):
+        standalone.start(flash=SCRATCH)
+        for name in list(os.listdir()):
+            if name.startswith("file"):
+                os.remove(name)
+        write_aside("file", b"old")
+        standalone.start(flash=SCRATCH, power_cut_at=cut)
+        try:
+            write_aside("file", b"newer")
+            whole = True
+        except Reset as reset:
+            assert reset.cause == machine.PWRON_RESET
+            whole = False
+        assert whole == (cut > operations)
+        state = {}
+        for name in os.listdir():
+            if name.startswith("file"):
+                with open(name, "rb") as file:
+                    state[name] = file.read()
+        states.append(sorted(state.items()))
+    aside = [("file", b"old"), ("file.new", b"")]
+    wanted = [[("file", b"old")], aside, aside, [("file", b"old"), ("file.new", b"newer")],
+              [("file.new", b"newer")], [("file", b"newer")]]  # fmt: skip
+    assert states == wanted, states
+
+
+def case_what_is_not_synced_is_lost_with_the_power():
+    """Whatever its name is by then; what was synced lasts, and so does what others had before."""
+    for synced in (True, False):
+        standalone.start(flash=SCRATCH)
+        write_aside("file", b"old")
+        standalone.start(flash=SCRATCH, power_cut_at=6)
+        write_aside("file", b"newer", synced)
+        try:
+            os.mkdir("folder")  # here the power fails
+            raise AssertionError("no power cut")
+        except Reset:
+            pass
+        with open("file", "rb") as file:
+            assert file.read() == (b"newer" if synced else b""), synced
+        os.remove("file")
+
+
+def case_watchdog_bites():
+    board = standalone.start()
+    watchdog = machine.WDT(timeout=100)
+    for _ in range(5):
+        board.spend(90 * 84_000)
+        watchdog.feed()
+    try:
+        board.spend(101 * 84_000)
+        raise AssertionError("no bite")
+    except Reset as reset:
+        assert reset.cause == machine.WDT_RESET
+    standalone.start(cause=machine.WDT_RESET)
+    assert machine.reset_cause() == machine.WDT_RESET
+
+
+def case_time_passes_in_calls():
+    standalone.start()
+    before = time.ticks_us()
+    time.sleep_us(1500)
+    assert 1500 <= time.ticks_diff(time.ticks_us(), before) < 102_000
+    before = time.ticks_ms()
+    for _ in range(3):
+        machine.idle()
+    # real time while nothing moves, at most 50 ms at once
+    assert 2 <= time.ticks_diff(time.ticks_ms(), before) <= 160
+
+
+def case_registers_by_the_chips_addresses():
+    standalone.start()
+    mem32[0x40000000 + 0x2C] = -1
+    assert mem32[stm.TIM2 + stm.TIM_ARR] == -1
+    assert machine.mem8[stm.TIM2 + stm.TIM_ARR + 3] == 255
+    try:
+        mem32[0x50000000] = 1
+        raise AssertionError("no such register")
+    except ValueError:
+        pass
+
+
+for name in cases.wanted(globals()):
+    standalone.start(flash=SCRATCH + "/flash")
+    globals()[name]()
+    print(name)
