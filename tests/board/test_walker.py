@@ -74,7 +74,10 @@ def test_edges_do_not_depend_on_how_the_ring_is_filled(
         steps = walking.walk(QUICK, tmp_path, records, room=room)[1]
         for mine, other in zip(steps, expected, strict=True):
             edges, others = (np.frombuffer(data, dtype="<i4").reshape(-1, 5) for data in (mine, other))
-            np.testing.assert_array_equal(edges[:, [0, 1, 3, 4]], others[:, [0, 1, 3, 4]])
+            np.testing.assert_array_equal(edges[:, :2], others[:, :2])
+        off = np.abs(edges[:, 3:] - others[:, 3:])
+        begins = others[:, 3] >> 10 == brake[0] >> 10
+        assert off[begins].max(initial=0) <= 4 and not off[~begins].any()
 
 
 BRAKES = [(2.0, 0.6), (3.1, 0.1), (0.2, 0.5), (1.0, 2.5), (5.5, 0.4)]
@@ -94,7 +97,10 @@ def test_braking_stays_on_the_path(interpreter: str, start_s: float, length_s: f
 def test_nothing_is_written_beyond_the_time_at_which_braking_begins(
     start_s: float, length_s: float, room: int, tmp_path: Path
 ) -> None:
-    """However much room there is, the edges are those that are written one by one."""
+    """However much room there is, the edges are those that are written one by one.
+
+    A step in the Ki tick in which braking begins is one of a cubic, or solved by itself: within a cubic's error.
+    """
     brake = round(start_s * walking.TICK_HZ), round(length_s * walking.TICK_HZ)
     records = [motions.feeding(), motions.cruise(90_000)]
     one_by_one = walking.walk(QUICK, tmp_path, records, room=2, brake=brake)[1]
@@ -102,7 +108,10 @@ def test_nothing_is_written_beyond_the_time_at_which_braking_begins(
         walking.walk(QUICK, tmp_path, records, room=room, brake=brake)[1], one_by_one, strict=True
     ):
         edges, others = (np.frombuffer(data, dtype="<i4").reshape(-1, 5) for data in (mine, other))
-        np.testing.assert_array_equal(edges[:, [0, 1, 3, 4]], others[:, [0, 1, 3, 4]])
+        np.testing.assert_array_equal(edges[:, :2], others[:, :2])
+        off = np.abs(edges[:, 3:] - others[:, 3:])
+        begins = others[:, 3] >> 10 == brake[0] >> 10
+        assert off[begins].max(initial=0) <= 4 and not off[~begins].any()
 
 
 def test_braking_from_full_speed(tmp_path: Path) -> None:

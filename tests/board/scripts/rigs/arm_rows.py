@@ -2,6 +2,7 @@
 
 HEAD = {
     "flags": 0,
+    "identity": 0,
     "pulse_ticks": 168,
     "low_ticks": 168,
     "dir_setup_ticks": 420,
