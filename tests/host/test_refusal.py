@@ -86,18 +86,14 @@ def test_a_record_larger_than_the_board_takes(tmp_path: Path) -> None:
         board.upload("big", bytes(MAX_MOTION_BYTES + 1))
 
 
-def test_a_record_for_which_the_board_has_no_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_command_for_which_the_board_has_no_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is answered by its own code."""
     pipe = Pipe(tmp_path / "flash")
     board, data = ready(pipe)
 
-    store = pipe._later["armtempo_board.storage.store"].Store
-    guarded = store._guard
+    def short_of_memory(self: Any, name: str) -> Any:
+        raise MemoryError
 
-    def short_of_memory(self: Any, call: Any, *arguments: Any) -> Any:
-        if call.__name__ == "read":
-            raise MemoryError
-        return guarded(self, call, *arguments)
-
-    monkeypatch.setattr(store, "_guard", short_of_memory)
-    with pytest.raises(BoardError, match=rf"refused 'start'.* \[{len(data)} bytes, for which"):
+    monkeypatch.setattr(pipe._later["armtempo_board.storage.store"].Store, "motion", short_of_memory)
+    with pytest.raises(BoardError, match=r"refused 'start'.*ran out of memory in this command"):
         board.start("feed", wire.record_crc(data))
