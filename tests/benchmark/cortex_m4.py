@@ -27,6 +27,7 @@ sys.path[:0] = [str(ROOT)] + [
 import micropython  # noqa: E402, F401  (puts ptr32 and its like into place)
 from armtempo_board.stepgen import (  # noqa: E402
     bezier,
+    control_points,
     cubics,
     interval_steps,
     newton,
@@ -56,7 +57,7 @@ machine code over its lines. A call in it takes CALL more."""
 CALL = 250
 """Instructions of calling one compiled function from another (see board/docs/hardware.md)."""
 
-COMPILED = (bezier, subdivision, newton, cubics, step_queue, time_law)
+COMPILED = (bezier, control_points, subdivision, newton, cubics, step_queue, time_law)
 ALL = (*COMPILED, subintervals, interval_steps, step_generator)
 
 

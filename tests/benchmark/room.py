@@ -34,7 +34,7 @@ ARMS += ((1, 240_000), (3, 60_000), (6, 40_000))
 LIMIT_S = 300.0
 _STAGE = 0x8000
 _PIECE = 200
-OWN = 4_300
+OWN = 4_400
 """Bytes of heap for what this benchmark itself has in it, given beside the chip's: the stack does not need them."""
 _DISK_BLOCKS = 190
 _SEMIHOSTING = ("-semihosting-config", "enable=on,target=native")
@@ -151,7 +151,7 @@ def _files(with_library: bool) -> dict[str, bytes]:
 def _outcome(said: str) -> Outcome:
     own = re.search(r"@ own (\d+)", said)
     assert own, said[-2000:]
-    assert 0 <= OWN - int(own[1]) < 400, own
+    assert 0 <= OWN - int(own[1]) < 500, own
     found = re.findall(r"@ (\w+)\nstack.*\nGC: total: \d+, used: (\d+).*\n.*max free sz: (\d+)", said)
     parser = wire.Parser()
     parser.feed(bytes.fromhex("".join(re.findall(r"@ answer (\w+)", said))))

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from armtempo import doctor
 from armtempo.cli import main
-from armtempo.doctor import Verdict, machine, robot
+from armtempo.doctor import Condition, machine, robot
 from armtempo.errors import LinkError
 from armtempo.ports.listing import Port
 from armtempo.robot.board_state import BoardState
@@ -29,6 +29,8 @@ STATE = BoardState(
     free_heap=40_000,
     max_rate=240_000,
     max_rate_sum=240_000,
+    room="5820 bytes: 3 x 5000 steps/s",
+    arm_problem="",
     state="idle",
     moving=False,
     fault="",
@@ -39,21 +41,29 @@ STATE = BoardState(
 
 
 def test_a_sound_board_has_nothing_wrong() -> None:
-    assert {item.level for item in doctor.examine_board(STATE)} == {Verdict.GOOD}
+    assert {item.level for item in doctor.examine_board(STATE)} == {Condition.GOOD}
 
 
 @pytest.mark.parametrize(
     ("change", "level", "words", "cure"),
     [
-        ({"program_current": False}, Verdict.WRONG, "another than", "armtempo deploy"),
-        ({"fault": "estop"}, Verdict.WRONG, "estop", "armtempo clear"),
-        ({"free_heap": 3_000}, Verdict.NOTE, "3000 bytes of heap", "firmware"),
-        ({"frames_bad": 7}, Verdict.NOTE, "7 damaged messages", "cable"),
+        ({"program_current": False}, Condition.WRONG, "another than", "armtempo deploy"),
+        ({"fault": "estop"}, Condition.WRONG, "estop", "armtempo clear"),
+        (
+            {"arm_problem": "not used: the record is damaged"},
+            Condition.WRONG,
+            "damaged",
+            "armtempo configure",
+        ),
+        ({"free_heap": 3_000}, Condition.NOTE, "3000 bytes of heap", "firmware"),
+        ({"frames_bad": 7}, Condition.NOTE, "7 damaged messages", "cable"),
     ],
 )
-def test_what_is_wrong_with_a_board(change: dict[str, object], level: Verdict, words: str, cure: str) -> None:
+def test_what_is_wrong_with_a_board(
+    change: dict[str, object], level: Condition, words: str, cure: str
+) -> None:
     found = [
-        item for item in doctor.examine_board(replace(STATE, **change)) if item.level is not Verdict.GOOD
+        item for item in doctor.examine_board(replace(STATE, **change)) if item.level is not Condition.GOOD
     ]  # type: ignore[arg-type]
     assert [item.level for item in found] == [level]
     assert words in found[0].found
@@ -62,7 +72,7 @@ def test_what_is_wrong_with_a_board(change: dict[str, object], level: Verdict, w
 
 def test_a_board_that_does_not_answer() -> None:
     (item,) = doctor.examine_board(LinkError("no answer within 2 s; check power and cable"))
-    assert item.level is Verdict.WRONG
+    assert item.level is Condition.WRONG
     assert "no answer" in item.found
 
 
@@ -71,7 +81,7 @@ def test_a_port_that_may_not_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(robot.os, "access", lambda *_: False)
     monkeypatch.setattr(robot.sys, "platform", "linux")
     (item,) = doctor.ports()
-    assert item.level is Verdict.WRONG
+    assert item.level is Condition.WRONG
     assert "dialout" in item.next_step
 
 
@@ -81,8 +91,8 @@ def test_packages_that_are_missing(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(machine, "version", nothing)
     levels = {item.what: item.level for item in doctor.packages()}
-    assert levels["numpy"] is Verdict.WRONG
-    assert levels["matplotlib"] is Verdict.NOTE
+    assert levels["numpy"] is Condition.WRONG
+    assert levels["matplotlib"] is Condition.NOTE
     assert "sphinx" not in levels
 
 

@@ -38,6 +38,7 @@ endif
 """
 HEADER = '#define MICROPY_HW_BOARD_NAME "F4DISC"\n#define MICROPY_HW_MCU_NAME "STM32F407"\n'
 ROOT = Path(__file__).parents[2]
+STM32F4DISC = "ports/stm32/boards/STM32F4DISC"
 HEAD = str(shutil.which("head"))
 MACHINE = "F4DISC with STM32F407"
 
@@ -232,6 +233,11 @@ def test_the_command_says_how_to_get_a_checkout(tools: Callable[..., Path], tmp_
         ("OTHER", {}, "has no STM32F405 or F407\nhint: give one that suits: PYBV11, STM32F4DISC"),
         ("STM32F4DISC", {"lib/tinyusb/a": None}, "lacks submodules (lib/tinyusb)\nhint: get them: make -C"),
         ("STM32F4DISC", {"lib/micropython-lib/a": None}, "lacks submodules (lib/micropython-lib)"),
+        (
+            "STM32F4DISC",
+            {f"{STM32F4DISC}/mpconfigboard.mk": f"{BOARD_MAKE}MICROPY_PY_LWIP = 1\n"},
+            "lacks submodules (lib/lwip)",
+        ),
         ("STM32F4DISC", {"py/mpconfig.h": "#define MICROPY_VERSION_MAJOR 1\n"}, "is no checkout"),
     ],
 )

@@ -136,10 +136,12 @@ def test_questions_at_a_terminal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert 'port = "sim:table"' in (tmp_path / "x" / "armtempo.toml").read_text()
 
 
-def test_a_name_with_quotes_and_controls_stays_one_line() -> None:
-    text = new_project.from_joints('a"\n', [joint_entry.JointEntry('b"\t')])
-    assert text.arm.name == 'a"\n'
-    assert text.arm.driven[0].name == 'b"\t'
+def test_a_name_with_quotes_stays_one_line_and_control_characters_are_refused() -> None:
+    text = new_project.from_joints('a"', [joint_entry.JointEntry("b'\\")])
+    assert text.arm.name == 'a"'
+    assert text.arm.driven[0].name == "b'\\"
+    with pytest.raises(InputError, match="control characters"):
+        new_project.from_joints("a\n", [joint_entry.JointEntry("b")])
 
 
 def test_nothing_is_left_where_it_cannot_be_written(tmp_path: Path) -> None:

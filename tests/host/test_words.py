@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 import serial
-from armtempo.cli import status
+from armtempo.cli import state
 from armtempo.errors import InputError, LinkError
 from armtempo.formats import toml_table
 from armtempo.link.transport import SerialTransport
+from armtempo.robot import board_state
 from armtempo.robot.board import Board
 
 from tests.host.linked import ready
@@ -45,9 +46,9 @@ def test_a_motion_has_to_be_named_where_the_button_starts_none(tmp_path: Path) -
 
 def test_a_sound_link_is_called_so(tmp_path: Path) -> None:
     client, _ = ready(Pipe(tmp_path / "flash"))
-    found = client.status()
-    assert "link      sound: no message arrived damaged, no sample was lost" in status.lines(found)
-    worse = status.lines(replace(found, frames_bad=3, samples_lost=2))
+    found = board_state.read(client, "pipe")
+    assert "link      sound: no message arrived damaged, no sample was lost" in state.lines(found)
+    worse = state.lines(replace(found, frames_bad=3, samples_lost=2))
     assert "link      messages damaged 3 times, 2 samples lost: check cable and plugs" in worse
 
 

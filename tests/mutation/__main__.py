@@ -18,7 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from tests.interpreters import ROOT
+from tests.interpreters import AVAILABLE, ROOT
 from tests.mutation import concerned, mutations
 
 SIMULATOR = "host/armtempo/simulator"
@@ -61,8 +61,16 @@ def chosen(area: str, count: int, seed: int) -> list[tuple[Path, mutations.Mutat
     for path, each in every:
         by_line.setdefault((path, each.line), []).append(each)
     rng = random.Random(f"{area} {seed}")
-    lines = rng.sample(sorted(by_line), min(count, len(by_line)))
-    return [(path, rng.choice(by_line[path, line])) for path, line in lines]
+    lines = sorted(by_line)
+    rng.shuffle(lines)
+    found: list[tuple[Path, mutations.Mutation]] = []
+    for path, line in lines:
+        mutation = rng.choice(by_line[path, line])
+        if mutations.parses(mutation.of((ROOT / path).read_bytes())):
+            found.append((path, mutation))
+        if len(found) == count:
+            break
+    return found
 
 
 def copy_to(folder: Path) -> None:
@@ -80,11 +88,11 @@ def copy_to(folder: Path) -> None:
             (folder / ".cache" / "micropython" / path.name).symlink_to(path)
 
 
-def noticed(folder: Path, tests: list[str], seconds: float) -> str:
+def noticed(folder: Path, tests: list[str], without: str, seconds: float) -> str:
     """The first test that fails in the copy, "time-out", or "" where none does."""
     path = os.pathsep.join(str(folder / name) for name in ("host", "shared", "board"))
     command = [sys.executable, "-m", "pytest", "-q", "-x", "--no-header", "-p", "no:cacheprovider", *tests]
-    command += ["-k", concerned.WITHOUT]
+    command += ["-k", without]
     environment = {**os.environ, "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
     try:
         done = subprocess.run(
@@ -110,6 +118,8 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=600.0, help="for the tests of one mistake")
     options = parser.parse_args()
     found = late = 0
+    on_board = options.area in ("board", "simulator") and "micropython" in AVAILABLE
+    without = concerned.WITHOUT_CPYTHON if on_board else concerned.WITHOUT
     wanted = chosen(options.area, options.count, options.seed)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -119,7 +129,7 @@ def main() -> None:
             (folder / path).write_bytes(mutation.of(source))
             begin_s = time.monotonic()
             tests = concerned.tests(path)
-            result = noticed(folder, tests, options.seconds) if tests else ""
+            result = noticed(folder, tests, without, options.seconds) if tests else ""
             (folder / path).write_bytes(source)
             found += bool(result)
             late += result == "time-out"

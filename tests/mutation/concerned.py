@@ -9,6 +9,8 @@ from pathlib import Path
 from tests.interpreters import ROOT
 
 WITHOUT = "not micropython-arm and not cut_off and not demo and not examples and not wheel"
+WITHOUT_CPYTHON = f"{WITHOUT} and not cpython"
+"""For code that runs on MicroPython: one interpreter is enough to notice."""
 MOST = 14
 """Test files that are run for a file of the host."""
 BY_FOLDER = {
@@ -22,7 +24,7 @@ BY_FOLDER = {
     "board/armtempo_board/motion": ["test_check", "test_engine", "test_walker", "test_app"],
     "board/armtempo_board/hardware": ["test_registers", "test_engine", "test_interrupt_cost"],
     "board/armtempo_board/storage": ["test_store", "test_app"],
-    "board/armtempo_board/link": ["test_app", "test_fuzz"],
+    "board/armtempo_board/link": ["test_app"],
     "board/armtempo_board/app": ["test_app", "test_replay"],
     "board/armtempo_board": ["test_app", "test_replay", "test_engine"],
 }
@@ -58,7 +60,9 @@ def tests(path: Path) -> list[str]:
         return [*SHARED, *nearest, "tests/board/test_check.py", "tests/board/test_app.py"]
     folder = str(path.parent)
     found = [f"tests/board/{test}.py" for test in BY_FOLDER[folder]]
-    return found + (IN_PROCESS if folder.split("/")[-1] in ("app", "link", "storage") else []) + WHOLE
+    if folder.split("/")[-1] in ("app", "link", "storage"):
+        found += [*IN_PROCESS, "tests/board/test_fuzz.py"]
+    return found + WHOLE
 
 
 def by_imports(path: Path) -> list[str]:

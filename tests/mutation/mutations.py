@@ -42,15 +42,17 @@ class Mutation:
 
 
 def all_of(source: bytes) -> list[Mutation]:
-    """Every mutation of a Python file that still parses; none of docstrings, annotations and messages."""
-    found = []
-    for mutation in _Finder(source).found():
-        try:
-            ast.parse(mutation.of(source))
-        except SyntaxError:
-            continue
-        found.append(mutation)
-    return found
+    """Every mutation of a Python file; none of docstrings, annotations and messages. Not all of them parse."""
+    return list(_Finder(source).found())
+
+
+def parses(source: bytes) -> bool:
+    """Whether the file is still Python."""
+    try:
+        ast.parse(source)
+    except SyntaxError:
+        return False
+    return True
 
 
 class _Finder:

@@ -48,7 +48,8 @@ class JointDrive:
     ) -> None:
         from armtempo_board.hardware import pins  # here, so that it can be forgotten
 
-        head, row = arm[0], arm[1][number]
+        head, rows = arm
+        row = rows[number]
         self._sampler = sampler
         block = sampler.block
         self._words_at = sampler.joint_at(number)

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from armtempo_board.stepgen.subintervals import Subintervals
 
 _SHORT_TICKS = const(1024)
+_OLDEST = const(0)
 _POINT_BYTES = const(8)
 _HIGH_TICKS_BITS = const(12)  # a high word of time counts 2**12 ticks
 _PASS = const(0)
@@ -91,7 +92,7 @@ def _check_spline(motion: "MotionHead", joint: int, offset: int, segments: int, 
         for segment in range(segments):
             control.extend(struct.unpack("<q", stream.read(_POINT_BYTES)))
             _check_segment(control, joint, segment, is_time)
-            del control[0]
+            control.pop(_OLDEST)
     finally:
         stream.close()
 

@@ -26,6 +26,10 @@ def _keep_last(words: ptr32) -> object:
         i += 1
 
 
+def _too_short() -> int:
+    raise OSError("the motion's file ends too early")
+
+
 class ControlPoints:
     """``words``: memory of WINDOW_WORDS, in which points stand as in the record (int64, little endian)."""
 
@@ -53,7 +57,5 @@ class ControlPoints:
         """Word at which the control points of a segment begin; segments are asked for in their order."""
         while segment + self._degree >= self._end:
             _keep_last(self.words)
-            if not self._stream.readinto(self._fresh):
-                raise OSError("the motion's file ends too early")
-            self._end += _FRESH
+            self._end += _FRESH if self._stream.readinto(self._fresh) else _too_short()
         return 2 * (segment - self._end + _KEPT + _FRESH)

@@ -39,7 +39,7 @@ def command(arm_path: Path | None, port: str | None, as_json: bool) -> None:
         "arm": _arm(arm_path),
         "board": _board(port, arm_path),
     }
-    wrong = any(item.level is doctor.Verdict.WRONG for items in parts.values() for item in items)
+    wrong = any(item.level is doctor.Condition.WRONG for items in parts.values() for item in items)
     if as_json:
         click.echo(json.dumps({part: [_values(item) for item in items] for part, items in parts.items()}))
     else:
@@ -49,14 +49,14 @@ def command(arm_path: Path | None, port: str | None, as_json: bool) -> None:
 
 
 def _project(arm_path: Path | None, port: str | None) -> list[Item]:
-    from armtempo.doctor import Item, Verdict
+    from armtempo.doctor import Condition, Item
 
     project = ProjectSettings()
     given = {settings.ARM: arm_path, settings.PORT: port}
     try:
         found = [project.get(name, given.get(name)) for name in settings.NAMES]
     except ArmtempoError as error:
-        return [Item("armtempo.toml", str(error), Verdict.WRONG, "correct that")]
+        return [Item("armtempo.toml", str(error), Condition.WRONG, "correct that")]
     return [Item(one.name, f"{one.value} ({one.source})" if one else "not set") for one in found]
 
 
@@ -68,7 +68,7 @@ def _arm(arm_path: Path | None) -> list[Item]:
         setting = ProjectSettings().get(settings.ARM, arm_path)
         return doctor.examine_arm(shipped.find(setting.value).path) if setting else []
     except ArmtempoError as error:
-        return [doctor.Item("arm file", str(error), doctor.Verdict.WRONG, "name an arm file that is there")]
+        return [doctor.Item("arm file", str(error), doctor.Condition.WRONG, "name an arm file that is there")]
 
 
 def _board(port: str | None, arm_path: Path | None) -> list[Item]:
@@ -78,7 +78,9 @@ def _board(port: str | None, arm_path: Path | None) -> list[Item]:
     try:
         name = board_port.choose(port, others=True).value
     except ArmtempoError:  # none was named and none can be meant: nothing is wrong with that
-        return [doctor.Item("board", "not looked at", doctor.Verdict.NOTE, "give --port PORT, or --port sim")]
+        return [
+            doctor.Item("board", "not looked at", doctor.Condition.NOTE, "give --port PORT, or --port sim")
+        ]
     try:
         return doctor.examine_board(_named(_state(name), arm_path))
     except ArmtempoError as error:

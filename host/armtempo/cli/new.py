@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from armtempo.errors import InputError
+
 if TYPE_CHECKING:
     from armtempo.new_project.geometry import ArmText
     from armtempo.new_project.joint_entry import JointEntry
@@ -56,11 +58,11 @@ def command(
     from armtempo import new_project
 
     if sum(map(bool, (like, urdf, joints))) > 1:
-        raise click.UsageError("--like, --urdf and --joint exclude each other; give one of them")
+        raise InputError("--like, --urdf and --joint exclude each other", "give one of them")
     asked = _asked()
     if not (like or urdf or joints):
         if not asked:
-            raise click.UsageError("which arm? Give --like ARM, --urdf FILE, or a --joint for each joint")
+            raise InputError("which arm?", "give --like ARM, --urdf FILE, or a --joint for each joint")
         arm = _ask_arm(folder.name)
     else:
         arm = _given_arm(folder.name, like, urdf, joints)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 
-class Verdict(Enum):
+class Condition(Enum):
     """How a line is meant."""
 
     GOOD = "ok"
@@ -21,5 +21,5 @@ class Item:
 
     what: str
     found: str
-    level: Verdict = Verdict.GOOD
+    level: Condition = Condition.GOOD
     next_step: str = ""

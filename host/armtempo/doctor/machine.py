@@ -7,7 +7,7 @@ import re
 import sys
 from importlib.metadata import PackageNotFoundError, requires, version
 
-from armtempo.doctor.item import Item, Verdict
+from armtempo.doctor.item import Condition, Item
 
 LEAST_PYTHON = (3, 11)
 
@@ -24,7 +24,7 @@ def examine_machine() -> list[Item]:
         Item(
             "Python",
             python,
-            Verdict.GOOD if fits else Verdict.WRONG,
+            Condition.GOOD if fits else Condition.WRONG,
             "" if fits else f"install Python {least} or newer",
         ),
         Item("system", f"{platform.system()} {platform.release()}, {platform.machine()}"),
@@ -50,6 +50,6 @@ def _package(name: str, extra: str) -> Item:
     except PackageNotFoundError:
         if extra:
             return Item(
-                name, "not installed", Verdict.NOTE, f"pip install 'armtempo[{extra}]' if you want it"
+                name, "not installed", Condition.NOTE, f"pip install 'armtempo[{extra}]' if you want it"
             )
-        return Item(name, "missing", Verdict.WRONG, "pip install --force-reinstall armtempo")
+        return Item(name, "missing", Condition.WRONG, "pip install --force-reinstall armtempo")

@@ -48,7 +48,7 @@ def write(folder: Path, arm: ArmText, port: str) -> list[Path]:
     Raises InputError where the folder is there and not empty, or cannot be written; nothing is left then.
     """
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError(f"{folder}: is there already and not empty; choose another name")
+        raise InputError(f"{folder}: is there already and not empty", "choose another name")
     files = {"arm.toml": arm.text, "armtempo.toml": _SETTINGS.format(port=_quoted(port))}
     if arm.arm.driven_indices:
         files["first.toml"] = _JOB.format(rows=_rows(arm.arm))
@@ -56,7 +56,7 @@ def write(folder: Path, arm: ArmText, port: str) -> list[Path]:
     try:
         _put(folder, files)
     except OSError as error:
-        raise InputError(f"{folder}: cannot be written: {why(error)}; choose another place") from None
+        raise InputError(f"{folder}: cannot be written: {why(error)}", "choose another place") from None
     return [folder / name for name in files]
 
 

@@ -32,7 +32,7 @@ def from_shipped(name: str) -> ArmText:
     files = shipped.files()
     if name not in files:
         raise InputError(
-            f"{name}: no arm of that name ships with armtempo; those that do: {', '.join(files)}"
+            f"{name}: no arm of that name ships with armtempo", f"give one of {', '.join(files)}"
         )
     return _checked(files[name].read_text(encoding="utf-8"))
 

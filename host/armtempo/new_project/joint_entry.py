@@ -58,7 +58,8 @@ def parse(text: str, number: int) -> JointEntry:
         if not equals or key not in ("name", *NUMBERS) or key in values:
             why = "is given twice" if key in values else "is not one of the keys"
             raise InputError(
-                f"joint {number}: {part!r} {why}; give KEY=VALUE with {', '.join(('name', *NUMBERS))}"
+                f"joint {number}: {part!r} {why}",
+                f"give KEY=VALUE with {', '.join(('name', *NUMBERS))}",
             )
         values[key] = value
     name = values.pop("name", f"joint {number}")
@@ -71,7 +72,9 @@ def _number(number: int, key: str, value: str) -> float | int:
             return int(value)
         return float(value)
     except ValueError:
-        raise InputError(f"joint {number}: {key} = {value!r} is no number; write it as 12 or -3.5") from None
+        raise InputError(
+            f"joint {number}: {key} = {value!r} is no number", "write it as 12 or -3.5"
+        ) from None
 
 
 def table(entry: JointEntry, channel: int, joints: int) -> str:

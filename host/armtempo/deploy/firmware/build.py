@@ -18,6 +18,7 @@ from armtempo.progress import Progress
 
 _SAID_LINES = 12
 """Of a build that fails, the last ones are shown."""
+_SAID_COLUMNS = 200
 _FILES = 330
 """That a build compiles, about; for its progress."""
 _WHOLE = ("firmware.dfu", "firmware.hex", "firmware.elf")
@@ -33,7 +34,7 @@ def build(micropython: Path, board: str, out: Path, progress: Progress) -> image
     """
     found = checkout.look(micropython)
     definition = checkout.board(found, board)
-    checkout.check_submodules(found, definition.name)
+    checkout.check_submodules(found, definition)
     toolchain.check(with_mpy_cross=not toolchain.has_mpy_cross(found.folder))
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise InputError(f"{out} is there already", "name a new folder with --out")
@@ -102,7 +103,7 @@ def _run(command: list[str], step: Callable[[], None]) -> None:
         assert process.stdout is not None
         try:
             for line in process.stdout:
-                said = [*said[1 - _SAID_LINES :], line.rstrip()]
+                said = [*said[1 - _SAID_LINES :], line.rstrip()[:_SAID_COLUMNS]]
                 step()
         except BaseException:
             process.terminate()

@@ -20,6 +20,8 @@ _FLASH_KB = {"E": 512, "G": 1024}
 _FLASH_START = 0x08000000
 _PARTS = ("MAJOR", "MINOR", "MICRO")
 _LIBRARY = "lib/micropython-lib"
+_OF_SETTINGS = {"MICROPY_PY_LWIP": "lib/lwip", "MICROPY_SSL_MBEDTLS": "lib/mbedtls"}
+"""Submodules that a board needs whose makefile sets these to 1: it has a network."""
 
 
 @dataclass(frozen=True)
@@ -123,15 +125,17 @@ def suitable(checkout: Checkout) -> list[str]:
     ]
 
 
-def check_submodules(checkout: Checkout, name: str) -> None:
-    """InputError where a submodule that the port needs is not there."""
+def check_submodules(checkout: Checkout, definition: BoardDefinition) -> None:
+    """InputError where a submodule that the port or the board needs is not there."""
     make = (checkout.port / "Makefile").read_text(encoding="utf-8", errors="replace")
     needed = {*re.findall(r"lib/\S+", " ".join(re.findall(r"GIT_SUBMODULES \+=(.*)", make))), _LIBRARY}
+    board_make = (definition.folder / "mpconfigboard.mk").read_text(encoding="utf-8", errors="replace")
+    needed |= {path for name, path in _OF_SETTINGS.items() if _setting(board_make, name) == "1"}
     missing = sorted(path for path in needed if not any((checkout.folder / path).glob("*")))
     if missing:
         raise InputError(
             f"{checkout.folder} lacks submodules ({', '.join(missing)})",
-            f"get them: make -C {checkout.port} BOARD={name} submodules",
+            f"get them: make -C {checkout.port} BOARD={definition.name} submodules",
         )
 
 
