@@ -74,10 +74,7 @@ def test_edges_do_not_depend_on_how_the_ring_is_filled(
         steps = walking.walk(QUICK, tmp_path, records, room=room)[1]
         for mine, other in zip(steps, expected, strict=True):
             edges, others = (np.frombuffer(data, dtype="<i4").reshape(-1, 5) for data in (mine, other))
-            np.testing.assert_array_equal(edges[:, :2], others[:, :2])
-        off = np.abs(edges[:, 3:] - others[:, 3:])
-        begins = others[:, 3] >> 10 == brake[0] >> 10
-        assert off[begins].max(initial=0) <= 4 and not off[~begins].any()
+            np.testing.assert_array_equal(edges[:, [0, 1, 3, 4]], others[:, [0, 1, 3, 4]])
 
 
 BRAKES = [(2.0, 0.6), (3.1, 0.1), (0.2, 0.5), (1.0, 2.5), (5.5, 0.4)]
@@ -111,7 +108,8 @@ def test_nothing_is_written_beyond_the_time_at_which_braking_begins(
         np.testing.assert_array_equal(edges[:, :2], others[:, :2])
         off = np.abs(edges[:, 3:] - others[:, 3:])
         begins = others[:, 3] >> 10 == brake[0] >> 10
-        assert off[begins].max(initial=0) <= 4 and not off[~begins].any()
+        assert off[begins].max(initial=0) <= 4
+        assert not off[~begins].any()
 
 
 def test_braking_from_full_speed(tmp_path: Path) -> None:

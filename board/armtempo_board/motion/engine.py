@@ -27,20 +27,20 @@ from machine import mem32
 from micropython import const
 
 from armtempo_board import heap
-from armtempo_board.buffers import COMMANDED, TICKS_HIGH, TICKS_LOW
+from armtempo_board.buffers import COMMANDED, PATH_HIGH, PATH_LOW, TICKS_HIGH, TICKS_LOW
 from armtempo_board.errors import Refused
 from armtempo_board.hardware import isr
 from armtempo_board.hardware.encoders import EncoderInput, NoEncoder
 from armtempo_board.hardware.inputs import Inputs
 from armtempo_board.motion.following_error import FollowingError
 from armtempo_board.motion.joint_drive import LOOKAHEAD_KITICKS, JointDrive
-from armtempo_board.motion.override import Override
 from armtempo_board.motion.readings import Readings
 from armtempo_board.motion.workspace import Workspace
-from armtempo_board.stepgen import time_law
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from typing import Any
+
     from armtempo_shared.motion import MotionHead
 
 LEAD_TICKS = const(1680000)
@@ -90,8 +90,9 @@ class Engine:
         ]
         self._encoders = [fitted[rows.index(row)] if row in rows else NoEncoder() for row in joints]
         slots = [isr.RAW_ENCODERS + rows.index(row) if row in rows else 0 for row in joints]
-        self._override = Override()
-        self._readings = Readings(self._sampler, self._joints, self._encoders, slots, self._override.law)
+        self._override: "Any" = None  # while a motion is loaded
+        self._end = array("i", [0] * COMMANDED)  # both times at which the last one ended, as in a sample
+        self._readings = Readings(self._sampler, self._joints, self._encoders, slots)
         self._following = [FollowingError(row) for row in joints]
         self._inputs = Inputs(head, joints, self._sampler)
         self._feeder.connect(self._inputs, self._joints)
@@ -129,15 +130,12 @@ class Engine:
         ``rate``, in thousandths: how fast the motion's own time is to run.
         """
         self._check(motion)
-        self._override.begin(rate, motion.brake_ticks, self.duration_ticks)
-        self.duration_ticks = self._override.end_ticks()
-        if self.duration_ticks > LONGEST_RUN_TICKS:
-            raise Refused(codes.TOO_LONG)
+        self._take_override(rate, motion.brake_ticks)
         self._inputs.enable(True)
         self._set_clock(-LEAD_TICKS)
         self._end_ticks = self.duration_ticks
         self._sampler.plan(self._end_ticks)
-        self._readings.clear()
+        self._readings.clear(self._override)
         self._can_brake = motion.brake_ticks > 0
         self._can_change = self._can_brake and motion.ramps
         self._braked = self._end_moves = self._change_waits = False
@@ -149,6 +147,16 @@ class Engine:
             self._prefill(joint)
         self._inputs.watch(1)
         self.finished = False
+
+    def _take_override(self, rate: int, brake_ticks: int) -> None:
+        from armtempo_board.motion.override import Override  # here, so that it can be forgotten
+
+        override = Override()
+        override.begin(rate, brake_ticks, self.duration_ticks)
+        self.duration_ticks = override.end_ticks()
+        if self.duration_ticks > LONGEST_RUN_TICKS:
+            raise Refused(codes.TOO_LONG)
+        self._override = override
 
     def _check(self, motion: "MotionHead") -> None:
         if self.moving:
@@ -346,7 +354,7 @@ class Engine:
         self._change_rate()
 
     def _is_steady(self) -> bool:
-        return self._clock() > self._override.steady_kiticks
+        return bool(self._clock() > self._override.steady_kiticks)
 
     def _change_rate(self) -> None:
         """Begin the ramp to the rate that is wanted, or wait until the last one lies behind."""
@@ -408,12 +416,22 @@ class Engine:
 
     def _finish(self) -> None:
         self._stop_counters()
+        if self._override:
+            self._let_override_go()
         for joint in self._joints:
             joint.empty()
             joint.generator.close()
         self._inputs.watch(0)
         self.moving = False
         self.finished = True
+
+    def _let_override_go(self) -> None:
+        """What the samples and a snapshot need of it is taken before."""
+        self._readings.convert(self._epoch, self._counter_kiticks)
+        self._readings.close()
+        _put_ticks(self._end, self._end_ticks)
+        self._override.put_path(self._end, 0)
+        self._override = None
 
     def _stop_counters(self) -> None:
         mem32[stm.TIM6] = 0
@@ -456,11 +474,13 @@ class Engine:
 
     def snapshot(self, buffer: "array[int]") -> None:
         """Write a sample of this moment to ``buffer``; after a motion with the time at which it ended."""
-        ticks = self._end_ticks if self.finished else max(self.motion_ticks(), 0)
-        low = ticks & 0xFFFFFFFF
-        buffer[TICKS_LOW] = low - (1 << 32) if low >> 31 else low
-        buffer[TICKS_HIGH] = ticks >> 32
-        time_law.to_motion_time(self._override.law, buffer, 0)
+        if self.finished:
+            for word in range(COMMANDED):
+                buffer[word] = self._end[word]
+        else:
+            _put_ticks(buffer, max(self.motion_ticks(), 0))
+        if self._override:
+            self._override.put_path(buffer, 0)
         count = len(self._joints)
         for number in range(count):
             buffer[COMMANDED + number] = self.commanded(number)
@@ -486,3 +506,10 @@ class Engine:
             self._epoch += 1
         self._counter_kiticks = low
         return (self._epoch << 22) + low
+
+
+def _put_ticks(sample: "array[int]", ticks: int) -> None:
+    """Put the time into a sample; the motion's own time is the same."""
+    low = ticks & 0xFFFFFFFF
+    sample[TICKS_LOW] = sample[PATH_LOW] = low - (1 << 32) if low >> 31 else low
+    sample[TICKS_HIGH] = sample[PATH_HIGH] = ticks >> 32

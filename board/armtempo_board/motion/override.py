@@ -50,6 +50,10 @@ class Override:
         time_law.set_times(self.law, end + time_law.REAL_START_HIGH - time_law.START_HIGH, self._real_ticks)
         time_law.set_rates(self.law, before, after)
 
+    def put_path(self, sample: "array[int]", at: int) -> None:
+        """Put the motion's own time into a sample that begins at word ``at`` (buffers.py)."""
+        time_law.to_motion_time(self.law, sample, at)
+
     def end_ticks(self) -> int:
         """Real time at which the motion ends: of the ramp's end, where it ends within; LONGEST_RUN_TICKS: never."""
         left = max(self._duration_ticks - self._motion_ticks, 0)

@@ -12,17 +12,17 @@ from armtempo_board.hardware import isr
 from armtempo_board.hardware.encoders import EncoderInput, NoEncoder
 from armtempo_board.hardware.sampler import Sampler
 from armtempo_board.motion.joint_drive import JointDrive
-from armtempo_board.stepgen.time_law import to_motion_time
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
 
 _CAPACITY = const(4)  # samples
 _HALF_ROUND_KITICKS = const(1 << 21)  # of the counter
 
 
 class Readings:
-    """``joints`` and ``encoders``: one of each a joint; ``slots``: word of its encoder in a raw sample.
-
-    ``law``: of the motion's time (time_law.py).
-    """
+    """``joints`` and ``encoders``: one of each a joint; ``slots``: word of its encoder in a raw sample."""
 
     def __init__(
         self,
@@ -30,20 +30,20 @@ class Readings:
         joints: "list[JointDrive]",
         encoders: "list[EncoderInput | NoEncoder]",
         slots: "list[int]",
-        law: "array[int]",
     ) -> None:
         self._sampler = sampler
         self._joints = joints
         self._encoders = encoders
         self._slots = slots
-        self._law = law
+        self._override: "Any" = None
         self._size = COMMANDED + 2 * len(joints)
         self._words = array("i", bytearray(4 * _CAPACITY * self._size))
         self._in = self._out = 0
         self.lost = 0
 
-    def clear(self) -> None:
-        """Forget what was not fetched."""
+    def clear(self, override: "Any") -> None:
+        """Forget what was not fetched; ``override``: of the motion that comes."""
+        self._override = override
         self._in = self._out = 0
         self.lost = 0
 
@@ -71,7 +71,7 @@ class Readings:
         words[to + TICKS_HIGH] = max(epoch, 0)
         if epoch >= 0:
             isr.copy_word(raw, at, words, to)
-        to_motion_time(self._law, words, to)
+        self._override.put_path(words, to)
         commanded, counts = to + COMMANDED, to + COMMANDED + len(self._joints)
         for number in range(len(self._joints)):
             joint = self._joints[number]
@@ -79,6 +79,10 @@ class Readings:
             encoder.take(raw[at + self._slots[number]])
             words[commanded + number] = joint.position(raw[at + isr.RAW_MATCHES + number])
             words[counts + number] = encoder.counts
+
+    def close(self) -> None:
+        """All are converted, no more come: let the override go."""
+        self._override = None
 
     def next(self, buffer: "array[int]") -> bool:
         """Copy the oldest sample to ``buffer`` and forget it; False where there is none."""

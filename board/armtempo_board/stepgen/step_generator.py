@@ -8,9 +8,8 @@ What steps come is found in the motion's own time, so it is the same however slo
 from micropython import const
 
 from armtempo_board.memory import Memory
-from armtempo_board.stepgen import newton, step_queue, subdivision, time_law
+from armtempo_board.stepgen import newton, step_queue, subdivision
 from armtempo_board.stepgen.bezier import BIAS, HIGH, LOW
-from armtempo_board.stepgen.interval_steps import queue_steps
 from armtempo_board.stepgen.newton import (
     FIRST_NODE,
     HELD_NODE,
@@ -43,6 +42,7 @@ from armtempo_board.stepgen.subintervals import Subintervals
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from array import array
+    from typing import Any
 
     from armtempo_shared.motion import MotionHead
 
@@ -65,9 +65,12 @@ class StepGenerator:
 
     def __init__(self, memory: Memory) -> None:
         """``memory``: where its words are taken from (``armtempo_shared.engine_memory`` counts them)."""
+        from armtempo_board.stepgen.time_law import LAW_WORDS  # here, so that it can be forgotten
+
         self.queue = memory.take(step_queue.QUEUE_SIZE)
         self._solver = memory.take(newton.SOLVER_SIZE)
-        self._law = memory.take(time_law.LAW_WORDS)
+        self._law_words = memory.take(LAW_WORDS)
+        self._law: "Any" = None  # JointLaw, while a motion is loaded
         self.subintervals = Subintervals(memory)
         self.direction = self._heading = 1
         self.at_turn = False
@@ -91,6 +94,9 @@ class StepGenerator:
         ``pulse_ticks``: STEP high time; ``gap_ticks``: least time between steps in opposite directions. Two that
         would be closer are both left out.
         """
+        from armtempo_board.stepgen.joint_law import JointLaw  # here, so that it can be forgotten
+
+        self._law = JointLaw(self._law_words)
         self.subintervals.load(motion, joint)
         self.subintervals.min_ticks = gap_ticks >> 3
         queue = self.queue
@@ -112,8 +118,9 @@ class StepGenerator:
                 self.turn()
 
     def close(self) -> None:
-        """The motion is read no further."""
+        """The motion is read no further; what only a motion needs is let go."""
         self.subintervals.close()
+        self._law = None
 
     def prepare(self, until_kiticks: int) -> bool:
         """Put the next steps into the queue, unless it is full or goes on beyond a time already.
@@ -161,13 +168,11 @@ class StepGenerator:
         back. The ramp of the law before must lie behind what was written. ``is_last``: where the motion's time stands
         still behind the ramp, it is the end.
         """
-        time_law.copy_law(self._law, law)
-        start_kiticks = _kiticks(law[time_law.REAL_START_HIGH], 0)
         queue = self.queue
-        if not queue[MODE] & BY_LAW:
-            self._law[time_law.MOTION_HIGH] = queue[INTERVAL_HIGH]
+        high = self._high()
         queue[MODE] |= BY_LAW
-        queue[INTERVAL_HIGH] = time_law.count_from(self._law, self._law[time_law.MOTION_HIGH])
+        queue[INTERVAL_HIGH] = self._law.take(law, high)
+        start_kiticks = _kiticks(self._law.start_high(), 0)
         reached = queue[REACHED]
         if queue[LATEST_KITICKS] >= start_kiticks and holds_steps(queue):
             if self._held_queued:
@@ -227,7 +232,7 @@ class StepGenerator:
         if self._found == NOT_YET:
             self._found = now.search(self._position)
         found = self._found
-        is_past = self.queue[MODE] & BY_LAW and time_law.is_past(self._law, now.time[HIGH])
+        is_past = self.queue[MODE] & BY_LAW and self._law.is_past(now.time[HIGH])
         if found == END or is_past:
             if self._held:
                 self._queue_held()
@@ -252,7 +257,7 @@ class StepGenerator:
         queue[TIME_SCALE] = scale
         queue[INTERVAL_HIGH] = now.time[HIGH]
         if queue[MODE] & BY_LAW:
-            queue[INTERVAL_HIGH] = time_law.count_from(self._law, now.time[HIGH])
+            queue[INTERVAL_HIGH] = self._law.count_from(now.time[HIGH])
         solver[newton.TIME_OFFSET] = now.time[LOW] >> (16 - scale)
         if at_start:
             solver[newton.RANGE] = 0
@@ -276,10 +281,10 @@ class StepGenerator:
         self._first_ticks = self._node_ticks()
         self._first_comes = True
         if queue[MODE] & BY_LAW:
-            comes = time_law.to_real_time(self._law, solver, FIRST_NODE, queue[TIME_SCALE])
+            comes = self._law.to_real_time(solver, FIRST_NODE, queue[TIME_SCALE])
             if comes and queue[MODE] < AT_START:
-                time_law.scale_slope(solver, FIRST_NODE)
-            self._first_comes = bool(comes)
+                self._law.scale_slope(solver, FIRST_NODE)
+            self._first_comes = comes
 
     def _queue_first(self) -> None:
         """The first step of a subinterval, against the one that was held back before it."""
@@ -305,7 +310,7 @@ class StepGenerator:
         """The next steps of the subinterval."""
         queue = self.queue
         self._held_queued = False
-        queue_steps(self._solver, queue, _NODES, self._law)
+        self._law.queue_steps(self._solver, queue, _NODES)
         if queue[HELD_BACK]:
             queue[HELD_BACK] = 0
             if queue[MODE] & BY_LAW:  # its node is in real time
@@ -349,12 +354,12 @@ class StepGenerator:
         high, ticks = self._held_high, self._held_ticks
         if self.queue[MODE] & BY_LAW:
             solver, law = self._solver, self._law
-            before = law[time_law.MOTION_HIGH]
-            high = time_law.count_from(law, high)
+            before = law.motion_high()
+            high = law.count_from(high)
             solver[HELD_NODE] = ticks
-            comes = time_law.to_real_time(law, solver, HELD_NODE, 0)
+            comes = law.to_real_time(solver, HELD_NODE, 0)
             ticks = solver[HELD_NODE] + solver[HELD_NODE + NODE_DELAY]
-            time_law.count_from(law, before)
+            law.count_from(before)
             if not comes:
                 self._halt()
                 return
@@ -372,7 +377,7 @@ class StepGenerator:
 
     def _high(self) -> int:
         """What the motion's times of the subinterval count from."""
-        return self._law[time_law.MOTION_HIGH] if self.queue[MODE] & BY_LAW else self.queue[INTERVAL_HIGH]
+        return int(self._law.motion_high() if self.queue[MODE] & BY_LAW else self.queue[INTERVAL_HIGH])
 
     def _node_ticks(self) -> int:
         """Time of the first node in ticks, rounded."""

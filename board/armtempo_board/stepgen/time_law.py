@@ -30,7 +30,7 @@ BEFORE = const(10)  # rate before it, in thousandths,
 AFTER = const(11)  # and after it
 _LEAST = const(12)  # b
 _RISE = const(13)  # h
-_GIVEN_WORDS = const(14)
+GIVEN_WORDS = const(14)
 # for a joint: what times of the subinterval that is gone through count from, 4096 ticks, + bezier.BIAS
 MOTION_HIGH = const(14)  # in the motion's time
 REAL_HIGH = const(15)  # and in real time
@@ -73,13 +73,13 @@ _AHEAD = const(4096)  # so many thousand units are added, where a time may lie b
 _MOST_ROUNDS = const(60)
 
 
-def set_times(law: "array[int] | memoryview[int]", at: int, ticks: int) -> None:
+def set_times(law: "array[int]", at: int, ticks: int) -> None:
     """Put a time into the words ``at`` and behind it."""
     law[at] = (ticks >> 12) + _BIAS
     law[at + 1] = ticks & 4095
 
 
-def set_length(law: "array[int] | memoryview[int]", ticks: int) -> None:
+def set_length(law: "array[int]", ticks: int) -> None:
     """The length of the ramp, a multiple of RAMP_GRID_TICKS up to LONGEST_RAMP_TICKS."""
     unit = 0
     while ticks >> unit >= _LONGEST:
@@ -88,47 +88,12 @@ def set_length(law: "array[int] | memoryview[int]", ticks: int) -> None:
     law[UNIT] = unit
 
 
-def set_rates(law: "array[int] | memoryview[int]", before: int, after: int) -> None:
+def set_rates(law: "array[int]", before: int, after: int) -> None:
     """The rates, in thousandths."""
     law[BEFORE] = before
     law[AFTER] = after
     law[_LEAST] = (min(before, after) << _FRACTION_BITS) // PERMILLE
     law[_RISE] = (abs(after - before) << _FRACTION_BITS) // PERMILLE
-
-
-def copy_law(target: "array[int] | memoryview[int]", law: "array[int] | memoryview[int]") -> None:
-    """Copy a law, but not what belongs to a joint."""
-    for word in range(_GIVEN_WORDS):
-        target[word] = law[word]
-
-
-def is_past(law: "array[int] | memoryview[int]", high: int) -> bool:
-    """Whether a time of the motion (4096 ticks, + bezier.BIAS) lies behind a ramp's end, at which it stands still."""
-    return bool(law[AFTER] == 0 and high > law[END_HIGH])
-
-
-def count_from(law: "array[int] | memoryview[int]", high: int) -> int:
-    """Let the motion's times of a joint count from ``high``; returns what the real times then count from.
-
-    That is near the real time of ``high``, and not later.
-    """
-    if high < law[START_HIGH]:
-        real = law[REAL_START_HIGH] - _stretched(law[START_HIGH] + 1 - high, law[BEFORE]) - 1
-    elif high < law[END_HIGH] or law[AFTER] == 0:
-        real = law[REAL_START_HIGH] + high - law[START_HIGH] - 1
-    else:
-        real = law[REAL_END_HIGH] + _stretched(high - law[END_HIGH], law[AFTER]) - 1
-    law[MOTION_HIGH] = high
-    law[REAL_HIGH] = real
-    return real
-
-
-def _stretched(time: int, rate: int) -> int:
-    """How long a time of the motion takes at a constant rate, in thousandths; 0 at rest. Small integers."""
-    if rate == 0:
-        return 0
-    whole = time // rate
-    return PERMILLE * whole + PERMILLE * (time - whole * rate) // rate
 
 
 @micropython.viper

@@ -73,6 +73,7 @@ def begin(motion, rate=1000):
     rig.trusting()
     recorders = [Recorder(rig, joint) for joint in rig.joints]
     rig.laws = [(0, 0, 0, rate, rate)]
+    rig.engine.load(motion, rate)
     ramp = rig.engine._override.ramp
 
     def watched(from_ticks, to):
@@ -86,7 +87,6 @@ def begin(motion, rate=1000):
         rig.laws.append((start, passed, length, before, to))
 
     rig.engine._override.ramp = watched
-    rig.engine.load(motion, rate)
     rig.engine.start()
     return rig, recorders
 
