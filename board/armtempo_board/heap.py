@@ -12,6 +12,7 @@ _ONLY_FOR_SET_UP = (
     "joint_law",
     "time_law",
     "interval_steps",
+    "cubics",
     "endpoints",
     "arm_check",
     "motion_file",

@@ -149,6 +149,8 @@ class Engine:
         self.finished = False
 
     def _take_override(self, rate: int, brake_ticks: int) -> None:
+        heap.forget()
+        gc.collect()
         from armtempo_board.motion.override import Override  # here, so that it can be forgotten
 
         override = Override()
