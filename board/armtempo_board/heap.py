@@ -3,7 +3,7 @@
 import gc
 import sys
 
-_ONLY_FOR_SET_UP = (
+_NOT_ALWAYS = (
     "pins",
     "registers",
     "motion_check",
@@ -40,13 +40,14 @@ def collect_often(often: bool = True) -> None:
 
 
 def forget() -> None:
-    """Give up the modules that only set-up or the start of a motion needs; the next collection frees them.
+    """Give up the modules that only set-up, the start of a motion or a motion needs; the next collection frees them.
 
-    They are imported inside of functions, never at the head of a module, and never while a motion runs.
+    They are imported inside of functions, never at the head of a module that stays, and never while a motion runs.
+    What a motion needs is held by its engine until it ends.
     """
     for module in list(sys.modules):
         if module.startswith("armtempo_"):
             package, _, name = module.rpartition(".")
-            if name in _ONLY_FOR_SET_UP or module in _ONLY_FOR_SET_UP:
+            if name in _NOT_ALWAYS or module in _NOT_ALWAYS:
                 del sys.modules[module]
                 delattr(sys.modules[package], name)

@@ -89,7 +89,7 @@ def _measured(sheet: html_page.Page, found: Evaluation) -> None:
 def _steps(sheet: html_page.Page, found: Evaluation) -> None:
     start, end = verdict.planned_steps(found)
     made = found.last.commanded_steps[-1] - start
-    off = np.abs(found.last.commanded_deg - found.trajectory(found.last.time_s)).max(axis=0)
+    off = np.abs(found.last.commanded_deg - found.trajectory(found.last.path_s)).max(axis=0)
     rows = [
         [joint.name, str(end[n] - start[n]), str(made[n]), f"{1 / joint.steps_per_deg:.4f}", f"{off[n]:.4f}"]
         for n, joint in enumerate(found.run.joints)

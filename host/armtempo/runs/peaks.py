@@ -9,6 +9,7 @@ import numpy as np
 
 from armtempo.arrays import Array
 from armtempo.model.arm import Limits
+from armtempo.runs import stretched
 from armtempo.runs.analysis import SAMPLE_S, Curves
 from armtempo.runs.differentiation import noise, of_curves, quantisation_sigma, weights
 from armtempo.splines.trajectory import Trajectory
@@ -57,16 +58,15 @@ def limit_checks(
     to ``resolutions_deg``, degrees per encoder count, averaged over the repetitions.
     """
     error = np.where(found.measured, found.mean[0] - found.theory[0], np.nan)
-    ended = bool(found.times_s[-1] > trajectory.duration_s - SAMPLE_S)
+    ended = bool(found.path_s[-1] > trajectory.duration_s - SAMPLE_S)
     smooth = of_curves(error, SAMPLE_S, ended, PEAK_WINDOW)
     rounding = [quantisation_sigma(resolution) / np.sqrt(len(found.each)) for resolution in resolutions_deg]
     sigmas = np.fmax(rounding, _scatter(error - smooth[0]))
     times = np.arange(0.0, found.times_s[-1] + _PEAK_STEP_S / 2, _PEAK_STEP_S)
+    path_s = np.interp(times, found.times_s, found.path_s)
+    theory = stretched.theory(trajectory, times, path_s)
     peaks = [
-        [
-            _peak(trajectory(times, order)[:, joint] + _interpolated(smooth[order, :, joint], times))
-            for order in (1, 2)
-        ]
+        [_peak(theory[order, :, joint] + _interpolated(smooth[order, :, joint], times)) for order in (1, 2)]
         for joint in range(len(limits))
     ]
     return [
