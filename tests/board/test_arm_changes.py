@@ -14,8 +14,8 @@ SCRIPT = Path(__file__).parent / "scripts" / "probes" / "arm_changes.py"
 CHANGES = 25
 SEED = 12
 KEPT_A_RUN = 480
-"""Bytes that the Unix port never gives back: 32 for each compiled function that is imported for an arm or a motion (15). On
-the chip the collector frees machine code."""
+"""Bytes that the Unix port never gives back: 32 for each of the 15 compiled functions that are imported for an arm or a
+motion. On the chip the collector frees machine code."""
 
 
 @pytest.mark.parametrize("name", [name for name in interpreters.AVAILABLE if name == "micropython"])

@@ -84,7 +84,17 @@ def describe(path: Path, **changes: object) -> None:
 
 @pytest.mark.parametrize(
     ("cell", "value"),
-    [(0, "9" * 20), (0, "x"), (2, "1e12"), (2, "nan"), (3, "1e30"), (3, "nan"), (4, "inf"), (6, "")],
+    [
+        (0, "9" * 20),
+        (0, "x"),
+        (2, "1e12"),
+        (2, "nan"),
+        (3, "1e30"),
+        (3, "nan"),
+        (4, "1e30"),
+        (5, "inf"),
+        (7, ""),
+    ],
 )
 def test_a_cell_beyond_reason_makes_the_file_damaged(tmp_path: Path, cell: int, value: str) -> None:
     path = made_runs.make(tmp_path / "run", repetitions=2) / "samples-01.csv"

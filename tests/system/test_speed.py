@@ -64,7 +64,7 @@ class Changing(Watcher):
         self.pause_s: list[float] = []
 
     def sample(self, sample: Sample, duration_s: float) -> None:
-        at = {2: 0.3, 20: 0.0, 80: -1.0, 110: 1.0}.get(sample.index)
+        at = {3: 0.0, 40: -1.0, 70: 1.0}.get(sample.index)
         if at == 0.0:
             self._board.pause()
         elif at == -1.0:
@@ -75,6 +75,7 @@ class Changing(Watcher):
 
 def test_changes_and_a_pause_while_it_runs(plan: armtempo.Plan, tmp_path: Path) -> None:
     with armtempo.connect("sim", plan.arm) as board:
+        board.speed(0.3)
         run = board.run(plan, out=tmp_path, watcher=Changing(board))
         with pytest.raises(BoardError, match="nothing is moving"):
             board.pause()

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from armtempo.cli import chosen, options
-from armtempo.errors import PortError
+from armtempo.errors import LinkError, PortError
 
 _PORT_FREE_S = 5.0
 """Within this time a program that has just taken the port answers for it."""
@@ -57,6 +57,6 @@ def _asked(name: str, log_traffic: Path | None, rate: int) -> str:
             return f", through {shared.program}"
     with chosen.board(name, log_traffic) as board:
         if not board.status().moving:
-            raise click.ClickException("nothing moves; 'armtempo run --speed' begins at a lower speed")
+            raise LinkError("nothing moves", "'armtempo run --speed' begins at a lower speed")
         change_speed(board.client, rate)
     return ""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armtempo.report.evaluation import Evaluation
-from armtempo.runs import peaks
+from armtempo.runs import peaks, stretched
 from armtempo.runs.run_folder import COMPLETE
 
 GOOD, BAD, OPEN = "good", "bad", "open"
@@ -76,7 +76,7 @@ def _repetitions(found: Evaluation) -> Iterator[VerdictItem]:
 
 def _samples(found: Evaluation) -> Iterator[VerdictItem]:
     """Cut-short repetitions are told by their number; here is what is missing or damaged of the record."""
-    missing = [text for text in found.complaints if "cut short" not in text]
+    missing = [text for text in found.complaints if "cut short" not in text and stretched.NOTE not in text]
     yield from (VerdictItem(OPEN, text) for text in missing)
     if not missing:
         yield VerdictItem(GOOD, "no sample is missing")

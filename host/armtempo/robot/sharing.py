@@ -103,7 +103,7 @@ class Sharing:
         rate = int(request["rate"])
         with self._client.session.in_a_hurry(TURN_S) as mine:
             if not mine:
-                raise NoAnswerError("the program that has the port waits for the board's answer; try again")
+                raise NoAnswerError("the program that has the port waits for the board's answer", "try again")
             change_speed(self._client, rate)
         if self._server is not None:
             self._server.publish("event", {"event": "speed", "rate": rate})

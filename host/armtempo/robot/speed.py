@@ -14,7 +14,8 @@ def permille(fraction: float) -> int:
     if not SLOWEST_PERMILLE <= rate <= PERMILLE:
         raise InputError(
             f"speed {100 * fraction:g} %: it must be from {100 * SLOWEST_PERMILLE / PERMILLE:g} to 100 % of the "
-            "planned one; a quicker motion needs a plan with higher limits"
+            "planned one",
+            "a quicker motion needs a plan with higher limits",
         )
     return rate
 

@@ -11,6 +11,8 @@ from armtempo.splines.trajectory import Trajectory
 _EQUAL_S = 1e-6
 """Times that differ by less are the same: a tick is 12 ns."""
 _SHORT_S = 0.01
+NOTE = "of the planned speed"
+"""In every text of ``note``."""
 
 
 def is_stretched(repetition: RepetitionData) -> bool:
@@ -49,4 +51,4 @@ def note(repetition: RepetitionData) -> str:
     rates = 100 * np.diff(repetition.path_s)[whole] / passed_s[whole]
     low, high = round(float(rates.min()), 1), round(float(rates.max()), 1)
     speed = f"at {high:g} %" if high - low < 1.0 else f"between {low:g} and {high:g} %"
-    return f"{repetition.file}: ran {speed} of the planned speed; it is held against the plan at that speed"
+    return f"{repetition.file}: ran {speed} {NOTE}; it is held against the plan at that speed"
