@@ -131,6 +131,9 @@ class Pipe:
                 return data
             self.wait(_STEP_S)
 
+    def wake(self) -> None:
+        """See Transport."""
+
     def close(self) -> None:
         """See Transport."""
 

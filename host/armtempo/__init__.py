@@ -27,6 +27,7 @@ __all__ = [
     "ArmtempoError",
     "Board",
     "BoardError",
+    "BoardState",
     "InputError",
     "Job",
     "LinkError",
@@ -36,12 +37,14 @@ __all__ = [
     "Pose",
     "Run",
     "RunFolderError",
+    "SharedBoard",
     "Spline",
     "StopRequest",
     "Stopped",
     "Trajectory",
     "Watcher",
     "__version__",
+    "attach",
     "compare",
     "connect",
     "deploy",
@@ -66,15 +69,17 @@ if TYPE_CHECKING:
         RunFolderError,
     )
     from armtempo.kinematics.of_arm import forward, inverse
-    from armtempo.link.ports import find_ports
     from armtempo.model.arm import Arm
     from armtempo.model.job import Job
     from armtempo.model.plan import Plan
     from armtempo.model.tool_pose import Pose
     from armtempo.pipeline import compare, connect, plan, summary
+    from armtempo.ports.listing import find_ports
     from armtempo.robot.board import Board
+    from armtempo.robot.board_state import BoardState
     from armtempo.robot.recording import Watcher
     from armtempo.robot.run import Run
+    from armtempo.robot.shared_board import SharedBoard, attach
     from armtempo.robot.stop_request import Stopped, StopRequest
     from armtempo.splines.spline import Spline
     from armtempo.splines.trajectory import Trajectory
@@ -90,15 +95,17 @@ _HOMES = {
         "RunFolderError",
     ),
     "armtempo.kinematics.of_arm": ("forward", "inverse"),
-    "armtempo.link.ports": ("find_ports",),
+    "armtempo.ports.listing": ("find_ports",),
     "armtempo.model.arm": ("Arm",),
     "armtempo.model.job": ("Job",),
     "armtempo.model.plan": ("Plan",),
     "armtempo.model.tool_pose": ("Pose",),
     "armtempo.pipeline": ("compare", "connect", "plan", "summary"),
     "armtempo.robot.board": ("Board",),
+    "armtempo.robot.board_state": ("BoardState",),
     "armtempo.robot.recording": ("Watcher",),
     "armtempo.robot.run": ("Run",),
+    "armtempo.robot.shared_board": ("SharedBoard", "attach"),
     "armtempo.robot.stop_request": ("StopRequest", "Stopped"),
     "armtempo.splines.spline": ("Spline",),
     "armtempo.splines.trajectory": ("Trajectory",),

@@ -29,7 +29,7 @@ from armtempo.planning.corridor_curve import CorridorTime
 from armtempo.progress import Progress, part
 from armtempo.records import encode
 from armtempo.report import comparison, text_summary
-from armtempo.robot.board import connect
+from armtempo.robot.connect import connect
 from armtempo.robot.recording import Watcher
 from armtempo.robot.run import Run
 
@@ -71,15 +71,16 @@ def summary(plan: Plan) -> list[str]:
     return text_summary.lines(plan)
 
 
-def load(path: Path | str, arm: Arm | None = None) -> Plan:
+def load(path: Path | str, arm: Arm | None = None, altered: bool = False) -> Plan:
     """The plan of a trajectory file.
 
-    Raises InputError where the file is none or damaged, or was planned for another arm than ``arm``.
+    ``altered``: also of one that was altered after it had been written. Raises InputError where the file is none,
+    damaged or altered, or was planned for another arm than ``arm``.
     """
-    found = trajectory_file.load(path)
+    found = trajectory_file.load(path, altered)
     if arm is not None and encode.arm_record(arm) != encode.arm_record(found.arm):
         raise InputError(
-            f"{path} was planned for another arm than {arm.source}",
+            f"{path} was planned for another arm than {arm.name!r} ({arm.source})",
             "plan it again with this arm",
         )
     return found
@@ -87,13 +88,15 @@ def load(path: Path | str, arm: Arm | None = None) -> Plan:
 
 def run(
     plan: Plan,
-    port: str = "sim",
+    port: str | None = None,
     repeat: int = 1,
     out: Path | str = "runs",
     progress: Progress | None = None,
     watcher: Watcher | None = None,
 ) -> Run:
-    """Replay a plan on the board of ``port`` and record it: ``Board.run`` with a connection of its own."""
+    """Replay a plan on the board of ``port`` (as for ``connect``) and record it: ``Board.run`` with a connection of
+    its own.
+    """
     with connect(port, plan.arm) as board:
         return board.run(plan, repeat, out, progress, watcher)
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from armtempo.cli import main
 from armtempo.errors import InputError
-from armtempo.model import exchange, thinning, trajectory_file
+from armtempo.model import arm_file, exchange, thinning, trajectory_file
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from click.testing import CliRunner
@@ -142,7 +142,7 @@ def test_what_cannot_be_thinned_to_a_motion_is_refused() -> None:
 def test_the_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     trajectory_file.save(shipped_plan(), "feed.json")
-    run = CliRunner().invoke
+    run = CliRunner(env={"ARMTEMPO_ARM": str(arm_file.default_path())}).invoke
     assert run(main, ["export", "feed.json", "--rate", "2", "-o", "feed.csv"]).exit_code == 0
     assert run(main, ["export", "feed.json", "--format", "ros"]).output.startswith("header:")
     made = run(main, ["import", "feed.csv", "--name", "again"])
@@ -151,9 +151,12 @@ def test_the_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         r"15 lines thinned to \d+ via points: .* within 0.1 deg; the times are planned anew\n", made.output
     )
     assert Job.load("again.toml", ARM).timing == "shared"
+    assert run(main, ["import", "feed.csv", "--name", "again"]).exit_code == 0  # the same content
+    Path("again.toml").write_text("# mine")
     again = run(main, ["import", "feed.csv", "--name", "again"])
     assert again.exit_code == 2
     assert "exists" in again.output
+    assert Path("again.toml").read_text() == "# mine"
     Path("out.csv").write_text("0,-60,40\n900,0,0\n")
     outside = run(main, ["import", "out.csv"])
     assert outside.exit_code == 2

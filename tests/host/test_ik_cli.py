@@ -21,7 +21,9 @@ POSITION = ("--position", "-536.404", "0", "434.698")
 
 
 def run(*arguments: str | Path) -> Result:
-    return CliRunner().invoke(main, ["ik", *map(str, arguments)])
+    return CliRunner(env={"ARMTEMPO_ARM": str(arm_file.default_path())}).invoke(
+        main, ["ik", *map(str, arguments)]
+    )
 
 
 def solutions(*arguments: str | Path) -> list[dict[str, Any]]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from armtempo.cli import main
-from armtempo.model import shipped, trajectory_file
+from armtempo.model import arm_file, shipped, trajectory_file
 from armtempo.model.arm import Arm
 from armtempo.planning import planner
 from click.testing import CliRunner, Result
@@ -19,8 +19,9 @@ iterations = 10
 
 
 def run(*arguments: str) -> Result:
-    """The command's outcome."""
-    return CliRunner().invoke(main, ["plan", *arguments])
+    """The command's outcome; a job is for the arm that ships with armtempo."""
+    arm = {"ARMTEMPO_ARM": str(arm_file.default_path())} if "--job" in arguments else {}
+    return CliRunner(env=arm).invoke(main, ["plan", *arguments])
 
 
 @pytest.fixture(autouse=True)
@@ -62,7 +63,7 @@ def test_an_arm_that_ships_is_taken_by_its_name() -> None:
     Path("ar4.toml").write_text('name = "lift"\nvia_deg = [[0,0,0,0,0,0],[10,5,5,0,5,0]]\niterations = 5\n')
     result = run("--job", "ar4.toml", "--arm", "ar4")
     assert result.exit_code == 0, result.output
-    assert "arm: ar4, as it ships with armtempo" in result.stderr
+    assert "arm: AR4-MK3 (as it ships with armtempo)" in result.stdout
     assert trajectory_file.load("lift.json").arm == Arm.load("ar4")
 
 

@@ -325,7 +325,7 @@ def test_shared_timing_needs_no_such_section(tmp_path: Path) -> None:
 def spoil_plan(path: Path, change: Callable[[Plan], Plan]) -> None:
     """Change the plan in a run folder."""
     file = path / "trajectory.json"
-    trajectory_file.save(change(trajectory_file.load(file)), file)
+    trajectory_file.save(change(trajectory_file.load(file)), file, force=True)
 
 
 @pytest.mark.parametrize("changes", [{"name": "another"}, {"driver": Driver(pulse_us=9.0)}])

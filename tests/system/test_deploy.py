@@ -40,7 +40,7 @@ def steps_of_a_run(folder: Path, deployed: bool) -> dict[str, list[int]]:
     ) as found:
         if deployed:
             armtempo("deploy", "--port", found.port, cwd=folder)
-        armtempo("home", "--port", found.port, cwd=folder)
+        armtempo("home", "--arm", "paper", "--port", found.port, cwd=folder)
         armtempo("run", small_plan(folder / "small.json"), "--port", found.port, cwd=folder)
     edges = edgelog.read(log)[-1].motion()
     return {pin: edges[pin][0].tolist() for pin in ("A15", "A1", "B10")}
@@ -73,7 +73,7 @@ def test_from_an_empty_board_and_back(tmp_path: Path, name: str) -> None:
         damaged = next((flash / "lib" / "armtempo_board").rglob("program.*py"))
         damaged.write_bytes(b"")
         assert "1 files of the library written" in armtempo("deploy", "--port", port, cwd=tmp_path)
-        armtempo("home", "--port", port, cwd=tmp_path)
+        armtempo("home", "--arm", "paper", "--port", port, cwd=tmp_path)
         file = small_plan(tmp_path / "small.json")
         assert "complete" in armtempo("run", file, "--port", port, cwd=tmp_path)
         assert "boot.py" in mpremote(port, "ls", ":/flash")

@@ -1,4 +1,4 @@
-"""Records in flash: motions, the arm record, the name of the default motion; never half written.
+"""Records in flash: motions, the arm record, the default by name and checksum; never half written.
 
 A record is written to ``NAME.new``, read back, synced and renamed. Where a power cut leaves a ``.new`` file,
 ``recover`` takes it if the old file is gone and the new one is whole, and removes it otherwise.
@@ -8,7 +8,7 @@ before a motion (see ``Controller.store``): no file is read or written while one
 """
 
 import os
-from binascii import crc32
+from binascii import crc32, hexlify
 
 from armtempo_shared import codes
 from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_NAME
@@ -196,29 +196,36 @@ class Store:
             raise Refused(codes.EXISTS)
         was_default = self.default() == old
         if was_default:
-            self._write_default(new + "\n" + old)
+            crc = self._crc(old)
+            self._write_default(new + crc + "\n" + old + crc)
         self._guard(os.rename, self._path(old_file), self._path(new_file))
         self._guard(_sync)
         if was_default:
-            self._write_default(new)
+            self._write_default(new + crc)
 
     def default(self) -> str:
-        """Name of the default motion, "" for none."""
+        """Name of the default motion; "" for none, or where it is no longer the one that was chosen."""
         try:
             lines = self._read(_DEFAULT).decode().split("\n")
         except (Refused, UnicodeError):
             return ""
         names = self.names()
-        for name in lines:
-            if name in names:
+        for line in lines:
+            name = line.split(" ")[0]
+            if name in names and line == name + self._crc(name):
                 return name
         return ""
 
     def set_default(self, name: str) -> None:
         """Make a stored motion the default; "" for none."""
         if name:
-            self._size_of(_motion_file(name))
+            name += self._crc(name)
         self._write_default(name)
+
+    def _crc(self, name: str) -> str:
+        """A motion's checksum as it stands in its last bytes, behind a blank."""
+        size = self._size_of(_motion_file(name))
+        return " " + hexlify(self.part(name, max(0, size - 4), 4)[1]).decode()
 
     def _write_default(self, text: str) -> None:
         file = self._guard(open, self._path(_DEFAULT + _NEW), "wb")

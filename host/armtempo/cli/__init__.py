@@ -16,6 +16,7 @@ from armtempo import __version__
 from armtempo.cli import messages
 from armtempo.cli.interrupts import raised_by_signals
 from armtempo.errors import INTERRUPTED, ArmtempoError
+from armtempo.formats.spelling import did_you_mean
 
 COMMANDS = (
     "demo",
@@ -32,6 +33,7 @@ COMMANDS = (
     "import",
     "import-urdf",
     "check",
+    "configure",
     "goto",
     "home",
     "stop",
@@ -45,7 +47,9 @@ COMMANDS = (
     "undeploy",
     "ports",
     "virtual-board",
+    "watch",
     "monitor",
+    "config",
 )
 """In the order of the help page. Each is ``command`` in its module: '-' as '_', a keyword with '_' behind."""
 
@@ -64,6 +68,15 @@ class LazyGroup(click.Group):
         module = import_module(f"{__name__}.{name.replace('-', '_')}{'_' * iskeyword(name)}")
         command: click.Command = module.command
         return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command that is meant; the error for one that there is not names the nearest."""
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            near = did_you_mean(args[0], COMMANDS) or ". 'armtempo --help' lists them"
+            ctx.fail(f"no command {args[0]!r}{near}")
+        return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; an error that the user can correct is one message, without a traceback."""
@@ -90,8 +103,8 @@ class LazyGroup(click.Group):
                 )
             )
             ctx.exit(1)
-        except KeyboardInterrupt:
-            click.echo("armtempo: interrupted", err=True)
+        except KeyboardInterrupt as error:
+            click.echo(f"armtempo: interrupted{': ' if error.args else ''}{error}", err=True)
             ctx.exit(INTERRUPTED)
 
 

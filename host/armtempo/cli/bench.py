@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from armtempo.cli import messages, options
+from armtempo.cli import chosen, messages, options
 from armtempo.cli.progress import ProgressBar
 from armtempo.errors import INTERRUPTED, InputError, MissingPackageError
 
@@ -87,17 +87,17 @@ def _sizes(ctx: click.Context, parameter: click.Parameter, value: str) -> list[i
 @click.option("--plot/--no-plot", default=True, help="Draw convergence.png (needs matplotlib), or do not.")
 @click.pass_context
 def command(
-    ctx: click.Context, /, out: Path, workers: int | None, scheduler: str | None, plot: bool, **chosen: Any
+    ctx: click.Context, /, out: Path, workers: int | None, scheduler: str | None, plot: bool, **given: Any
 ) -> None:
     """Compare the search algorithms as the paper does in Table 4 and Fig. 6."""
+    from armtempo.model.arm import Arm
+    from armtempo.model.job import Job
     from armtempo.research.bench import cases, result_table, worker_pool
     from armtempo.research.bench.result_store import ResultStore
 
-    arm_path, job_path = chosen["arm_path"], chosen["job_path"]
-    arm = options.load_arm(arm_path)
-    job = options.load_job(job_path, arm)
-    problem = cases.problem_of(arm, job, chosen["joint"], chosen["fitness"], chosen["iterations"])
-    wanted = cases.cases(chosen["algorithms"], chosen["populations"], range(1, chosen["seeds"] + 1))
+    arm, job = chosen.arm_and_job(given["arm_path"], given["job_path"])
+    problem = cases.problem_of(arm, job, given["joint"], given["fitness"], given["iterations"])
+    wanted = cases.cases(given["algorithms"], given["populations"], range(1, given["seeds"] + 1))
     store = ResultStore(out, problem)
     place = worker_pool.cluster(scheduler) if scheduler else worker_pool.local(workers)
     try:
@@ -111,7 +111,7 @@ def command(
             err=True,
         )
         ctx.exit(INTERRUPTED)
-    with_paper = chosen["joint"] == 1 and arm_path is None and job_path is None
+    with_paper = given["joint"] == 1 and (arm.source, job.source) == (Arm.paper().source, Job.paper().source)
     found = result_table.rows((store.runs[case] for case in wanted), problem.iterations)
     _write(out, found, with_paper, plot)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import chosen, options
 from armtempo.cli.progress import ProgressBar
 from armtempo.errors import InputError
 
@@ -26,7 +26,7 @@ from armtempo.errors import InputError
     help="Instead write FOLDER with a manifest.py that makes the program a part of MicroPython's firmware.",
 )
 @options.port
-def command(mpy: bool, package: Path | None, firmware: Path | None, port: str) -> None:
+def command(mpy: bool, package: Path | None, firmware: Path | None, port: str | None) -> None:
     """Put the board program on a board, or bring it up to date.
 
     mpremote copies what differs below /flash/lib; every file is read back. A boot.py or main.py that was
@@ -49,5 +49,5 @@ def command(mpy: bool, package: Path | None, firmware: Path | None, port: str) -
         )
         return
     with ProgressBar("copying") as progress:
-        deploy(port, mpy, click.echo, progress)
+        deploy(chosen.port(port), mpy, click.echo, progress)
     click.echo("the board runs armtempo")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import chosen, options
 
 if TYPE_CHECKING:
     from armtempo.kinematics.listing import Listing
@@ -102,7 +102,7 @@ def command(
     from armtempo.kinematics.solver import PoseSolver
 
     wanted = [_within(pose, tolerance_mm, tolerance_deg) for pose in _poses(_Given(**given))]
-    solver = PoseSolver(options.load_arm(arm_path))
+    solver = PoseSolver(chosen.arm_or_paper(arm_path))
     found = listings(solver, wanted, _posture(previous, solver), numerical)
     show = _print_json if as_json else _print_text
     show(solver, found)

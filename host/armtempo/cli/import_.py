@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import chosen, options
 
 
 @click.command("import")
@@ -26,8 +26,9 @@ from armtempo.cli import options
     "--output",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="Job file to write; without it the job's name with .toml. An existing file is not overwritten.",
+    help="Job file to write; without it the job's name with .toml. An existing file of other content is kept.",
 )
+@options.force("an existing FILE of other content")
 def command(
     table: Path,
     arm_path: Path | None,
@@ -35,25 +36,25 @@ def command(
     radians: bool,
     tolerance_deg: float | None,
     output: Path | None,
+    force: bool,
 ) -> None:
     """Make a job file from the CSV file TABLE: a line a via point, a column a driven joint.
 
     Columns are separated by commas, semicolons or tabs. What 'armtempo export' wrote comes back as a job of few via
     points along the same path.
     """
-    from armtempo.errors import InputError
     from armtempo.formats import toml_table
-    from armtempo.formats.atomic_file import replace_text
+    from armtempo.formats.atomic_file import check_not_input, check_replaceable, replace_text
     from armtempo.model import exchange, job_file
 
-    arm = options.load_arm(arm_path)
+    arm = chosen.load_arm(arm_path)
     title = name or table.stem
     target = output or Path(f"{title}.toml")
-    if target.exists():
-        raise InputError(f"{target} exists", "choose another place with --output")
+    check_not_input(target, (table, arm.source))
     found = exchange.via_from_csv(table, arm, radians, tolerance_deg)
     text = exchange.job_text(title, found)
     job_file.of_table(toml_table.parse(text, str(table)), arm)
+    check_replaceable(target, text, force)
     replace_text(target, text)
     if found.thinned_to_deg is not None:
         click.echo(

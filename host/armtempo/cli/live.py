@@ -24,8 +24,10 @@ from armtempo.runs.run_folder import Repetition, RunFolder
 class Live(Watcher):
     """Shows a run on the terminal; used as a context. Without a display it says so and opens no window."""
 
-    def __init__(self, window: bool) -> None:
+    def __init__(self, window: bool, where: str = "") -> None:
+        """``where``: on what the motion runs, if that needs saying."""
         self._window = window
+        self._where = f", on {where}" if where else ""
         self._plot: LivePlot | None = None
         self._progress = ProgressBar("moving")
 
@@ -34,7 +36,7 @@ class Live(Watcher):
         self._motion = motion
         self._started_s = time.monotonic()
         self._plot = self._open() if self._window else None
-        click.echo(f"{motion.name}: {motion.trajectory.duration_s:.3f} s, into {folder.path}")
+        click.echo(f"{motion.name}: {motion.trajectory.duration_s:.3f} s, into {folder.path}{self._where}")
 
     def sample(self, sample: Sample, duration_s: float) -> None:
         """Show one sample."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from armtempo.cli import messages, options
+from armtempo.cli import chosen, messages, options
 from armtempo.cli.progress import ProgressBar
 from armtempo.errors import InputError
 
@@ -34,8 +34,10 @@ def _refine(ctx: click.Context, param: click.Parameter, value: str | None) -> in
     "--output",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="Trajectory file to write; without it the job's name with .json.",
+    help="Trajectory file to write; without it the job's name with .json. An existing FILE is only replaced where "
+    "it is an earlier plan of the same job for the same arm, by their names.",
 )
+@options.force("any other FILE too")
 @click.option(
     "--path",
     type=click.Choice(["through", "free"]),
@@ -71,20 +73,27 @@ def command(
     job_path: Path | None,
     arm_path: Path | None,
     output: Path | None,
+    force: bool,
     split: bool,
     corridor_curve: bool,
     **changes: Any,
 ) -> None:
-    """Plan a job and write its trajectory file."""
-    arm = options.load_arm(arm_path)
-    job = _changed(options.load_job(job_path, arm), changes)
+    """Plan a job and write its trajectory file.
+
+    Where neither an arm nor a job is named, this plans the demo's job for the arm that ships with armtempo.
+    """
+    from armtempo.formats.atomic_file import check_not_input
+
+    arm, job = chosen.arm_and_job(arm_path, job_path)
+    job = _changed(job, changes)
     target = output or Path(f"{job.name}.json")
+    check_not_input(target, (job.source, arm.source))
     if corridor_curve:
-        _write_curve(arm, job, target)
+        _write_curve(arm, job, target, force)
         return
     plans = _plans(arm, job, split)
     for number, plan in enumerate(plans, 1):
-        _write(plan, target if len(plans) == 1 else target.with_stem(f"{target.stem}-{number}"))
+        _write(plan, target if len(plans) == 1 else target.with_stem(f"{target.stem}-{number}"), force)
 
 
 def _changed(job: Job, changes: dict[str, Any]) -> Job:
@@ -109,20 +118,21 @@ def _plans(arm: Arm, job: Job, split: bool) -> list[Plan]:
     return plans
 
 
-def _write(plan: Plan, target: Path) -> None:
+def _write(plan: Plan, target: Path, force: bool) -> None:
     from armtempo import pipeline
 
-    plan.save(target)
+    plan.save(target, force)
+    click.echo(f"arm: {chosen.words(plan.arm)}")
     for line in pipeline.summary(plan):
         click.echo(line)
     click.echo(f"written: {target}")
 
 
-def _write_curve(arm: Arm, job: Job, target: Path) -> None:
+def _write_curve(arm: Arm, job: Job, target: Path, force: bool) -> None:
     """Table to the terminal and as CSV, and the figure where matplotlib is installed."""
     from armtempo import pipeline
     from armtempo.errors import MissingPackageError
-    from armtempo.formats.atomic_file import replace_text
+    from armtempo.formats.atomic_file import check_replaceable, replace_text
     from armtempo.planning.corridor_curve import unit_of
     from armtempo.report import corridor_plot, drawing
 
@@ -132,7 +142,9 @@ def _write_curve(arm: Arm, job: Job, target: Path) -> None:
     for line in corridor_plot.lines(points, unit):
         click.echo(line)
     table, picture = (target.with_name(f"{target.stem}-corridor{suffix}") for suffix in (".csv", ".png"))
-    replace_text(table, corridor_plot.csv(points, unit))
+    text = corridor_plot.csv(points, unit)
+    check_replaceable(table, text, force)
+    replace_text(table, text)
     try:
         drawing.save(corridor_plot.figure(points, unit, job.name), picture)
     except MissingPackageError as error:

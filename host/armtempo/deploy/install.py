@@ -18,7 +18,7 @@ from armtempo.deploy.changes import Tell, check_suitable, choose, difference, is
 from armtempo.deploy.remote import RECOVERY, Remote, Survey, each, rename
 from armtempo.errors import InputError, LinkError, NoProgramError, PortError
 from armtempo.link import open_board
-from armtempo.link.ports import is_sim
+from armtempo.ports.names import is_sim
 from armtempo.progress import Progress
 
 KEPT_ASIDE = ".before-armtempo"

@@ -17,6 +17,7 @@ import numpy as np
 
 from armtempo.errors import InputError
 from armtempo.formats.plain_text import visible
+from armtempo.formats.spelling import did_you_mean
 
 _AGAIN = "restore the file from a copy, or make it again with the command that wrote it"
 ADDED = {"added": True}
@@ -111,7 +112,8 @@ def _dataclass(kind: Any, value: Any, where: str) -> Any:
     missing = {name for name, added in fields.items() if name not in value and not added}
     for what, keys in (("unknown", value.keys() - fields.keys()), ("missing", missing)):
         if keys:
-            raise InputError(f"{where}: {what} key {', '.join(sorted(keys))}", _AGAIN)
+            meant = did_you_mean(min(keys), fields) if what == "unknown" else ""
+            raise InputError(f"{where}: {what} key {', '.join(sorted(keys))}{meant}", _AGAIN)
     hints = _hints(kind)
     return kind(
         **{name: decode(hints[name], value[name], f"{where}.{name}") for name in fields if name in value}

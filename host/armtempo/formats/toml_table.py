@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import reprlib
 import sys
@@ -14,6 +13,7 @@ from typing import Any
 from armtempo.errors import InputError
 from armtempo.formats.atomic_file import why
 from armtempo.formats.plain_text import is_plain
+from armtempo.formats.spelling import did_you_mean, misspelt
 
 _REQUIRED: Any = object()
 
@@ -59,13 +59,24 @@ class Table:
         """The error for a key: say what is there and what is allowed."""
         name = f"{self._place}{key}"
         if key not in self._values:
-            return InputError(f"{self.file}: {name} is missing", f"write {name} = {allowed}")
+            return InputError(
+                f"{self.file}: {name} is missing", f"write {name} = {allowed}{self._misspelt(key)}"
+            )
         value = reprlib.repr(self._values[key])
         return InputError(f"{self.file}: {name} = {value} is not allowed", f"give {allowed}")
+
+    def _misspelt(self, key: str) -> str:
+        """A note on a key that is there and may be meant."""
+        near = misspelt(key, [other for other in self._values if other not in self._asked])
+        return f"; {self._place}{near} is there: is it misspelt?" if near else ""
 
     def has(self, key: str) -> bool:
         """Whether the key is given."""
         return key in self._values
+
+    def known(self, *keys: str) -> None:
+        """These keys may be there, whether a getter asks for them or not."""
+        self._asked.extend(keys)
 
     def _get(self, key: str, default: Any, allowed: str) -> Any:
         self._asked.append(key)
@@ -162,11 +173,10 @@ class Table:
         for key in self._values:
             if key in self._asked:
                 continue
-            near = difflib.get_close_matches(key, self._asked, 1)
+            meant = did_you_mean(key, self._asked).removeprefix("; ")
             known = f"known here: {', '.join(sorted(set(self._asked)))}"
             raise InputError(
-                f"{self.file}: {self._place}{key}: unknown key",
-                f"did you mean {near[0]!r}? {known}" if near else known,
+                f"{self.file}: {self._place}{key}: unknown key", f"{meant} {known}" if meant else known
             )
 
 

@@ -10,6 +10,7 @@ from armtempo_shared import wire
 from armtempo_shared.limits import TICK_HZ
 
 from armtempo.formats.plain_text import visible
+from armtempo.virtual_id import is_virtual
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,11 @@ class Hello:
     program_crc: int
     boot: int
     board_id: str
+
+    @property
+    def virtual(self) -> bool:
+        """Whether it is a virtual board."""
+        return is_virtual(self.board_id)
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,10 @@ _FRAME_SIGNS = (bytes((SYNC,)), bytes((wire.EVENT["ok"][1], wire.COMMAND["hello"
 _NUDGE = b"\r\x02\r"
 """Ends a line, leaves a raw REPL, asks for a prompt; the board program ignores it."""
 
+_ASK = b"print('armtempo','is','here')if'armtempo'in open('/flash/main.py').read()else 0\r"
+_HERE = b"armtempo is here"
+"""Asks the prompt whether the program is in the flash; the echo of the question is not the answer."""
+
 
 def explain(transport: Transport, heard: bytes) -> LinkError:
     """The error to raise, by what the port sends: nothing, a REPL, pieces of frames, or else; ``heard`` so far."""
@@ -23,6 +27,13 @@ def explain(transport: Transport, heard: bytes) -> LinkError:
     heard += _listen(transport)
     where = f"the board on {transport.name}"
     if any(sign in heard for sign in _REPL_SIGNS):
+        transport.write(_ASK)
+        if _HERE in _listen(transport):
+            return NoProgramError(
+                f"{where} runs MicroPython but not the armtempo program, which is on it: mpremote or an IDE ended it",
+                f"press the board's reset button, or: mpremote connect {transport.name} reset; if it does "
+                "not start then: armtempo deploy",
+            )
         return NoProgramError(
             f"{where} runs MicroPython but not the armtempo program",
             "install it with 'armtempo deploy'",

@@ -97,6 +97,7 @@ class Follower:
             between()
             event = self._client.session.poll(CHECK_S)
             if event is None:
+                between()  # a stop request ends the wait
                 self._ask_status()
             else:
                 self._take(event)

@@ -105,6 +105,10 @@ class LoggedTransport:
         self._log(TO_BOARD, data)
         self._inner.write(data)
 
+    def wake(self) -> None:
+        """See Transport."""
+        self._inner.wake()
+
     def close(self) -> None:
         """See Transport."""
         self._inner.close()

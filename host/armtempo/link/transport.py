@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+from contextlib import suppress
 from typing import Protocol
 
 import serial
@@ -26,6 +27,9 @@ class Transport(Protocol):
     def write(self, data: bytes) -> None:
         """Send all of it."""
 
+    def wake(self) -> None:
+        """End a read that waits, or the next one; for other threads and signal handlers. It may do nothing."""
+
     def close(self) -> None:
         """Free the port; may be called twice."""
 
@@ -36,9 +40,10 @@ class SerialTransport:
     Raises InputError where there is no such port, PortError where it is in use, LinkError where it breaks.
     """
 
-    def __init__(self, port: str) -> None:
+    def __init__(self, port: str, exclusive: bool = True) -> None:
+        """``exclusive``: not while another program has the port open, where the operating system can tell."""
         self.name = port
-        self._serial = _open(port)
+        self._serial = _open(port, exclusive)
 
     def read(self, timeout_s: float) -> bytes:
         """See Transport."""
@@ -55,17 +60,22 @@ class SerialTransport:
         except (serial.SerialException, OSError) as error:
             raise _broken(self.name, error) from error
 
+    def wake(self) -> None:
+        """See Transport."""
+        with suppress(serial.SerialException, OSError, AttributeError, TypeError):  # URLs need not have it
+            self._serial.cancel_read()
+
     def close(self) -> None:
         """See Transport."""
         self._serial.close()
 
 
-def _open(port: str) -> serial.Serial:
+def _open(port: str, exclusive: bool) -> serial.Serial:
     try:
         device = serial.serial_for_url(port, do_not_open=True)
         device.baudrate = BAUD_RATE
         device.write_timeout = 2.0
-        if "://" not in port:
+        if exclusive and "://" not in port:
             device.exclusive = True
         device.open()
     except ValueError as error:

@@ -70,11 +70,15 @@ class Plan:
         """The motion time: when the last joint arrives, seconds."""
         return self.trajectory.duration_s
 
-    def save(self, path: Path | str) -> None:
-        """Write the trajectory file, whole or not at all; InputError where it cannot be written."""
+    def save(self, path: Path | str, force: bool = False) -> None:
+        """Write the trajectory file, whole or not at all.
+
+        ``force``: also over a file that is no earlier plan of the same job for the same arm, by their names.
+        Raises InputError where such a file is there, or the file cannot be written.
+        """
         from armtempo.model import trajectory_file
 
-        trajectory_file.save(self, path)
+        trajectory_file.save(self, path, force)
 
     def to_csv(self, rate_hz: float = 100.0) -> str:
         """Angle, speed, acceleration and jerk of each driven joint as CSV, ``rate_hz`` lines a second."""
@@ -89,8 +93,11 @@ class Plan:
         return exchange.to_ros(self, rate_hz, frame_id)
 
     @classmethod
-    def load(cls, path: Path | str) -> Plan:
-        """The plan of a trajectory file; InputError where the file is none, is damaged or does not fit."""
+    def load(cls, path: Path | str, altered: bool = False) -> Plan:
+        """The plan of a trajectory file; ``altered``: also of one that was altered after it had been written.
+
+        InputError where the file is none, is damaged, altered or does not fit.
+        """
         from armtempo.model import trajectory_file
 
-        return trajectory_file.load(path)
+        return trajectory_file.load(path, altered)

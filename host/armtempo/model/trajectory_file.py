@@ -1,8 +1,13 @@
-"""The trajectory file: a plan as JSON, whole enough to run it and to plan it again."""
+"""The trajectory file: a plan as JSON, whole enough to run it and to plan it again.
+
+It carries a sha256 over the plan, which does not depend on blanks and line breaks; files of version 1 have none.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
+import logging
 from pathlib import Path
 from typing import Any
 
@@ -11,48 +16,94 @@ from armtempo_shared.basis import BASIS
 
 from armtempo.errors import InputError
 from armtempo.formats import json_codec
-from armtempo.formats.atomic_file import replace_text, why
+from armtempo.formats.atomic_file import check_replaceable, replace_text, why
 from armtempo.model import arm_json
 from armtempo.model.job import AUTO
 from armtempo.model.plan import Plan
 from armtempo.splines.trajectory import JointSpline
 
 FORMAT = "armtempo trajectory"
-VERSION = 1
+VERSION = 2
+_RUN = "run.json"
+"""A run folder has this beside its trajectory file."""
+RULE = "a trajectory file is replaced by one of the same job, by its name, for an arm of the same name"
+LOG = logging.getLogger("armtempo")
 
 
-def save(plan: Plan, path: Path | str) -> None:
+def save(plan: Plan, path: Path | str, force: bool = False) -> None:
     """Write the plan, whole or not at all.
 
-    Raises InputError where the file cannot be written.
+    ``force``: also over a file that is not of the same job for the same arm, by their names, or was altered.
+    Raises InputError where such a file is there, or the file cannot be written.
     """
-    content = {"format": FORMAT, "version": VERSION, "plan": json_codec.encode(plan)}
-    text = json.dumps(content, indent=1, allow_nan=False)
-    replace_text(Path(path), text + "\n")
+    content = json_codec.encode(plan)
+    whole = {"format": FORMAT, "version": VERSION, "sha256": _checksum(content), "plan": content}
+    text = json.dumps(whole, indent=1, allow_nan=False) + "\n"
+    target = Path(path)
+    check_replaceable(target, text, force or _is_earlier(target, plan), RULE)
+    replace_text(target, text)
 
 
-def load(path: Path | str) -> Plan:
+def load(path: Path | str, altered: bool = False) -> Plan:
     """The plan of a trajectory file.
 
-    Raises InputError for a file that is missing, cut, of another format or version, or holds a key, value or
-    shape that this program does not understand.
+    ``altered``: also of one that was altered after it had been written. Raises InputError for a file that is
+    missing, cut, altered, of another format or version, or holds a key, value or shape that this program does
+    not understand.
     """
     content = _read(path)
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise InputError(f"{path}: is not a trajectory file", "make one with: armtempo plan")
-    if content.get("version") != VERSION:
+    version = content.get("version")
+    if version not in (1, VERSION):
         raise InputError(
-            f"{path}: has version {content.get('version')!r}, this program reads version {VERSION}",
-            "plan it again",
+            f"{path}: has version {version!r}, this program reads versions 1 and {VERSION}", "plan it again"
         )
-    if content.keys() != {"format", "version", "plan"}:
+    expected = {"format", "version", "plan"} | ({"sha256"} if version == VERSION else set())
+    if content.keys() != expected:
         raise InputError(
-            f"{path}: unknown or missing key beside format, version and plan",
-            "plan it again",
+            f"{path}: unknown or missing key beside {', '.join(sorted(expected))}", "plan it again"
         )
+    _check_unaltered(content, path, altered)
     plan: Plan = json_codec.decode(Plan, content["plan"], f"{path}: plan")
     _check(plan, path)
     return plan
+
+
+def _checksum(content: Any) -> str:
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _check_unaltered(content: dict[str, Any], path: Path | str, altered: bool) -> None:
+    if content["version"] == 1:
+        LOG.warning(
+            f"{path} was written before trajectory files had a checksum: whether it was altered is not known"
+        )
+    elif content["sha256"] != _checksum(content["plan"]):
+        if not altered:
+            raise InputError(
+                f"{path} was altered after it had been written: its checksum does not fit", _cure(path)
+            )
+        LOG.warning(f"{path} was altered after it had been written, and is taken all the same")
+
+
+def _cure(path: Path | str) -> str:
+    if (Path(path).parent / _RUN).exists():
+        return "it no longer says what was run: bring the original back, or move it out of the run folder"
+    return "plan it again; or, if you know what was altered, take it with --altered"
+
+
+def _is_earlier(path: Path, plan: Plan) -> bool:
+    """Whether the file holds an earlier plan of the same job and arm, by their names, as it was written."""
+    try:
+        content = _read(path)
+        before = content["plan"]
+        names = before["job"]["name"], before["arm"]["name"]
+        unaltered = content["version"] == 1 or content["sha256"] == _checksum(before)
+    except (InputError, LookupError, TypeError):
+        return False
+    return bool(names == (plan.job.name, plan.arm.name) and unaltered and content.get("format") == FORMAT)
 
 
 def _read(path: Path | str) -> Any:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from binascii import crc32
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -14,6 +17,8 @@ from armtempo.model.arm import Arm, DrivenJoint
 from armtempo.planning import checks
 from armtempo.splines.trajectory import Trajectory
 
+_NOT_IDENTITY = ("name", "range_deg", "home_deg", "limits", "model")
+"""Of a joint: what may change while it stays where it is. (Driver and safety have fields of their own.)"""
 _TICKS_PER_US = limits.TICK_HZ / 1e6
 
 
@@ -79,7 +84,31 @@ def _head(arm: Arm) -> dict[str, Any]:
         f"{name}_ticks": round(getattr(driver, f"{name}_us") * _TICKS_PER_US)
         for name in ("pulse", "low", "dir_setup", "dir_hold")
     }
-    return {"flags": flags, "link_timeout_ms": safety.link_timeout_ms, **ticks}
+    return {
+        "flags": flags,
+        "link_timeout_ms": safety.link_timeout_ms,
+        "identity": _identity(arm),
+        **ticks,
+    }
+
+
+def _identity(arm: Arm) -> int:
+    """A hash of what makes an angle of a joint mean a place of the arm: all but names, limits and models."""
+    joints = [{k: v for k, v in asdict(joint).items() if k not in _NOT_IDENTITY} for joint in arm.joints]
+    for joint in joints:
+        if joint["encoder"]:
+            del joint["encoder"]["following_error_deg"]
+    text = json.dumps(_as_floats(joints), sort_keys=True)
+    return crc32(text.encode())
+
+
+def _as_floats(value: Any) -> Any:
+    """The same with every number a float: 20 and 20.0 are one gear ratio."""
+    if isinstance(value, dict):
+        return {key: _as_floats(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_as_floats(entry) for entry in value]
+    return float(value) if isinstance(value, int | float) else value
 
 
 def _joint(joint: DrivenJoint) -> dict[str, Any]:

@@ -118,7 +118,9 @@ def _origin(sheet: html_page.Page, found: Evaluation) -> None:
     sheet.heading("How to repeat it")
     what = "trajectory.json" if plan else meta["name"]
     sheet.code(f"armtempo run {what} --repeat {len(found.run.repetitions)}")
-    known = [(key, _flat(meta[key])) for key in ("port", "board") if key in meta]
+    known: list[tuple[str, str]] = [(key, _flat(meta[key])) for key in ("port", "board") if key in meta]
+    if "virtual" in meta:
+        known.append(("virtual board", "yes" if meta["virtual"] else "no"))
     if plan:
         plan_section.origin(sheet, plan, known)
     else:

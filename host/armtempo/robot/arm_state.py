@@ -12,24 +12,32 @@ from armtempo.link import Client
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
 from armtempo.records import encode
+from armtempo.robot import arm_difference
 
 
 def configure(client: Client, arm: Arm, replace: bool) -> None:
-    """Make sure the board has this arm's record; a new one makes all positions unknown.
+    """Make sure the board has this arm's record; where it is new, positions are unknown.
 
-    Raises LinkError where the board is set up for another arm and ``replace`` is false, BoardError where
-    it is moving.
+    ``replace``: also in the place of another record; where that differs in limits alone, the board keeps the
+    positions. Raises LinkError where the board has another record and ``replace`` is false, BoardError where it
+    is moving.
     """
     data = encode.arm_record(arm)
     if client.info.arm_crc == wire.record_crc(data):
         return
     if client.info.arm_crc and not replace:
-        raise LinkError(
-            f"the board is set up for another arm than {arm.name!r} ({arm.source})",
-            "name its arm file with --arm",
-        )
+        raise _other_arm(arm, client.fetch(wire.ARM_RECORD_NAME), data)
     client.upload(wire.ARM_RECORD_NAME, data)
     client.hello()
+
+
+def _other_arm(arm: Arm, old: bytes, new: bytes) -> LinkError:
+    return LinkError(
+        f"the board is set up for another arm than {arm.name!r} ({arm.source}): "
+        f"{arm_difference.describe(old, new)}",
+        f"name that arm's file with --arm; or, if this is the arm on the board "
+        f"now, 'armtempo configure' or --replace-arm sets the board up for it, {arm_difference.consequence(old, new)}",
+    )
 
 
 def home(client: Client, arm: Arm, angles_deg: ArrayLike | None = None) -> None:

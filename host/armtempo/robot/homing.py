@@ -16,9 +16,8 @@ from armtempo.link import Client
 from armtempo.model.arm import Arm, DrivenJoint, Limits
 from armtempo.planning import point_to_point
 from armtempo.records import encoded_motion
-from armtempo.robot.goto import TEMPORARY
 from armtempo.robot.stop_request import StopRequest
-from armtempo.robot.stored_motion import raise_fault, replay, store
+from armtempo.robot.stored_motion import TEMPORARY, raise_fault, replay, store
 
 FAST, SLOW = 0.2, 0.04
 """Fractions of the joint's limits in the first and in the second approach."""

@@ -68,6 +68,7 @@ def new_run(parent: Path, motion: EncodedMotion, port: str, client: Client) -> R
     origin = {
         "arm": motion.arm.name,
         "port": port,
+        "virtual": client.info.virtual,
         "board": vars(client.info),
         "motion_crc": f"{motion.key.crc:08x}",
     }

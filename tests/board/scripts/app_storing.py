@@ -55,6 +55,19 @@ def case_names():
     assert host.ask("get", (0, 9), "food") == ("error", "not_found", 255, 0)
 
 
+def case_default_is_one_content_of_its_name():
+    app, host = connected()
+    other = stand_in.record(stand_in.arm(), segments=9)
+    assert other != host.record
+    assert host.ask("set_default", (), "feed")[0] == "ok"
+    assert host.upload("feed", other)[-1][0] == "ok"
+    assert host.ask("list", (0,))[1][5] == 0
+    assert app.controller.store().default() == ""  # the button starts nothing
+    assert host.upload("feed", host.record)[-1][0] == "ok"
+    assert host.ask("list", (0,))[1][5] == 1
+    assert app.controller.store().default() == "feed"
+
+
 def case_damaged_file_in_flash_is_not_run():
     app, host = connected()
     name = flash() + "/feed.atm"

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from armtempo.link.ports import SIM
 from armtempo.model.plan import Plan
+from armtempo.ports.names import SIM
 from armtempo.progress import Progress
 from armtempo.report.evaluation import Evaluation, evaluate
 from armtempo.research.paper import motions, printed
 from armtempo.research.paper.claims import DIFFERS, SAME, Claim
-from armtempo.robot.board import connect
+from armtempo.robot.connect import connect
 from armtempo.robot.stop_request import StopRequest
 from armtempo.runs import analysis, peaks
 from armtempo.splines import extremes
