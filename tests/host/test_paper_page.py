@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from armtempo.errors import LinkError
+from armtempo.model.arm import Limits
 from armtempo.report.evaluation import evaluate
 from armtempo.research.bench.cases import Case, Trial
 from armtempo.research.bench.result_table import Row, rows
@@ -60,8 +61,12 @@ def test_fig_12_is_judged_by_how_rough_the_ends_are(
 def test_a_limit_that_is_exceeded_shows(tmp_path: Path) -> None:
     runs = series(tmp_path, {QUINTIC: 0.02, CUBIC: 0.02, UNOPTIMISED: 0.02})
     found = runs[0].found
-    lower = [[replace(check, limit=check.limit / 10) for check in checks] for checks in found.limit_checks]
-    runs[0] = replace(runs[0], found=replace(found, limit_checks=lower))
+    assert found.arm is not None
+    lower = [
+        replace(joint, limits=joint.limits and Limits(*(value / 10 for value in joint.limits.values)))
+        for joint in found.arm.joints
+    ]
+    runs[0] = replace(runs[0], found=replace(found, arm=replace(found.arm, joints=tuple(lower))))
     kept = [claim for claim in experiment.claims(runs) if "keeps its limit" in claim.what]
     assert len(kept) == 6
     assert any(claim.verdict == DIFFERS and claim.because for claim in kept)
