@@ -136,15 +136,15 @@ def _write_curve(arm: Arm, job: Job, target: Path, force: bool) -> None:
     from armtempo.planning.corridor_curve import unit_of
     from armtempo.report import corridor_plot, drawing
 
+    table, picture = (target.with_name(f"{target.stem}-corridor{suffix}") for suffix in (".csv", ".png"))
+    for file in (table, picture):
+        check_replaceable(file, "", force)  # before the work, which takes a while
     with ProgressBar("planning") as progress:
         points = pipeline.corridor_curve(arm, job, progress)
     unit = unit_of(job)
     for line in corridor_plot.lines(points, unit):
         click.echo(line)
-    table, picture = (target.with_name(f"{target.stem}-corridor{suffix}") for suffix in (".csv", ".png"))
-    text = corridor_plot.csv(points, unit)
-    check_replaceable(table, text, force)
-    replace_text(table, text)
+    replace_text(table, corridor_plot.csv(points, unit))
     try:
         drawing.save(corridor_plot.figure(points, unit, job.name), picture)
     except MissingPackageError as error:
