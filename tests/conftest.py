@@ -14,6 +14,10 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+SLOW = ("micropython-arm", "anywhere]")
+"""What in a test's name says that it takes long: the emulator, and cases that try many moments."""
+
+
 @pytest.fixture(params=interpreters.AVAILABLE)
 def interpreter(request: pytest.FixtureRequest) -> str:
     """Each interpreter that is here, by name; for ``interpreters.run``."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from tests.board import heap_use
 
 PEAK = 60_000
@@ -9,6 +11,7 @@ MOTION = 55_000
 MACHINE_CODE = 26_000
 
 
+@pytest.mark.slow
 def test_heap_of_the_compiled_program() -> None:
     """Measured on 32-bit MicroPython with the shipped arm; machine code is counted apart."""
     stages = heap_use.measure()

@@ -82,6 +82,7 @@ def test_store_commands(run: Run, file: str) -> None:
     assert "empty, too long or has other characters" in run("rename", "x", "a b", code=1).output
 
 
+@pytest.mark.slow
 def test_run_writes_a_folder(run: Run, file: str, pipe: Pipe) -> None:
     assert "armtempo home" in run("run", file, code=1).output
     assert "stands at 0.00, -60.00, 39.99 degrees" in run("home", "P0").output  # the nearest step

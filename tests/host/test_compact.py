@@ -258,6 +258,7 @@ def test_packages_that_cannot_go_are_told(more: dict[str, str], words: str) -> N
         compact(PACKAGES | more, "made.inner.main", {"made.inner.main"}, {"run"})
 
 
+@pytest.mark.slow
 def test_the_board_program_is_mostly_one_module() -> None:
     made = program_files.compact_program()
     for text in made.sources.values():
@@ -299,6 +300,7 @@ def test_traceback_of_the_compiled_program_is_readable() -> None:
     assert program_files.in_full(alone) == f"{alone[:-1]} ({labels})\n", "nothing tells which"
 
 
+@pytest.mark.slow
 def test_traceback_from_the_firmware_and_of_others() -> None:
     line = _frame("app.App.turn")
     frozen = line.replace('"core"', '"armtempo_board/core.py"')

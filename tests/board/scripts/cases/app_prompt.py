@@ -56,4 +56,14 @@ def case_leave_answers_first():
     assert app.left()
 
 
+def case_begun_again_it_waits_for_a_greeting():
+    app, host = connected()
+    host.ask("leave")
+    app.enter()
+    assert not app.left()
+    assert host.ask("status")[:2] == ("error", "no_session")
+    assert host.hello()[0] == "ok"
+    assert host.ask("status")[0] == "ok"
+
+
 cases.run(globals())
