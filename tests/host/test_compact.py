@@ -258,6 +258,7 @@ def test_packages_that_cannot_go_are_told(more: dict[str, str], words: str) -> N
         compact(PACKAGES | more, "made.inner.main", {"made.inner.main"}, {"run"})
 
 
+@pytest.mark.slow
 def test_the_board_program_is_mostly_one_module() -> None:
     made = program_files.compact_program()
     for text in made.sources.values():
@@ -324,6 +325,13 @@ def test_traceback_of_the_plain_program_reads_the_same(folder: str) -> None:
 
 
 def test_tracebacks_of_others_stay() -> None:
+
+
+@pytest.mark.slow
+def test_traceback_from_the_firmware_and_of_others() -> None:
+    line = _frame("app.App.turn")
+    frozen = line.replace('"core"', '"armtempo_board/core.py"')
+    assert "app.App.turn" in program_files.in_full(frozen)
     for other in (
         '  File "main.py", line 3, in turn\n',
         '  File "core", line 1, in nothing\n',

@@ -200,6 +200,7 @@ def test_a_stop_that_is_asked_for_ends_a_run_early(
     assert [entry.state for entry in board.last_run.entries] == ["interrupted"]
 
 
+@pytest.mark.slow
 def test_a_stored_motion_runs_by_its_name(plan: armtempo.Plan, arm: armtempo.Arm, tmp_path: Path) -> None:
     with armtempo.connect("sim", arm) as board:
         board.upload(plan, "kept", default=True)

@@ -79,6 +79,7 @@ def the_page(made: motions.Plans, folder: Path) -> tuple[str, list[Claim]]:
     return sheet.render(claims, made, searched(), runs), claims
 
 
+@pytest.mark.slow
 def test_the_page_is_whole(made: motions.Plans, tmp_path: Path) -> None:
     text, claims = the_page(made, tmp_path)
     for claim in claims:
@@ -89,6 +90,7 @@ def test_the_page_is_whole(made: motions.Plans, tmp_path: Path) -> None:
     assert 'replays of each motion</td><td data-column="value">2<' in text
 
 
+@pytest.mark.slow
 def test_the_page_in_a_browser(made: motions.Plans, tmp_path: Path) -> None:
     browser.needed()
     page = tmp_path / "paper.html"
