@@ -30,6 +30,10 @@ def own_settings() -> Iterator[None]:
     shutil.rmtree(folder, ignore_errors=True)
 
 
+SLOW = ("micropython-arm", "anywhere]")
+"""What in a test's name says that it takes long: the emulator, and cases that try many moments."""
+
+
 @pytest.fixture(params=interpreters.AVAILABLE)
 def interpreter(request: pytest.FixtureRequest) -> str:
     """Each interpreter that is here, by name; for ``interpreters.run``."""

@@ -87,7 +87,7 @@ class Session:
 def arm_record(rates: list[int]) -> bytes:
     """An arm of so many joints; encoders and switches stand still in the emulator."""
     rows = [row(channel=n, max_rate=rate, counts_num=0, counts_den=1) for n, rate in enumerate(rates)]
-    return armrecord.pack(HEAD, rows)
+    return armrecord.pack({**HEAD, "identity": 1}, rows)
 
 
 def motion_record(arm: bytes, segments: int) -> bytes:

@@ -13,6 +13,7 @@ FRAMES = {"cpython": 1_000_000, "micropython": 100_000, "micropython-arm": 10_00
 SEED = 20261121
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", interpreters.AVAILABLE)
 def test_no_exception_no_wrong_check_no_motion(name: str) -> None:
     """The script asserts all three (and names the seed in its arguments); every handler is reached."""

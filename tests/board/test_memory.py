@@ -4,6 +4,8 @@ With what is taken at the start for the largest arm that fits."""
 
 from __future__ import annotations
 
+import pytest
+
 from tests.board import heap_use
 
 PEAK = 77_000
@@ -11,6 +13,7 @@ MOTION = 74_000
 MACHINE_CODE = 27_500
 
 
+@pytest.mark.slow
 def test_heap_of_the_compiled_program() -> None:
     """Measured on 32-bit MicroPython with the shipped arm; machine code is counted apart."""
     stages = heap_use.measure()

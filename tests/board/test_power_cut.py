@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from armtempo.errors import LinkError
 from armtempo.link.client import Client
 from armtempo.link.session import Session
@@ -21,6 +22,7 @@ MOST_CUTS = 60
 INTERPRETER = interpreters.starter(interpreters.AVAILABLE[min(1, len(interpreters.AVAILABLE) - 1)])
 
 
+@pytest.mark.slow
 def test_upload_is_old_or_new(tmp_path: Path) -> None:
     paper_arm = Arm.paper()
     home_deg = np.array(paper_arm.home_deg)

@@ -30,11 +30,23 @@ def test_steps_are_where_the_spline_says(name: str, tmp_path: Path) -> None:
     walking.verify(record, steps[0])
 
 
+@pytest.mark.parametrize("beyond", [-1e-4, -1e-6, 1e-6, 3e-5, 1e-4, 2e-4, 1e-3, 0.1])
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_a_turn_that_just_reaches_a_half_step(sign: int, beyond: float, tmp_path: Path) -> None:
+    """The two steps of a turn that comes too little beyond it are left out; here it lies between two segments."""
+    via = sign * np.array([0.0, 20.5 + beyond, 0.0])
+    record = motions.record([via], [np.full(2, 0.1)], 5)
+    verdicts, steps = walking.walk(QUICK, tmp_path, [record])
+    assert verdicts == ["None"]
+    walking.verify(record, steps[0])
+
+
 def chance_records(count: int) -> list[bytes]:
     rng = np.random.default_rng(20_240_607)
     return [motions.chance(rng) for _ in range(count)]
 
 
+@pytest.mark.slow
 def test_two_hundred_motions_by_chance(tmp_path: Path) -> None:
     records = [record for record in chance_records(260) if walking.peak_rate(record) < 330_000]
     verdicts, steps = walking.walk(QUICK, tmp_path, records)
@@ -59,6 +71,7 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[bytes], list[
     return records, walking.walk(QUICK, tmp_path_factory.mktemp("shared"), records, room=2)[1]
 
 
+@pytest.mark.slow
 def test_all_interpreters_give_the_same_edges(
     interpreter: str, shared: tuple[list[bytes], list[bytes]], tmp_path: Path
 ) -> None:
@@ -89,6 +102,7 @@ def test_braking_stays_on_the_path(interpreter: str, start_s: float, length_s: f
         _verify_braked(Motion(record), joint, walking.steps_of(steps, joint), start, length)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("room", [14, 512, 1024])
 @pytest.mark.parametrize(("start_s", "length_s"), BRAKES)
 def test_nothing_is_written_beyond_the_time_at_which_braking_begins(
@@ -112,6 +126,7 @@ def test_nothing_is_written_beyond_the_time_at_which_braking_begins(
         assert not off[~begins].any()
 
 
+@pytest.mark.slow
 def test_braking_from_full_speed(tmp_path: Path) -> None:
     start, length = round(0.9 * walking.TICK_HZ), round(0.8 * walking.TICK_HZ)
     record = motions.cruise(333_000)

@@ -194,6 +194,7 @@ def test_tables_say_what_the_runs_are(runs: dict[cases.Case, cases.Trial]) -> No
     ]
 
 
+@pytest.mark.slow
 def test_the_paper_stands_beside_its_own_problem_only(tmp_path: Path) -> None:
     small = ["--algorithms", "ga", "--populations", "10", "--seeds", "1", "--iterations", "2", "--no-plot"]
     for joint, expected in (("1", True), ("2", False)):

@@ -85,6 +85,7 @@ def test_store_commands(run: Run, file: str) -> None:
     assert "empty, too long or has other characters" in run("rename", "x", "a b", code=1).output
 
 
+@pytest.mark.slow
 def test_run_writes_a_folder(run: Run, file: str, pipe: Pipe) -> None:
     assert "armtempo home" in run("run", file, code=1).output
     said = run("home", "P0").output

@@ -258,6 +258,7 @@ def test_packages_that_cannot_go_are_told(more: dict[str, str], words: str) -> N
         compact(PACKAGES | more, "made.inner.main", {"made.inner.main"}, {"run"})
 
 
+@pytest.mark.slow
 def test_the_board_program_is_mostly_one_module() -> None:
     made = program_files.compact_program()
     for text in made.sources.values():
@@ -323,6 +324,7 @@ def test_traceback_of_the_plain_program_reads_the_same(folder: str) -> None:
     assert program_files.in_full(compiled) == re.sub(r", line \d+", "", wanted)
 
 
+@pytest.mark.slow
 def test_tracebacks_of_others_stay() -> None:
     for other in (
         '  File "main.py", line 3, in turn\n',

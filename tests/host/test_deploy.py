@@ -119,6 +119,7 @@ def test_program_in_the_firmware_leaves_no_library() -> None:
     assert list(changes.last_files(frozen)) == ["/flash/boot.py", "/flash/main.py"]
 
 
+@pytest.mark.slow
 def test_full_flash_is_refused() -> None:
     with pytest.raises(LinkError, match="has room for 20"):
         changes.choose(replace(BOARD, free_blocks=20), True, quiet)

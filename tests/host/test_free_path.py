@@ -13,7 +13,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job, Stop
 from armtempo.model.plan import Plan
 from armtempo.model.tool_pose import Pose
-from armtempo.planning import corridor, planner
+from armtempo.planning import checks, corridor, planner
 from armtempo.planning.tool import Tool
 from armtempo.splines import bspline
 
@@ -39,10 +39,11 @@ def test_the_shipped_motion_is_5_percent_faster_and_keeps_everything() -> None:
     assert plan.searches[0].floor_kind == "vias"
 
 
-@pytest.mark.parametrize("seed", [1, 3, 5, 12, 79, 83, 92])
+@pytest.mark.parametrize("seed", [1, 3, 5, 12, 79, 83, 92, 109])
 def test_random_jobs_keep_their_limits_and_pass_their_via_points(seed: int) -> None:
-    """More of them: tests/benchmark/random_plans.py. The last three have repeated via points, and a dwell at angles
-    that hardly differ; there rounding exceeded limits, and the dwell came out too short.
+    """More of them: tests/benchmark/random_plans.py. The last four have repeated via points, a dwell at angles
+    that hardly differ, and one far shorter than the rest: there rounding exceeded limits, the dwell came out too short,
+    and time ran backwards.
     """
     arm, job = problems.random_free_problem(seed)
     if np.all(np.ptp(job.via, axis=0) == 0):
@@ -213,3 +214,13 @@ def test_a_seed_repeats_and_starts_are_reported() -> None:
 def test_refuses_what_a_free_path_cannot_be(changes: dict[str, object], message: str) -> None:
     with pytest.raises(InputError, match=message):
         planner.plan(ARM, replace(FEED, **changes))
+
+
+def test_time_that_does_not_increase_is_refused() -> None:
+    plan = planner.plan(ARM, replace(FEED, refine=3))
+    spline = plan.trajectory.joints[0]
+    times = spline.time_points_s.copy()
+    times[4] = times[3]
+    joints = (replace(spline, time_points_s=times), *plan.trajectory.joints[1:])
+    with pytest.raises(PlanError, match="increases everywhere"):
+        checks.check_time(replace(plan.trajectory, joints=joints))

@@ -87,7 +87,7 @@ def test_public_functions_are_typed() -> None:
 
 def test_the_errors_are_the_tree_that_is_drawn() -> None:
     for found in pkgutil.walk_packages(armtempo.__path__, "armtempo."):
-        if "simulator." not in found.name and not found.name.endswith("__main__"):
+        if "simulator." not in found.name and not found.name.endswith(("__main__", "firmware.manifest")):
             import_module(found.name)
 
     def drawn(kind: type[BaseException], depth: int) -> list[tuple[int, str]]:
@@ -200,6 +200,7 @@ def test_a_stop_that_is_asked_for_ends_a_run_early(
     assert [entry.state for entry in board.last_run.entries] == ["interrupted"]
 
 
+@pytest.mark.slow
 def test_a_stored_motion_runs_by_its_name(plan: armtempo.Plan, arm: armtempo.Arm, tmp_path: Path) -> None:
     with armtempo.connect("sim", arm) as board:
         board.upload(plan, "kept", default=True)

@@ -65,6 +65,7 @@ def test_a_board_that_stays_silent_is_given_up_after_a_minute(tmp_path: Path) ->
     assert 60 < pipe.clock() - begin_s < 80
 
 
+@pytest.mark.slow
 def test_another_board_at_the_same_port_gets_no_command(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
     board, stored = prepared(pipe)
@@ -131,6 +132,7 @@ def test_cable_out_during_a_run_costs_no_sample(tmp_path: Path) -> None:
     assert [text.split()[0] for text in told] == ["the", "connected"] * 2
 
 
+@pytest.mark.slow
 def test_cable_out_during_an_upload(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
     board, _ = ready(pipe)

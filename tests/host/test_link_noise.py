@@ -14,6 +14,7 @@ from tests.host.linked import ARM, follow, random_motion, ready, started
 from tests.inprocess import FAULTS, Noise, Pipe, connect
 
 
+@pytest.mark.slow
 def test_thousand_uploads_over_a_bad_line_arrive_identical(tmp_path: Path) -> None:
     to_board, from_board = Noise("to", 0.01), Noise("from", 0.01)
     pipe = Pipe(tmp_path / "flash", to_board, from_board)
@@ -36,6 +37,7 @@ def test_runs_over_a_bad_line_are_complete(tmp_path: Path, seed: int) -> None:
     assert (end.fault, end.lost) == (0, ())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", FAULTS)
 def test_five_percent_is_survived_or_said(tmp_path: Path, kind: str) -> None:
     pipe = Pipe(tmp_path / "flash")

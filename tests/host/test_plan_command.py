@@ -232,3 +232,12 @@ def test_a_job_that_does_not_say_otherwise_is_planned_on_one_polished_axis() -> 
         None,
     )
     assert plan.trajectory.shared
+
+
+@pytest.mark.parametrize("name", ["move-corridor.csv", "move-corridor.png"])
+def test_a_corridor_curve_keeps_what_is_there(name: str) -> None:
+    Path(name).write_bytes(b"mine")
+    result = run("--job", "move.toml", "--path", "free", "--corridor-curve")
+    assert result.exit_code == 2
+    assert name in result.output
+    assert Path(name).read_bytes() == b"mine"

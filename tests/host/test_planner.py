@@ -62,6 +62,7 @@ def test_shipped_job_keeps_its_limits_and_meets_the_paper() -> None:
         assert np.all(np.diff(search.history_s) <= 0)
 
 
+@pytest.mark.slow
 def test_joint_1_over_20_seeds() -> None:
     via = tuple((angles[0],) for angles in JOB.via if isinstance(angles, tuple))
     arm = replace(ARM, joints=ARM.joints[:1])
@@ -79,6 +80,7 @@ def test_problem(problem: problems.Problem) -> None:
             planner.plan(problem.arm, job)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("thousand", range(10))
 def test_random_jobs_keep_their_limits_or_say_why_not(thousand: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """10 000 jobs; floors, which a plan only quotes, have their own test."""

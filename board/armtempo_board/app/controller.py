@@ -58,6 +58,7 @@ class Controller:
         self.boot = int.from_bytes(os.urandom(_BOOT_BYTES), "little")  # another number after each power-up
         self.joints = 0
         self.arm_crc = 0
+        self._all_but_limits = 0  # of the arm record: what makes two of them the same arm
         self.arm_waits = False  # an arm record has been stored, and is to be taken
         self.arm_problem = (
             0  # code: why the stored arm record is not in force, 0 where it is or there is none,
@@ -209,14 +210,21 @@ class Controller:
         return arm_check.checked(data, self._workspace.memory.size, self._workspace.joints)
 
     def _take_arm(self, record: "ArmRecord") -> None:
-        from armtempo_shared.armrecord import FLAG_STOP_ON_LINK_LOSS  # here, so that it can be forgotten
+        from armtempo_shared import armrecord  # here, so that it can be forgotten
 
         head, joints, crc = record
         if crc == self.arm_crc:
             return
+        all_but_limits = armrecord.without_limits(head, joints)
+        known, steps = 0, []
+        if self.engine and all_but_limits == self._all_but_limits:  # the same arm: it stands where it stood
+            known, steps = self.engine.known, [self.engine.commanded(joint) for joint in range(self.joints)]
         self._drop_engine()
         self.engine = Engine(head, joints, self._workspace)
-        stops = head["flags"] & FLAG_STOP_ON_LINK_LOSS
+        self._all_but_limits = all_but_limits
+        if known:
+            self.engine.home(known, steps)
+        stops = head["flags"] & armrecord.FLAG_STOP_ON_LINK_LOSS
         self._silence_ms = head["link_timeout_ms"] if stops else _NEVER_MS
         self.joints = len(joints)
         self.arm_crc = crc

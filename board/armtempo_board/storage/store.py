@@ -227,7 +227,7 @@ class Store:
             return ""
         names = self.names()
         for line in lines:
-            name = line.split(" ")[0]
+            name, _, _ = line.partition(" ")
             if name in names and line == name + self._crc(name):
                 return name
         return ""
@@ -241,7 +241,8 @@ class Store:
     def _crc(self, name: str) -> str:
         """A motion's checksum as it stands in its last bytes, behind a blank."""
         size = self._size_of(_motion_file(name))
-        return " " + hexlify(self.part(name, max(0, size - 4), 4)[1]).decode()
+        _, crc = self.part(name, max(0, size - 4), 4)
+        return " " + hexlify(crc).decode()
 
     def _write_default(self, text: str) -> None:
         file = self._guard(open, self._path(_DEFAULT + _NEW), "wb")

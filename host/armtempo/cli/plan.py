@@ -37,6 +37,7 @@ def _refine(ctx: click.Context, param: click.Parameter, value: str | None) -> in
     help="Trajectory file to write; without it the job's name with .json. An existing FILE is only replaced where "
     "it is an earlier plan of the same job for the same arm, by their names.",
 )
+@options.force("any other FILE too")
 @click.option(
     "--path",
     type=click.Choice(["through", "free"]),
@@ -48,7 +49,6 @@ def _refine(ctx: click.Context, param: click.Parameter, value: str | None) -> in
 @click.option(
     "--corridor-mm", type=click.FloatRange(0), metavar="MM", help="How far the tool may leave the spline."
 )
-@options.force("any other FILE too")
 @click.option("--timing", type=click.Choice(["per-joint", "shared"]), help="Instead of the job's timing.")
 @click.option("--degree", type=click.Choice(["3", "5"]), help="Instead of the job's spline degree.")
 @click.option(
@@ -92,7 +92,6 @@ def command(
         _write_curve(arm, job, target, force)
         return
     plans = _plans(arm, job, split)
-    click.echo(f"arm: {chosen.words(arm)}")
     for number, plan in enumerate(plans, 1):
         _write(plan, target if len(plans) == 1 else target.with_stem(f"{target.stem}-{number}"), force)
 
@@ -123,6 +122,7 @@ def _write(plan: Plan, target: Path, force: bool) -> None:
     from armtempo import pipeline
 
     plan.save(target, force)
+    click.echo(f"arm: {chosen.words(plan.arm)}")
     for line in pipeline.summary(plan):
         click.echo(line)
     click.echo(f"written: {target}")

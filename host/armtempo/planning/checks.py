@@ -247,6 +247,16 @@ def check_reached(arm: Arm, reached: tuple[Extremes, ...]) -> None:
         )
 
 
+def check_time(trajectory: Trajectory) -> None:
+    """Raises PlanError unless time increases everywhere: as all differences of its control points do."""
+    for spline in trajectory.joints:
+        if not np.all(np.diff(spline.time_points_s) > 0.0):
+            raise PlanError(
+                f"trajectory {trajectory.name!r}: no time axis was found that increases everywhere",
+                "via points, limits and dwells are too far apart in size to compute with; bring them closer",
+            )
+
+
 def check_held(trajectory: Trajectory, arm: Arm) -> None:
     """Raises PlanError where a control point exceeds the integers of the board's evaluator."""
     for joint_spline, joint in zip(trajectory.joints, arm.driven, strict=True):

@@ -275,7 +275,8 @@ class Improver:
         return replace(
             motion,
             angle_points_deg=self.variables.angle_points(x) * self._size,
-            differences_s=self.variables.time_differences(x) * unit_s,
+            # A dwell far shorter than the segments beside it may be missed; then it lasts longer.
+            differences_s=np.maximum(self.variables.time_differences(x), least) * unit_s,
         )
 
     def _smoothing(self) -> Array:

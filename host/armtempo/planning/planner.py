@@ -33,6 +33,7 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     way = free_plan.motion if checks.is_free(job) else through_plan.motion
     planned = way(arm, job, via, progress or _silent)
     trajectory = planned.trajectory
+    checks.check_time(trajectory)
     reached = extremes.of_joints(trajectory.joints)
     checks.check_reached(arm, reached)
     return Plan(arm, job, via, (*notes, *planned.notes), trajectory, planned.searches, reached, versions())

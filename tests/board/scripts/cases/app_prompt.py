@@ -104,4 +104,14 @@ def case_a_program_that_ended_by_itself_lets_no_frame_reach_the_prompt():
     assert Here.terminals == [None, port]
 
 
+def case_begun_again_it_waits_for_a_greeting():
+    app, host = connected()
+    host.ask("leave")
+    app.enter()
+    assert not app.left()
+    assert host.ask("status")[:2] == ("error", "no_session")
+    assert host.hello()[0] == "ok"
+    assert host.ask("status")[0] == "ok"
+
+
 cases.run(globals())

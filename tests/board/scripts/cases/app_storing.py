@@ -82,4 +82,14 @@ def case_damaged_file_in_flash_is_not_run():
     assert app.controller.engine.calls.count("load") == 0
 
 
+def case_other_limits_keep_the_position_another_arm_does_not():
+    app, host = connected()
+    app.controller.engine.steps[:] = [5, -7]
+    assert host.upload("/arm", stand_in.arm(low=-10))[-1][0] == "ok"
+    assert app.controller.engine.calls == ["home"]
+    assert (app.controller.engine.known, app.controller.engine.steps) == (3, [5, -7])
+    assert host.upload("/arm", stand_in.arm(flags=1))[-1][0] == "ok"
+    assert (app.controller.engine.known, app.controller.engine.steps) == (0, [0, 0])
+
+
 cases.run(globals())

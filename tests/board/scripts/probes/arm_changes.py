@@ -57,7 +57,7 @@ def largest():
 
 def arm_of(rates):
     rows = [row(channel=n, max_rate=rate, counts_num=0, counts_den=1) for n, rate in enumerate(rates)]
-    return armrecord.pack(HEAD, rows)
+    return armrecord.pack(dict(HEAD, identity=1), rows)
 
 
 def motion_of(arm, segments):

@@ -143,6 +143,9 @@ class Engine:
             if mask >> joint & 1:
                 self.steps[joint] = steps[joint]
 
+    def commanded(self, joint):
+        return self.steps[joint]
+
     def snapshot(self, raw):
         low = self.ticks & 0xFFFFFFFF
         raw[0] = low - (1 << 32) if low >> 31 else low
