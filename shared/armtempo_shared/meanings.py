@@ -77,6 +77,27 @@ _ROWS = (
         "the motion has no time in which its speed may change: it is of an older armtempo",
         "upload it again; it can be run slower from its start",
     ),
+    ("is_sequence", "this is a sequence, not a motion", "run it with 'armtempo run' and its name"),
+    (
+        "leg_missing",
+        "the board does not have a motion that the sequence runs, or another one under its name",
+        "upload the sequence again, which brings its motions",
+    ),
+    (
+        "leg_elsewhere",
+        "a motion of the sequence begins elsewhere than the one before it ends",
+        "plan the sequence again and upload it",
+    ),
+    (
+        "no_such_pin",
+        "the sequence uses an output or an input that the arm on the board does not have",
+        "plan the sequence again with the arm file that the board is set up for",
+    ),
+    (
+        "no_sequence_room",
+        "the board has no room to run a sequence of motions for this arm; nothing has moved",
+        "put the program into the firmware (board/docs/firmware.md), or let the host run the steps (board.run)",
+    ),
     ("estop", "the E-stop input tripped", "release it, then 'armtempo clear' and home"),
     ("limit_switch", "a limit switch tripped", "'armtempo clear', then move the arm away from it"),
     (
@@ -96,6 +117,11 @@ _ROWS = (
     ),
     ("watchdog", "the watchdog restarted the board", "home again; report it"),
     ("link_lost", "the host disappeared during the motion", "check the cable, then 'armtempo clear'"),
+    (
+        "input_timeout",
+        "an input did not come in time in a sequence",
+        "find out why, then 'armtempo clear'",
+    ),
     ("start_failed", "the timers did not start as set up", "power-cycle the board"),
 )
 ERRORS: "dict[int, tuple[str, str, str]]" = {}
@@ -119,6 +145,10 @@ VALUES: "dict[str, str]" = {
     "too_long": "bytes of the record (at `put_begin`: that it takes); of a joint: its largest number",
     "too_abrupt": "steps/s²",
     "no_room": "bytes needed",
+    "leg_missing": "number of the motion in the sequence, from 1",
+    "leg_elsewhere": "number of the step in the sequence",
+    "no_such_pin": "number of the step in the sequence",
+    "no_sequence_room": "bytes that are missing",
 }
 """What ``value`` of a refusal is, by name; the others have none."""
 
@@ -142,14 +172,20 @@ COMMANDS: "dict[str, str]" = {
     "for being whole, and takes the place of the old one. An arm record whose engine would not fit is refused "
     "before that (`no_room`), and the old one stays in force; else it takes effect at once.",
     "list": "The stored trajectory number `index` (from 0, in order of names) of `count`; `not_found` behind "
-    "the last. A damaged one has `crc`, `duration` and `joints` 0. Tail of the answer: its name.",
+    "the last. A damaged one has `crc`, `duration` and `joints` 0. `sequence` 1: it is a sequence, whose `duration` "
+    "and `joints` are 0. Tail of the answer: its name.",
+    "sequence": "Where the sequence stands, or where the last one ended. `ending`: 0 there was none since the start, "
+    "1 it runs, 2 finished, 3 stopped, 4 an input did not come and the sequence was to stop then, 5 a fault, 6 a leg "
+    "was refused; `code`: of that fault or refusal. `step`: of the sequence file; `row`: of the record; `cycle`: "
+    "finished passes of its outermost repeat. Tail: its name.",
     "remove": "Removes the trajectory of that name.",
     "rename": "The tail is the old name (`old_length` bytes), then the new one. The default goes with it.",
     "get": "Up to `length` bytes of a stored record (`/arm`: the arm record) from `offset` on.",
     "set_default": "What the button starts; an empty name for nothing.",
     "home": "The joints of the mask `joints` stand at these steps; the tail has an i32 for every joint.",
     "start": "Starts a stored trajectory whose checksum is `crc`. `flags` 1: a limit switch ends it without "
-    "a fault. Answer: number of the run and its length in ticks.",
+    "a fault. Answer: number of the run and its length in ticks. Or starts a sequence, each of whose motions is a run "
+    "of its own; then the answer has the number of the last run and 0.",
     "stop": "`now` 0: brake along the path (freeze where the motion has no braking time); 1: freeze.",
     "speed": "Lets the motion's own time go on at `rate` thousandths of its planned rate (10 to 1000), along the same "
     "path; 0: pause, 65535: as before the pause. Refused with `fixed_speed`, or with `too_long` where the run would "

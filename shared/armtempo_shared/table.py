@@ -21,6 +21,7 @@ C remove 14 text
 C rename 15 old_length:B text
 C get 16 offset:I length:H text
 C set_default 17 text
+C sequence 18
 C home 20 joints:B bytes
 C start 21 flags:B crc:I text
 C stop 22 now:B
@@ -35,11 +36,12 @@ A status 02 state:B fault:B fault_joint:B known:B run:I ticks:Q path:Q rate:H
 A put_begin 10
 A put_data 11 next:I
 A put_commit 12
-A list 13 count:H size:I crc:I duration:Q joints:B default:B text
+A list 13 count:H size:I crc:I duration:Q joints:B default:B sequence:B text
 A remove 14
 A rename 15
 A get 16 size:I bytes
 A set_default 17
+A sequence 18 ending:B code:B step:H row:H cycle:I text
 A home 20
 A start 21 run:I duration:Q
 A stop 22

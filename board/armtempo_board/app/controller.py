@@ -36,6 +36,7 @@ _BYTES_PER_JOINT = const(8)  # in a sample on the wire
 _PERMILLE = const(1000)
 _BOOT_BYTES = const(4)
 _NEVER_MS = const((1 << 30) - 1)
+_START_BYTES = const(18_000)  # of heap that the start of a motion takes at most (docs/memory.md)
 
 
 class Controller:
@@ -77,6 +78,10 @@ class Controller:
         self._can_brake = False  # the motion can come to rest along its path
         self._next_rate = _PERMILLE  # of the next run that a host starts
         self._by_host = False  # the run was started by a command
+        self.outputs: "Any" = None  # of the arm; None: it has none
+        self.inputs: "Any" = None
+        self.sequence: "Any" = None  # the one under way
+        self.told: "Any" = None  # how the last one stands or ended, and its name
         self._assumed = 0  # joints whose position a homing motion took for granted
 
     # the loop
@@ -91,6 +96,8 @@ class Controller:
             elif silent_ms > self._silence_ms and self._by_host and not self._braking:
                 self._fault = codes.LINK_LOST
                 self.stop(0)
+        if self.sequence and not self.engine.moving:
+            self.sequence.turn()
 
     def refill(self) -> None:
         """What cannot wait for the end of longer work while something moves."""
@@ -119,6 +126,8 @@ class Controller:
 
     def halt(self) -> None:
         """Freeze what still moves; the position stays known."""
+        if self.sequence:
+            self.sequence.stopping = True
         if self.engine and self.engine.moving:
             self.engine.freeze()
 
@@ -266,21 +275,70 @@ class Controller:
         self.engine.home(mask, steps)
 
     def begin(self, name: str, flags: int, crc: "int | None" = None) -> None:
-        """Start a stored motion, or refuse. ``crc``: of the record that the host means; None: there is no host."""
+        """Start a stored motion or sequence, or refuse. ``crc``: of the record that the host means; None: there is no
+        host.
+        """
         self.check_ready()
         homing = bool(flags & START_HOMING)
         unknown = self.everyone() & ~self.known()
         if unknown and not homing:
             raise Refused(codes.UNHOMED, _lowest(unknown))
+        if self.store().is_sequence(name):
+            if homing:
+                raise Refused(codes.IS_SEQUENCE)
+            if crc is None:
+                self.forget_speed()
+            return self._begin_sequence(name, crc)
         rate, self._next_rate = self._next_rate, _PERMILLE
-        motion = self.load(name, crc)
+        self._by_host = crc is not None
+        return self._begin_motion(self.load(name, crc), _PERMILLE if crc is None else rate, homing, unknown)
+
+    def begin_leg(self, motion: "tuple[str, int]", by_host: bool) -> None:
+        """Start a motion of the sequence, (name, crc32), or refuse."""
+        self._by_host = by_host
+        self._begin_motion(self.load(motion[0], motion[1]), self._next_rate, False, 0)
+
+    def _begin_sequence(self, name: str, crc: "int | None") -> None:
+        self.forget_store()
+        heap.forget()
+        gc.collect()
+        missing = 0
+        try:
+            self.sequence = self._new_sequence(name, crc)
+        except MemoryError:
+            missing = _START_BYTES
+        finally:
+            self.forget_store()
+            heap.forget()
+            gc.collect()
+        missing = missing or (_START_BYTES - _free_heap() if _free_heap() else 0)
+        if missing > 0:
+            self.sequence = self.told = None
+            heap.forget()
+            raise Refused(codes.NO_SEQUENCE_ROOM, value=missing)
+
+    def _new_sequence(self, name: str, crc: "int | None") -> "Any":
+        from armtempo_board.app import sequence_start  # here, so that it can be forgotten
+
+        return sequence_start.sequencer(self, name, crc)
+
+    def end_sequence(self) -> None:
+        """It has ended, and its program is given up; ``told`` says how."""
+        self.sequence = None
+        self.forget_speed()
+
+    def set_fault(self, code: int) -> None:
+        """A fault that no motion has: it stays until it is cleared."""
+        self._fault = code
+
+    def _begin_motion(self, motion: "MotionFile", rate: int, homing: bool, unknown: int) -> None:
         self.forget_store()
         heap.forget()
         gc.collect()
         if homing:
             self._assume(motion, unknown)
         try:
-            self.engine.load(motion, _PERMILLE if crc is None else rate)
+            self.engine.load(motion, rate)
         except Refused:
             self._withdraw_assumed()
             raise
@@ -288,7 +346,6 @@ class Controller:
         self.done = False
         self.duration_ticks = self.engine.duration_ticks
         self.run_number += 1
-        self._by_host = crc is not None
         self._braking = False
         self._can_brake = motion.brake_ticks > 0
         heap.forget()
@@ -325,7 +382,11 @@ class Controller:
         return motion
 
     def stop(self, now: int) -> None:
-        """Brake along the path; freeze where ``now``, or where the motion has no way to brake."""
+        """Brake along the path; freeze where ``now``, or where the motion has no way to brake. A sequence ends there."""
+        if self.sequence:
+            self.sequence.stopping = True
+            if not self.engine.moving:
+                return
         self._braking = True
         if now or not self._can_brake:
             self.engine.freeze()
@@ -334,16 +395,19 @@ class Controller:
 
     def change_speed(self, rate: int) -> None:
         """What moves goes on at ``rate`` thousandths (0: pause, RESUME: as before), or a host's next run begins so."""
-        if self.moving():
+        if self.engine and self.engine.moving:
             self.engine.change_rate(rate)
+            if self.sequence and rate not in (0, RESUME):
+                self._next_rate = rate  # its other motions follow suit
         elif rate in (0, RESUME):
             raise Refused(codes.NOT_MOVING)
         else:
             self._next_rate = rate
 
     def forget_speed(self) -> None:
-        """A new host: what another one wanted for its next run is no longer meant."""
-        self._next_rate = _PERMILLE
+        """A new host: what another one wanted for its next run is no longer meant; a sequence keeps its speed."""
+        if not self.sequence:
+            self._next_rate = _PERMILLE
 
     def clear(self) -> None:
         """Clear what is pending; the cause must be gone."""
@@ -360,8 +424,8 @@ class Controller:
     # what the board tells
 
     def moving(self) -> bool:
-        """Whether steps may still come."""
-        return self.engine is not None and self.engine.moving
+        """Whether steps may still come; a sequence has more to come while it waits."""
+        return self.engine is not None and (self.engine.moving or self.sequence is not None)
 
     def known(self) -> int:
         """Bit a joint: its position is known."""
@@ -381,7 +445,7 @@ class Controller:
 
     def speed(self) -> int:
         """The rate that is wanted of the motion's own time, in thousandths; 0 in a pause."""
-        return self.engine.rate if self.moving() else self._next_rate
+        return self.engine.rate if self.engine and self.engine.moving else self._next_rate
 
     def state(self) -> int:
         """Number of the state (messages.STATES)."""

@@ -55,21 +55,32 @@ def put_commit(commands: "Caller", row: tuple, length: int) -> None:
 
 
 def list(commands: "Caller", row: tuple, length: int) -> int:
-    """One of the stored motions, and how many there are."""
+    """One of the stored motions and sequences, and how many there are."""
     (index,) = commands.fields(row)
     store = commands.controller.store()
     names = store.names()
     if index >= len(names):
         raise Refused(codes.NOT_FOUND)
     name = names[index]
+    crc = duration = joints = is_sequence = 0
     try:
-        motion = store.motion(name)
-        crc, duration, joints = motion.crc, endpoints.duration_ticks(motion), motion.joints
+        is_sequence = store.is_sequence(name)
+        if is_sequence:
+            crc = store.sequence(name).crc
+        else:
+            motion = store.motion(name)
+            crc, duration, joints = motion.crc, endpoints.duration_ticks(motion), motion.joints
     except Refused:
-        crc = duration = joints = 0
+        crc = 0
     default = name == store.default()
-    size = commands.reply(row, len(names), store.size_of(name), crc, duration, joints, default)
+    size = commands.reply(row, len(names), store.size_of(name), crc, duration, joints, default, is_sequence)
     return commands.reply_tail(size, name.encode())
+
+
+def sequence(commands: "Caller", row: tuple, length: int) -> int:
+    """How the last sequence ended; while one runs it answers this itself."""
+    told, name = commands.controller.told or ((0, 0, 0, 0, 0), b"")
+    return commands.reply_tail(commands.reply(row, *told), name)
 
 
 def remove(commands: "Caller", row: tuple, length: int) -> None:

@@ -39,3 +39,18 @@ def start_offset(motion: "MotionHead", joint: int, position_steps: int) -> int:
     if 64 * abs(off) <= 33 * one:
         return 0
     return (2 * off + one) // (2 * one) or (1 if off > 0 else -1)
+
+
+def at_start(motion: "MotionHead", joint: int) -> int:
+    """Where the joint begins, in 1/64 step, rounded down."""
+    return _at_64th(motion, joint, 0)
+
+
+def at_end(motion: "MotionHead", joint: int) -> int:
+    """Where it ends, in 1/64 step, rounded down."""
+    return _at_64th(motion, joint, motion.segments)
+
+
+def _at_64th(motion: "MotionHead", joint: int, node: int) -> int:
+    total, parts = _at_node(motion, motion.angle_offset(joint), node)
+    return 64 * total // (parts << STEP_FRACTION_BITS)

@@ -3,7 +3,7 @@
 A record is written to ``NAME.new``, read back, synced and renamed. Where a power cut leaves a ``.new`` file,
 ``recover`` takes it if the old file is gone and the new one is whole, and removes it otherwise.
 
-A record's name is that of its motion, or ``ARM_RECORD_NAME``. The module is imported when it is needed and forgotten
+A record's name is that of its motion or sequence, or ``ARM_RECORD_NAME``; its first bytes say which it is. The module is imported when it is needed and forgotten
 before a motion (see ``Controller.store``): no file is read or written while one runs.
 """
 
@@ -34,6 +34,7 @@ _ST_SIZE = const(6)  # of os.stat
 _F_BSIZE = const(0)  # of os.statvfs
 _F_BAVAIL = const(3)
 _CRC_BYTES = const(4)
+_SEQUENCE_MAGIC = b"ATS1"  # as in armtempo_shared.sequence, which is loaded for sequences only
 _PIECE = const(512)
 _MOST_FREE = const(0x3FFFFFFF)
 
@@ -98,7 +99,7 @@ class Store:
         return min(stat[_F_BSIZE] * stat[_F_BAVAIL], _MOST_FREE)
 
     def names(self) -> "list[str]":
-        """Names of the stored motions, sorted."""
+        """Names of the stored motions and sequences, sorted."""
         return sorted([name[: -len(_MOTION)] for name in self._files() if name.endswith(_MOTION)])
 
     def begin(self, name: str, size: int) -> None:
@@ -181,6 +182,16 @@ class Store:
         if not name:
             raise Refused(codes.NOT_FOUND)
         return self._motion(_motion_file(name))
+
+    def is_sequence(self, name: str) -> bool:
+        """Whether the record of this name is a sequence; NOT_FOUND."""
+        if not name:
+            raise Refused(codes.NOT_FOUND)
+        return self._is_sequence(_motion_file(name))
+
+    def sequence(self, name: str) -> "Any":
+        """A stored sequence, a ``SequenceFile``, checked as far as its head and checksum go."""
+        return self._sequence(_motion_file(name))
 
     def size_of(self, name: str) -> int:
         """Bytes of a record; NOT_FOUND."""
@@ -308,20 +319,50 @@ class Store:
             raise Refused(codes.BAD_CHECKSUM)
         if found != crc:
             raise Refused(codes.BAD_CHECKSUM)
-        self._motion(file_name)
+        self._check_kind(file_name)
+
+    def _check_kind(self, file_name: str) -> None:
+        """Refuses what is neither a motion nor a sequence."""
+        if not self._is_sequence(file_name):
+            self._motion(file_name)
+            return
+        from armtempo_shared import sequence_check  # here, so that it can be forgotten
+
+        try:
+            sequence_check.check(self._sequence(file_name))
+        except sequence_check.SequenceError:
+            raise Refused(codes.BAD_RECORD)
+
+    def _is_sequence(self, file_name: str) -> bool:
+        self._size_of(file_name)
+        file = self._guard(open, self._path(file_name), "rb")
+        try:
+            return bool(self._guard(file.read, len(_SEQUENCE_MAGIC)) == _SEQUENCE_MAGIC)
+        finally:
+            file.close()
+
+    def _sequence(self, file_name: str) -> "Any":
+        from armtempo_board.storage import sequence_file  # here, so that it can be forgotten
+
+        size = self._size_of(file_name)
+        try:
+            return self._guard(sequence_file.SequenceFile, self._path(file_name), size)
+        except ValueError:  # SequenceError, or MotionError for its checksum
+            raise Refused(codes.BAD_RECORD)
 
     def _motion(self, file_name: str) -> MotionFile:
         size = self._size_of(file_name)
         try:
             return self._guard(MotionFile, self._path(file_name), size)  # type: ignore[no-any-return]
         except MotionError:
-            raise Refused(codes.BAD_RECORD)
+            raise Refused(codes.IS_SEQUENCE if self._is_sequence(file_name) else codes.BAD_RECORD)
 
     def _is_whole(self, file_name: str) -> bool:
         """Whether a ``.new`` file is a whole record, of the kind that the file's name says."""
         try:
             if file_name.endswith(_MOTION):
-                return self._motion(file_name + _NEW) is not None
+                self._check_kind(file_name + _NEW)
+                return True
             data = self._read(file_name + _NEW)
         except Refused:
             return False

@@ -1,0 +1,95 @@
+"""Before a sequence starts: everything that it names is there, and each motion begins where the one before it ends.
+
+Imported for that and given up before anything moves.
+"""
+
+from array import array
+
+from armtempo_shared import codes, sequence
+from armtempo_shared.motion import MotionError
+from armtempo_shared.sequence import SequenceError
+from armtempo_shared.sequence_check import check
+
+from armtempo_board.app.sequencer import Sequencer
+from armtempo_board.errors import Refused
+from armtempo_board.motion import endpoints
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from armtempo_board.app.controller import Controller
+    from armtempo_board.storage.sequence_file import SequenceFile
+
+_NONE = -1
+
+
+def sequencer(controller: "Controller", name: str, crc: "int | None") -> Sequencer:
+    """The sequence ``name``, ready for its first row, or Refused; ``crc`` as for ``Controller.begin``."""
+    record = controller.store().sequence(name)
+    if crc is not None and record.crc != crc:
+        raise Refused(codes.BAD_CHECKSUM)
+    if record.arm_crc != controller.arm_crc:
+        raise Refused(codes.ARM_MISMATCH)
+    try:
+        check(record)
+        ends = [_Ends(controller, record, index) for index in range(record.motions)]
+    except (MotionError, SequenceError):
+        raise Refused(codes.BAD_RECORD)
+    _check_rows(controller, record, ends)
+    return Sequencer(controller, record, name.encode(), crc is not None)
+
+
+class _Ends:
+    """Where a motion of the sequence begins and ends."""
+
+    def __init__(self, controller: "Controller", record: "SequenceFile", index: int) -> None:
+        name, crc = record.motion(index)
+        try:
+            motion = controller.load(name, crc)
+        except Refused as refused:
+            code = codes.LEG_MISSING if refused.code in _MISSING else refused.code
+            raise Refused(code, refused.joint, index + 1)
+        joints = range(motion.joints)
+        self.first = array("q", [endpoints.at_start(motion, joint) for joint in joints])
+        self.last = array("q", [endpoints.at_end(motion, joint) for joint in joints])
+        self._away = [
+            endpoints.start_offset(motion, joint, controller.engine.commanded(joint)) for joint in joints
+        ]
+
+    def check_begins_here(self) -> None:
+        """Refused where the arm stands elsewhere."""
+        for joint, away in enumerate(self._away):
+            if away:
+                raise Refused(codes.WRONG_START, joint, away)
+
+    def check_follows(self, before: "_Ends", step: int) -> None:
+        """Refused where it begins elsewhere than ``before`` ends; 1/64 of a step is rounding."""
+        for joint, start in enumerate(self.first):
+            if abs(start - before.last[joint]) > 1:
+                raise Refused(codes.LEG_ELSEWHERE, joint, step)
+
+
+_MISSING = (codes.NOT_FOUND, codes.BAD_CHECKSUM, codes.IS_SEQUENCE)
+
+
+def _check_rows(controller: "Controller", record: "SequenceFile", ends: "list[_Ends]") -> None:
+    last = _NONE  # motion that was run last
+    firsts: "list[int]" = []  # the first motion in each repeat that has begun
+    outputs = len(controller.outputs.values) if controller.outputs else 0
+    inputs = controller.inputs.count if controller.inputs else 0
+    for index in range(record.rows):
+        op, number, _, _, step = record.row(index)
+        if op == sequence.MOVE:
+            if last == _NONE:
+                ends[number].check_begins_here()
+            else:
+                ends[number].check_follows(ends[last], step)
+            last = number
+            firsts = [number if first == _NONE else first for first in firsts]
+        elif op == sequence.REPEAT:
+            firsts.append(_NONE)
+        elif op == sequence.END:
+            first = firsts.pop()
+            if first != _NONE:
+                ends[first].check_follows(ends[last], step)
+        elif op == sequence.OUTPUT and number >= outputs or op == sequence.WAIT_INPUT and number >= inputs:
+            raise Refused(codes.NO_SUCH_PIN, value=step)

@@ -1,0 +1,131 @@
+"""A sequence under way: step by step between motions, in the program's loop, never in an interrupt.
+
+Imported when a sequence starts and given up when it has ended. ``sequence_start`` has found everything that it names.
+"""
+
+import time
+from array import array
+from struct import pack_into
+
+from armtempo_shared import codes, sequence
+from armtempo_shared.messages import PAYLOAD_AT
+from micropython import const
+
+from armtempo_board.buffers import copy, pack_offsets
+from armtempo_board.errors import Refused
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
+    from armtempo_board.app.controller import Controller
+    from armtempo_board.storage.sequence_file import SequenceFile
+
+_ANSWER = const(2)  # of a command's row: the format of its answer
+_ANSWER_AT = const(1)  # behind the command's number
+_ANSWER_BYTES = const(10)  # of that format
+_ENDING, _CODE, _STEP, _ROW, _CYCLE = const(0), const(1), const(2), const(3), const(4)
+_OP, _NUMBER, _VALUE, _AMOUNT, _STEP_OF_ROW = const(0), const(1), const(2), const(3), const(4)
+_IDLE = (0, 0, 0, 0, 0)
+
+
+class Sequencer:
+    """``told`` says how it stands, also after its end: ending, code, step, row, cycles."""
+
+    def __init__(self, controller: "Controller", record: "SequenceFile", name: bytes, by_host: bool) -> None:
+        self._controller = controller
+        self._record = record
+        self._by_host = by_host
+        self._row = _IDLE  # the one under way
+        self._next = 0  # number of the one behind it
+        self._since_ms = 0  # when it began
+        self._repeats = array("i", [0] * (2 * sequence.MAX_NESTING))  # of each: first row, passes left
+        self._depth = 0
+        self._name = name
+        self.told = array("i", [sequence.RUNNING, 0, 0, 0, 0])
+        self.stopping = False
+        controller.told = (self.told, name)
+
+    def turn(self) -> None:
+        """Called while nothing moves: end, wait on, or do what the next row says."""
+        controller = self._controller
+        if controller.fault():
+            return self._end(sequence.FAULTED, controller.fault())
+        if self.stopping:
+            return self._end(sequence.STOPPED)
+        if not self._is_over():
+            return None
+        if self._next == self._record.rows:
+            return self._end(sequence.FINISHED)
+        try:
+            return self._do()
+        except Refused as refused:
+            return self._end(sequence.REFUSED, refused.code)
+        except OSError:
+            return self._end(sequence.REFUSED, codes.FLASH_ERROR)
+
+    def _do(self) -> None:
+        """What the next row says."""
+        self._row = self._record.row(self._next)
+        self.told[_STEP] = self._row[_STEP_OF_ROW]
+        self.told[_ROW] = self._next
+        self._next += 1
+        self._since_ms = time.ticks_ms()
+        op, number, value, _, _ = self._row
+        if op == sequence.MOVE:
+            self._controller.begin_leg(self._record.motion(number), self._by_host)
+        elif op == sequence.OUTPUT:
+            self._controller.outputs.set(number, value)
+        elif op == sequence.REPEAT:
+            self._repeats[2 * self._depth] = self._next
+            self._repeats[2 * self._depth + 1] = self._row[_AMOUNT]
+            self._depth += 1
+        elif op == sequence.END:
+            self._again()
+
+    def _again(self) -> None:
+        """The end of a repeat: from its first row again, or on."""
+        at = 2 * self._depth - 2
+        if not at:
+            self.told[_CYCLE] = (self.told[_CYCLE] + 1) & 0x7FFFFFFF
+        left = self._repeats[at + 1] - 1
+        if left:  # below 0: for ever
+            self._next = self._repeats[at]
+            self._repeats[at + 1] = max(left, 0)
+        else:
+            self._depth -= 1
+
+    def _is_over(self) -> bool:
+        """Whether the row under way is done; a motion is, as nothing moves."""
+        op, number, value, amount, _ = self._row
+        if op != sequence.WAIT and op != sequence.WAIT_INPUT:
+            return True
+        late = time.ticks_diff(time.ticks_ms(), self._since_ms) >= amount
+        if op == sequence.WAIT:
+            return late
+        if self._controller.inputs.level(number) == value & sequence.ACTIVE:
+            return True
+        if not late or not amount:
+            return False
+        return self._time_out(value & ~sequence.ACTIVE)
+
+    def _time_out(self, then: int) -> bool:
+        if then == sequence.STOP_THEN:
+            self._end(sequence.TIMED_OUT)
+        elif then == sequence.FAULT_THEN:
+            self._controller.set_fault(codes.INPUT_TIMEOUT)  # the next turn ends it
+        return then == sequence.NEXT_THEN
+
+    def _end(self, ending: int, code: int = 0) -> None:
+        self.told[_ENDING] = ending
+        self.told[_CODE] = code
+        self._controller.end_sequence()
+
+    def sequence(self, commands: "Any", row: tuple, length: int) -> int:
+        """The answer to the command of this name while it runs; allocates nothing."""
+        told = self.told
+        reply = commands.link.reply
+        at = PAYLOAD_AT + _ANSWER_AT
+        pack_into(row[_ANSWER], reply, at, told[_ENDING], told[_CODE], told[_STEP], told[_ROW], told[_CYCLE])
+        copy(reply, self._name, pack_offsets(at + _ANSWER_BYTES, 0), len(self._name))
+        return _ANSWER_BYTES + len(self._name)

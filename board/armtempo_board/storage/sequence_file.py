@@ -1,0 +1,24 @@
+"""A stored sequence, read from its file row by row: it takes no memory while motions run."""
+
+from armtempo_shared.sequence import SequenceRecord
+
+from armtempo_board.storage.motion_file import stated_crc
+
+
+class SequenceFile(SequenceRecord):
+    """The sequence in the file ``path`` of ``length`` bytes; ``crc``: its checksum.
+
+    Raises SequenceError or MotionError where the record is cut, damaged or of an unknown kind, OSError where the flash
+    fails.
+    """
+
+    def __init__(self, path: str, length: int) -> None:
+        self._path = path
+        super().__init__(length)
+        self.crc = stated_crc(path, length)
+
+    def part(self, offset: int, size: int) -> bytes:
+        """See ``SequenceRecord``."""
+        with open(self._path, "rb") as file:
+            file.seek(offset)
+            return file.read(size)

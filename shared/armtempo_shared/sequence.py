@@ -1,0 +1,117 @@
+"""The sequence record: which stored motions the board runs one after the other, and what it does between them.
+
+Little endian. It names its motions by name and checksum, and carries no motion itself.
+
+::
+
+    offset  type   field
+    0       4s     magic  b"ATS1"
+    4       I      crc32 of the arm record it was made for
+    8       H      rows R
+    10      B      motions M
+    11      B      0
+    12      10 R   the rows: B op, B number, H value, I amount, H step
+    ...     28 M   the motions: 24s name (padded with 0), I crc32 of the motion's record
+    end     I      crc32 over all before it
+
+``step`` is the step of the sequence file that a row comes from (from 1), for those who follow it. The others, by op:
+
+====  ===========  ==================  ===============================  ================================
+op                 number              value                            amount
+====  ===========  ==================  ===============================  ================================
+1     MOVE         of the motion       0                                0
+2     OUTPUT       of the output       what it is set to, 0 to 65535    0
+3     WAIT         0                   0                                ms
+4     WAIT_INPUT   of the input        level | what a time-out does     ms until the time-out, 0: for ever
+5     REPEAT       0                   0                                how many times, 0: for ever
+6     END          0                   0                                0; of the REPEAT it belongs to
+====  ===========  ==================  ===============================  ================================
+"""
+
+import struct
+from binascii import crc32
+
+from armtempo_shared.limits import MAX_NAME
+
+MAGIC = b"ATS1"
+MOVE, OUTPUT, WAIT, WAIT_INPUT, REPEAT, END = 1, 2, 3, 4, 5, 6
+ACTIVE = 1
+"""Bit of the value of WAIT_INPUT: the level waited for. The others say what a time-out does:"""
+STOP_THEN, FAULT_THEN, NEXT_THEN = 0, 2, 4
+
+ENDINGS = ("none", "running", "finished", "stopped", "timed_out", "fault", "refused")
+"""How a sequence stands or ended, by its number on the wire; none: there was none since the start."""
+NONE, RUNNING, FINISHED, STOPPED, TIMED_OUT, FAULTED, REFUSED = 0, 1, 2, 3, 4, 5, 6
+
+MAX_ROWS, MAX_MOTIONS, MAX_NESTING = 500, 64, 4
+MAX_WAIT_MS = 3_600_000
+MAX_REPEATS = 1_000_000
+
+_HEAD = "<4sIHBB"
+_ROW = "<BBHIH"
+_MOTION = "<%dsI" % MAX_NAME
+_HEAD_BYTES, _ROW_BYTES, _MOTION_BYTES = struct.calcsize(_HEAD), struct.calcsize(_ROW), struct.calcsize(_MOTION)
+_CRC_BYTES = 4
+
+
+class SequenceError(ValueError):
+    """The record is damaged or of an unknown kind."""
+
+
+def pack(arm_crc: int, rows: "list[tuple[int, ...]]", motions: "list[tuple[str, int]]") -> bytes:
+    """A sequence record of ``rows`` (op, number, value, amount, step) and ``motions`` (name, crc32)."""
+    data = struct.pack(_HEAD, MAGIC, arm_crc, len(rows), len(motions), 0)
+    for row in rows:
+        data += struct.pack(_ROW, *row)
+    for name, crc in motions:
+        data += struct.pack(_MOTION, name.encode(), crc)
+    return data + struct.pack("<I", crc32(data))
+
+
+class SequenceRecord:
+    """What a record of ``length`` bytes says; who subclasses it gives the bytes in ``part``, and checks the checksum.
+
+    Raises SequenceError where the record is cut or of an unknown kind. What its rows say is judged by
+    ``sequence_check.check``.
+    """
+
+    def __init__(self, length: int) -> None:
+        if length < _HEAD_BYTES + _CRC_BYTES:
+            raise SequenceError("too short")
+        magic, self.arm_crc, self.rows, self.motions, zero = struct.unpack(_HEAD, self.part(0, _HEAD_BYTES))
+        if magic != MAGIC or zero != 0:
+            raise SequenceError("not a sequence record of this version")
+        size = _HEAD_BYTES + _ROW_BYTES * self.rows + _MOTION_BYTES * self.motions + _CRC_BYTES
+        if length != size or not 1 <= self.rows <= MAX_ROWS or self.motions > MAX_MOTIONS:
+            raise SequenceError("length does not fit the header")
+
+    def part(self, offset: int, size: int) -> bytes:
+        """So many bytes of the record from ``offset`` on."""
+        raise NotImplementedError
+
+    def row(self, index: int) -> "tuple[int, ...]":
+        """(op, number, value, amount, step) of a row."""
+        return struct.unpack(_ROW, self.part(_HEAD_BYTES + _ROW_BYTES * index, _ROW_BYTES))
+
+    def motion(self, index: int) -> "tuple[str, int]":
+        """(name, crc32) of a motion."""
+        at = _HEAD_BYTES + _ROW_BYTES * self.rows + _MOTION_BYTES * index
+        name, crc = struct.unpack(_MOTION, self.part(at, _MOTION_BYTES))
+        try:
+            return name.rstrip(b"\x00").decode(), crc
+        except UnicodeError:
+            raise SequenceError("a motion's name")
+
+
+class Sequence(SequenceRecord):
+    """A checked view of a record in memory."""
+
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+        super().__init__(len(data))
+        if crc32(memoryview(data)[:-_CRC_BYTES]) != struct.unpack_from("<I", data, len(data) - _CRC_BYTES)[0]:
+            raise SequenceError("checksum")
+
+    def part(self, offset: int, size: int) -> bytes:
+        """See ``SequenceRecord``."""
+        return self._data[offset : offset + size]
