@@ -177,7 +177,7 @@ COMMANDS: "dict[str, str]" = {
     "sequence": "Where the sequence stands, or where the last one ended. `ending`: 0 there was none since the start, "
     "1 it runs, 2 finished, 3 stopped, 4 an input did not come and the sequence was to stop then, 5 a fault, 6 a leg "
     "was refused; `code`: of that fault or refusal. `step`: of the sequence file; `row`: of the record; `cycle`: "
-    "finished passes of its outermost repeat. Tail: its name.",
+    "finished passes of its outermost repeats. Tail: its name.",
     "remove": "Removes the trajectory of that name.",
     "rename": "The tail is the old name (`old_length` bytes), then the new one. The default goes with it.",
     "get": "Up to `length` bytes of a stored record (`/arm`: the arm record) from `offset` on.",

@@ -14,7 +14,7 @@ Little endian. It names its motions by name and checksum, and carries no motion 
     ...     28 M   the motions: 24s name (padded with 0), I crc32 of the motion's record
     end     I      crc32 over all before it
 
-``step`` is the step of the sequence file that a row comes from (from 1), for those who follow it. The others, by op:
+A repeat whose first pass begins elsewhere than the others has the rows of that pass before it. ``step`` is the step of the sequence file that a row comes from (from 1), for those who follow it. The others, by op:
 
 ====  ===========  ==================  ===============================  ================================
 op                 number              value                            amount
@@ -23,8 +23,8 @@ op                 number              value                            amount
 2     OUTPUT       of the output       what it is set to, 0 to 65535    0
 3     WAIT         0                   0                                ms
 4     WAIT_INPUT   of the input        level | what a time-out does     ms until the time-out, 0: for ever
-5     REPEAT       0                   0                                how many times, 0: for ever
-6     END          0                   0                                0; of the REPEAT it belongs to
+5     REPEAT       0                   1: a pass stands before it      how many times, 0: for ever
+6     END          0                   1: its passes count as cycles    0
 ====  ===========  ==================  ===============================  ================================
 """
 

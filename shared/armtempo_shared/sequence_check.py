@@ -7,7 +7,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from armtempo_shared.sequence import SequenceRecord
 
-_MOST_VALUES = (0, 0, 0xFFFF, 0, sequence.ACTIVE | sequence.NEXT_THEN, 0, 0)
+_MOST_VALUES = (0, 0, 0xFFFF, 0, sequence.ACTIVE | sequence.NEXT_THEN, 1, 1)
 _MOST_AMOUNTS = (0, 0, 0, sequence.MAX_WAIT_MS, sequence.MAX_WAIT_MS, sequence.MAX_REPEATS, 0)
 """The most that a row's value and amount may be, by its op."""
 

@@ -77,17 +77,20 @@ class Sequencer:
         elif op == sequence.OUTPUT:
             self._controller.outputs.set(number, value)
         elif op == sequence.REPEAT:
+            self._count(value)
             self._repeats[2 * self._depth] = self._next
             self._repeats[2 * self._depth + 1] = self._row[_AMOUNT]
             self._depth += 1
         elif op == sequence.END:
+            self._count(value)
             self._again()
+
+    def _count(self, passes: int) -> None:
+        self.told[_CYCLE] = (self.told[_CYCLE] + passes) & 0x7FFFFFFF
 
     def _again(self) -> None:
         """The end of a repeat: from its first row again, or on."""
         at = 2 * self._depth - 2
-        if not at:
-            self.told[_CYCLE] = (self.told[_CYCLE] + 1) & 0x7FFFFFFF
         left = self._repeats[at + 1] - 1
         if left:  # below 0: for ever
             self._next = self._repeats[at]

@@ -52,12 +52,12 @@ class Table:
     def __init__(self, values: Mapping[str, Any], file: str, place: str = "") -> None:
         self._values = values
         self.file = file
-        self._place = place
+        self.place = place
         self._asked: list[str] = []
 
     def fail(self, key: str, allowed: str) -> InputError:
         """The error for a key: say what is there and what is allowed."""
-        name = f"{self._place}{key}"
+        name = f"{self.place}{key}"
         if key not in self._values:
             return InputError(
                 f"{self.file}: {name} is missing", f"write {name} = {allowed}{self._misspelt(key)}"
@@ -68,11 +68,15 @@ class Table:
     def _misspelt(self, key: str) -> str:
         """A note on a key that is there and may be meant."""
         near = misspelt(key, [other for other in self._values if other not in self._asked])
-        return f"; {self._place}{near} is there: is it misspelt?" if near else ""
+        return f"; {self.place}{near} is there: is it misspelt?" if near else ""
 
     def has(self, key: str) -> bool:
         """Whether the key is given."""
         return key in self._values
+
+    def peek(self, key: str) -> Any:
+        """The value as it stands there, unchecked, or None; for one that may be of several kinds."""
+        return self._values.get(key)
 
     def known(self, *keys: str) -> None:
         """These keys may be there, whether a getter asks for them or not."""
@@ -154,14 +158,14 @@ class Table:
             return None
         if not isinstance(value, dict):
             raise self.fail(key, "a table")
-        return Table(value, self.file, f"{self._place}{key}.")
+        return Table(value, self.file, f"{self.place}{key}.")
 
     def tables(self, key: str) -> list[Table]:
         """A list of tables ([[key]]), at least one."""
         entries = self.array(key, f"a list of tables, [[{key}]]")
         if not all(isinstance(entry, dict) for entry in entries):
             raise self.fail(key, f"a list of tables, [[{key}]]")
-        return [Table(entry, self.file, f"{self._place}{key}[{n}].") for n, entry in enumerate(entries, 1)]
+        return [Table(entry, self.file, f"{self.place}{key}[{n}].") for n, entry in enumerate(entries, 1)]
 
     def rest(self) -> dict[str, Any]:
         """All values of the table, for a caller that checks the keys itself."""
@@ -176,7 +180,7 @@ class Table:
             meant = did_you_mean(key, self._asked).removeprefix("; ")
             known = f"known here: {', '.join(sorted(set(self._asked)))}"
             raise InputError(
-                f"{self.file}: {self._place}{key}: unknown key", f"{meant} {known}" if meant else known
+                f"{self.file}: {self.place}{key}: unknown key", f"{meant} {known}" if meant else known
             )
 
 

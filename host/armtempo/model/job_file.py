@@ -51,7 +51,7 @@ def of_table(top: Table, arm: Arm) -> Job:
     parameters = top.table("parameters")
     vias, stops = _vias(top, arm)
     job = Job(
-        name=_name(top),
+        name=name_of(top),
         via=vias,
         stops=stops,
         path=top.choice("path", PATHS, Job.path),
@@ -96,11 +96,12 @@ def _bounds(top: Table) -> tuple[float, float] | None:
     return low, high
 
 
-def _name(top: Table) -> str:
+def name_of(top: Table, longest: int = MAX_NAME) -> str:
+    """The ``name`` of a job or sequence, which the board can take for that of a motion."""
     name = top.text("name")
     allowed = string.ascii_letters + string.digits + "-_"
-    if len(name) > MAX_NAME or any(letter not in allowed for letter in name):
-        raise top.fail("name", f"at most {MAX_NAME} of the characters a-z A-Z 0-9 - _")
+    if len(name) > longest or any(letter not in allowed for letter in name):
+        raise top.fail("name", f"at most {longest} of the characters a-z A-Z 0-9 - _")
     return name
 
 
@@ -113,7 +114,7 @@ def _vias(top: Table, arm: Arm) -> tuple[tuple[tuple[float, ...] | Pose, ...], t
         rows = top.array("via_deg", "a list of at least 2 lists of angles")
         named = Table({f"via_deg[{n}]": row for n, row in enumerate(rows, 1)}, top.file)
         vias: list[tuple[float, ...] | Pose] = [
-            _angles(named, f"via_deg[{n}]", arm) for n in range(1, len(rows) + 1)
+            angles(named, f"via_deg[{n}]", arm) for n in range(1, len(rows) + 1)
         ]
     else:
         tables = top.tables("via")
@@ -151,19 +152,20 @@ def _via(table: Table, where: str, arm: Arm) -> tuple[float, ...] | Pose:
             "leave all but one of them out",
         )
     if forms == ["angles_deg"]:
-        angles = _angles(table, "angles_deg", arm)
+        found = angles(table, "angles_deg", arm)
         table.done()
-        return angles
+        return found
     posture = table.numbers("posture_deg", len(arm.joints)) if table.has("posture_deg") else None
     pose = pose_table.read(table, where)
     table.done()
     return replace(pose, posture_deg=posture)
 
 
-def _angles(table: Table, key: str, arm: Arm) -> tuple[float, ...]:
-    angles = table.numbers(key, len(arm.driven))
-    for joint, angle in zip(arm.driven, angles, strict=True):
+def angles(table: Table, key: str, arm: Arm) -> tuple[float, ...]:
+    """Angles of the driven joints in degrees, (J,), each within its range."""
+    found = table.numbers(key, len(arm.driven))
+    for joint, angle in zip(arm.driven, found, strict=True):
         low, high = joint.range_deg
         if not low <= angle <= high:
             raise table.fail(key, f"within the range of {joint.name}, {low:g} to {high:g} degrees")
-    return angles
+    return found

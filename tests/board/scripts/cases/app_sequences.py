@@ -130,7 +130,7 @@ def case_steps_come_one_after_the_other():
 
 
 def case_repeats_within_repeats_are_counted():
-    rows = [(REPEAT, 0, 0, 3), (OUTPUT, 0, 1, 0), (REPEAT, 0, 0, 2), (OUTPUT, 1, 2, 0), (END, 0, 0, 0), (END, 0, 0, 0)]
+    rows = [(REPEAT, 0, 0, 3), (OUTPUT, 0, 1, 0), (REPEAT, 0, 0, 2), (OUTPUT, 1, 2, 0), (END, 0, 0, 0), (END, 0, 1, 0)]
     app, host = ready(rows)
     begin(host)
     host.turn(100)
@@ -139,7 +139,7 @@ def case_repeats_within_repeats_are_counted():
 
 
 def case_for_ever_ends_only_by_a_stop():
-    app, host = ready([(REPEAT, 0, 0, 0), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 0, 0)])
+    app, host = ready([(REPEAT, 0, 0, 0), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 1, 0)])
     begin(host)
     for cycle in range(20):
         arrive(app, host, 10)
@@ -269,7 +269,7 @@ def case_before_any_there_is_none():
 
 
 def case_hosts_come_and_go():
-    app, host = ready([(REPEAT, 0, 0, 5), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 0, 0)])
+    app, host = ready([(REPEAT, 0, 0, 5), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 1, 0)])
     begin(host)
     for cycle in range(5):
         host.hello(cycle + 2)

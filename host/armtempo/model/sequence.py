@@ -1,0 +1,117 @@
+"""A sequence of motions, outputs and waits, as its file describes it; nothing is planned yet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
+from armtempo.model.plan import Plan
+
+STOP, FAULT, NEXT = "stop", "fault", "next"
+ON_TIMEOUT = (STOP, FAULT, NEXT)
+"""What happens where an input does not come in time: the sequence ends in order, or by a fault, or goes on."""
+FOR_EVER = "for ever"
+
+
+@dataclass(frozen=True)
+class Posture:
+    """Angles of the driven joints (J,), and what the user calls them."""
+
+    name: str
+    angles_deg: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A job that is still to be planned, or a plan, by its file."""
+
+    name: str
+    source: Job | Plan
+
+
+@dataclass(frozen=True, eq=False)
+class Goto:
+    """Move straight to a posture, or to where a motion begins."""
+
+    where: str
+    step: int
+    target: Posture | Motion
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Run a motion from its beginning."""
+
+    where: str
+    step: int
+    motion: Motion
+
+
+@dataclass(frozen=True)
+class SetOutput:
+    """Set an output; ``raw`` as the board takes it, ``words`` as the user wrote it."""
+
+    where: str
+    step: int
+    number: int
+    raw: int
+    words: str
+
+
+@dataclass(frozen=True)
+class Wait:
+    """Wait for a time."""
+
+    where: str
+    step: int
+    wait_s: float
+
+
+@dataclass(frozen=True)
+class WaitInput:
+    """Wait until an input is active, or not; ``timeout_s`` 0: for ever."""
+
+    where: str
+    step: int
+    number: int
+    active: bool
+    timeout_s: float
+    on_timeout: str
+    words: str
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """Steps that come ``times`` times, 0: for ever."""
+
+    where: str
+    step: int
+    times: int
+    steps: tuple[Step, ...]
+
+
+Step = Goto | Run | SetOutput | Wait | WaitInput | Repeat
+"""``where`` names file and step for messages; ``step`` is the number in the sequence's own file, from 1."""
+
+
+@dataclass(frozen=True)
+class Sequence:
+    """What the arm is to do, step by step."""
+
+    name: str
+    start: Posture | None
+    """Where it begins; None: where its first step that moves says."""
+    steps: tuple[Step, ...]
+    source: str
+
+    @classmethod
+    def load(cls, path: Path | str, arm: Arm) -> Sequence:
+        """The sequence described by a TOML file, for this arm.
+
+        Raises InputError, naming file, step and key, for anything missing, unknown or not allowed.
+        """
+        from armtempo.model import sequence_file
+
+        return sequence_file.load(path, arm)

@@ -1,0 +1,249 @@
+"""The sequence file: a sequence described in TOML."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from armtempo_shared.sequence import MAX_NESTING, MAX_REPEATS, MAX_WAIT_MS
+
+from armtempo.errors import InputError
+from armtempo.formats import toml_table
+from armtempo.formats.spelling import did_you_mean
+from armtempo.formats.toml_table import Table
+from armtempo.model import job_file, trajectory_file
+from armtempo.model.arm import Arm
+from armtempo.model.sequence import (
+    FOR_EVER,
+    ON_TIMEOUT,
+    STOP,
+    Goto,
+    Motion,
+    Posture,
+    Repeat,
+    Run,
+    Sequence,
+    SetOutput,
+    Step,
+    Wait,
+    WaitInput,
+)
+
+LONGEST_NAME = 20
+"""Of a sequence: its motions are stored as NAME-1, NAME-2 …, within the board's 24 characters."""
+HOME = "home"
+_MOST_S = MAX_WAIT_MS / 1000
+_KINDS = ("goto", "run", "output", "wait_s", "wait_input", "repeat", "end", "call")
+
+
+def is_sequence(path: Path | str) -> bool:
+    """Whether a TOML file describes a sequence: it has steps. Raises InputError where it is not TOML."""
+    return Path(path).suffix == ".toml" and toml_table.read(path).has("step")
+
+
+def load(path: Path | str, arm: Arm) -> Sequence:
+    """The sequence described by a TOML file, for this arm; errors as for ``Sequence.load``."""
+    top = toml_table.read(path)
+    name = job_file.name_of(top, LONGEST_NAME)
+    reader = _Reader(arm, Path(path), _postures(top, arm))
+    start = reader.posture(top, "start") if top.has("start") else None
+    steps = reader.steps(top)
+    top.done()
+    return Sequence(name, start, steps, str(path))
+
+
+def arm_named(path: Path | str) -> Path | None:
+    """The arm file that a sequence file names, or None."""
+    top = toml_table.read(path)
+    if not top.has("arm"):
+        return None
+    named = Path(top.text("arm"))
+    beside = Path(path).parent / named
+    return beside if beside.is_file() else named
+
+
+def _postures(top: Table, arm: Arm) -> dict[str, Posture]:
+    """The arm's postures by name, the arm's home, and those of the sequence itself."""
+    found = {HOME: Posture(HOME, tuple(float(angle) for angle in arm.home_deg))}
+    own = top.table("posture")
+    for name in own.rest() if own else ():
+        table = own.table(name) if own else None
+        if table is None or name in found:
+            raise InputError(f"{top.file}: posture.{name} is there already", "choose another name")
+        found[name] = Posture(name, job_file.angles(table, "angles_deg", arm))
+        table.done()
+    return found
+
+
+@dataclass
+class _Reader:
+    """Reads the steps of one file, and of those that it calls."""
+
+    arm: Arm
+    file: Path
+    postures: dict[str, Posture]
+    callers: tuple[Path, ...] = ()
+    number: int = 0
+    """Of the calling step, for all steps of a file that was called; 0: each has its own."""
+    motions: dict[Path, Motion] = field(default_factory=dict)
+
+    def steps(self, top: Table) -> tuple[Step, ...]:
+        """All steps of a file; repeats hold what stands between them and their end."""
+        top.known("name", "arm", "start", "posture")
+        tables = top.tables("step")
+        found: list[list[Step]] = [[]]
+        begun: list[tuple[Table, int, int]] = []
+        for index, table in enumerate(tables, 1):
+            step = self.number or index
+            kind = self._kind(table, index)
+            if kind == "repeat":
+                begun.append((table, step, self._times(table)))
+                found.append([])
+                if len(begun) > MAX_NESTING:
+                    raise table.fail("repeat", f"at most {MAX_NESTING} within each other")
+            elif kind == "end":
+                table.choice("end", ("repeat",))
+                if not begun:
+                    raise table.fail("end", "given behind a step with repeat")
+                row, number, times = begun.pop()
+                inner = tuple(found.pop())
+                found[-1].append(Repeat(_place(row), number, times, inner))
+            else:
+                found[-1].extend(_GETTERS[kind](self, table, step))
+            table.done()
+        if begun:
+            raise InputError(
+                f"{_place(begun[-1][0])}: repeat has no end", 'write a step with end = "repeat" behind its last step'
+            )
+        return tuple(found[0])
+
+    def _kind(self, table: Table, index: int) -> str:
+        table.known(*_KINDS, "to", "active", "timeout_s", "on_timeout")
+        kinds = [key for key in _KINDS if table.has(key)]
+        if kinds == ["output", "wait_s"]:
+            return "output"
+        if len(kinds) == 1:
+            return kinds[0]
+        table.done()  # a key that nobody knows is the likelier mistake
+        what = " and ".join(kinds) if kinds else "nothing"
+        raise InputError(f"{_place(table)}: says {what}", f"give one of {', '.join(_KINDS)} in each step")
+
+    def _times(self, table: Table) -> int:
+        only(table, "repeat")
+        if isinstance(table.peek("repeat"), str):
+            table.choice("repeat", (FOR_EVER,), allowed=f'"{FOR_EVER}", or a whole number')
+            return 0
+        return table.integer("repeat", least=1, most=MAX_REPEATS)
+
+    def goto(self, table: Table, step: int) -> list[Step]:
+        only(table, "goto")
+        target: Posture | Motion
+        if table.has("goto") and str(table.peek("goto")).endswith((".toml", ".json")):
+            target = self._motion(table, "goto")
+        else:
+            target = self.posture(table, "goto")
+        return [Goto(_place(table), step, target)]
+
+    def posture(self, table: Table, key: str) -> Posture:
+        """A posture by name, or as angles."""
+        if not isinstance(table.peek(key), str):
+            angles = job_file.angles(table, key, self.arm)
+            return Posture(", ".join(f"{angle:g}" for angle in angles) + "°", angles)
+        name = table.text(key)
+        if name not in self.postures:
+            near = did_you_mean(name, self.postures)
+            raise InputError(
+                f"{_place(table)}{key} = {name!r}: there is no such posture{near}",
+                f"known here: {', '.join(sorted(self.postures))}; more with [posture.NAME] angles_deg = [...]",
+            )
+        return self.postures[name]
+
+    def run(self, table: Table, step: int) -> list[Step]:
+        only(table, "run")
+        return [Run(_place(table), step, self._motion(table, "run"))]
+
+    def _motion(self, table: Table, key: str) -> Motion:
+        path = self.file.parent / table.text(key)
+        if path not in self.motions:
+            source = trajectory_file.load(path) if path.suffix == ".json" else job_file.load(path, self.arm)
+            self.motions[path] = Motion(path.stem, source)
+        return self.motions[path]
+
+    def output(self, table: Table, step: int) -> list[Step]:
+        only(table, "output", "to", "wait_s")
+        name, place = table.text("output"), _place(table)
+        number = _index(name, self.arm.outputs, f"{place}output = {name!r}: the arm has no such output")
+        to = table.peek("to")
+        if isinstance(to, bool) or not isinstance(to, str | int | float):
+            raise table.fail("to", "a state of the output, or a number in its unit")
+        try:
+            raw = self.arm.outputs[number].raw(to)
+        except InputError as error:
+            raise InputError(f"{place}to: {error.problem}", error.hint) from None
+        table.known("to")
+        found: list[Step] = [SetOutput(place, step, number, raw, f"{name} {to}")]
+        return found + (self.wait(table, step) if table.has("wait_s") else [])
+
+    def wait(self, table: Table, step: int) -> list[Step]:
+        only(table, "output", "to", "wait_s")
+        return [Wait(_place(table), step, table.number("wait_s", least=0.001, most=_MOST_S))]
+
+    def wait_input(self, table: Table, step: int) -> list[Step]:
+        only(table, "wait_input", "active", "timeout_s", "on_timeout")
+        name, place = table.text("wait_input"), _place(table)
+        number = _index(name, self.arm.inputs, f"{place}wait_input = {name!r}: the arm has no such input")
+        active = table.boolean("active", True)
+        timeout_s = table.number("timeout_s", 0.0, least=0.001, most=_MOST_S) if table.has("timeout_s") else 0.0
+        if table.has("on_timeout") and not timeout_s:
+            raise table.fail("on_timeout", "given together with timeout_s only")
+        then = table.choice("on_timeout", ON_TIMEOUT, STOP)
+        words = name if active else f"{name} not"
+        return [WaitInput(place, step, number, active, timeout_s, then, words)]
+
+    def call(self, table: Table, step: int) -> list[Step]:
+        only(table, "call")
+        path = (self.file.parent / table.text("call")).resolve()
+        chain = (*self.callers, self.file.resolve())
+        if path in chain:
+            names = " calls ".join(one.name for one in (*chain[chain.index(path) :], path))
+            raise InputError(f"{_place(table)}call: the sequence calls itself: {names}", "take one of the calls out")
+        top = toml_table.read(path)
+        if not top.has("step"):
+            raise InputError(f"{_place(table)}call: {path.name} is no sequence: it has no [[step]]", "use run for a job")
+        postures = {**self.postures, **_postures(top, self.arm)}
+        called = _Reader(self.arm, path, postures, chain, step, self.motions)
+        steps = called.steps(top)
+        top.done()
+        return list(steps)
+
+
+_Getter = Callable[[_Reader, Table, int], list[Step]]
+_GETTERS: dict[str, _Getter] = {
+    "goto": _Reader.goto,
+    "run": _Reader.run,
+    "output": _Reader.output,
+    "wait_s": _Reader.wait,
+    "wait_input": _Reader.wait_input,
+    "call": _Reader.call,
+}
+
+
+def only(table: Table, *keys: str) -> None:
+    """Raise InputError for a key that belongs to another kind of step."""
+    for key in (*_KINDS, "to", "active", "timeout_s", "on_timeout"):
+        if table.has(key) and key not in keys:
+            raise table.fail(key, f"left out beside {keys[0]}")
+
+
+def _place(table: Table) -> str:
+    return f"{table.file}: {table.place}"
+
+
+def _index(name: str, known: Any, problem: str) -> int:
+    names = [one.name for one in known]
+    if name not in names:
+        there = f"the arm file has: {', '.join(names)}" if names else "the arm file has none"
+        raise InputError(f"{problem}{did_you_mean(name, names)}", there)
+    return names.index(name)

@@ -1,0 +1,196 @@
+"""A planned sequence: every motion, and the rows that the board goes through."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from armtempo_shared import sequence as record
+from armtempo_shared.sequence import END, MOVE, REPEAT, WAIT
+
+from armtempo.errors import InputError
+from armtempo.formats import json_codec
+from armtempo.formats.atomic_file import check_replaceable, replace_text, why
+from armtempo.model import arm_json
+from armtempo.model.arm import Arm
+from armtempo.splines.trajectory import Trajectory
+
+FORMAT = "armtempo sequence"
+VERSION = 1
+PAUSE_S = 0.045
+"""From the end of a motion to the beginning of the next: host/docs/sequences.md."""
+_AGAIN = "plan it again"
+_RULE = "a sequence's plan is replaced by one of a sequence of the same name"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of the record (``armtempo_shared.sequence``), with what it does in words."""
+
+    op: int
+    number: int
+    value: int
+    amount: int
+    step: int
+    words: str
+
+
+@dataclass(frozen=True)
+class Share:
+    """What a stretch of time is made of."""
+
+    motion_s: float = 0.0
+    wait_s: float = 0.0
+    motions: int = 0
+    """How many there are; before each is a pause."""
+
+    @property
+    def total_s(self) -> float:
+        """All of it."""
+        return self.motion_s + self.wait_s + PAUSE_S * self.motions
+
+    def __add__(self, other: Share) -> Share:
+        return Share(
+            self.motion_s + other.motion_s, self.wait_s + other.wait_s, self.motions + other.motions
+        )
+
+    def __mul__(self, times: int) -> Share:
+        return Share(self.motion_s * times, self.wait_s * times, self.motions * times)
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """One pass of a repeat."""
+
+    step: int
+    times: int
+    """0: for ever."""
+    share: Share
+
+
+@dataclass(frozen=True, eq=False)
+class SequencePlan:
+    """A sequence for ``arm``, ready for the board."""
+
+    arm: Arm
+    name: str
+    legs: tuple[Trajectory, ...]
+    """Its motions, each once; NAME-1, NAME-2 … on the board."""
+    rows: tuple[Row, ...]
+    versions: Mapping[str, str]
+
+    @property
+    def start_deg(self) -> tuple[float, ...] | None:
+        """Where it begins, degrees (J,); None where nothing moves."""
+        for row in self.rows:
+            if row.op == MOVE:
+                return tuple(float(angle) for angle in self.legs[row.number](0.0))
+        return None
+
+    @property
+    def cycles(self) -> tuple[Cycle, ...]:
+        """One pass of each outermost repeat."""
+        return self._times()[1]
+
+    @property
+    def total(self) -> Share | None:
+        """The whole sequence without waiting for inputs; None where it has no end."""
+        return self._times()[0]
+
+    def _times(self) -> tuple[Share | None, tuple[Cycle, ...]]:
+        open_: list[tuple[Row, Share]] = []
+        share, endless = Share(), False
+        cycles = []
+        for row in self.rows:
+            if row.op == MOVE:
+                share += Share(motion_s=self.legs[row.number].duration_s, motions=1)
+            elif row.op == WAIT:
+                share += Share(wait_s=row.amount / 1000)
+            elif row.op == REPEAT:
+                open_.append((row, share))
+                share = Share()
+            elif row.op == END:
+                begun, before = open_.pop()
+                if row.value:
+                    times = begun.amount + begun.value if begun.amount else 0
+                    cycles.append(Cycle(begun.step, times, share))
+                endless = endless or not begun.amount
+                share = before + share * begun.amount
+        return (None if endless else share), tuple(cycles)
+
+    def save(self, path: Path | str, force: bool = False) -> None:
+        """Write the sequence's plan, whole or not at all.
+
+        ``force``: also over a file that is no earlier plan of a sequence of this name. Raises InputError where such a
+        file is there, or the file cannot be written.
+        """
+        content = json_codec.encode(self)
+        whole = {"format": FORMAT, "version": VERSION, "sha256": _checksum(content), "sequence": content}
+        text = json.dumps(whole, indent=1, allow_nan=False) + "\n"
+        target = Path(path)
+        check_replaceable(target, text, force or _name_in(target) == self.name, _RULE)
+        replace_text(target, text)
+
+    @classmethod
+    def load(cls, path: Path | str) -> SequencePlan:
+        """The plan of a file that ``save`` wrote; InputError where it is none, is damaged, altered or does not fit."""
+        content = _read(path)
+        if not isinstance(content, dict) or content.get("format") != FORMAT:
+            raise InputError(f"{path}: is not a planned sequence", "make one with: armtempo plan SEQUENCE.toml")
+        if content.get("version") != VERSION:
+            raise InputError(f"{path}: has version {content.get('version')!r}, this program reads {VERSION}", _AGAIN)
+        if content.keys() != {"format", "version", "sha256", "sequence"}:
+            raise InputError(f"{path}: unknown or missing key", _AGAIN)
+        if content["sha256"] != _checksum(content["sequence"]):
+            raise InputError(f"{path} was altered after it had been written: its checksum does not fit", _AGAIN)
+        plan: SequencePlan = json_codec.decode(cls, content["sequence"], f"{path}: sequence")
+        arm_json.check(plan.arm, f"{path}: arm", _AGAIN)
+        if any(row.op == MOVE and not 0 <= row.number < len(plan.legs) for row in plan.rows):
+            raise InputError(f"{path}: a row names a motion that there is not", _AGAIN)
+        return plan
+
+
+def is_sequence_plan(path: Path) -> bool:
+    """Whether a file is a planned sequence; False for what cannot be read."""
+    return bool(_name_in(path))
+
+
+def rows_of(plan: SequencePlan) -> list[tuple[int, ...]]:
+    """The rows as ``armtempo_shared.sequence.pack`` takes them."""
+    return [(row.op, row.number, row.value, row.amount, row.step) for row in plan.rows]
+
+
+def check_size(rows: int, legs: int, where: str) -> None:
+    """Raise InputError where the board takes no sequence as large."""
+    if rows > record.MAX_ROWS or legs > record.MAX_MOTIONS:
+        raise InputError(
+            f"{where}: {rows} rows and {legs} motions; the board takes {record.MAX_ROWS} and {record.MAX_MOTIONS}",
+            "use repeat, or make two sequences of it",
+        )
+
+
+def _checksum(content: Any) -> str:
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _name_in(path: Path) -> str:
+    try:
+        content = _read(path)
+        found = content["sequence"]["name"] if content["format"] == FORMAT else ""
+    except (InputError, LookupError, TypeError):
+        return ""
+    return str(found)
+
+
+def _read(path: Path | str) -> Any:
+    try:
+        return json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {why(error)}", "check the path and its permissions") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path}: damaged or cut: {error}", _AGAIN) from None

@@ -1,0 +1,192 @@
+"""Planning a sequence: every motion time-optimally, from where the one before it ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from armtempo_shared import sequence as record
+
+from armtempo.errors import ArmtempoError, InputError
+from armtempo.model.arm import Arm
+from armtempo.model.job import GRADIENT, Job
+from armtempo.model.plan import Plan
+from armtempo.model.sequence import (
+    FAULT,
+    NEXT,
+    Goto,
+    Motion,
+    Posture,
+    Repeat,
+    Run,
+    Sequence,
+    SetOutput,
+    Step,
+    Wait,
+    WaitInput,
+)
+from armtempo.model.sequence_plan import Row, SequencePlan, check_size
+from armtempo.planning import checks, planner
+from armtempo.progress import Progress
+from armtempo.splines.trajectory import Trajectory
+
+Angles = tuple[float, ...]
+_REFINE = 16
+"""Segments of a straight motion's time axis: within 1 % of its lower bound, and a record that the board checks soon."""
+_THEN = {NEXT: record.NEXT_THEN, FAULT: record.FAULT_THEN}
+_SAME_STEPS = 1 / 128
+"""Two angles as near as this are one: the board allows 1/64 step between two motions."""
+
+
+def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> SequencePlan:
+    """All motions of a sequence, equal ones once, and the rows that the board goes through.
+
+    Raises InputError, naming file and step, where a motion begins elsewhere than the one before it ends or nothing is
+    left to do; PlanError where a motion cannot be planned.
+    """
+    compiler = _Compiler(arm, progress)
+    here = sequence.start.angles_deg if sequence.start else None
+    rows, _ = compiler.rows(sequence.steps, here, sequence.start.name if sequence.start else "")
+    if not rows:
+        raise InputError(f"{sequence.source}: nothing is left to do", "add a step that moves, sets or waits")
+    check_size(len(rows), len(compiler.legs), sequence.source)
+    legs = [replace(leg, name=f"{sequence.name}-{number}") for number, leg in enumerate(compiler.legs, 1)]
+    return SequencePlan(arm, sequence.name, tuple(legs), tuple(rows), planner.versions())
+
+
+@dataclass(frozen=True)
+class _End:
+    """Where rows lead: the angles, None where nothing has moved yet, and what the user calls them."""
+
+    angles_deg: Angles | None
+    name: str
+
+
+@dataclass
+class _Compiler:
+    arm: Arm
+    progress: Progress | None
+    legs: list[Trajectory] = field(default_factory=list)
+    _known: dict[tuple[object, ...], int] = field(default_factory=dict)
+    _plans: dict[int, Trajectory] = field(default_factory=dict)
+    _depth: int = 0
+
+    def rows(self, steps: tuple[Step, ...], here: Angles | None, name: str) -> tuple[list[Row], _End]:
+        """The rows of some steps from a posture on, and where they lead."""
+        end = _End(here, name)
+        found: list[Row] = []
+        for step in steps:
+            if isinstance(step, Repeat):
+                rows, end = self._repeat(step, end)
+            elif isinstance(step, Goto):
+                rows, end = self._goto(step, end)
+            elif isinstance(step, Run):
+                rows, end = self._run(step, end)
+            else:
+                rows = [_still(step)]
+            found += rows
+        return found, end
+
+    def _repeat(self, step: Repeat, before: _End) -> tuple[list[Row], _End]:
+        """The first pass stands before the others where it begins elsewhere than they do."""
+        outermost = not self._depth
+        self._depth += 1
+        first, end = self.rows(step.steps, before.angles_deg, before.name)
+        if not first:
+            raise InputError(f"{step.where}: nothing is repeated", "put steps between repeat and its end")
+        apart = before.angles_deg is not None and end.angles_deg != before.angles_deg
+        rows, last = self.rows(step.steps, end.angles_deg, end.name) if end.angles_deg else (first, end)
+        apart = apart or rows != first
+        self._depth -= 1
+        times = step.times - apart if step.times else 0
+        if apart and step.times == 1:
+            return first, end
+        words = f"{step.times} times" if step.times else "for ever"
+        begin = Row(record.REPEAT, 0, int(apart and outermost), times, step.step, f"repeat {words}")
+        close = Row(record.END, 0, int(outermost), 0, step.step, "end of repeat")
+        return [*(first if apart else ()), begin, *rows, close], last
+
+    def _goto(self, step: Goto, here: _End) -> tuple[list[Row], _End]:
+        target = self._posture(step.target)
+        if here.angles_deg is None or here.angles_deg == target.angles_deg:
+            return [], _End(target.angles_deg, target.name)
+        key = (here.angles_deg, target.angles_deg)
+        if key not in self._known:
+            self._known[key] = self._add(self._straight(step, here.angles_deg, target.angles_deg))
+        words = f"goto {target.name}"
+        return [_move(self._known[key], step.step, words)], _End(target.angles_deg, target.name)
+
+    def _run(self, step: Run, here: _End) -> tuple[list[Row], _End]:
+        trajectory = self._planned(step.motion, step.where)
+        start, end = _angles(trajectory(0.0)), _angles(trajectory(trajectory.duration_s))
+        if here.angles_deg is not None and not self._same(here.angles_deg, start):
+            raise InputError(
+                f"{step.where}run: {step.motion.name} begins at {_words(start)}, but the arm is at "
+                f"{here.name or _words(here.angles_deg)} ({_words(here.angles_deg)})",
+                f"put a step before it that goes there: goto with the same file as run, {step.motion.name!r}",
+            )
+        key = ("run", id(step.motion))
+        if key not in self._known:
+            self._known[key] = self._add(trajectory)
+        return [_move(self._known[key], step.step, f"run {step.motion.name}")], _End(end, f"the end of {step.motion.name}")
+
+    def _posture(self, target: Posture | Motion) -> Posture:
+        if isinstance(target, Posture):
+            return target
+        trajectory = self._planned(target, "")
+        return Posture(f"the start of {target.name}", _angles(trajectory(0.0)))
+
+    def _planned(self, motion: Motion, where: str) -> Trajectory:
+        if id(motion) not in self._plans:
+            self._plans[id(motion)] = self._of(motion.source, where)
+        return self._plans[id(motion)]
+
+    def _of(self, source: Job | Plan, where: str) -> Trajectory:
+        if isinstance(source, Plan):
+            if source.arm != self.arm:
+                raise InputError(f"{where}run: it was planned for another arm than {self.arm.name!r}", "plan it again")
+            return source.trajectory
+        found = planner.plan(self.arm, source, self.progress).trajectory
+        checks.check_held(found, self.arm)
+        return found
+
+    def _straight(self, step: Goto, start: Angles, end: Angles) -> Trajectory:
+        job = Job("goto", via_deg=[start, end], optimiser=GRADIENT, refine=_REFINE)
+        try:
+            return planner.plan(self.arm, job, self.progress).trajectory
+        except ArmtempoError as error:
+            raise type(error)(f"{step.where}goto: {error.problem}", error.hint) from error
+
+    def _add(self, trajectory: Trajectory) -> int:
+        self.legs.append(trajectory)
+        return len(self.legs) - 1
+
+    def _same(self, one: Angles, other: Angles) -> bool:
+        return all(
+            abs(a - b) * joint.steps_per_deg <= _SAME_STEPS
+            for a, b, joint in zip(one, other, self.arm.driven, strict=True)
+        )
+
+
+def _still(step: SetOutput | Wait | WaitInput) -> Row:
+    """The row of a step that moves nothing."""
+    if isinstance(step, SetOutput):
+        return Row(record.OUTPUT, step.number, step.raw, 0, step.step, f"output {step.words}")
+    if isinstance(step, Wait):
+        return Row(record.WAIT, 0, 0, round(step.wait_s * 1000), step.step, f"wait {step.wait_s:g} s")
+    value = int(step.active) | _THEN.get(step.on_timeout, record.STOP_THEN)
+    limit = f", at most {step.timeout_s:g} s, then {step.on_timeout}" if step.timeout_s else ""
+    words = f"wait for input {step.words}{limit}"
+    return Row(record.WAIT_INPUT, step.number, value, round(step.timeout_s * 1000), step.step, words)
+
+
+def _move(leg: int, step: int, words: str) -> Row:
+    return Row(record.MOVE, leg, 0, 0, step, words)
+
+
+def _angles(values: np.ndarray) -> Angles:
+    return tuple(float(value) for value in values)
+
+
+def _words(angles: Angles) -> str:
+    return ", ".join(f"{round(angle, 3) + 0.0:g}" for angle in angles) + "°"

@@ -1,0 +1,42 @@
+"""A sequence made ready for the board: its motions' records and its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from armtempo_shared import sequence, sequence_check
+from armtempo_shared.wire import record_crc
+
+from armtempo.model.arm import Arm
+from armtempo.model.sequence_plan import SequencePlan, rows_of
+from armtempo.records import encode, encoded_motion
+from armtempo.records.encoded_motion import EncodedMotion, MotionKey
+
+
+@dataclass(frozen=True, eq=False)
+class EncodedSequence:
+    """A sequence as the board stores and runs it."""
+
+    plan: SequencePlan
+    motions: tuple[EncodedMotion, ...]
+    data: bytes
+    """The sequence record (layout: ``armtempo_shared.sequence``)."""
+
+    @property
+    def arm(self) -> Arm:
+        """The arm it was planned for."""
+        return self.plan.arm
+
+    @property
+    def key(self) -> MotionKey:
+        """What the board knows it by."""
+        return MotionKey(self.plan.name, record_crc(self.data))
+
+
+def of_plan(plan: SequencePlan) -> EncodedSequence:
+    """The records of a sequence; InputError or PlanError where the board could not run it."""
+    motions = tuple(encoded_motion.of_trajectory(leg, plan.arm) for leg in plan.legs)
+    keys = [(motion.name, motion.key.crc) for motion in motions]
+    data = sequence.pack(record_crc(encode.arm_record(plan.arm)), rows_of(plan), keys)
+    sequence_check.check(sequence.Sequence(data))
+    return EncodedSequence(plan, motions, data)
