@@ -21,6 +21,8 @@ _ONLY_FOR_SET_UP = (
     "table",
     "program_hash",
     "basis",
+    "outputs",
+    "digital_inputs",
 )
 
 

@@ -32,6 +32,8 @@ NO_SESSION = 25
 NO_ROOM = 26
 NO_MEMORY = 27
 FAILED = 28
+NO_OUTPUT = 30
+PIN_TAKEN = 31
 # faults: they stop the motion and stay until cleared
 ESTOP = 40
 LIMIT_SWITCH = 41

@@ -72,6 +72,16 @@ _ROWS = (
         "the board program failed in this command; its traceback comes as a notice",
         "report it with the log",
     ),
+    (
+        "no_output",
+        "the arm on the board has no output of this number",
+        "name the arm's file with --arm, or set the board up for it: 'armtempo configure'",
+    ),
+    (
+        "pin_taken",
+        "an output or input of the arm has a pin or timer that the engine takes",
+        "'armtempo check' says which pin; give another one (board/docs/hardware.md)",
+    ),
     ("estop", "the E-stop input tripped", "release it, then 'armtempo clear' and home"),
     ("limit_switch", "a limit switch tripped", "'armtempo clear', then move the arm away from it"),
     (
@@ -114,6 +124,8 @@ VALUES: "dict[str, str]" = {
     "too_long": "bytes of the record (at `put_begin`: that it takes); of a joint: its largest number",
     "too_abrupt": "steps/s²",
     "no_room": "bytes needed",
+    "no_output": "outputs that the arm has",
+    "pin_taken": "16 times the port (A is 0) and the number in it",
 }
 """What ``value`` of a refusal is, by name; the others have none."""
 
@@ -145,6 +157,10 @@ COMMANDS: "dict[str, str]" = {
     "a fault. Answer: number of the run and its length in ticks.",
     "stop": "`now` 0: brake along the path (freeze where the motion has no braking time); 1: freeze.",
     "clear": "Clears the fault; refused with `fault_pending` while its cause is still there.",
+    "output": "Sets output `number` of the arm record (from 0) to `value`: 0 to 65535 are its whole range. Also while "
+    "a motion runs. Refused with `fault_pending` while it has to be in its safe state.",
+    "inputs": "Answer: `levels` has a bit for each input of the arm record, set where it is active; the tail has "
+    "an u16 for each output, the value that it has.",
     "leave": "Ends the program; the port becomes MicroPython's prompt.",
     "samples": "All samples before `acknowledged` have arrived and may go; those from there on, `wanted` of "
     "them, are to be sent again. Answer: the oldest kept and how many are kept.",

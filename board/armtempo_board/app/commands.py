@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from armtempo_board.app.controller import Controller
     from armtempo_board.link.serial_link import SerialLink
 
-_WHILE_MOVING = ("hello", "status", "stop", "samples")
+_WHILE_MOVING = ("hello", "status", "stop", "output", "inputs", "samples")
 _BYTES_PER_POSITION = const(4)
 _BYTES_OF_INDEX = const(4)  # of a sample
 _ANSWER_AT = const(6)  # in a reply: its payload begins with the command's number
@@ -93,6 +93,8 @@ class Commands:
         self.controller.refill()
         handler = row[_HANDLER]
         size = self._store(handler, row, length) if isinstance(handler, str) else handler(row, length)
+        if size is not None and size < 0:
+            return self._refuse(number, -size)
         if self.controller.arm_waits:
             self.controller.take_new_arm()
         self.controller.refill()
@@ -219,6 +221,29 @@ class Commands:
             raise Refused(codes.NOT_MOVING)
         self.controller.stop(self._link.reader.data[PAYLOAD_AT])
         return 0
+
+    def _output(self, row: tuple, length: int) -> int:
+        """Minus the code of a refusal, which allocates nothing; else 0."""
+        data = self._link.reader.data
+        outputs = self.controller.outputs
+        number = data[PAYLOAD_AT]
+        if not outputs or number >= len(outputs.values):
+            return -codes.NO_OUTPUT
+        if self.controller.fault():
+            return -codes.FAULT_PENDING
+        outputs.set(number, data[PAYLOAD_AT + 1] | data[PAYLOAD_AT + 2] << 8)
+        return 0
+
+    def _inputs(self, row: tuple, length: int) -> int:
+        reply = self._link.reply
+        inputs = self.controller.inputs
+        reply[_ANSWER_AT] = inputs.levels if inputs else 0
+        size = 1
+        if self.controller.outputs:
+            for value in self.controller.outputs.values:
+                pack_into("<H", reply, _ANSWER_AT + size, value)
+                size += 2
+        return size
 
     def _clear(self, row: tuple, length: int) -> None:
         self.controller.clear()
