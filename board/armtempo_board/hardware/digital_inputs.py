@@ -13,7 +13,7 @@ class DigitalInputs:
         self._pins = [_input(row) for row in rows]
         self._active = bytes([row["active_high"] for row in rows])
         self._debounce_ms = array("H", [row["debounce_ms"] for row in rows])
-        self._changed_ms = array("I", [time.ticks_ms() for _ in rows])
+        self._changed_ms = array("I", [0] * len(rows))
         self.levels = 0
         for number in range(len(rows)):
             self.levels |= self._is_active(number) << number

@@ -72,7 +72,7 @@ _USB = {
     "PA12": "USB (data)",
 }
 _ALWAYS = {**_USB, "PA13": "the debugger", "PA14": "the debugger", "PB2": "the boot mode (BOOT1)"}
-_CARD = {pin: "the SD card" for pin in ("PC8", "PC9", "PC10", "PC11", "PC12", "PD2")}
+_CARD = dict.fromkeys(("PC8", "PC9", "PC10", "PC11", "PC12", "PD2"), "the SD card")
 _CLOCK = {"PC14": "the clock crystal", "PC15": "the clock crystal"}
 
 
@@ -126,7 +126,7 @@ BOARDS: dict[str, BoardPins] = {
                 **_ALWAYS,
                 **_CARD,
                 **_CLOCK,
-                **{pin: "the flash chip" for pin in ("PA5", "PA6", "PA7", "PC4")},
+                **dict.fromkeys(("PA5", "PA6", "PA7", "PC4"), "the flash chip"),
             },
         ),
     )

@@ -34,7 +34,7 @@ def taken_pins(arm: Arm) -> dict[str, str]:
     """Pins (``"PE12"``) that the program takes for this arm, and what for."""
     pins = table()
     found = {pins["ENABLE"]: "ENABLE of the drivers", pins["BUTTON"]: "the button"}
-    found.update({pin: "a LED of the board" for pin in pins["LEDS"]})
+    found.update(dict.fromkeys(pins["LEDS"], "a LED of the board"))
     if arm.safety.estop_fitted:
         found[pins["ESTOP"]] = "the E-stop"
     for joint in arm.joints:
