@@ -31,6 +31,8 @@ _NOT_ALWAYS = (
     "table",
     "program_hash",
     "basis",
+    "outputs",
+    "digital_inputs",
 )
 
 

@@ -2,13 +2,21 @@
 
 The host makes it from the arm file; the board keeps it in its flash. A motion record names its arm by this
 record's crc32.
-Little endian: the header, then one entry a joint, then the crc32 over all before it.
+Little endian: the header, then one entry a joint, then the crc32 over all before it. An arm with outputs or inputs has
+another version, and behind its joints the number of outputs and of inputs (a byte each), then an entry for each.
 """
 
 import struct
 from binascii import crc32
 
-from armtempo_shared.limits import MAX_JOINTS
+from armtempo_shared.limits import MAX_INPUTS, MAX_JOINTS, MAX_OUTPUTS
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    Rows = Sequence[dict[str, int]]
+    Fields = Sequence[tuple[str, str]]
 
 MAGIC = b"ATA1"
 NONE = 255
@@ -45,11 +53,37 @@ JOINT = (
     ("limit_active_high", "B"),
     ("spare", "B"),
 )
+OUTPUT = (
+    ("pin", "B"),  # 16 * port + number in it; port A is 0
+    ("timer", "B"),  # 0: on and off, without a timer
+    ("channel", "B"),  # of the timer, 1 to 4
+    ("spare", "B"),
+    ("prescaler", "H"),
+    ("period", "H"),  # value of the period register
+    ("low", "H"),  # pulse width in counts of the timer, or level of the pin, at value 0,
+    ("high", "H"),  # and at value 65535
+    ("safe", "H"),  # value that it takes when the arm is taken, at a fault, and when the program ends
+)
+INPUT = (
+    ("pin", "B"),
+    ("active_high", "B"),
+    ("debounce_ms", "H"),
+)
+
+
+def _layout(fields: "Fields") -> str:
+    return "<" + "".join([kind for _, kind in fields])
+
+
 _HEAD_FORMAT = "<4sBB" + "".join(kind for _, kind in HEAD)
-_JOINT_FORMAT = "<" + "".join(kind for _, kind in JOINT)
 _HEAD_SIZE = struct.calcsize(_HEAD_FORMAT)
-_JOINT_SIZE = struct.calcsize(_JOINT_FORMAT)
+_JOINT_SIZE = struct.calcsize(_layout(JOINT))
+_OUTPUT_SIZE = struct.calcsize(_layout(OUTPUT))
+_INPUT_SIZE = struct.calcsize(_layout(INPUT))
 VERSION = 2
+VERSION_WITH_OUTPUTS = 3
+"""Of a record that has outputs or inputs."""
+_VERSION_AT, _JOINTS_AT = 4, 5
 _LIMITS = ("min_steps", "max_steps", "max_rate", "following_counts", "link_timeout_ms")
 """Fields that may change without any doubt about where the joints are; beside them FLAG_STOP_ON_LINK_LOSS."""
 
@@ -58,12 +92,25 @@ class ArmRecordError(ValueError):
     """The record is damaged or of another version."""
 
 
-def pack(head: "dict[str, int]", joints: "list[dict[str, int]]") -> bytes:
-    """An arm record from a dict of the HEAD fields and a list of dicts of the JOINT fields."""
-    data = struct.pack(_HEAD_FORMAT, MAGIC, VERSION, len(joints), *[head[name] for name, _ in HEAD])
-    for joint in joints:
-        data += struct.pack(_JOINT_FORMAT, *[joint[name] for name, _ in JOINT])
+def pack(
+    head: "dict[str, int]",
+    joints: "list[dict[str, int]]",
+    outputs: "Rows" = (),
+    inputs: "Rows" = (),
+) -> bytes:
+    """An arm record from a dict of the HEAD fields and dicts of the JOINT, OUTPUT and INPUT fields."""
+    version = VERSION_WITH_OUTPUTS if outputs or inputs else VERSION
+    data = struct.pack(_HEAD_FORMAT, MAGIC, version, len(joints), *[head[name] for name, _ in HEAD])
+    data += _packed(joints, JOINT)
+    if version != VERSION:
+        data += bytes((len(outputs), len(inputs)))
+        data += _packed(outputs, OUTPUT) + _packed(inputs, INPUT)
     return data + struct.pack("<I", crc32(data))
+
+
+def _packed(rows: "Rows", fields: "Fields") -> bytes:
+    layout = _layout(fields)
+    return b"".join([struct.pack(layout, *[row[name] for name, _ in fields]) for row in rows])
 
 
 def without_limits(head: "dict[str, int]", joints: "list[dict[str, int]]") -> int:
@@ -86,16 +133,39 @@ def unpack(data: bytes) -> "tuple[dict[str, int], list[dict[str, int]], int]":
         raise ArmRecordError("too short")
     values = struct.unpack_from(_HEAD_FORMAT, data, 0)
     count = values[2]
-    if values[0] != MAGIC or values[1] != VERSION or not 1 <= count <= MAX_JOINTS:
+    if values[0] != MAGIC or values[1] not in (VERSION, VERSION_WITH_OUTPUTS) or not 1 <= count <= MAX_JOINTS:
         raise ArmRecordError("not an arm record of this version")
-    if len(data) != _HEAD_SIZE + count * _JOINT_SIZE + 4:
+    if len(data) != _size(data, count):
         raise ArmRecordError("length does not fit the header")
     crc = struct.unpack_from("<I", data, len(data) - 4)[0]
     if crc32(memoryview(data)[:-4]) != crc:
         raise ArmRecordError("checksum")
     head = dict(zip([name for name, _ in HEAD], values[3:]))
-    joints = []
-    for index in range(count):
-        values = struct.unpack_from(_JOINT_FORMAT, data, _HEAD_SIZE + index * _JOINT_SIZE)
-        joints.append(dict(zip([name for name, _ in JOINT], values)))
-    return head, joints, crc
+    return head, _rows(data, _HEAD_SIZE, count, JOINT), crc
+
+
+def unpack_outputs(data: bytes) -> "tuple[list[dict[str, int]], list[dict[str, int]]]":
+    """Dicts of the outputs and of the inputs of an arm record that ``unpack`` takes."""
+    at = _HEAD_SIZE + data[_JOINTS_AT] * _JOINT_SIZE
+    if data[_VERSION_AT] == VERSION:
+        return [], []
+    inputs_at = at + 2 + data[at] * _OUTPUT_SIZE
+    return _rows(data, at + 2, data[at], OUTPUT), _rows(data, inputs_at, data[at + 1], INPUT)
+
+
+def _size(data: bytes, joints: int) -> int:
+    """Bytes of a whole record that begins so; 0 where it cannot be one."""
+    size = _HEAD_SIZE + joints * _JOINT_SIZE + 4
+    if data[_VERSION_AT] == VERSION:
+        return size
+    if len(data) < size + 2 or data[size - 4] > MAX_OUTPUTS or data[size - 3] > MAX_INPUTS:
+        return 0
+    outputs, inputs = data[size - 4], data[size - 3]
+    return size + 2 + outputs * _OUTPUT_SIZE + inputs * _INPUT_SIZE
+
+
+def _rows(data: bytes, at: int, count: int, fields: "Fields") -> "list[dict[str, int]]":
+    layout = _layout(fields)
+    size = struct.calcsize(layout)
+    names = [name for name, _ in fields]
+    return [dict(zip(names, struct.unpack_from(layout, data, at + row * size))) for row in range(count)]

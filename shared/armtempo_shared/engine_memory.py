@@ -17,6 +17,8 @@ The queue of steps, the solver, the law of time; pieces of angle and of time, th
 """
 GENERATOR_WORDS = sum(GENERATOR_PARTS)
 _BLOCK_WORDS = 1026  # for a ring of 1024 entries, or two of 512
+_SPARE_BYTES = 2048
+"""Heap that is kept for other work and that an arm's outputs and inputs may take."""
 LARGEST_WORDS = 6 * GENERATOR_WORDS + 5 * 513 + 257
 """For any arm whose joints' highest step rates sum up to 240 000 steps/s."""
 
@@ -42,6 +44,17 @@ def words(rates: "list[int]") -> int:
 def object_bytes(joints: int) -> int:
     """Bytes of heap that the engine's objects take besides: measured, see board/docs/memory.md."""
     return 1760 + 1184 * joints
+
+
+def output_bytes(outputs: int, inputs: int) -> int:
+    """Bytes of heap that outputs and inputs take besides, with their code: measured, see board/docs/memory.md."""
+    found = 1400 + 120 * outputs if outputs else 0
+    return found + (900 + 80 * inputs if inputs else 0)
+
+
+def objects_fit(joints: int, beside: int, most_joints: int) -> bool:
+    """Whether the objects of an engine, and so many bytes beside them, fit where those for the most joints do."""
+    return not beside or object_bytes(joints) + beside <= object_bytes(most_joints) + _SPARE_BYTES
 
 
 def blocks(room_words: int) -> "list[int]":

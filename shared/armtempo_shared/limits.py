@@ -26,6 +26,10 @@ MOST_SPAN_STEPS = 1 << 24
 
 MAX_JOINTS = 6
 MAX_ENCODERS = 4
+MAX_OUTPUTS = 8
+MAX_INPUTS = 8
+FULL_OUTPUT = 65535
+"""Value of an output at the upper end of its range; 0 is the lower end."""
 MAX_SEGMENTS = 512
 """Most time-axis segments in one motion record."""
 

@@ -77,6 +77,16 @@ _ROWS = (
         "the motion has no time in which its speed may change: it is of an older armtempo",
         "upload it again; it can be run slower from its start",
     ),
+    (
+        "no_output",
+        "the arm on the board has no output of this number",
+        "name the arm's file with --arm, or set the board up for it: 'armtempo configure'",
+    ),
+    (
+        "pin_taken",
+        "an output or input of the arm has a pin or timer that the engine takes",
+        "'armtempo check' says which pin; give another one (board/docs/hardware.md)",
+    ),
     ("is_sequence", "this is a sequence, not a motion", "run it with 'armtempo run' and its name"),
     (
         "leg_missing",
@@ -145,6 +155,8 @@ VALUES: "dict[str, str]" = {
     "too_long": "bytes of the record (at `put_begin`: that it takes); of a joint: its largest number",
     "too_abrupt": "steps/s²",
     "no_room": "bytes needed",
+    "no_output": "outputs that the arm has",
+    "pin_taken": "16 times the port (A is 0) and the number in it",
     "leg_missing": "number of the motion in the sequence, from 1",
     "leg_elsewhere": "number of the step in the sequence",
     "no_such_pin": "number of the step in the sequence",
@@ -191,6 +203,10 @@ COMMANDS: "dict[str, str]" = {
     "path; 0: pause, 65535: as before the pause. Refused with `fixed_speed`, or with `too_long` where the run would "
     "last longer than 1 h 49 min. While nothing moves: the rate of this session's next start.",
     "clear": "Clears the fault; refused with `fault_pending` while its cause is still there.",
+    "output": "Sets output `number` of the arm record (from 0) to `value`: 0 to 65535 are its whole range. Also while "
+    "a motion runs. Refused with `fault_pending` while it has to be in its safe state.",
+    "inputs": "Answer: `levels` has a bit for each input of the arm record, set where it is active; the tail has "
+    "an u16 for each output, the value that it has.",
     "leave": "Ends the program; the port becomes MicroPython's prompt.",
     "samples": "All samples before `acknowledged` have arrived and may go; those from there on, `wanted` of "
     "them, are to be sent again. Answer: the oldest kept and how many are kept.",

@@ -28,6 +28,8 @@ C stop 22 now:B
 C clear 23
 C speed 25 rate:H
 C leave 24
+C output 26 number:B value:H
+C inputs 27
 C samples 30 acknowledged:I wanted:H
 A hello 01 protocol:B joints:B encoders:B state:B tick_hz:I max_rate:I max_rate_sum:I free_flash:I
  free_heap:I arm_crc:I program_crc:I boot:I engine_room:I engine_joints:B arm_problem:B arm_value:I text
@@ -48,6 +50,8 @@ A stop 22
 A clear 23
 A speed 25
 A leave 24
+A output 26
+A inputs 27 levels:B bytes
 A samples 30 first:I count:H
 E sample 40 run:I index:I ticks:Q path:Q flags:B bytes
 E done 41 run:I ticks:Q path:Q samples:I lost:I bytes

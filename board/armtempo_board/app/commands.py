@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from armtempo_board.app.controller import Controller
     from armtempo_board.link.serial_link import SerialLink
 
-_WHILE_MOVING = ("hello", "status", "stop", "speed", "samples", "sequence")
+_WHILE_MOVING = ("hello", "status", "stop", "speed", "output", "inputs", "samples", "sequence")
 _BYTES_PER_POSITION = const(4)
 _BYTES_OF_INDEX = const(4)  # of a sample
 _ANSWER_AT = const(6)  # in a reply: its payload begins with the command's number
@@ -102,6 +102,8 @@ class Commands:
         self.controller.refill()
         handler = row[_HANDLER]
         size = self._store(handler, row, length) if isinstance(handler, str) else handler(row, length)
+        if size is not None and size < 0:
+            return self._refuse(number, -size)
         if self.controller.arm_waits:
             self.controller.take_new_arm()
         self.controller.refill()
@@ -240,6 +242,29 @@ class Commands:
         if not (rate in (0, RESUME) or SLOWEST_PERMILLE <= rate <= PERMILLE):
             raise Refused(codes.MALFORMED)
         self.controller.change_speed(rate)
+
+    def _output(self, row: tuple, length: int) -> int:
+        """Minus the code of a refusal, which allocates nothing; else 0."""
+        data = self.link.reader.data
+        outputs = self.controller.outputs
+        number = data[PAYLOAD_AT]
+        if not outputs or number >= len(outputs.values):
+            return -codes.NO_OUTPUT
+        if self.controller.fault():
+            return -codes.FAULT_PENDING
+        outputs.set(number, data[PAYLOAD_AT + 1] | data[PAYLOAD_AT + 2] << 8)
+        return 0
+
+    def _inputs(self, row: tuple, length: int) -> int:
+        reply = self.link.reply
+        inputs = self.controller.inputs
+        reply[_ANSWER_AT] = inputs.levels if inputs else 0
+        size = 1
+        if self.controller.outputs:
+            for value in self.controller.outputs.values:
+                pack_into("<H", reply, _ANSWER_AT + size, value)
+                size += 2
+        return size
 
     def _clear(self, row: tuple, length: int) -> None:
         self.controller.clear()

@@ -11,6 +11,7 @@ shared/docs/protocol.md.
 import gc
 import os
 import sys
+import time
 from array import array
 
 import machine
@@ -54,6 +55,8 @@ class Controller:
         self._root = root
         self._store: "Any" = None
         self.engine: "Any" = None
+        self.outputs: "Any" = None  # of an arm that has any
+        self.inputs: "Any" = None
         self.program_crc = program_crc
         self.board_id = _board_id()
         self.boot = int.from_bytes(os.urandom(_BOOT_BYTES), "little")  # another number after each power-up
@@ -78,8 +81,6 @@ class Controller:
         self._can_brake = False  # the motion can come to rest along its path
         self._next_rate = _PERMILLE  # of the next run that a host starts
         self._by_host = False  # the run was started by a command
-        self.outputs: "Any" = None  # of the arm; None: it has none
-        self.inputs: "Any" = None
         self.sequence: "Any" = None  # the one under way
         self.told: "Any" = None  # how the last one stands or ended, and its name
         self._assumed = 0  # joints whose position a homing motion took for granted
@@ -90,6 +91,10 @@ class Controller:
         """Keep steps and samples coming; notice the end of a run, or that the host was silent for too long."""
         self.engine.service()
         self._collect()
+        if self.outputs and self.fault():
+            self.outputs.safe()
+        if self.inputs:
+            self.inputs.poll(time.ticks_ms())
         if self._running:
             if not self.engine.moving:
                 self._end()
@@ -120,14 +125,18 @@ class Controller:
     def fail(self) -> None:
         """The program has failed: freeze, and INTERNAL is the pending fault."""
         self._fault = codes.INTERNAL
+        if self.outputs:
+            self.outputs.safe()
         if self.engine:
             self.engine.freeze()
             self._withdraw_assumed()
 
     def halt(self) -> None:
-        """Freeze what still moves; the position stays known."""
+        """Freeze what still moves, outputs to their safe values; the position stays known."""
         if self.sequence:
             self.sequence.stopping = True
+        if self.outputs:
+            self.outputs.safe()
         if self.engine and self.engine.moving:
             self.engine.freeze()
 
@@ -157,7 +166,8 @@ class Controller:
         self.arm_waits = False
         self.arm_problem = self.arm_value = 0
         try:
-            self._take_arm(self._stored_arm())
+            data = self._stored_bytes()
+            self._take_arm(self._judged(data), data)
         except Refused as refused:
             if refused.code != codes.NOT_FOUND:
                 self.arm_problem, self.arm_value = refused.code, refused.value
@@ -182,7 +192,7 @@ class Controller:
         self._decide(True)
         self.arm_problem = self.arm_value = 0
         try:
-            self._take_arm(record)
+            self._take_arm(record, data)
         except Exception:
             self._drop_engine()
             raise
@@ -202,9 +212,6 @@ class Controller:
         store.Store(self._root, recover=False).take_arm(is_fit)
         heap.forget()
 
-    def _stored_arm(self) -> "ArmRecord":
-        return self._judged(self._stored_bytes())
-
     def _stored_bytes(self) -> bytes:
         try:
             return bytes(self.store().read(ARM_RECORD_NAME))
@@ -218,7 +225,7 @@ class Controller:
 
         return arm_check.checked(data, self._workspace.memory.size, self._workspace.joints)
 
-    def _take_arm(self, record: "ArmRecord") -> None:
+    def _take_arm(self, record: "ArmRecord", data: bytes) -> None:
         from armtempo_shared import armrecord  # here, so that it can be forgotten
 
         head, joints, crc = record
@@ -239,12 +246,25 @@ class Controller:
         self.arm_crc = crc
         self._raw = array("i", [0] * (COMMANDED + 2 * self.joints))
         self.samples.configure(self.joints)
+        self._take_outputs(*armrecord.unpack_outputs(data))
+
+    def _take_outputs(self, outputs: "list[dict[str, int]]", inputs: "list[dict[str, int]]") -> None:
+        if outputs:
+            from armtempo_board.hardware.outputs import Outputs  # here, as few arms have any
+
+            self.outputs = Outputs(outputs)
+        if inputs:
+            from armtempo_board.hardware.digital_inputs import DigitalInputs
+
+            self.inputs = DigitalInputs(inputs)
 
     def _drop_engine(self) -> None:
         """Before another takes its place: the heap is to be as it was without one."""
         if self.engine:
             self.engine.close()
-        self.engine = None
+        if self.outputs:
+            self.outputs.close()
+        self.engine = self.outputs = self.inputs = None
         self.joints = self.arm_crc = 0
         self.samples.configure(0)
         self._raw = array("i", [0] * COMMANDED)

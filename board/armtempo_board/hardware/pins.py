@@ -31,6 +31,11 @@ BUTTON = "A0"  # not together with the STEP of channel 6
 LEDS = ("D12", "D13", "D14", "D15")  # green, orange, red, blue
 
 
+def name(number: int) -> str:
+    """The name of a pin by the number that the arm record has for it: 16 times its port, and the number in it."""
+    return "ABCDE"[number >> 4] + str(number & 15) if number >> 4 < 5 else ""
+
+
 def port(pin: str) -> str:
     """The letter of a pin's port."""
     return pin[:_LETTER]

@@ -10,13 +10,15 @@ from armtempo_board.hardware import pins
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     Record = tuple[dict[str, int], list[dict[str, int]], int]
+    Rows = list[dict[str, int]]
 
 
 def checked(data: bytes, room_words: int, most_joints: int) -> "Record":
     """(head, joints, crc32) of an arm record, as ``armrecord.unpack`` gives them.
 
     ``room_words``, ``most_joints``: what an engine can have. Refused: BAD_RECORD where it is damaged, of another
-    version, or names what the board has not; NO_ROOM with the bytes needed.
+    version, or names what the board has not; PIN_TAKEN where an output or input has what the engine takes; NO_ROOM
+    with the bytes needed.
     """
     try:
         head, joints, crc = armrecord.unpack(data)
@@ -27,9 +29,16 @@ def checked(data: bytes, room_words: int, most_joints: int) -> "Record":
     for number, row in enumerate(joints):
         if not _is_fit(row) or row["channel"] in [other["channel"] for other in joints[:number]]:
             raise Refused(codes.BAD_RECORD, number)
+    outputs, inputs = armrecord.unpack_outputs(data)
+    _check_pins(head, joints, outputs, inputs)
     rates = [row["max_rate"] for row in joints]
-    if len(rates) > most_joints or not engine_memory.fits(rates, room_words):
-        raise Refused(codes.NO_ROOM, NO_JOINT, 4 * engine_memory.words(rates))
+    beside = engine_memory.output_bytes(len(outputs), len(inputs))
+    if (
+        len(rates) > most_joints
+        or not engine_memory.fits(rates, room_words)
+        or not engine_memory.objects_fit(len(rates), beside, most_joints)
+    ):
+        raise Refused(codes.NO_ROOM, NO_JOINT, 4 * engine_memory.words(rates) + beside)
     return head, joints, crc
 
 
@@ -44,3 +53,27 @@ def _is_fit(row: "dict[str, int]") -> bool:
         if row[name] >= count and row[name] != armrecord.NONE:
             return False
     return True
+
+
+def _check_pins(head: "dict[str, int]", joints: "Rows", outputs: "Rows", inputs: "Rows") -> None:
+    """Pins and timers of outputs and inputs: each once, and none that the engine takes."""
+    if not outputs and not inputs:
+        return
+    timers = [2, 5, 6]  # the counters of STEP, and what fills their rings
+    taken = [pins.ENABLE, pins.BUTTON] + list(pins.LEDS)
+    if head["flags"] & armrecord.FLAG_ESTOP_FITTED:
+        taken.append(pins.ESTOP)
+    for row in joints:
+        taken += [pins.STEP[row["channel"]][0], pins.DIR[row["channel"]]]
+        taken += [
+            pins.LIMIT[row[side]] for side in ("limit_low", "limit_high") if row[side] != armrecord.NONE
+        ]
+        if row["encoder"] != armrecord.NONE:
+            timer, first, second, _ = pins.ENCODER[row["encoder"]]
+            taken += [first, second]
+            timers.append(timer)
+    for row in outputs + inputs:
+        name = pins.name(row["pin"])
+        if name in taken or row.get("timer") in timers:
+            raise Refused(codes.PIN_TAKEN, NO_JOINT, row["pin"])
+        taken.append(name)

@@ -28,6 +28,8 @@ GROUPS = {
         "speed",
         "pause",
         "resume",
+        "output",
+        "input",
         "stop",
         "clear",
         "status",

@@ -160,6 +160,18 @@ class Table:
             raise self.fail(key, "a table")
         return Table(value, self.file, f"{self.place}{key}.")
 
+    def named_tables(self, key: str) -> list[tuple[str, Table]]:
+        """The tables [key.NAME] with their names, in the order of the file; none where the key is not given."""
+        outer = self.table(key)
+        if outer is None:
+            return []
+        found = []
+        for name in outer.rest():
+            table = outer.table(name)
+            if table is not None:
+                found.append((name, table))
+        return found
+
     def tables(self, key: str) -> list[Table]:
         """A list of tables ([[key]]), at least one."""
         entries = self.array(key, f"a list of tables, [[{key}]]")

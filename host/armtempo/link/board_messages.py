@@ -82,6 +82,20 @@ class Status:
 
 
 @dataclass(frozen=True)
+class Levels:
+    """The board's answer to ``inputs``."""
+
+    inputs: int
+    """Bit an input of the arm record: it is active."""
+    outputs: tuple[int, ...]
+    """The value of each output, 0 to 65535."""
+
+    def active(self, number: int) -> bool:
+        """Whether an input (from 0) is active."""
+        return bool(self.inputs >> number & 1)
+
+
+@dataclass(frozen=True)
 class StoredMotion:
     """One stored motion; ``crc``, ``duration_ticks`` and ``joints`` are 0 where it is damaged."""
 
@@ -156,6 +170,13 @@ def positions(tail: bytes) -> Positions:
         raise wire.WireError("length")
     values = struct.unpack(f"<{len(tail) // 4}i", tail)
     return Positions(values[0::2], values[1::2])
+
+
+def levels(inputs: int, tail: bytes) -> Levels:
+    """The answer to ``inputs``; WireError where the tail does not fit."""
+    if len(tail) % 2:
+        raise wire.WireError("length")
+    return Levels(inputs, struct.unpack(f"<{len(tail) // 2}H", tail))
 
 
 def event(number: int, payload: bytes) -> Event:

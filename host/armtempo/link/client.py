@@ -223,6 +223,15 @@ class Client:
         """Clear a fault."""
         self.session.command("clear")
 
+    def set_output(self, number: int, value: int) -> None:
+        """Set an output of the arm record (from 0) to a value of 0 to 65535, also while something moves."""
+        self.session.command("output", (number, value))
+
+    def levels(self) -> board_messages.Levels:
+        """What the inputs of the arm record are now, debounced, and what its outputs are set to."""
+        (inputs,), tail = self.session.command("inputs")
+        return board_messages.levels(inputs, tail)
+
     def leave(self) -> None:
         """End the board program; the port becomes MicroPython's REPL."""
         self.session.command("leave")

@@ -9,6 +9,9 @@ from pathlib import Path
 
 from armtempo.errors import InputError
 from armtempo.formats import json_codec
+from armtempo.formats.spelling import did_you_mean
+from armtempo.model import boards
+from armtempo.model.outputs import Input, Output
 
 
 @dataclass(frozen=True)
@@ -183,6 +186,11 @@ class Arm:
     driver: Driver = field(default_factory=Driver)
     safety: Safety = field(default_factory=Safety)
     source: str = ""
+    board: str = field(default=boards.DEFAULT, metadata=json_codec.ADDED)
+    """Name in ``boards.BOARDS``."""
+    outputs: tuple[Output, ...] = field(default=(), metadata=json_codec.ADDED)
+    """In the order of the file, which is also the board's."""
+    inputs: tuple[Input, ...] = field(default=(), metadata=json_codec.ADDED)
 
     @classmethod
     def load(cls, path: Path | str) -> Arm:
@@ -213,6 +221,20 @@ class Arm:
     def driven_indices(self) -> tuple[int, ...]:
         """Where the joints with a motor stand among all joints, from 0."""
         return tuple(index for index, joint in enumerate(self.joints) if joint.motor is not None)
+
+    def output(self, name: str) -> int:
+        """The number of an output, from 0; InputError where the arm has none of this name."""
+        return self._number("output", name, [output.name for output in self.outputs])
+
+    def input(self, name: str) -> int:
+        """The number of an input, from 0; InputError where the arm has none of this name."""
+        return self._number("input", name, [entry.name for entry in self.inputs])
+
+    def _number(self, what: str, name: str, names: list[str]) -> int:
+        if name in names:
+            return names.index(name)
+        there = f"it has {', '.join(names)}" if names else f"write a table [{what}.{name}] in its file"
+        raise InputError(f"arm {self.name!r} has no {what} {name!r}{did_you_mean(name, names)}", there)
 
     @property
     def all_home_deg(self) -> tuple[float, ...]:

@@ -11,6 +11,7 @@ from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS
 from armtempo.errors import InputError
 from armtempo.formats import toml_table
 from armtempo.formats.toml_table import Table
+from armtempo.model import boards, outputs_file, pin_use
 from armtempo.model.arm import (
     Arm,
     Driver,
@@ -58,11 +59,13 @@ def load(path: Path | str) -> Arm:
     """
     arm = read(path)
     _check_channels(arm, path)
+    for problem in pin_use.problems(arm):
+        raise InputError(f"{path}: {problem.where}: {problem.what}", problem.next_step)
     return arm
 
 
 def read(path: Path | str) -> Arm:
-    """The arm as its file stands, even if no joint has a motor yet or two have the same channel.
+    """The arm as its file stands, even if no joint has a motor yet or two have the same channel or pin.
 
     Raises InputError as ``load`` does for all else.
     """
@@ -76,8 +79,10 @@ def of_table(top: Table) -> Arm:
     safety = _safety(top.table("safety"))
     tables = top.tables("joint")
     joints = tuple(_joint(table, number) for number, table in enumerate(tables, 1))
+    board = top.choice("board", tuple(boards.BOARDS), boards.DEFAULT)
+    outputs, inputs = outputs_file.outputs(top), outputs_file.inputs(top)
     top.done()
-    return Arm(name, joints, driver, safety, top.file)
+    return Arm(name, joints, driver, safety, top.file, board, outputs, inputs)
 
 
 def _driver(table: Table | None) -> Driver:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from armtempo.errors import InputError
 from armtempo.model.arm import Arm, DrivenJoint
 from armtempo.planning import checks
+from armtempo.records import output_rows
 from armtempo.splines.trajectory import Trajectory
 
 _NOT_IDENTITY = ("name", "range_deg", "home_deg", "limits", "model")
@@ -27,7 +28,8 @@ def arm_record(arm: Arm) -> bytes:
 
     Raises InputError where a figure does not fit the board.
     """
-    return armrecord.pack(_head(arm), [_joint(joint) for joint in arm.driven])
+    joints = [_joint(joint) for joint in arm.driven]
+    return armrecord.pack(_head(arm), joints, output_rows.outputs(arm), output_rows.inputs(arm))
 
 
 def step_rates(arm: Arm) -> list[int]:

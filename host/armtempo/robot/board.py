@@ -24,6 +24,7 @@ from armtempo.records import encoded_motion
 from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.robot import arm_state, board_state, goto, homing, recording, stored_motion
 from armtempo.robot.board_state import BoardState
+from armtempo.robot.outputs import BoardInput, BoardOutput
 from armtempo.robot.recording import Watcher
 from armtempo.robot.run import Run
 from armtempo.robot.speed import change_speed, permille
@@ -161,6 +162,16 @@ class Board:
         """Where the joints are by the steps commanded, degrees (J,); LinkError where that is unknown."""
         return arm_state.posture_deg(self.client, self._known_arm())
 
+    # outputs and inputs
+
+    def output(self, name: str) -> BoardOutput:
+        """An output of the arm by its name; InputError where the arm has none of this name or is not known."""
+        return BoardOutput(self.client, self._configured_arm(), name)
+
+    def input(self, name: str) -> BoardInput:
+        """An input of the arm by its name; raises as ``output``."""
+        return BoardInput(self.client, self._configured_arm(), name)
+
     # moving
 
     def goto(self, where: Where, progress: Progress | None = None, stop: StopRequest | None = None) -> None:
@@ -261,6 +272,11 @@ class Board:
         if self.arm is None:
             raise InputError("no arm is known to move", "say which with home(arm) or configure(arm)")
         return self.arm
+
+    def _configured_arm(self) -> Arm:
+        arm = self._known_arm()
+        self.configure(arm)
+        return arm
 
     def _posture(self, where: Where) -> Array:
         if isinstance(where, Plan):

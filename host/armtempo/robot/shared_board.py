@@ -11,6 +11,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from armtempo.errors import LinkError
+from armtempo.link.board_messages import Levels
 from armtempo.ports import names
 from armtempo.robot.board_state import BoardState
 from armtempo.share import claim
@@ -49,6 +50,15 @@ class SharedBoard:
     def speed(self, rate: int) -> None:
         """Let what moves go on at ``rate`` thousandths of its planned speed; 0: pause, RESUME: as before it."""
         self._caller.ask("speed", ANSWER_S, rate=rate)
+
+    def set_output(self, number: int, value: int) -> None:
+        """Set an output of the arm record (from 0) to a value of 0 to 65535."""
+        self._caller.ask("output", ANSWER_S, number=number, value=value)
+
+    def levels(self) -> Levels:
+        """What the inputs of the arm record are now, and what its outputs are set to."""
+        found = self._caller.ask("inputs", ANSWER_S)
+        return Levels(found["inputs"], tuple(found["outputs"]))
 
     def wait_for_rest(self) -> BoardState:
         """The state in which the board comes to rest; LinkError where it does not within REST_S."""

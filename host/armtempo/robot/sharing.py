@@ -6,14 +6,15 @@ and a stop goes first.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from threading import Event as Flag
 from threading import Thread
 from typing import Any
 
-from armtempo_shared.limits import TICK_HZ
+from armtempo_shared.limits import FULL_OUTPUT, TICK_HZ
 
-from armtempo.errors import ArmtempoError, NoAnswerError
+from armtempo.errors import ArmtempoError, LinkError, NoAnswerError
 from armtempo.link import Client
 from armtempo.link.board_messages import Done, Event, Fault, Sample
 from armtempo.link.traffic import Chunk
@@ -61,7 +62,13 @@ class Sharing:
             return
         session = self._client.session
         device = session.transport.name if names.is_sim(port) else port
-        handlers = {"status": self._status, "stop": self._stop, "speed": self._speed}
+        handlers = {
+            "status": self._status,
+            "stop": self._stop,
+            "speed": self._speed,
+            "output": self._output,
+            "inputs": self._inputs,
+        }
         self._server = Server(claim.new(name, port, device), handlers)
         session.check = self._server.check
         session.heard = self._heard
@@ -101,19 +108,35 @@ class Sharing:
 
     def _speed(self, request: Message) -> Message:
         rate = int(request["rate"])
-        with self._client.session.in_a_hurry(TURN_S) as mine:
-            if not mine:
-                raise NoAnswerError("the program that has the port waits for the board's answer", "try again")
+        with self._turn():
             change_speed(self._client, rate)
         if self._server is not None:
             self._server.publish("event", {"event": "speed", "rate": rate})
         return {}
 
+    def _output(self, request: Message) -> Message:
+        number, value = request.get("number"), request.get("value")
+        if not (isinstance(number, int) and isinstance(value, int)):
+            raise LinkError("output: a number and a value are needed", "run the command again")
+        with self._turn():
+            self._client.set_output(number & 0xFF, min(max(value, 0), FULL_OUTPUT))
+        return {}
+
+    def _inputs(self, request: Message) -> Message:
+        with self._turn():
+            found = self._client.levels()
+        return {"inputs": found.inputs, "outputs": list(found.outputs)}
+
     def _read(self) -> BoardState:
+        with self._turn():
+            return self._state()
+
+    @contextmanager
+    def _turn(self) -> Iterator[None]:
         with self._client.session.in_a_hurry(TURN_S) as mine:
             if not mine:
                 raise NoAnswerError("the program that has the port waits for the board's answer", "try again")
-            return self._state()
+            yield
 
     # what is handed out
 

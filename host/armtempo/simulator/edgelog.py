@@ -6,6 +6,8 @@ The file: ``b"ATE1"``, then records of 16 bytes, little endian, ``<BBBBIq``::
                     the pin toggles at base + each offset
           2 counter timer number, 1 started or 0 stopped, 0, its counter, tick
           3 input   as kind 1, with n = 1: an input pin was changed from outside
+          5 pulses pin, 0, 0, ticks high, tick; then the ticks of a period (I): a timer makes such pulses from
+                    that tick on (its channel is in PWM mode); 0 and 0: it makes none
           4 reset   the board was powered up or reset; ticks count from 0 again
 
 Ticks are of 84 MHz, since the last reset.
@@ -16,6 +18,7 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,12 +26,20 @@ from numpy.typing import NDArray
 from armtempo.errors import RunFolderError
 
 _RECORD = struct.Struct("<BBBBIq")
-_EDGES, _COUNTER, _INPUT, _RESET = 1, 2, 3, 4
+_EDGES, _COUNTER, _INPUT, _RESET, _PULSES = 1, 2, 3, 4, 5
 _PORTS = "ABCDEFGHI"
 _MOTION_TIMER = 2
 
 Edges = tuple[NDArray[np.int64], NDArray[np.int8]]
 """Ticks of a pin's changes, ascending, and the level after each."""
+
+
+class Pulses(NamedTuple):
+    """What pulses a timer makes at a pin from a tick on; all 0 where it makes none."""
+
+    tick: int
+    high_ticks: int
+    period_ticks: int
 
 
 @dataclass
@@ -38,6 +49,8 @@ class PowerCycle:
     pins: dict[str, Edges] = field(default_factory=dict)
     starts: list[int] = field(default_factory=list)
     """Tick of motion time 0 of each motion."""
+    pulses: dict[str, list[Pulses]] = field(default_factory=dict)
+    """Per pin what pulses a timer made there, in the order of time."""
     ends: list[int] = field(default_factory=list)
     """Tick at which the motion clock was stopped, where it was."""
 
@@ -83,6 +96,10 @@ def read(path: Path) -> list[PowerCycle]:
             offsets = np.frombuffer(data, "<u4", count, at)
             at += 4 * count
             cycles[-1].edges(pin, before, base + offsets.astype(np.int64))
+        elif kind == _PULSES:
+            (period,) = struct.unpack_from("<I", data, at)
+            at += 4
+            cycles[-1].pulses(pin, Pulses(base, count, period))
         elif kind == _COUNTER and pin == _MOTION_TIMER:
             cycles[-1].counter(bool(before), count, base)
     return [collector.cycle for collector in cycles]
@@ -101,6 +118,9 @@ class _Collector:
         levels = (np.arange(1, len(ticks) + 1) + before) % 2
         self._levels.setdefault(pin, []).append(levels.astype(np.int8))
 
+    def pulses(self, pin: int, pulses: Pulses) -> None:
+        self._cycle.pulses.setdefault(_name(pin), []).append(pulses)
+
     def counter(self, started: bool, count: int, tick: int) -> None:
         if not started:
             self._cycle.ends.append(tick)
@@ -110,6 +130,9 @@ class _Collector:
     @property
     def cycle(self) -> PowerCycle:
         for pin, pieces in self._ticks.items():
-            name = f"{_PORTS[pin >> 4]}{pin & 15}"
-            self._cycle.pins[name] = (np.concatenate(pieces), np.concatenate(self._levels[pin]))
+            self._cycle.pins[_name(pin)] = (np.concatenate(pieces), np.concatenate(self._levels[pin]))
         return self._cycle
+
+
+def _name(pin: int) -> str:
+    return f"{_PORTS[pin >> 4]}{pin & 15}"

@@ -6,7 +6,7 @@ from array import array
 from virtual_board.chip.flash import real_open
 
 MAGIC = b"ATE1"
-EDGES, COUNTER, INPUT, RESET = 1, 2, 3, 4
+EDGES, COUNTER, INPUT, RESET, PULSES = 1, 2, 3, 4, 5
 RECORD = "<BBBBIq"
 _CHUNK = 8192
 
@@ -23,6 +23,7 @@ class EdgeLog:
         for port in board.pins.ports:
             for line in port.lines:
                 line.sinks.append(self)
+                line.pulse_sinks.append(self)
         board.observers.append(self)
         self._buffer.extend(struct.pack(RECORD, RESET, 0, 0, 0, 0, 0))
 
@@ -36,6 +37,13 @@ class EdgeLog:
             self._buffer.extend(bytes(array("I", times)))
         if len(self._buffer) > _CHUNK:
             self._write()
+
+    def pulses(self, line, pulses, now):
+        """The pulses on a pin changed."""
+        high, period = pulses
+        self._record(PULSES, line, 0, high, now)
+        self._buffer.extend(struct.pack("<I", period))
+        self._write()
 
     def counting(self, timer, now):
         """A timer started or stopped."""

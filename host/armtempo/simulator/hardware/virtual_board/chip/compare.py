@@ -5,11 +5,11 @@ of that interval in one tight loop (``Channel.match``): that loop is the cost of
 """
 
 from virtual_board.chip import memory
-from virtual_board.chip.timer_registers import CCER, CCMR1, CCR1, DIER, NEVER, SR
+from virtual_board.chip.timer_registers import CCER, CCMR1, CCR1, CR1, DIER, NEVER, SR
 
 DMA_DELAY_TICKS = 6
 """A compare value that comes this close behind its predecessor is too late (bus delay)."""
-_FROZEN, _ACTIVE, _INACTIVE, _TOGGLE, _LOW, _HIGH = range(6)
+_FROZEN, _ACTIVE, _INACTIVE, _TOGGLE, _LOW, _HIGH, _PWM, _PWM_INVERTED = range(8)
 
 
 class Channel:
@@ -29,6 +29,7 @@ class Channel:
         self.stream = None
         self.interrupt = False
         self.sink = None
+        self.pulses = None  # in PWM mode: ticks that the output is high, and of the period
 
     def _registers(self):
         """(mode, output enabled, inverted) as the registers have them now."""
@@ -42,8 +43,14 @@ class Channel:
     def sync(self, total, now):
         """The program may have written the channel's registers."""
         self.mode, self.output, self.inverted = self._registers()
-        if self.mode > _HIGH:
-            raise ValueError("TIM%d channel %d: PWM is not simulated" % (self.timer.number, self.number))
+        if self.mode == _PWM_INVERTED:
+            raise ValueError(
+                "TIM%d channel %d: PWM mode 2 is not simulated" % (self.timer.number, self.number)
+            )
+        self._sync_pulses(now)
+        if self.mode == _PWM:
+            self.due = NEVER
+            return
         enabled = memory.words[self.timer.at + DIER] >> self.number
         self.interrupt = bool(enabled & 1)
         dma = (enabled >> 8) & 1
@@ -58,9 +65,23 @@ class Channel:
             self.level = self.mode - _LOW
         self._show(now)
 
+    def _sync_pulses(self, now):
+        """Pulses are not made one by one: what they are is told where it changes."""
+        timer = self.timer
+        pulses = None
+        if self.mode == _PWM and self.output and memory.words[timer.at + CR1] & 1 and timer.clocked:
+            high = min(memory.words[self.ccr_at], timer.modulus)
+            pulses = high * timer.scale // timer.rate, timer.modulus * timer.scale // timer.rate
+        if pulses != self.pulses:
+            self.pulses = pulses
+            for line in timer.board.pins.of_channel(timer.number, self.number):
+                line.pulse(pulses or (0, 0), now)
+
     def plan(self, total):
         """Find the next match of the compare value as it stands."""
         timer = self.timer
+        if self.mode == _PWM:
+            return
         if self.ccr >= timer.modulus:
             self.due = NEVER
             return

@@ -19,7 +19,13 @@ TIMER_PINS = {
     ("A6", 2): (3, 1), ("A7", 2): (3, 2), ("B4", 2): (3, 1), ("B5", 2): (3, 2),
     ("C6", 2): (3, 1), ("C7", 2): (3, 2),
     ("B6", 2): (4, 1), ("B7", 2): (4, 2), ("D12", 2): (4, 1), ("D13", 2): (4, 2),
-    ("C6", 3): (8, 1), ("C7", 3): (8, 2),
+    ("C6", 3): (8, 1), ("C7", 3): (8, 2), ("C8", 3): (8, 3), ("C9", 3): (8, 4),
+    ("E13", 1): (1, 3), ("E14", 1): (1, 4), ("A10", 1): (1, 3),
+    ("B0", 2): (3, 3), ("B1", 2): (3, 4), ("C8", 2): (3, 3), ("C9", 2): (3, 4),
+    ("B8", 2): (4, 3), ("B9", 2): (4, 4), ("D14", 2): (4, 3), ("D15", 2): (4, 4),
+    ("A2", 3): (9, 1), ("A3", 3): (9, 2), ("E5", 3): (9, 1), ("E6", 3): (9, 2),
+    ("B8", 3): (10, 1), ("B9", 3): (11, 1), ("B14", 9): (12, 1), ("B15", 9): (12, 2),
+    ("A6", 9): (13, 1), ("A7", 9): (14, 1),
 }  # fmt: skip
 INPUT, OUTPUT, ALTERNATE, ANALOG = range(4)
 
@@ -34,7 +40,9 @@ class Line:
         self.external = None
         self.driven = False  # by a timer channel
         self.level = 0
+        self.pulses = (0, 0)
         self.sinks = []
+        self.pulse_sinks = []
 
     def mode(self):
         """INPUT, OUTPUT, ALTERNATE or ANALOG."""
@@ -66,6 +74,12 @@ class Line:
         memory.poke(at, memory.words[at] & ~(1 << self.number) | self.level << self.number)
         for sink in self.sinks:
             sink.edges(self, before, count, times, origin)
+
+    def pulse(self, pulses, now):
+        """From now on a timer makes pulses here: ticks high, ticks of the period; (0, 0) where it ended."""
+        self.pulses = pulses
+        for sink in self.pulse_sinks:
+            sink.pulses(self, pulses, now)
 
 
 class GpioPort:
@@ -119,6 +133,11 @@ class Pins:
         if name[0] == "P":
             name = name[1:]
         return self.ports[PORTS.index(name[0])].lines[int(name[1:])]
+
+    def of_channel(self, timer, channel):
+        """The pins that a timer's channel leads to now."""
+        lines = [line for port in self.ports for line in port.lines if line.mode() == ALTERNATE]
+        return [line for line in lines if line.timer() == (timer, channel)]
 
     def route(self, timers):
         """Connect each timer's channels to the pins whose alternate function selects them."""

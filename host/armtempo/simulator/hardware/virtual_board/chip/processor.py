@@ -19,7 +19,10 @@ INTERRUPT_TICKS = 160
 CALLBACK_TICKS = 250
 """What a callback takes on top of its own simulated calls."""
 NEVER = timer_registers.NEVER
-_RCC_TIMERS = {1: (17, 0), 8: (17, 1), 2: (16, 0), 3: (16, 1), 4: (16, 2), 5: (16, 3), 6: (16, 4), 7: (16, 5)}
+_RCC_TIMERS = {
+    1: (17, 0), 8: (17, 1), 2: (16, 0), 3: (16, 1), 4: (16, 2), 5: (16, 3), 6: (16, 4), 7: (16, 5),
+    9: (17, 16), 10: (17, 17), 11: (17, 18), 12: (16, 6), 13: (16, 7), 14: (16, 8),
+}  # fmt: skip
 
 
 class Chip:
@@ -37,7 +40,8 @@ class Chip:
         self.pins = gpio.Pins()
         self.timers = {}
         for number, bits, rate in ((2, 32, 1), (5, 32, 1), (1, 16, 2), (8, 16, 2), (3, 16, 1), (4, 16, 1),
-                                   (6, 16, 1), (7, 16, 1)):  # fmt: skip
+                                   (6, 16, 1), (7, 16, 1), (9, 16, 2), (10, 16, 2), (11, 16, 2),
+                                   (12, 16, 1), (13, 16, 1), (14, 16, 1)):  # fmt: skip
             self.timers[number] = timers.TimerUnit(self, number, bits, rate)
         self.timers[2].follower = self.timers[5]
         self.counting = []

@@ -56,8 +56,11 @@ class TimerUnit:
         elif not words[self.at + CR1] & 0x80:
             self._reload(words[self.at + ARR])
         self._sync_enable(now)
+        makes_pulses = [channel.pulses is not None for channel in self.channels]
         for channel in self.channels:
             channel.sync(self.total, now)
+        if makes_pulses != [channel.pulses is not None for channel in self.channels]:
+            self.board.recount()
         self._find_next()
 
     def _sync_count(self, now):
@@ -121,7 +124,7 @@ class TimerUnit:
 
     def counts_by_clock(self):
         """Whether time moves this counter."""
-        return self.running and not self.encoder
+        return self.running and not self.encoder and not any([channel.pulses for channel in self.channels])
 
     def next_interrupt(self):
         """Absolute tick of the next interrupt, or NEVER."""

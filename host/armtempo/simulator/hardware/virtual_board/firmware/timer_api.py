@@ -120,7 +120,7 @@ class Timer:
         """Read or set the prescaler register."""
         return self.register(timer_registers.PSC, value)
 
-    def channel(self, number, mode=None, callback=None, pin=None, compare=0, polarity=0):
+    def channel(self, number, mode=None, callback=None, pin=None, compare=0, polarity=0, pulse_width=0):
         """Set up a channel, or get the one that was."""
         if not 1 <= number <= 4:
             raise ValueError("invalid channel (%d)" % number)
@@ -130,7 +130,9 @@ class Timer:
             self._route(pin)
         channel = TimerChannel(self, number)
         self._channels[number] = channel
-        if mode in _ENCODER:
+        if mode == self.PWM:
+            channel.setup_compare(_OC_MODES[mode], pulse_width, polarity, callback)
+        elif mode in _ENCODER:
             channel.setup_encoder(_ENCODER[mode])
         elif mode in _OC_MODES and mode > 1:
             channel.setup_compare(_OC_MODES[mode], compare, polarity, callback)

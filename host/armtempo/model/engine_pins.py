@@ -1,0 +1,61 @@
+"""Which pins and timers the board's engine takes for an arm: from the board program's own table, ``hardware/pins.py``."""
+
+from __future__ import annotations
+
+import ast
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from armtempo.model.arm import Arm
+
+ENGINE_TIMERS = {2: "the step pulses", 5: "the step pulses", 6: "the step pulses"}
+
+
+@cache
+def table() -> dict[str, Any]:
+    """The constants of the board program's table by name; nothing of it is executed."""
+    spec = find_spec("armtempo_board")
+    if spec is None or not spec.submodule_search_locations:
+        raise FileNotFoundError("the package armtempo_board is not installed")
+    source = Path(spec.submodule_search_locations[0], "hardware", "pins.py").read_text(encoding="utf-8")
+    found = {}
+    for node in ast.parse(source).body:
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+            try:
+                found[node.targets[0].id] = ast.literal_eval(node.value)
+            except ValueError:
+                continue
+    return found
+
+
+def taken_pins(arm: Arm) -> dict[str, str]:
+    """Pins (``"PE12"``) that the program takes for this arm, and what for."""
+    pins = table()
+    found = {pins["ENABLE"]: "ENABLE of the drivers", pins["BUTTON"]: "the button"}
+    found.update(dict.fromkeys(pins["LEDS"], "a LED of the board"))
+    if arm.safety.estop_fitted:
+        found[pins["ESTOP"]] = "the E-stop"
+    for joint in arm.joints:
+        if joint.motor is None:
+            continue
+        channel = joint.motor.channel
+        found[pins["STEP"][channel - 1][0]] = f"STEP of channel {channel}"
+        found[pins["DIR"][channel - 1]] = f"DIR of channel {channel}"
+        if joint.encoder is not None:
+            for pin in pins["ENCODER"][joint.encoder.channel - 1][1:3]:
+                found[pin] = f"encoder {joint.encoder.channel}"
+        for switch in (joint.switches.low, joint.switches.high):
+            if switch is not None:
+                found[pins["LIMIT"][switch - 1]] = f"limit switch {switch}"
+    return {f"P{pin}": use for pin, use in found.items()}
+
+
+def taken_timers(arm: Arm) -> dict[int, str]:
+    """Timers that the program takes for this arm, and what for."""
+    found = dict(ENGINE_TIMERS)
+    for joint in arm.joints:
+        if joint.motor is not None and joint.encoder is not None:
+            found[table()["ENCODER"][joint.encoder.channel - 1][0]] = f"encoder {joint.encoder.channel}"
+    return found

@@ -1,0 +1,131 @@
+"""The tables [output.NAME] and [input.NAME] of an arm file."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from armtempo_shared.limits import MAX_INPUTS, MAX_OUTPUTS
+
+from armtempo.errors import InputError
+from armtempo.formats.toml_table import Table
+from armtempo.model.outputs import KINDS, PWM, SERVO, SWITCH, Input, Output
+
+_NAME = re.compile(r"[A-Za-z0-9_-]{1,24}")
+_PIN = re.compile(r"P[A-E](1[0-5]|[0-9])")
+_PIN_WORDS = 'a pin of ports A to E, such as "PE9"'
+_SERVO_HZ = 50.0
+_FREQUENCY_HZ = (1.0, 100_000.0)
+_SERVO_FREQUENCY_HZ = (40.0, 400.0)
+_PULSE_US = (100.0, 5000.0)
+_MAX_ANGLE_DEG = 3600.0
+
+
+def outputs(top: Table) -> tuple[Output, ...]:
+    """The outputs of a file; InputError, naming file, key and value, for what is not allowed."""
+    return tuple(_output(name, table) for name, table in _named(top, "output", MAX_OUTPUTS))
+
+
+def inputs(top: Table) -> tuple[Input, ...]:
+    """The inputs of a file; raises as ``outputs``."""
+    return tuple(_input(name, table) for name, table in _named(top, "input", MAX_INPUTS))
+
+
+def _named(top: Table, key: str, most: int) -> list[tuple[str, Table]]:
+    found = top.named_tables(key)
+    if len(found) > most:
+        raise InputError(f"{top.file}: {len(found)} tables [{key}.NAME]", f"the board has room for {most}")
+    for name, _ in found:
+        if not _NAME.fullmatch(name):
+            raise InputError(
+                f"{top.file}: {key}.{name}: the name is not allowed",
+                "choose one of 1 to 24 letters, digits, '-' and '_'",
+            )
+    return found
+
+
+def _output(name: str, table: Table) -> Output:
+    kind = table.choice("kind", KINDS)
+    settings: dict[str, Any] = {}
+    if kind == SWITCH:
+        settings["active"] = table.choice("active", ("low", "high"), "high")
+    elif kind == PWM:
+        settings["frequency_hz"] = table.number("frequency_hz", least=_FREQUENCY_HZ[0], most=_FREQUENCY_HZ[1])
+    else:
+        settings |= _servo(table)
+    bare = Output(name, kind, _pin(table), 0.0, **settings)
+    states = _states(bare, table.table("states"))
+    known = Output(name, kind, bare.pin, 0.0, states, **settings)
+    safe = _safe(known, table)
+    table.done()
+    return Output(name, kind, bare.pin, safe, states, **settings)
+
+
+def _servo(table: Table) -> dict[str, Any]:
+    frequency_hz = table.number(
+        "frequency_hz", _SERVO_HZ, least=_SERVO_FREQUENCY_HZ[0], most=_SERVO_FREQUENCY_HZ[1]
+    )
+    pulse_us = table.numbers("pulse_us", 2, (1000.0, 2000.0))
+    most_us = min(_PULSE_US[1], 0.9e6 / frequency_hz)
+    if not all(_PULSE_US[0] <= width <= most_us for width in pulse_us) or pulse_us[0] == pulse_us[1]:
+        raise table.fail("pulse_us", f"two pulse widths from {_PULSE_US[0]:g} to {most_us:g} us that differ")
+    angles_deg = table.numbers("angles_deg", 2)
+    if not -_MAX_ANGLE_DEG <= angles_deg[0] < angles_deg[1] <= _MAX_ANGLE_DEG:
+        raise table.fail("angles_deg", "two angles, the smaller first (exchange pulse_us for the other way)")
+    return {"frequency_hz": frequency_hz, "pulse_us": pulse_us, "angles_deg": angles_deg}
+
+
+def _states(output: Output, table: Table | None) -> tuple[tuple[str, float], ...]:
+    if table is None:
+        return ()
+    found = []
+    for name in table.rest():
+        if not _NAME.fullmatch(name) or _is_number(name):
+            raise table.fail(name, "states with names of letters, digits, '-' and '_'")
+        found.append((name, _checked(output, table, name, table.number(name))))
+    return tuple(found)
+
+
+def _safe(output: Output, table: Table) -> float:
+    """Without it: 0, which a servo has to have within its angles."""
+    names = [name for name, _ in output.states]
+    value = table.rest().get("safe")
+    if value is None and output.kind != SERVO:
+        return 0.0
+    if isinstance(value, str):
+        return output.number(table.choice("safe", names, allowed=f"a number or one of {', '.join(names)}"))
+    return _checked(output, table, "safe", table.number("safe"))
+
+
+def _checked(output: Output, table: Table, key: str, value: float) -> float:
+    try:
+        return output.number(value)
+    except InputError:
+        low, high = output.range
+        raise table.fail(key, "0 or 1" if output.kind == SWITCH else f"{low:g} to {high:g}") from None
+
+
+def _input(name: str, table: Table) -> Input:
+    found = Input(
+        name,
+        _pin(table),
+        active=table.choice("active", ("low", "high"), Input.active),
+        debounce_ms=table.integer("debounce_ms", Input.debounce_ms, least=0, most=10_000),
+    )
+    table.done()
+    return found
+
+
+def _pin(table: Table) -> str:
+    pin = table.text("pin")
+    if not _PIN.fullmatch(pin):
+        raise table.fail("pin", _PIN_WORDS)
+    return pin
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

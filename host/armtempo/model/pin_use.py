@@ -1,0 +1,113 @@
+"""Which pin and timer each output and input of an arm takes, and what stands in the way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from armtempo.model import engine_pins
+from armtempo.model.arm import Arm
+from armtempo.model.boards import BOARDS, DEFAULT, TIMER_OUTPUTS, BoardPins, TimerOutput
+from armtempo.model.outputs import SWITCH, Output
+
+_MORE = "board/docs/hardware.md lists what is free"
+_MOST_COUNTS = 65_535
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A pin or timer that cannot be had."""
+
+    where: str
+    """Key of the arm file: ``"output.gripper"``."""
+    what: str
+    next_step: str
+
+
+@dataclass(frozen=True)
+class Period:
+    """How a timer makes a frequency: ``counts`` a period, each of ``prescaler`` of its clocks."""
+
+    prescaler: int
+    counts: int
+
+    @classmethod
+    def of(cls, output: Output, place: TimerOutput) -> Period:
+        """The nearest to the output's frequency."""
+        clocks = place.clock_hz / output.frequency_hz
+        prescaler = max(1, -int(-clocks // _MOST_COUNTS))
+        return cls(prescaler, min(round(clocks / prescaler), _MOST_COUNTS))
+
+    def counts_in(self, time_us: float, place: TimerOutput) -> int:
+        """A pulse width in counts."""
+        return round(time_us * place.clock_hz / 1e6 / self.prescaler)
+
+
+def problems(arm: Arm) -> list[Problem]:
+    """What stands in the way of the arm's outputs and inputs, and of its board; empty where nothing does."""
+    if not (arm.outputs or arm.inputs) and arm.board == DEFAULT:
+        return []
+    board = BOARDS[arm.board]
+    engine = engine_pins.taken_pins(arm)
+    missing = [f"{pin} ({use})" for pin, use in engine.items() if pin not in board.pins]
+    if missing:
+        what = f"{board.name} has not the pins that the engine takes: {', '.join(missing)}"
+        return [Problem("board", what, "take a board whose chip has 100 pins or more")]
+    return [*_pin_problems(arm, board, engine), *_placed(arm)[1]]
+
+
+def timer_outputs(arm: Arm) -> dict[str, TimerOutput]:
+    """The timer channel of each output with pulses, by the output's name; of an arm without problems."""
+    return _placed(arm)[0]
+
+
+def _pin_problems(arm: Arm, board: BoardPins, engine: dict[str, str]) -> list[Problem]:
+    found = []
+    used = {pin: f"is taken by the engine for {use}" for pin, use in engine.items()}
+    for pin, use in board.taken.items():
+        used.setdefault(pin, f"is taken on the {board.name} by {use}")
+    for where, pin in [
+        *((f"output.{output.name}", output.pin) for output in arm.outputs),
+        *((f"input.{entry.name}", entry.pin) for entry in arm.inputs),
+    ]:
+        if pin not in board.pins:
+            found.append(Problem(where, f"the {board.name} has no pin {pin}", f"take another pin; {_MORE}"))
+        elif pin in used:
+            found.append(Problem(where, f"{pin} {used[pin]}", f"take another pin; {_MORE}"))
+        used.setdefault(pin, f"is the pin of {where}")
+    return found
+
+
+def _placed(arm: Arm) -> tuple[dict[str, TimerOutput], list[Problem]]:
+    found: dict[str, TimerOutput] = {}
+    failed = []
+    taken = engine_pins.taken_timers(arm)
+    periods: dict[int, tuple[Period, str]] = {}
+    for output in arm.outputs:
+        if output.kind == SWITCH:
+            continue
+        place, why = _place(output, taken, periods, list(found.values()))
+        if place is None:
+            next_step = f"take a pin with a timer that is free, or one frequency for both; {_MORE}"
+            failed.append(Problem(f"output.{output.name}", why, next_step))
+            continue
+        found[output.name] = place
+        periods.setdefault(place.timer, (Period.of(output, place), output.name))
+    return found, failed
+
+
+def _place(
+    output: Output, taken: dict[int, str], periods: dict[int, tuple[Period, str]], used: list[TimerOutput]
+) -> tuple[TimerOutput | None, str]:
+    """The timer channel for an output, or why there is none."""
+    why = [f"{output.pin} has no timer for pulses"]
+    for place in TIMER_OUTPUTS.get(output.pin, ()):
+        period, first = periods.get(place.timer, (Period.of(output, place), ""))
+        if place.timer in taken:
+            why.append(f"timer {place.timer} of {output.pin} is taken by the engine for {taken[place.timer]}")
+        elif place in used:
+            why.append(f"channel {place.channel} of timer {place.timer} is taken by another output")
+        elif period != Period.of(output, place):
+            why.append(f"timer {place.timer} of {output.pin} has another frequency, for output.{first}")
+        else:
+            return place, ""
+    return None, why[-1]
