@@ -35,6 +35,8 @@ __all__ = [
     "Pose",
     "Run",
     "RunFolderError",
+    "Sequence",
+    "SequencePlan",
     "SharedBoard",
     "Spline",
     "StopRequest",
@@ -51,6 +53,7 @@ __all__ = [
     "inverse",
     "optimise",
     "plan",
+    "plan_sequence",
     "simulator",
     "summary",
 ]
@@ -72,8 +75,10 @@ if TYPE_CHECKING:
     from armtempo.model.arm import Arm
     from armtempo.model.job import Job
     from armtempo.model.plan import Plan
+    from armtempo.model.sequence import Sequence
+    from armtempo.model.sequence_plan import SequencePlan
     from armtempo.model.tool_pose import Pose
-    from armtempo.pipeline import compare, connect, plan, summary
+    from armtempo.pipeline import compare, connect, plan, plan_sequence, summary
     from armtempo.ports.listing import find_ports
     from armtempo.robot.board import Board
     from armtempo.robot.board_state import BoardState
@@ -99,8 +104,10 @@ _HOMES = {
     "armtempo.model.arm": ("Arm",),
     "armtempo.model.job": ("Job",),
     "armtempo.model.plan": ("Plan",),
+    "armtempo.model.sequence": ("Sequence",),
+    "armtempo.model.sequence_plan": ("SequencePlan",),
     "armtempo.model.tool_pose": ("Pose",),
-    "armtempo.pipeline": ("compare", "connect", "plan", "summary"),
+    "armtempo.pipeline": ("compare", "connect", "plan", "plan_sequence", "summary"),
     "armtempo.robot.board": ("Board",),
     "armtempo.robot.board_state": ("BoardState",),
     "armtempo.robot.recording": ("Watcher",),

@@ -14,7 +14,7 @@ be kept in a file, a motion on the board, a run in its folder.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import abc
 from pathlib import Path
 
 from armtempo.errors import InputError
@@ -22,7 +22,9 @@ from armtempo.model import trajectory_file
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
-from armtempo.planning import checks, planner
+from armtempo.model.sequence import Sequence
+from armtempo.model.sequence_plan import SequencePlan
+from armtempo.planning import checks, planner, sequence_planner
 from armtempo.planning import corridor_curve as corridors
 from armtempo.planning import split as cut
 from armtempo.planning.corridor_curve import CorridorTime
@@ -33,7 +35,18 @@ from armtempo.robot.connect import connect
 from armtempo.robot.recording import Watcher
 from armtempo.robot.run import Run
 
-__all__ = ["compare", "connect", "corridor_curve", "load", "plan", "report", "run", "split", "summary"]
+__all__ = [
+    "compare",
+    "connect",
+    "corridor_curve",
+    "load",
+    "plan",
+    "plan_sequence",
+    "report",
+    "run",
+    "split",
+    "summary",
+]
 
 
 def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
@@ -43,6 +56,11 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     job and arm do not fit each other, PlanError where there is no motion under these limits and ranges.
     """
     return planner.plan(arm, job, progress)
+
+
+def plan_sequence(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> SequencePlan:
+    """A sequence, every motion planned from where the one before it ends; errors as in ``sequence_planner.plan``."""
+    return sequence_planner.plan(arm, sequence, progress)
 
 
 def split(arm: Arm, job: Job, progress: Progress | None = None) -> list[Plan]:
@@ -106,7 +124,7 @@ def report(run: Run) -> Path:
     return run.report()
 
 
-def compare(folders: Sequence[Path], page: Path | None = None) -> Path:
+def compare(folders: abc.Sequence[Path], page: Path | None = None) -> Path:
     """Write one page that compares recorded runs, by default beside the first; gives the page.
 
     A folder that cannot be read is named there. Raises RunFolderError where fewer than two can be read.

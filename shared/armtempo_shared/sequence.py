@@ -14,7 +14,8 @@ Little endian. It names its motions by name and checksum, and carries no motion 
     ...     28 M   the motions: 24s name (padded with 0), I crc32 of the motion's record
     end     I      crc32 over all before it
 
-A repeat whose first pass begins elsewhere than the others has the rows of that pass before it. ``step`` is the step of the sequence file that a row comes from (from 1), for those who follow it. The others, by op:
+A repeat whose first pass begins elsewhere than the others has the rows of that pass before it. ``step`` is the step
+of the sequence file that a row comes from (from 1), for those who follow it. The others, by op:
 
 ====  ===========  ==================  ===============================  ================================
 op                 number              value                            amount
@@ -50,7 +51,11 @@ MAX_REPEATS = 1_000_000
 _HEAD = "<4sIHBB"
 _ROW = "<BBHIH"
 _MOTION = "<%dsI" % MAX_NAME
-_HEAD_BYTES, _ROW_BYTES, _MOTION_BYTES = struct.calcsize(_HEAD), struct.calcsize(_ROW), struct.calcsize(_MOTION)
+_HEAD_BYTES, _ROW_BYTES, _MOTION_BYTES = (
+    struct.calcsize(_HEAD),
+    struct.calcsize(_ROW),
+    struct.calcsize(_MOTION),
+)
 _CRC_BYTES = 4
 
 

@@ -85,7 +85,9 @@ def _serve_panel(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
         return
     leds.show(controller.state())
     watchdog.feed()
-    pressed = button.pressed()  # a press while something moves does nothing, then or later; a sequence it stops
+    pressed = (
+        button.pressed()
+    )  # a press while something moves does nothing, then or later; a sequence it stops
     if pressed and controller.sequence:
         controller.stop(0)
     if controller.moving():

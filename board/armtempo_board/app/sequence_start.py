@@ -91,5 +91,7 @@ def _check_rows(controller: "Controller", record: "SequenceFile", ends: "list[_E
             first = firsts.pop()
             if first != _NONE:
                 ends[first].check_follows(ends[last], step)
-        elif op == sequence.OUTPUT and number >= outputs or op == sequence.WAIT_INPUT and number >= inputs:
+        elif (op == sequence.OUTPUT and number >= outputs) or (
+            op == sequence.WAIT_INPUT and number >= inputs
+        ):
             raise Refused(codes.NO_SUCH_PIN, value=step)

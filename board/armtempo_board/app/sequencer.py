@@ -36,9 +36,9 @@ class Sequencer:
         self._controller = controller
         self._record = record
         self._by_host = by_host
-        self._row = _IDLE  # the one under way
+        self._row: "tuple[int, ...]" = _IDLE  # the one under way
         self._next = 0  # number of the one behind it
-        self._since_ms = 0  # when it began
+        self._since_ms = time.ticks_ms()  # when it began
         self._repeats = array("i", [0] * (2 * sequence.MAX_NESTING))  # of each: first row, passes left
         self._depth = 0
         self._name = name

@@ -21,4 +21,5 @@ class SequenceFile(SequenceRecord):
         """See ``SequenceRecord``."""
         with open(self._path, "rb") as file:
             file.seek(offset)
-            return file.read(size)
+            found: bytes = file.read(size)
+            return found

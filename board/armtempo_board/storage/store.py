@@ -330,7 +330,7 @@ class Store:
 
         try:
             sequence_check.check(self._sequence(file_name))
-        except sequence_check.SequenceError:
+        except ValueError:  # SequenceError
             raise Refused(codes.BAD_RECORD)
 
     def _is_sequence(self, file_name: str) -> bool:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from armtempo.errors import InputError
 from armtempo.project.settings import ARM, JOB, RUNS, ProjectSettings, nothing_set
 
 if TYPE_CHECKING:
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from armtempo.model.arm import Arm
     from armtempo.model.job import Job
     from armtempo.model.plan import Plan
+    from armtempo.model.sequence_plan import SequencePlan
     from armtempo.robot.board import Board
 
 
@@ -137,6 +139,23 @@ def load_plan(path: Path, arm_path: Path | None, altered: bool = False) -> Plan:
     from armtempo import pipeline
 
     return pipeline.load(path, named_arm(arm_path), altered)
+
+
+def load_sequence_plan(path: Path, arm_path: Path | None, name: str | None = None) -> SequencePlan:
+    """A planned sequence, which must fit the arm that is named, if one is; ``name`` is refused."""
+    from armtempo.model.sequence_plan import SequencePlan
+    from armtempo.records.encode import arm_record
+
+    if name is not None:
+        raise InputError("--name: a sequence keeps the name in its file", "change it there and plan it again")
+    found = SequencePlan.load(path)
+    named = named_arm(arm_path)
+    if named is not None and arm_record(named) != arm_record(found.arm):
+        raise InputError(
+            f"{path} was planned for another arm than {named.name!r} ({named.source})",
+            "plan it again with this arm",
+        )
+    return found
 
 
 # board

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 @options.log_traffic
 @options.as_json
 def command(arm_path: Path | None, port: str | None, log_traffic: Path | None, as_json: bool) -> None:
-    """List the motions on the board, and where they begin and end.
+    """List the motions and sequences on the board, and where they begin and end.
 
     The one marked * is what the board's button starts.
     """
@@ -60,6 +60,8 @@ def _arm(board: Board, arm_path: Path | None) -> Arm | None:
 
 def _line(entry: StoredMotion) -> str:
     name = entry.name + (" *" if entry.default else "")
+    if entry.sequence:
+        return f"{name:<26}{entry.size:>8}{'sequence':>18}  {entry.crc:08x}"
     if not entry.joints:
         return f"{name:<26}{entry.size:>8}  damaged; upload it again or remove it"
     return f"{name:<26}{entry.size:>8}{entry.joints:>8}{entry.duration_s:>10.3f}  {entry.crc:08x}"

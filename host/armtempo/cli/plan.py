@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from armtempo.cli import chosen, messages, options
+from armtempo.cli import chosen, messages, options, sequences
 from armtempo.cli.progress import ProgressBar
 from armtempo.errors import InputError
 
@@ -27,6 +27,7 @@ def _refine(ctx: click.Context, param: click.Parameter, value: str | None) -> in
 
 
 @click.command()
+@click.argument("file", type=click.Path(path_type=Path), required=False)
 @options.job
 @options.arm
 @click.option(
@@ -70,6 +71,7 @@ def _refine(ctx: click.Context, param: click.Parameter, value: str | None) -> in
     "--corridor-curve", is_flag=True, help="Instead of a plan: the motion time in ever wider corridors."
 )
 def command(
+    file: Path | None,
     job_path: Path | None,
     arm_path: Path | None,
     output: Path | None,
@@ -78,12 +80,21 @@ def command(
     corridor_curve: bool,
     **changes: Any,
 ) -> None:
-    """Plan a job and write its trajectory file.
+    """Plan a job and write its trajectory file, or plan a sequence.
 
+    FILE: a sequence file, or a job file, as with --job.
     Where neither an arm nor a job is named, this plans the demo's job for the arm that ships with armtempo.
     """
     from armtempo.formats.atomic_file import check_not_input
+    from armtempo.model import sequence_file
 
+    if file is not None and job_path is not None:
+        raise InputError("FILE and --job are both given", "name one of them")
+    if file is not None and sequence_file.is_sequence(file):
+        sequences.refuse_job_options({"split": split, "corridor_curve": corridor_curve, **changes})
+        sequences.plan(file, arm_path, output, force)
+        return
+    job_path = file or job_path
     arm, job = chosen.arm_and_job(arm_path, job_path)
     job = _changed(job, changes)
     target = output or Path(f"{job.name}.json")

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from armtempo.model.arm import Arm
     from armtempo.model.job import Job
     from armtempo.model.plan import Plan
+    from armtempo.model.sequence_plan import SequencePlan
     from armtempo.robot.board import Board
 
 HOME = "home"
@@ -37,10 +38,16 @@ class NamedPosture:
     """The arm that is named, else the one of the trajectory file; None: whatever the board is set up for."""
     plan: Plan | None
     """Of the trajectory file."""
+    sequence: SequencePlan | None = None
 
     @classmethod
     def of(cls, text: str, arm_path: Path | None, altered: bool) -> NamedPosture:
         """The posture that ``text`` names; InputError where its trajectory file or the arm cannot be read."""
+        from armtempo.model.sequence_plan import is_sequence_plan
+
+        if text.endswith(".json") and is_sequence_plan(Path(text)):
+            sequence = chosen.load_sequence_plan(Path(text), arm_path)
+            return cls(text, sequence.arm, None, sequence)
         if text.endswith(".json"):
             plan = chosen.load_plan(Path(text), arm_path, altered)
             return cls(text, plan.arm, plan)
@@ -52,6 +59,8 @@ class NamedPosture:
         """Angles in degrees (J,); InputError where the text is no posture, or does not fit the arm."""
         from armtempo.planning import point_to_point
 
+        if self.sequence is not None:
+            return point_to_point.posture(self.sequence.start_deg or arm.home_deg, arm)
         if self.plan is not None:
             return self.plan.trajectory(0.0)
         if self.text == HOME:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from armtempo.cli import chosen, options
+from armtempo.cli import chosen, options, sequences
+from armtempo.errors import InputError
 
 if TYPE_CHECKING:
     from armtempo.model.plan import Plan
@@ -41,13 +42,25 @@ def command(
     port: str | None,
     log_traffic: Path | None,
 ) -> None:
-    """Replay a motion and record it.
+    """Replay a motion and record it, or run a sequence.
 
-    WHAT is a trajectory file or the name of a motion on the board; the samples go into a new run folder.
+    WHAT is a trajectory file or the name of a motion on the board; the samples go into a new run folder. Or a
+    planned sequence or the name of one on the board, which is not recorded: step and cycle are shown.
     The arm must be homed ('armtempo home') and stand where the motion begins ('armtempo goto'); a virtual
     board sees to that itself. Between repetitions the arm returns along the same path. Ctrl-C brakes, and so
     does 'armtempo stop' in another terminal; 'armtempo speed', 'pause' and 'resume' work there too.
     """
+    from armtempo.model.sequence_plan import is_sequence_plan
+
+    if chosen.is_file(what) and is_sequence_plan(Path(what)):
+        only_for_motions(repeat, live, out)
+        sequence = chosen.load_sequence_plan(Path(what), arm_path)
+        with chosen.board(port, log_traffic, sequence.arm) as board:
+            board.configure(sequence.arm, replace=replace_arm)
+            click.echo(f"arm: {chosen.words(sequence.arm)}")
+            board.speed(percent / 100)
+            sequences.run_and_tell(board, sequence, force)
+        return
     plan = chosen.load_plan(Path(what), arm_path, altered) if chosen.is_file(what) else None
     named = plan.arm if plan else chosen.named_arm(arm_path)
     with chosen.board(port, log_traffic, named) as board:
@@ -56,7 +69,25 @@ def command(
         click.echo(f"arm: {chosen.words(arm)}")
         motion = board.upload(plan, replace=force) if plan else what
         board.speed(percent / 100)
+        if isinstance(motion, str) and _is_sequence(board, motion):
+            only_for_motions(repeat, live, out)
+            sequences.run_and_tell(board, motion)
+            return
         run_and_tell(board, motion, repeat, chosen.runs(out), live)
+
+
+def only_for_motions(repeat: int, live: bool, out: Path | None) -> None:
+    """InputError for what a sequence has not: repetitions of its own, a plot, a run folder."""
+    for name, given in (("--repeat", repeat != 1), ("--live", live), ("--out", out is not None)):
+        if given:
+            raise InputError(
+                f"{name}: a sequence has no such thing", "leave it out; repeat is a step of the sequence"
+            )
+
+
+def _is_sequence(board: Board, name: str) -> bool:
+    found = board.client.find(name)
+    return found is not None and found.sequence
 
 
 def run_and_tell(

@@ -31,9 +31,18 @@ def command(
     port: str | None,
     log_traffic: Path | None,
 ) -> None:
-    """Store a trajectory file on the board."""
+    """Store a trajectory file, or a planned sequence with its motions, on the board."""
+    from armtempo.model.sequence_plan import is_sequence_plan
     from armtempo.records import encoded_motion
 
+    if is_sequence_plan(file):
+        plan = chosen.load_sequence_plan(file, arm_path, name)
+        with chosen.board(port, log_traffic, plan.arm) as board:
+            board.configure(plan.arm, replace=replace_arm)
+            with ProgressBar("uploading") as progress:
+                board.upload_sequence(plan, as_default, progress, force)
+        click.echo(f"{plan.name}: sequence and {len(plan.legs)} motions stored")
+        return
     motion = encoded_motion.of_plan(chosen.load_plan(file, arm_path, altered), name)
     with chosen.board(port, log_traffic, motion.arm) as board:
         board.configure(motion.arm, replace=replace_arm)

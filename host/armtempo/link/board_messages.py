@@ -8,6 +8,7 @@ from typing import Any
 
 from armtempo_shared import wire
 from armtempo_shared.limits import TICK_HZ
+from armtempo_shared.sequence import ENDINGS
 
 from armtempo.formats.plain_text import visible
 from armtempo.virtual_id import is_virtual
@@ -106,11 +107,29 @@ class StoredMotion:
     joints: int
     default: bool
     """Whether the board's button starts it."""
+    sequence: bool = False
+    """Whether it is a sequence, which has neither ``duration_ticks`` nor ``joints`` of its own."""
 
     @property
     def duration_s(self) -> float:
         """Motion time, seconds."""
         return self.duration_ticks / TICK_HZ
+
+
+@dataclass(frozen=True)
+class SequenceState:
+    """Where a sequence stands, or where the last one ended."""
+
+    ending: str
+    """One of ``armtempo_shared.sequence.ENDINGS``."""
+    code: int
+    """Of the fault or refusal that ended it."""
+    step: int
+    """Of the sequence file, from 1."""
+    row: int
+    cycle: int
+    """Finished passes of its outermost repeats."""
+    name: str
 
 
 @dataclass(frozen=True)
@@ -162,6 +181,11 @@ Event = Sample | Done | Fault | Notice
 def state_name(number: int) -> str:
     """Name of a state; a number the host does not know is shown as such."""
     return wire.STATES[number] if number < len(wire.STATES) else f"state {number}"
+
+
+def ending_name(number: int) -> str:
+    """How a sequence stands; a number the host does not know is shown as such."""
+    return ENDINGS[number] if number < len(ENDINGS) else f"ending {number}"
 
 
 def positions(tail: bytes) -> Positions:

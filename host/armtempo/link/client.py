@@ -157,7 +157,7 @@ class Client:
         found: list[board_messages.StoredMotion] = []
         while True:
             try:
-                (count, size, crc, duration, joints, default), name = self.session.command(
+                (count, size, crc, duration, joints, default, is_sequence), name = self.session.command(
                     "list", (len(found),)
                 )
             except BoardError as error:
@@ -166,7 +166,11 @@ class Client:
                 raise
             if not name:
                 return found
-            found.append(board_messages.StoredMotion(name, size, crc, duration, joints, bool(default)))
+            found.append(
+                board_messages.StoredMotion(
+                    name, size, crc, duration, joints, bool(default), bool(is_sequence)
+                )
+            )
             if len(found) >= count:
                 return found
 
@@ -195,6 +199,11 @@ class Client:
     def set_default(self, name: str) -> None:
         """Choose what the board's button starts; "" for nothing."""
         self.session.command("set_default", (), name, silence_timeout_s=FLASH_TIMEOUT_S)
+
+    def sequence(self) -> board_messages.SequenceState:
+        """Where the sequence stands, or where the last one since the board's start ended."""
+        (ending, code, step, row, cycle), name = self.session.command("sequence")
+        return board_messages.SequenceState(board_messages.ending_name(ending), code, step, row, cycle, name)
 
     def home(self, steps: Sequence[int | None]) -> None:
         """Declare the positions of the joints, in steps; None leaves a joint as it is."""

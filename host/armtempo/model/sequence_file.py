@@ -115,7 +115,8 @@ class _Reader:
             table.done()
         if begun:
             raise InputError(
-                f"{_place(begun[-1][0])}: repeat has no end", 'write a step with end = "repeat" behind its last step'
+                f"{_place(begun[-1][0])}: repeat has no end",
+                'write a step with end = "repeat" behind its last step',
             )
         return tuple(found[0])
 
@@ -174,14 +175,11 @@ class _Reader:
     def output(self, table: Table, step: int) -> list[Step]:
         only(table, "output", "to", "wait_s")
         name, place = table.text("output"), _place(table)
-        number = _index(name, self.arm.outputs, f"{place}output = {name!r}: the arm has no such output")
+        number = _placed(place, self.arm.output, name)
         to = table.peek("to")
         if isinstance(to, bool) or not isinstance(to, str | int | float):
             raise table.fail("to", "a state of the output, or a number in its unit")
-        try:
-            raw = self.arm.outputs[number].raw(to)
-        except InputError as error:
-            raise InputError(f"{place}to: {error.problem}", error.hint) from None
+        raw = _placed(f"{place}to: ", self.arm.outputs[number].raw, to)
         table.known("to")
         found: list[Step] = [SetOutput(place, step, number, raw, f"{name} {to}")]
         return found + (self.wait(table, step) if table.has("wait_s") else [])
@@ -193,9 +191,11 @@ class _Reader:
     def wait_input(self, table: Table, step: int) -> list[Step]:
         only(table, "wait_input", "active", "timeout_s", "on_timeout")
         name, place = table.text("wait_input"), _place(table)
-        number = _index(name, self.arm.inputs, f"{place}wait_input = {name!r}: the arm has no such input")
+        number = _placed(place, self.arm.input, name)
         active = table.boolean("active", True)
-        timeout_s = table.number("timeout_s", 0.0, least=0.001, most=_MOST_S) if table.has("timeout_s") else 0.0
+        timeout_s = (
+            table.number("timeout_s", 0.0, least=0.001, most=_MOST_S) if table.has("timeout_s") else 0.0
+        )
         if table.has("on_timeout") and not timeout_s:
             raise table.fail("on_timeout", "given together with timeout_s only")
         then = table.choice("on_timeout", ON_TIMEOUT, STOP)
@@ -208,10 +208,14 @@ class _Reader:
         chain = (*self.callers, self.file.resolve())
         if path in chain:
             names = " calls ".join(one.name for one in (*chain[chain.index(path) :], path))
-            raise InputError(f"{_place(table)}call: the sequence calls itself: {names}", "take one of the calls out")
+            raise InputError(
+                f"{_place(table)}call: the sequence calls itself: {names}", "take one of the calls out"
+            )
         top = toml_table.read(path)
         if not top.has("step"):
-            raise InputError(f"{_place(table)}call: {path.name} is no sequence: it has no [[step]]", "use run for a job")
+            raise InputError(
+                f"{_place(table)}call: {path.name} is no sequence: it has no [[step]]", "use run for a job"
+            )
         postures = {**self.postures, **_postures(top, self.arm)}
         called = _Reader(self.arm, path, postures, chain, step, self.motions)
         steps = called.steps(top)
@@ -241,9 +245,9 @@ def _place(table: Table) -> str:
     return f"{table.file}: {table.place}"
 
 
-def _index(name: str, known: Any, problem: str) -> int:
-    names = [one.name for one in known]
-    if name not in names:
-        there = f"the arm file has: {', '.join(names)}" if names else "the arm file has none"
-        raise InputError(f"{problem}{did_you_mean(name, names)}", there)
-    return names.index(name)
+def _placed(place: str, function: Callable[[Any], int], value: Any) -> int:
+    """What a function of the arm says of a value; its InputError names the step."""
+    try:
+        return function(value)
+    except InputError as error:
+        raise InputError(f"{place}{error.problem}", error.hint) from None

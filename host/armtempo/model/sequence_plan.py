@@ -54,9 +54,7 @@ class Share:
         return self.motion_s + self.wait_s + PAUSE_S * self.motions
 
     def __add__(self, other: Share) -> Share:
-        return Share(
-            self.motion_s + other.motion_s, self.wait_s + other.wait_s, self.motions + other.motions
-        )
+        return Share(self.motion_s + other.motion_s, self.wait_s + other.wait_s, self.motions + other.motions)
 
     def __mul__(self, times: int) -> Share:
         return Share(self.motion_s * times, self.wait_s * times, self.motions * times)
@@ -140,13 +138,19 @@ class SequencePlan:
         """The plan of a file that ``save`` wrote; InputError where it is none, is damaged, altered or does not fit."""
         content = _read(path)
         if not isinstance(content, dict) or content.get("format") != FORMAT:
-            raise InputError(f"{path}: is not a planned sequence", "make one with: armtempo plan SEQUENCE.toml")
+            raise InputError(
+                f"{path}: is not a planned sequence", "make one with: armtempo plan SEQUENCE.toml"
+            )
         if content.get("version") != VERSION:
-            raise InputError(f"{path}: has version {content.get('version')!r}, this program reads {VERSION}", _AGAIN)
+            raise InputError(
+                f"{path}: has version {content.get('version')!r}, this program reads {VERSION}", _AGAIN
+            )
         if content.keys() != {"format", "version", "sha256", "sequence"}:
             raise InputError(f"{path}: unknown or missing key", _AGAIN)
         if content["sha256"] != _checksum(content["sequence"]):
-            raise InputError(f"{path} was altered after it had been written: its checksum does not fit", _AGAIN)
+            raise InputError(
+                f"{path} was altered after it had been written: its checksum does not fit", _AGAIN
+            )
         plan: SequencePlan = json_codec.decode(cls, content["sequence"], f"{path}: sequence")
         arm_json.check(plan.arm, f"{path}: arm", _AGAIN)
         if any(row.op == MOVE and not 0 <= row.number < len(plan.legs) for row in plan.rows):
@@ -191,6 +195,8 @@ def _read(path: Path | str) -> Any:
     try:
         return json.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {why(error)}", "check the path and its permissions") from None
+        raise InputError(
+            f"{path}: cannot be read: {why(error)}", "check the path and its permissions"
+        ) from None
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: damaged or cut: {error}", _AGAIN) from None

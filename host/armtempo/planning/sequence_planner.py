@@ -128,7 +128,9 @@ class _Compiler:
         key = ("run", id(step.motion))
         if key not in self._known:
             self._known[key] = self._add(trajectory)
-        return [_move(self._known[key], step.step, f"run {step.motion.name}")], _End(end, f"the end of {step.motion.name}")
+        return [_move(self._known[key], step.step, f"run {step.motion.name}")], _End(
+            end, f"the end of {step.motion.name}"
+        )
 
     def _posture(self, target: Posture | Motion) -> Posture:
         if isinstance(target, Posture):
@@ -144,7 +146,9 @@ class _Compiler:
     def _of(self, source: Job | Plan, where: str) -> Trajectory:
         if isinstance(source, Plan):
             if source.arm != self.arm:
-                raise InputError(f"{where}run: it was planned for another arm than {self.arm.name!r}", "plan it again")
+                raise InputError(
+                    f"{where}run: it was planned for another arm than {self.arm.name!r}", "plan it again"
+                )
             return source.trajectory
         found = planner.plan(self.arm, source, self.progress).trajectory
         checks.check_held(found, self.arm)

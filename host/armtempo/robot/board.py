@@ -8,29 +8,33 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+import numpy as np
 from armtempo_shared.messages import RESUME
+from armtempo_shared.sequence import MAGIC as SEQUENCE
 from numpy.typing import ArrayLike
 
 from armtempo.arrays import Array
 from armtempo.errors import InputError, LinkError
 from armtempo.link import Client
-from armtempo.link.board_messages import Hello, Status, StoredMotion
+from armtempo.link.board_messages import Hello, SequenceState, Status, StoredMotion
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
+from armtempo.model.sequence_plan import SequencePlan
 from armtempo.planning import point_to_point
 from armtempo.ports.names import is_sim
 from armtempo.progress import Progress
-from armtempo.records import encoded_motion
-from armtempo.records.encoded_motion import EncodedMotion
-from armtempo.robot import arm_state, board_state, goto, homing, recording, stored_motion
+from armtempo.records import encoded_motion, encoded_sequence
+from armtempo.records.encoded_motion import EncodedMotion, MotionKey
+from armtempo.robot import arm_state, board_state, goto, homing, recording, sequence_run, stored_motion
 from armtempo.robot.board_state import BoardState
 from armtempo.robot.outputs import BoardInput, BoardOutput
 from armtempo.robot.recording import Watcher
 from armtempo.robot.run import Run
+from armtempo.robot.sequence_run import SequenceWatcher
 from armtempo.robot.speed import change_speed, permille
 from armtempo.robot.stop_request import StopRequest, stoppable
 
-Where = Plan | EncodedMotion | ArrayLike
+Where = Plan | EncodedMotion | SequencePlan | ArrayLike
 """A posture: angles of the driven joints in degrees, (J,), or a motion for where it begins."""
 
 
@@ -115,8 +119,23 @@ class Board:
             self.client.set_default(encoded.name)
         return encoded
 
+    def upload_sequence(
+        self,
+        sequence: SequencePlan,
+        default: bool = False,
+        progress: Progress | None = None,
+        replace: bool = False,
+    ) -> MotionKey:
+        """Store a planned sequence and its motions, unless the board has just these; as ``upload`` for a motion."""
+        encoded = encoded_sequence.of_plan(sequence)
+        self.configure(encoded.arm)
+        key = sequence_run.store(self.client, encoded, progress, replace)
+        if default:
+            self.client.set_default(key.name)
+        return key
+
     def list(self) -> tuple[StoredMotion, ...]:
-        """The stored motions."""
+        """The stored motions and sequences."""
         return tuple(self.client.stored())
 
     def read(self, name: str, arm: Arm | None = None) -> EncodedMotion:
@@ -124,7 +143,10 @@ class Board:
 
         InputError where the record is damaged or does not fit the arm.
         """
-        return encoded_motion.of_record(name, self.client.fetch(name), arm or self._known_arm())
+        data = self.client.fetch(name)
+        if data.startswith(SEQUENCE):
+            raise InputError(f"{name!r} is a sequence, not a motion", f"run it with: armtempo run {name}")
+        return encoded_motion.of_record(name, data, arm or self._known_arm())
 
     def remove(self, name: str) -> None:
         """Remove a stored motion."""
@@ -213,6 +235,46 @@ class Board:
                 pass
         return Run.load(folder.path)
 
+    def run_sequence(
+        self,
+        sequence: SequencePlan | str,
+        watcher: SequenceWatcher = lambda _: None,
+        stop: StopRequest | None = None,
+        replace: bool = False,
+    ) -> SequenceState:
+        """Run a planned sequence, or the stored one of that name, to its end, and say how it ended and where.
+
+        Each of its motions is a run of its own on the board; none is recorded. The arm must be homed and be where the
+        sequence begins, else LinkError or BoardError; the arm of a virtual board is brought there. ``watcher`` gets
+        how it stands. What an input that does not come does is the sequence's affair: an end as ``timed_out``, or
+        BoardError. With Stopped, its end is what ``client.sequence()`` says.
+        """
+        with self._stoppable(stop) as wanted:
+            key = self._sequence(sequence, wanted, replace)
+            return sequence_run.run(self.client, key, wanted, watcher)
+
+    def _sequence(self, sequence: SequencePlan | str, stop: StopRequest, replace: bool) -> MotionKey:
+        """What the board has it as; a virtual arm is brought to its start."""
+        if isinstance(sequence, str):
+            found = self.client.find(sequence)
+            if found is None or not found.sequence:
+                raise InputError(f"the board has no sequence {sequence!r}", "see 'armtempo list'")
+            if self.arm is not None:
+                self._home_virtual_arm(self.arm)
+            return MotionKey(found.name, found.crc)
+        key = self.upload_sequence(sequence, replace=replace)
+        start_deg = sequence.start_deg
+        if is_sim(self.port):
+            self._home_virtual_arm(sequence.arm)
+            if start_deg is not None:
+                goto.go_to(self.client, sequence.arm, np.array(start_deg), stop)
+        elif start_deg is not None and not arm_state.is_at(self.client, sequence.arm, np.array(start_deg)):
+            raise LinkError(
+                f"the arm does not stand where sequence {sequence.name!r} begins",
+                "bring it there with 'armtempo goto' and the sequence's file",
+            )
+        return key
+
     @property
     def last_run(self) -> Run | None:
         """The last run that this object recorded, however it ended; None before the first."""
@@ -283,6 +345,10 @@ class Board:
             return where.trajectory(0.0)
         if isinstance(where, EncodedMotion):
             return where.start_deg
+        if isinstance(where, SequencePlan):
+            return point_to_point.posture(
+                where.arm.home_deg if where.start_deg is None else where.start_deg, where.arm
+            )
         return point_to_point.posture(where, self._known_arm())
 
     def _encoded(self, motion: Plan | EncodedMotion | str) -> EncodedMotion:

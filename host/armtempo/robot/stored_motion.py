@@ -43,7 +43,12 @@ def store(
     found = client.find(name)
     if found is not None and found.crc == key.crc:
         return key
-    if found is not None and found.joints and not replace and not name.startswith(TEMPORARY):
+    if (
+        found is not None
+        and (found.joints or found.sequence)
+        and not replace
+        and not name.startswith(TEMPORARY)
+    ):
         button = ", which its button starts" if found.default else ""
         raise LinkError(
             f"the board keeps another motion {name!r}{button} ({found.duration_s:.3f} s, checksum {found.crc:08x})",
@@ -72,7 +77,7 @@ def replay(
     motion_s = started.duration_s * client.rate / PERMILLE
     follower = Follower(client, started.run)
     try:
-        return _follow(client, follower, _Brake(client, stop), lambda sample: sink(sample, motion_s))
+        return _follow(client, follower, Brake(client, stop), lambda sample: sink(sample, motion_s))
     except OtherBoardError as error:
         raise LinkError(
             f"{error.problem}; what came after the last sample cannot be known",
@@ -80,7 +85,7 @@ def replay(
         ) from error
 
 
-def _follow(client: Client, follower: Follower, brake: _Brake, take: Callable[[Sample], object]) -> RunEnd:
+def _follow(client: Client, follower: Follower, brake: Brake, take: Callable[[Sample], object]) -> RunEnd:
     heard_s = client.session.clock()
     while not follower.ended:
         try:
@@ -115,7 +120,7 @@ def _stop_after(client: Client, error: BaseException) -> None:
         client.stop(now=isinstance(error, KeyboardInterrupt))
 
 
-class _Brake:
+class Brake:
     """Called between two messages: passes a stop request on; freezes a board that does not come to rest."""
 
     def __init__(self, client: Client, stop: StopRequest, now: bool = False) -> None:
@@ -157,7 +162,7 @@ def stop(client: Client, now: bool) -> None:
     """Stop and wait until the arm rests; LinkError where it does not come to rest."""
     request = StopRequest()
     request.wanted = True
-    brake = _Brake(client, request, now)
+    brake = Brake(client, request, now)
     brake()
     while client.status().moving:
         brake()

@@ -110,7 +110,13 @@ def runs(app):
 
 def case_steps_come_one_after_the_other():
     app, host = ready(
-        [(OUTPUT, 0, 7, 0), (MOVE, "there", 0, 0), (WAIT, 0, 0, 500), (OUTPUT, 1, 65535, 0), (MOVE, "back", 0, 0)]
+        [
+            (OUTPUT, 0, 7, 0),
+            (MOVE, "there", 0, 0),
+            (WAIT, 0, 0, 500),
+            (OUTPUT, 1, 65535, 0),
+            (MOVE, "back", 0, 0),
+        ]
     )
     before = host.ask("status")[1][4]
     assert begin(host) == ("ok", (before, 0), b"")
@@ -130,7 +136,14 @@ def case_steps_come_one_after_the_other():
 
 
 def case_repeats_within_repeats_are_counted():
-    rows = [(REPEAT, 0, 0, 3), (OUTPUT, 0, 1, 0), (REPEAT, 0, 0, 2), (OUTPUT, 1, 2, 0), (END, 0, 0, 0), (END, 0, 1, 0)]
+    rows = [
+        (REPEAT, 0, 0, 3),
+        (OUTPUT, 0, 1, 0),
+        (REPEAT, 0, 0, 2),
+        (OUTPUT, 1, 2, 0),
+        (END, 0, 0, 0),
+        (END, 0, 1, 0),
+    ]
     app, host = ready(rows)
     begin(host)
     host.turn(100)
@@ -141,7 +154,7 @@ def case_repeats_within_repeats_are_counted():
 def case_for_ever_ends_only_by_a_stop():
     app, host = ready([(REPEAT, 0, 0, 0), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 1, 0)])
     begin(host)
-    for cycle in range(20):
+    for _ in range(20):
         arrive(app, host, 10)
         arrive(app, host, 0)
     assert stands(host) == ("running", 0, 2, 1, 20)
@@ -242,7 +255,7 @@ def case_what_cannot_go_on_is_named():
 
 
 def case_nothing_else_is_taken_meanwhile():
-    app, host = ready([(WAIT, 0, 0, 100000)])
+    _, host = ready([(WAIT, 0, 0, 100000)])
     begin(host)
     for name, values, tail in (
         ("start", (0, 0), "feed"),
@@ -258,7 +271,7 @@ def case_nothing_else_is_taken_meanwhile():
 
 
 def case_while_a_motion_runs_nobody_asks_for_a_sequence():
-    app, host = ready([(WAIT, 0, 0, 10)])
+    _, host = ready([(WAIT, 0, 0, 10)])
     start(host)
     assert host.ask("sequence")[:2] == ("error", "busy")
 
@@ -347,7 +360,7 @@ def case_a_motion_that_is_gone_or_another_is_named():
 
 
 def case_of_another_arm_it_is_refused():
-    app, host = ready([(WAIT, 0, 0, 1)])
+    _, host = ready([(WAIT, 0, 0, 1)])
     host.seq = sequence.pack(ARM_CRC ^ 1, [(WAIT, 0, 0, 1, 1)], [])
     host.upload("seq", host.seq)
     assert begin(host)[:2] == ("error", "arm_mismatch")
@@ -416,7 +429,7 @@ def case_a_sequence_is_stored_whole_or_not_at_all():
 
 
 def case_a_power_cut_before_the_rename_loses_nothing():
-    app, host = ready([(WAIT, 0, 0, 1)])
+    _, host = ready([(WAIT, 0, 0, 1)])
     path = flash() + "/seq.atm"
     with open(path, "rb") as file:
         data = file.read()

@@ -1,0 +1,136 @@
+"""A sequence on the board: its motions and its record stored, started, followed to its end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from armtempo_shared import sequence as record
+from armtempo_shared import wire
+
+from armtempo.errors import LinkError, NoAnswerError, OtherBoardError
+from armtempo.link import Client
+from armtempo.link.board_messages import SequenceState, StoredMotion
+from armtempo.link.refusal import refusal
+from armtempo.link.session import RECONNECT_S
+from armtempo.progress import Progress
+from armtempo.records.encoded_motion import MotionKey
+from armtempo.records.encoded_sequence import EncodedSequence
+from armtempo.robot import stored_motion
+from armtempo.robot.stop_request import StopRequest
+
+LOOK_S = 0.1
+"""How often the board is asked where it stands."""
+SequenceWatcher = Callable[[SequenceState], object]
+"""Gets how the sequence stands, each time it stands otherwise."""
+
+
+@dataclass(frozen=True)
+class _Record:
+    name: str
+    data: bytes
+
+    @property
+    def crc(self) -> int:
+        return wire.record_crc(self.data)
+
+
+def store(
+    client: Client, encoded: EncodedSequence, progress: Progress | None = None, replace: bool = False
+) -> MotionKey:
+    """Store a sequence: its motions first, itself last, so that it is whole or is not there.
+
+    Motions of an earlier sequence of this name that nobody needs any more are removed. Raises LinkError where the
+    board keeps something else under one of the names, unless ``replace``.
+    """
+    kept = {entry.name: entry for entry in client.stored()}
+    old = kept.get(encoded.plan.name)
+    legs = _legs_of(client, old) if old and old.sequence else {}
+    records = [_Record(one.name, one.data) for one in encoded.motions]
+    records.append(_Record(encoded.plan.name, encoded.data))
+    if not replace:
+        for one in records:
+            entry = kept.get(one.name)
+            if entry and entry.crc not in (0, one.crc, legs.get(one.name)):
+                raise LinkError(
+                    f"the board keeps something else as {one.name!r} (checksum {entry.crc:08x})",
+                    "replace it with --force, or give the sequence another name",
+                )
+    whole, done = sum(len(one.data) for one in records), 0
+    for one in records:
+        if one.name not in kept or kept[one.name].crc != one.crc:
+            client.upload(one.name, one.data)
+        done += len(one.data)
+        if progress is not None:
+            progress(done, whole)
+    for name in legs.keys() - {one.name for one in records}:
+        if name in kept and kept[name].crc == legs[name]:
+            client.remove(name)
+    return encoded.key
+
+
+def _legs_of(client: Client, old: StoredMotion) -> dict[str, int]:
+    """Names and checksums of the motions of a stored sequence; none where it cannot be read."""
+    try:
+        found = record.Sequence(client.fetch(old.name))
+        return dict(found.motion(index) for index in range(found.motions))
+    except record.SequenceError:
+        return {}
+
+
+def run(
+    client: Client, key: MotionKey, stop: StopRequest, watcher: SequenceWatcher = lambda _: None
+) -> SequenceState:
+    """Start a stored sequence and follow it to its end; a stop request makes the board brake and end it.
+
+    A board that cannot be reached goes on by itself; it is looked for RECONNECT_S long. Raises BoardError where the
+    board refuses to start or a fault ends the sequence, LinkError where it cannot be reached any more.
+    """
+    client.session.stopping = lambda: stop.wanted
+    stop.wake = client.session.wake
+    stop.check()
+    client.start(key.name, key.crc)
+    brake = stored_motion.Brake(client, stop)
+    try:
+        end = _follow(client, key.name, brake, watcher)
+    except KeyboardInterrupt:
+        stored_motion.send_stop(client, now=True)
+        raise
+    if end.ending == "fault":
+        raise refusal(f"the sequence ended by a fault {where(end)}", end.code, client.status().fault_joint)
+    if end.ending == "refused":
+        raise refusal(f"the sequence could not go on {where(end)}", end.code)
+    return end
+
+
+def _follow(client: Client, name: str, brake: stored_motion.Brake, watcher: SequenceWatcher) -> SequenceState:
+    before = None
+    heard_s = client.session.clock()
+    while True:
+        try:
+            brake()
+            state = client.sequence()
+            heard_s = client.session.clock()
+            if state != before:
+                watcher(state)
+                before = state
+            if state.name != name or state.ending == "none":
+                raise OtherBoardError(
+                    "the board has started anew during the sequence: positions are unknown",
+                    "bring the arm to its home posture and run 'armtempo home'",
+                )
+            if state.ending != "running":
+                return state
+            client.session.poll(LOOK_S)
+            client.session.events.clear()
+        except OtherBoardError:
+            raise
+        except NoAnswerError as error:
+            if client.session.stopping() or client.session.clock() - heard_s > RECONNECT_S:
+                raise
+            client.session.reconnect(error)
+
+
+def where(state: SequenceState) -> str:
+    """Where it stood, in words."""
+    return f"in step {state.step} after {state.cycle} whole cycle{'s' * (state.cycle != 1)}"
