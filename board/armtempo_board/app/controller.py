@@ -102,7 +102,7 @@ class Controller:
                 self._fault = codes.LINK_LOST
                 self.stop(0)
         if self.sequence and not self.engine.moving:
-            self.sequence.turn()
+            self.sequence.go_on()
 
     def refill(self) -> None:
         """What cannot wait for the end of longer work while something moves."""
@@ -315,8 +315,9 @@ class Controller:
 
     def begin_leg(self, motion: "tuple[str, int]", by_host: bool) -> None:
         """Start a motion of the sequence, (name, crc32), or refuse."""
+        name, crc = motion
         self._by_host = by_host
-        self._begin_motion(self.load(motion[0], motion[1]), self._next_rate, False, 0)
+        self._begin_motion(self.load(name, crc), self._next_rate, False, 0)
 
     def _begin_sequence(self, name: str, crc: "int | None") -> None:
         self.forget_store()

@@ -16,13 +16,13 @@ from armtempo_board.motion import endpoints
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from armtempo_board.app.controller import Controller
+    from armtempo_board.app.sequencer import Runner
     from armtempo_board.storage.sequence_file import SequenceFile
 
 _NONE = -1
 
 
-def sequencer(controller: "Controller", name: str, crc: "int | None") -> Sequencer:
+def sequencer(controller: "Runner", name: str, crc: "int | None") -> Sequencer:
     """The sequence ``name``, ready for its first row, or Refused; ``crc`` as for ``Controller.begin``."""
     record = controller.store().sequence(name)
     if crc is not None and record.crc != crc:
@@ -41,7 +41,7 @@ def sequencer(controller: "Controller", name: str, crc: "int | None") -> Sequenc
 class _Ends:
     """Where a motion of the sequence begins and ends."""
 
-    def __init__(self, controller: "Controller", record: "SequenceFile", index: int) -> None:
+    def __init__(self, controller: "Runner", record: "SequenceFile", index: int) -> None:
         name, crc = record.motion(index)
         try:
             motion = controller.load(name, crc)
@@ -71,7 +71,7 @@ class _Ends:
 _MISSING = (codes.NOT_FOUND, codes.BAD_CHECKSUM, codes.IS_SEQUENCE)
 
 
-def _check_rows(controller: "Controller", record: "SequenceFile", ends: "list[_Ends]") -> None:
+def _check_rows(controller: "Runner", record: "SequenceFile", ends: "list[_Ends]") -> None:
     last = _NONE  # motion that was run last
     firsts: "list[int]" = []  # the first motion in each repeat that has begun
     outputs = len(controller.outputs.values) if controller.outputs else 0

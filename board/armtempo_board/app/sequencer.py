@@ -16,10 +16,31 @@ from armtempo_board.errors import Refused
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from typing import Any
+    from typing import Any, Protocol
 
-    from armtempo_board.app.controller import Controller
+    from armtempo_board.storage.motion_file import MotionFile
     from armtempo_board.storage.sequence_file import SequenceFile
+
+    class Runner(Protocol):
+        """What is asked of who runs the motions, see ``controller.Controller``."""
+
+        engine: Any
+        outputs: Any
+        inputs: Any
+        told: Any
+        arm_crc: int
+
+        def store(self) -> Any: ...
+
+        def load(self, name: str, crc: "int | None" = None) -> MotionFile: ...
+
+        def begin_leg(self, motion: "tuple[str, int]", by_host: bool) -> None: ...
+
+        def end_sequence(self) -> None: ...
+
+        def fault(self) -> int: ...
+
+        def set_fault(self, code: int) -> None: ...
 
 _ANSWER = const(2)  # of a command's row: the format of its answer
 _ANSWER_AT = const(1)  # behind the command's number
@@ -32,21 +53,22 @@ _IDLE = (0, 0, 0, 0, 0)
 class Sequencer:
     """``told`` says how it stands, also after its end: ending, code, step, row, cycles."""
 
-    def __init__(self, controller: "Controller", record: "SequenceFile", name: bytes, by_host: bool) -> None:
+    def __init__(self, controller: "Runner", record: "SequenceFile", name: bytes, by_host: bool) -> None:
         self._controller = controller
         self._record = record
         self._by_host = by_host
         self._row: "tuple[int, ...]" = _IDLE  # the one under way
         self._next = 0  # number of the one behind it
         self._since_ms = time.ticks_ms()  # when it began
-        self._repeats = array("i", [0] * (2 * sequence.MAX_NESTING))  # of each: first row, passes left
+        self._first = array("i", [0] * sequence.MAX_NESTING)  # of each repeat that has begun: its first row
+        self._left = array("i", [0] * sequence.MAX_NESTING)  # passes left, 0: for ever
         self._depth = 0
         self._name = name
         self.told = array("i", [sequence.RUNNING, 0, 0, 0, 0])
         self.stopping = False
         controller.told = (self.told, name)
 
-    def turn(self) -> None:
+    def go_on(self) -> None:
         """Called while nothing moves: end, wait on, or do what the next row says."""
         controller = self._controller
         if controller.fault():
@@ -78,8 +100,8 @@ class Sequencer:
             self._controller.outputs.set(number, value)
         elif op == sequence.REPEAT:
             self._count(value)
-            self._repeats[2 * self._depth] = self._next
-            self._repeats[2 * self._depth + 1] = self._row[_AMOUNT]
+            self._first[self._depth] = self._next
+            self._left[self._depth] = self._row[_AMOUNT]
             self._depth += 1
         elif op == sequence.END:
             self._count(value)
@@ -90,13 +112,13 @@ class Sequencer:
 
     def _again(self) -> None:
         """The end of a repeat: from its first row again, or on."""
-        at = 2 * self._depth - 2
-        left = self._repeats[at + 1] - 1
+        inner = self._depth - 1
+        left = self._left[inner] - 1
         if left:  # below 0: for ever
-            self._next = self._repeats[at]
-            self._repeats[at + 1] = max(left, 0)
+            self._next = self._first[inner]
+            self._left[inner] = max(left, 0)
         else:
-            self._depth -= 1
+            self._depth = inner
 
     def _is_over(self) -> bool:
         """Whether the row under way is done; a motion is, as nothing moves."""

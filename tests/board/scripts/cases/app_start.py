@@ -139,7 +139,7 @@ def case_a_damaged_motion_is_listed_and_refused():
     assert hello[PROBLEM] == 0
     assert host.ask("home", (3,), bytes(8))[0] == "ok"
     for number, (name, size) in enumerate((("cut", 4), ("empty", 0), ("noise", 20000))):
-        assert host.ask("list", (number,)) == ("ok", (3, size, 0, 0, 0, 0), name)
+        assert host.ask("list", (number,)) == ("ok", (3, size, 0, 0, 0, 0, 0), name)
         assert host.ask("start", (0, 1), name.encode())[:2] == ("error", "bad_record")
     assert host.ask("remove", (), "noise") == ("ok", (), b"")
     assert host.ask("list", (0,))[1][0] == 2

@@ -78,7 +78,7 @@ def case_damaged_file_in_flash_is_not_run():
     with open(name, "wb") as file:
         file.write(data)
     assert start(host) == ("error", "bad_record", 255, 0)
-    assert host.ask("list", (0,)) == ("ok", (1, len(data), 0, 0, 0, 0), "feed")
+    assert host.ask("list", (0,)) == ("ok", (1, len(data), 0, 0, 0, 0, 0), "feed")
     assert app.controller.engine.calls.count("load") == 0
 
 
