@@ -37,7 +37,6 @@ _BYTES_PER_JOINT = const(8)  # in a sample on the wire
 _PERMILLE = const(1000)
 _BOOT_BYTES = const(4)
 _NEVER_MS = const((1 << 30) - 1)
-_START_BYTES = const(18_000)  # of heap that the start of a motion takes at most (docs/memory.md)
 
 
 class Controller:
@@ -75,7 +74,7 @@ class Controller:
         self.done = False  # a run has ended without a fault, and the host has not been told
         self._silence_ms = _NEVER_MS  # of the host, after which a run is stopped
         self._raw = array("i", [0] * COMMANDED)
-        self._fault = fault
+        self.pending = fault
         self._running = False  # a run has begun and its end has not been noticed
         self._braking = False
         self._can_brake = False  # the motion can come to rest along its path
@@ -99,7 +98,7 @@ class Controller:
             if not self.engine.moving:
                 self._end()
             elif silent_ms > self._silence_ms and self._by_host and not self._braking:
-                self._fault = codes.LINK_LOST
+                self.pending = codes.LINK_LOST
                 self.stop(0)
         if self.sequence and not self.engine.moving:
             self.sequence.go_on()
@@ -124,7 +123,7 @@ class Controller:
 
     def fail(self) -> None:
         """The program has failed: freeze, and INTERNAL is the pending fault."""
-        self._fault = codes.INTERNAL
+        self.pending = codes.INTERNAL
         if self.outputs:
             self.outputs.safe()
         if self.engine:
@@ -303,56 +302,26 @@ class Controller:
         unknown = self.everyone() & ~self.known()
         if unknown and not homing:
             raise Refused(codes.UNHOMED, _lowest(unknown))
-        if self.store().is_sequence(name):
-            if homing:
-                raise Refused(codes.IS_SEQUENCE)
-            if crc is None:
-                self.forget_speed()
-            return self._begin_sequence(name, crc)
-        rate, self._next_rate = self._next_rate, _PERMILLE
         self._by_host = crc is not None
-        return self._begin_motion(self.load(name, crc), _PERMILLE if crc is None else rate, homing, unknown)
+        rate, self._next_rate = self._next_rate if self._by_host else _PERMILLE, _PERMILLE
+        if self.store().is_sequence(name):
+            self._new_sequence(name, crc, rate, homing)
+            return self.sequence.begin()
+        return self.begin_motion(self.load(name, crc), rate, homing, unknown)
 
-    def begin_leg(self, motion: "tuple[str, int]", by_host: bool) -> None:
-        """Start a motion of the sequence, (name, crc32), or refuse."""
-        name, crc = motion
-        self._by_host = by_host
-        self._begin_motion(self.load(name, crc), self._next_rate, False, 0)
-
-    def _begin_sequence(self, name: str, crc: "int | None") -> None:
+    def _new_sequence(self, name: str, crc: "int | None", rate: int, homing: bool) -> None:
         self.forget_store()
         heap.forget()
         gc.collect()
-        missing = 0
         try:
-            self.sequence = self._new_sequence(name, crc)
+            from armtempo_board.app import sequence_start  # here, so that it can be forgotten
+
+            self.sequence = sequence_start.sequencer(self, name, crc, rate, homing)
         except MemoryError:
-            missing = _START_BYTES
-        finally:
-            self.forget_store()
-            heap.forget()
-            gc.collect()
-        missing = missing or (_START_BYTES - _free_heap() if _free_heap() else 0)
-        if missing > 0:
-            self.sequence = self.told = None
-            heap.forget()
-            raise Refused(codes.NO_SEQUENCE_ROOM, value=missing)
+            raise Refused(codes.NO_SEQUENCE_ROOM)
 
-    def _new_sequence(self, name: str, crc: "int | None") -> "Any":
-        from armtempo_board.app import sequence_start  # here, so that it can be forgotten
-
-        return sequence_start.sequencer(self, name, crc)
-
-    def end_sequence(self) -> None:
-        """It has ended, and its program is given up; ``told`` says how."""
-        self.sequence = None
-        self.forget_speed()
-
-    def set_fault(self, code: int) -> None:
-        """A fault that no motion has: it stays until it is cleared."""
-        self._fault = code
-
-    def _begin_motion(self, motion: "MotionFile", rate: int, homing: bool, unknown: int) -> None:
+    def begin_motion(self, motion: "MotionFile", rate: int, homing: bool = False, unknown: int = 0) -> None:
+        """Start a motion at ``rate`` thousandths of its speed, or refuse; ``unknown``: joints of unknown position."""
         self.forget_store()
         heap.forget()
         gc.collect()
@@ -416,25 +385,22 @@ class Controller:
 
     def change_speed(self, rate: int) -> None:
         """What moves goes on at ``rate`` thousandths (0: pause, RESUME: as before), or a host's next run begins so."""
-        if self.engine and self.engine.moving:
-            self.engine.change_rate(rate)
-            if self.sequence and rate not in (0, RESUME):
-                self._next_rate = rate  # its other motions follow suit
+        if self.moving():
+            (self.sequence or self.engine).change_rate(rate)
         elif rate in (0, RESUME):
             raise Refused(codes.NOT_MOVING)
         else:
             self._next_rate = rate
 
     def forget_speed(self) -> None:
-        """A new host: what another one wanted for its next run is no longer meant; a sequence keeps its speed."""
-        if not self.sequence:
-            self._next_rate = _PERMILLE
+        """A new host: what another one wanted for its next run is no longer meant."""
+        self._next_rate = _PERMILLE
 
     def clear(self) -> None:
         """Clear what is pending; the cause must be gone."""
         if self.engine and not self.engine.clear():
             raise Refused(codes.FAULT_PENDING, self.fault_joint(), self.fault())
-        self._fault = 0
+        self.pending = 0
 
     def measure_free(self) -> None:
         """Bring ``free_flash`` and ``free_heap`` up to date; costs milliseconds, so not while moving."""
@@ -458,7 +424,7 @@ class Controller:
 
     def fault(self) -> int:
         """Code of the pending fault, 0 for none."""
-        return self._fault or (self.engine.fault if self.engine else 0)
+        return self.pending or (self.engine.fault if self.engine else 0)
 
     def fault_joint(self) -> int:
         """The joint that the fault is about, or NO_JOINT."""
@@ -466,7 +432,7 @@ class Controller:
 
     def speed(self) -> int:
         """The rate that is wanted of the motion's own time, in thousandths; 0 in a pause."""
-        return self.engine.rate if self.engine and self.engine.moving else self._next_rate
+        return self.engine.rate if self.moving() else self._next_rate
 
     def state(self) -> int:
         """Number of the state (messages.STATES)."""

@@ -22,8 +22,10 @@ if TYPE_CHECKING:
 _NONE = -1
 
 
-def sequencer(controller: "Runner", name: str, crc: "int | None") -> Sequencer:
+def sequencer(controller: "Runner", name: str, crc: "int | None", rate: int, homing: bool) -> Sequencer:
     """The sequence ``name``, ready for its first row, or Refused; ``crc`` as for ``Controller.begin``."""
+    if homing:
+        raise Refused(codes.IS_SEQUENCE)
     record = controller.store().sequence(name)
     if crc is not None and record.crc != crc:
         raise Refused(codes.BAD_CHECKSUM)
@@ -35,7 +37,7 @@ def sequencer(controller: "Runner", name: str, crc: "int | None") -> Sequencer:
     except (MotionError, SequenceError):
         raise Refused(codes.BAD_RECORD)
     _check_rows(controller, record, ends)
-    return Sequencer(controller, record, name.encode(), crc is not None)
+    return Sequencer(controller, record, name.encode(), rate)
 
 
 class _Ends:

@@ -3,14 +3,16 @@
 Imported when a sequence starts and given up when it has ended. ``sequence_start`` has found everything that it names.
 """
 
+import gc
 import time
 from array import array
 from struct import pack_into
 
-from armtempo_shared import codes, sequence
+from armtempo_shared import codes, messages, sequence
 from armtempo_shared.messages import PAYLOAD_AT
 from micropython import const
 
+from armtempo_board import heap
 from armtempo_board.buffers import copy, pack_offsets
 from armtempo_board.errors import Refused
 
@@ -27,36 +29,37 @@ if TYPE_CHECKING:
         engine: Any
         outputs: Any
         inputs: Any
+        sequence: Any
         told: Any
+        pending: int
         arm_crc: int
 
         def store(self) -> Any: ...
 
         def load(self, name: str, crc: "int | None" = None) -> MotionFile: ...
 
-        def begin_leg(self, motion: "tuple[str, int]", by_host: bool) -> None: ...
+        def forget_store(self) -> None: ...
 
-        def end_sequence(self) -> None: ...
+        def begin_motion(self, motion: MotionFile, rate: int) -> None: ...
 
         def fault(self) -> int: ...
-
-        def set_fault(self, code: int) -> None: ...
 
 _ANSWER = const(2)  # of a command's row: the format of its answer
 _ANSWER_AT = const(1)  # behind the command's number
 _ANSWER_BYTES = const(10)  # of that format
 _ENDING, _CODE, _STEP, _ROW, _CYCLE = const(0), const(1), const(2), const(3), const(4)
 _OP, _NUMBER, _VALUE, _AMOUNT, _STEP_OF_ROW = const(0), const(1), const(2), const(3), const(4)
+_START_BYTES = const(18_000)  # of heap that the start of a motion takes at most (docs/memory.md)
 _IDLE = (0, 0, 0, 0, 0)
 
 
 class Sequencer:
     """``told`` says how it stands, also after its end: ending, code, step, row, cycles."""
 
-    def __init__(self, controller: "Runner", record: "SequenceFile", name: bytes, by_host: bool) -> None:
+    def __init__(self, controller: "Runner", record: "SequenceFile", name: bytes, rate: int) -> None:
         self._controller = controller
         self._record = record
-        self._by_host = by_host
+        self._rate = rate  # of the motions' own time, in thousandths
         self._row: "tuple[int, ...]" = _IDLE  # the one under way
         self._next = 0  # number of the one behind it
         self._since_ms = time.ticks_ms()  # when it began
@@ -66,7 +69,30 @@ class Sequencer:
         self._name = name
         self.told = array("i", [sequence.RUNNING, 0, 0, 0, 0])
         self.stopping = False
-        controller.told = (self.told, name)
+
+    def begin(self) -> None:
+        """From the next turn on; Refused where the heap has no room for a motion beside this."""
+        controller = self._controller
+        controller.forget_store()
+        heap.forget()
+        gc.collect()
+        free = gc.mem_free() if hasattr(gc, "mem_free") else _START_BYTES
+        if free < _START_BYTES:
+            controller.sequence = None
+            heap.forget()
+            raise Refused(codes.NO_SEQUENCE_ROOM, value=_START_BYTES - free)
+        controller.told = (self.told, self._name)
+
+    def change_rate(self, rate: int) -> None:
+        """As the engine's; of the motions to come too, and while none moves."""
+        engine = self._controller.engine
+        if engine.moving:
+            engine.change_rate(rate)
+            self._rate = rate if 0 < rate < messages.RESUME else self._rate
+        elif rate in (0, messages.RESUME):
+            raise Refused(codes.NOT_MOVING)
+        else:
+            self._rate = rate
 
     def go_on(self) -> None:
         """Called while nothing moves: end, wait on, or do what the next row says."""
@@ -95,7 +121,8 @@ class Sequencer:
         self._since_ms = time.ticks_ms()
         op, number, value, _, _ = self._row
         if op == sequence.MOVE:
-            self._controller.begin_leg(self._record.motion(number), self._by_host)
+            name, crc = self._record.motion(number)
+            self._controller.begin_motion(self._controller.load(name, crc), self._rate)
         elif op == sequence.OUTPUT:
             self._controller.outputs.set(number, value)
         elif op == sequence.REPEAT:
@@ -138,13 +165,13 @@ class Sequencer:
         if then == sequence.STOP_THEN:
             self._end(sequence.TIMED_OUT)
         elif then == sequence.FAULT_THEN:
-            self._controller.set_fault(codes.INPUT_TIMEOUT)  # the next turn ends it
+            self._controller.pending = codes.INPUT_TIMEOUT  # the next turn ends it
         return then == sequence.NEXT_THEN
 
     def _end(self, ending: int, code: int = 0) -> None:
         self.told[_ENDING] = ending
         self.told[_CODE] = code
-        self._controller.end_sequence()
+        self._controller.sequence = None
 
     def sequence(self, commands: "Any", row: tuple, length: int) -> int:
         """The answer to the command of this name while it runs; allocates nothing."""

@@ -1,5 +1,6 @@
 """Sequences: stored, refused before anything moves, run step by step, ended by whatever can end one."""
 
+import gc
 import sys
 
 import cases
@@ -317,6 +318,18 @@ def case_speed_holds_for_the_motions_that_follow():
     arrive(app, host, 0)
     begin(host)
     assert app.controller.engine.rate == 1000
+    arrive(app, host, 10)
+    assert host.ask("speed", (0,))[0] == "ok"
+
+
+def case_speed_between_motions_is_that_of_the_next():
+    app, host = ready([(WAIT, 0, 0, 5000), (MOVE, "there", 0, 0)])
+    begin(host)
+    assert host.ask("speed", (0,))[:2] == ("error", "not_moving")
+    assert host.ask("speed", (200,))[0] == "ok"
+    stand_in.Clock.now_ms += 5000
+    host.turn(5)
+    assert app.controller.engine.rate == 200
 
 
 def case_the_button_starts_it_as_the_default():
@@ -376,24 +389,29 @@ def case_unhomed_it_is_refused():
 
 def case_without_room_it_is_refused():
     app, host = ready([(WAIT, 0, 0, 1)])
-    import armtempo_board.app.controller as module
+    import armtempo_board.app.sequencer as module
 
-    module._free_heap = lambda: 10_000
+    module.gc = stand_in.Module()
+    module.gc.collect = gc.collect
+    module.gc.mem_free = lambda: 10_000
     assert begin(host) == ("error", "no_sequence_room", 255, 8000)
     assert not app.controller.sequence and state(host) == "idle"
     assert host.ask("sequence") == ("ok", (0, 0, 0, 0, 0), "")
-    module._free_heap = lambda: 20_000
+    module.gc.mem_free = lambda: 20_000
     assert begin(host)[0] == "ok"
 
 
 def case_no_memory_for_it_is_said_so():
     app, host = ready([(WAIT, 0, 0, 1)])
 
-    def none(name, crc):
+    def none(*arguments):
         raise MemoryError
 
-    app.controller._new_sequence = none
+    import armtempo_board.app.sequence_start as module
+
+    module.sequencer, kept = none, module.sequencer
     assert begin(host)[:2] == ("error", "no_sequence_room")
+    module.sequencer = kept
     assert host.ask("start", (0, wire.record_crc(host.record)), "feed")[0] == "ok"
 
 
