@@ -21,8 +21,6 @@ _ONLY_FOR_SET_UP = (
     "table",
     "program_hash",
     "basis",
-    "outputs",
-    "digital_inputs",
 )
 
 
@@ -36,14 +34,14 @@ def collect_often(often: bool = True) -> None:
         gc.threshold((gc.mem_free() + gc.mem_alloc()) // 64 if often else -1)
 
 
-def forget() -> None:
-    """Give up the modules that only set-up or the start of a motion needs; the next collection frees them.
+def forget(names: "tuple[str, ...]" = _ONLY_FOR_SET_UP) -> None:
+    """Give up modules, those that only set-up or the start of a motion needs; the next collection frees them.
 
     They are imported inside of functions, never at the head of a module, and never while a motion runs.
     """
     for module in list(sys.modules):
         if module.startswith("armtempo_"):
             package, _, name = module.rpartition(".")
-            if name in _ONLY_FOR_SET_UP or module in _ONLY_FOR_SET_UP:
+            if name in names or module in names:
                 del sys.modules[module]
                 delattr(sys.modules[package], name)

@@ -124,7 +124,6 @@ VALUES: "dict[str, str]" = {
     "too_long": "bytes of the record (at `put_begin`: that it takes); of a joint: its largest number",
     "too_abrupt": "steps/s²",
     "no_room": "bytes needed",
-    "no_output": "outputs that the arm has",
     "pin_taken": "16 times the port (A is 0) and the number in it",
 }
 """What ``value`` of a refusal is, by name; the others have none."""
@@ -158,9 +157,10 @@ COMMANDS: "dict[str, str]" = {
     "stop": "`now` 0: brake along the path (freeze where the motion has no braking time); 1: freeze.",
     "clear": "Clears the fault; refused with `fault_pending` while its cause is still there.",
     "output": "Sets output `number` of the arm record (from 0) to `value`: 0 to 65535 are its whole range. Also while "
-    "a motion runs. Refused with `fault_pending` while it has to be in its safe state.",
+    "a motion runs. Refused with `fault_pending` while a fault keeps it in its safe state. This and `inputs` are "
+    "unknown to a board whose arm has neither outputs nor inputs.",
     "inputs": "Answer: `levels` has a bit for each input of the arm record, set where it is active; the tail has "
-    "an u16 for each output, the value that it has.",
+    "an u16 for each output, the value that it has. Also while a motion runs.",
     "leave": "Ends the program; the port becomes MicroPython's prompt.",
     "samples": "All samples before `acknowledged` have arrived and may go; those from there on, `wanted` of "
     "them, are to be sent again. Answer: the oldest kept and how many are kept.",

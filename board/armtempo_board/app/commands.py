@@ -1,7 +1,8 @@
 """What the board does for each command of the message table; refusals are raised as ``Refused``.
 
-While a motion runs only the commands of ``_WHILE_MOVING`` are taken, and all of them but ``hello`` allocate nothing.
-The commands about the store are in ``store_commands.py``, which is imported when one comes.
+While a motion runs only the commands of ``_WHILE_MOVING`` and those about outputs and inputs are taken, and all of them
+but ``hello`` allocate nothing. The commands about the store are in ``store_commands.py``, which is imported when one
+comes; those about outputs and inputs in ``output_commands.py``, which is there for arms that have any.
 """
 
 from struct import calcsize, pack_into, unpack_from
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from armtempo_board.app.controller import Controller
     from armtempo_board.link.serial_link import SerialLink
 
-_WHILE_MOVING = ("hello", "status", "stop", "output", "inputs", "samples")
+_WHILE_MOVING = ("hello", "status", "stop", "samples")
 _BYTES_PER_POSITION = const(4)
 _BYTES_OF_INDEX = const(4)  # of a sample
 _ANSWER_AT = const(6)  # in a reply: its payload begins with the command's number
@@ -40,7 +41,7 @@ class Commands:
         self.controller = controller
         self.greeted = False  # a host has said hello
         self.leaving = False  # a host has asked for the REPL
-        self._link = link
+        self.link = link
         self._session = 0
         self._table: "dict[int, Any]" = {}
         while_moving = bytearray()
@@ -48,15 +49,15 @@ class Commands:
         for command, answer in zip(rows("C"), rows("A")):
             name, number, fields, _, tail = command
             _, _, values, _, _ = answer
-            handler = getattr(self, "_" + name, name)
+            if name in _WHILE_MOVING:
+                while_moving.append(number)
+            handler = getattr(type(self), "_" + name, name)
             self._table[number] = (
                 handler,
                 kept.setdefault(fields, fields),
                 kept.setdefault(values, values),
                 tail,
             )
-            if name in _WHILE_MOVING:
-                while_moving.append(number)
             if name == "hello":
                 self._hello_number = number
         self._while_moving = bytes(while_moving)
@@ -65,7 +66,7 @@ class Commands:
 
     def act(self) -> None:
         """Act on one command."""
-        number = self._link.reader.data[NUMBER_AT]
+        number = self.link.reader.data[NUMBER_AT]
         try:
             self._dispatch(number)
         except Refused as refused:
@@ -78,27 +79,28 @@ class Commands:
             raise
 
     def _dispatch(self, number: int) -> None:
-        row = self._table.get(number)
+        rows = self.controller.rows
+        row = self._table.get(number) or rows.get(number)
         if row is None:
             return self._refuse(number, codes.UNKNOWN_COMMAND)
-        length = self._link.reader.length()
+        length = self.link.reader.length()
         fixed = calcsize(row[_FIELDS])
         if length < fixed or (length > fixed and not row[_TAIL]):
             return self._refuse(number, codes.MALFORMED)
         if not self.greeted and number != self._hello_number:
             return self._refuse(number, codes.NO_SESSION)
-        if self.controller.moving() and number not in self._while_moving:
+        if self.controller.moving() and number not in self._while_moving and number not in rows:
             return self._refuse(number, codes.BUSY)
-        self._link.reply[PAYLOAD_AT] = number
+        self.link.reply[PAYLOAD_AT] = number
         self.controller.refill()
         handler = row[_HANDLER]
-        size = self._store(handler, row, length) if isinstance(handler, str) else handler(row, length)
+        size = self._store(handler, row, length) if isinstance(handler, str) else handler(self, row, length)
         if size is not None and size < 0:
             return self._refuse(number, -size)
         if self.controller.arm_waits:
             self.controller.take_new_arm()
         self.controller.refill()
-        self._link.answer(self._ok, _ANSWER_AT - PAYLOAD_AT + (size or 0))
+        self.link.answer(self._ok, _ANSWER_AT - PAYLOAD_AT + (size or 0))
 
     def _store(self, name: str, row: tuple, length: int) -> "int | None":
         from armtempo_board.app import store_commands  # here, so that it can be forgotten
@@ -106,18 +108,18 @@ class Commands:
         return getattr(store_commands, name)(self, row, length)  # type: ignore[no-any-return]
 
     def _refuse(self, number: int, code: int, joint: int = NO_JOINT, value: int = 0) -> None:
-        pack_into(self._error_fields, self._link.reply, PAYLOAD_AT, number, code, joint, value)
-        self._link.answer(self._error, calcsize(self._error_fields))
+        pack_into(self._error_fields, self.link.reply, PAYLOAD_AT, number, code, joint, value)
+        self.link.answer(self._error, calcsize(self._error_fields))
 
     # for those who act on a command
 
     def fields(self, row: tuple) -> tuple:
         """The fields of the command that stands in the reader."""
-        return unpack_from(row[_FIELDS], self._link.reader.data, PAYLOAD_AT)
+        return unpack_from(row[_FIELDS], self.link.reader.data, PAYLOAD_AT)
 
     def tail(self, row: tuple, length: int) -> bytes:
         """What comes behind its fields."""
-        return bytes(self._link.reader.data[PAYLOAD_AT + calcsize(row[_FIELDS]) : PAYLOAD_AT + length])
+        return bytes(self.link.reader.data[PAYLOAD_AT + calcsize(row[_FIELDS]) : PAYLOAD_AT + length])
 
     def text(self, row: tuple, length: int) -> str:
         """The same as text; refuses what is none."""
@@ -128,12 +130,12 @@ class Commands:
 
     def reply(self, row: tuple, *values: int) -> int:
         """Put the fields of the answer into the reply; their size."""
-        pack_into(row[_ANSWER], self._link.reply, _ANSWER_AT, *values)
+        pack_into(row[_ANSWER], self.link.reply, _ANSWER_AT, *values)
         return calcsize(row[_ANSWER])
 
     def reply_tail(self, size: int, tail: bytes) -> int:
         """Put the tail of the answer behind fields of ``size`` bytes; the size of all."""
-        self._link.reply[_ANSWER_AT + size : _ANSWER_AT + size + len(tail)] = tail
+        self.link.reply[_ANSWER_AT + size : _ANSWER_AT + size + len(tail)] = tail
         return size + len(tail)
 
     # session
@@ -170,13 +172,13 @@ class Commands:
     def _begin_session(self, session: int) -> None:
         self.greeted = True
         self._session = session
-        self._link.forget()
+        self.link.forget()
         self.controller.samples.skip()
         self.controller.forget_store()
 
     def _status(self, row: tuple, length: int) -> int:
         controller = self.controller
-        reply = self._link.reply
+        reply = self.link.reply
         samples = controller.samples
         pack_into(
             row[_ANSWER],
@@ -190,7 +192,7 @@ class Commands:
             0,
             samples.next - samples.first,
             samples.lost,
-            self._link.reader.bad,
+            self.link.reader.bad,
         )
         size = calcsize(row[_ANSWER])
         return size + controller.put_snapshot(reply, self._ticks_at, _ANSWER_AT + size)
@@ -207,7 +209,7 @@ class Commands:
         fixed = calcsize(row[_FIELDS])
         if length - fixed != _BYTES_PER_POSITION * joints or mask >> joints:
             raise Refused(codes.MALFORMED)
-        steps = unpack_from("<%di" % joints, self._link.reader.data, PAYLOAD_AT + fixed)
+        steps = unpack_from("<%di" % joints, self.link.reader.data, PAYLOAD_AT + fixed)
         self.controller.home(mask, steps)
 
     def _start(self, row: tuple, length: int) -> int:
@@ -219,41 +221,18 @@ class Commands:
     def _stop(self, row: tuple, length: int) -> int:
         if not self.controller.moving():
             raise Refused(codes.NOT_MOVING)
-        self.controller.stop(self._link.reader.data[PAYLOAD_AT])
+        self.controller.stop(self.link.reader.data[PAYLOAD_AT])
         return 0
-
-    def _output(self, row: tuple, length: int) -> int:
-        """Minus the code of a refusal, which allocates nothing; else 0."""
-        data = self._link.reader.data
-        outputs = self.controller.outputs
-        number = data[PAYLOAD_AT]
-        if not outputs or number >= len(outputs.values):
-            return -codes.NO_OUTPUT
-        if self.controller.fault():
-            return -codes.FAULT_PENDING
-        outputs.set(number, data[PAYLOAD_AT + 1] | data[PAYLOAD_AT + 2] << 8)
-        return 0
-
-    def _inputs(self, row: tuple, length: int) -> int:
-        reply = self._link.reply
-        inputs = self.controller.inputs
-        reply[_ANSWER_AT] = inputs.levels if inputs else 0
-        size = 1
-        if self.controller.outputs:
-            for value in self.controller.outputs.values:
-                pack_into("<H", reply, _ANSWER_AT + size, value)
-                size += 2
-        return size
 
     def _clear(self, row: tuple, length: int) -> None:
         self.controller.clear()
 
     def _samples(self, row: tuple, length: int) -> int:
-        data = self._link.reader.data
+        data = self.link.reader.data
         samples = self.controller.samples
         acknowledged = u32(data, PAYLOAD_AT)
         wanted_at = PAYLOAD_AT + _BYTES_OF_INDEX
         samples.acknowledge(acknowledged)
         samples.send_again(acknowledged, data[wanted_at] | data[wanted_at + 1] << 8)
-        pack_into(row[_ANSWER], self._link.reply, _ANSWER_AT, samples.first, samples.next - samples.first)
+        pack_into(row[_ANSWER], self.link.reply, _ANSWER_AT, samples.first, samples.next - samples.first)
         return calcsize(row[_ANSWER])
