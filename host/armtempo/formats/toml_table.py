@@ -74,6 +74,10 @@ class Table:
         """Whether the key is given."""
         return key in self._values
 
+    def is_text(self, key: str) -> bool:
+        """Whether the key is given, as a text."""
+        return isinstance(self._values.get(key), str)
+
     def known(self, *keys: str) -> None:
         """These keys may be there, whether a getter asks for them or not."""
         self._asked.extend(keys)

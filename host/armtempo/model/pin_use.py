@@ -52,7 +52,9 @@ def problems(arm: Arm) -> list[PinProblem]:
     if missing:
         what = f"{board.name} has not the pins that the engine takes: {', '.join(missing)}"
         return [PinProblem("board", what, "take a board whose chip has 100 pins or more")]
-    return [*_pin_problems(arm, board, engine), *_placed(arm)[1]]
+    found = _pin_problems(arm, board, engine)
+    named = [problem.where for problem in found]
+    return [*found, *(problem for problem in _placed(arm)[1] if problem.where not in named)]
 
 
 def timer_outputs(arm: Arm) -> dict[str, TimerOutput]:
