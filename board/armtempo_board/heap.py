@@ -16,11 +16,6 @@ _NOT_ALWAYS = (
     "endpoints",
     "arm_check",
     "motion_file",
-    "sequence_file",
-    "sequence_check",
-    "sequence_start",
-    "sequencer",
-    "armtempo_shared.sequence",
     "engine_memory",
     "room",
     "armtempo_shared.motion",
@@ -31,9 +26,8 @@ _NOT_ALWAYS = (
     "table",
     "program_hash",
     "basis",
-    "outputs",
-    "digital_inputs",
 )
+_SEQUENCE = "sequence"  # how the names of the modules begin that only sequences need
 
 
 def collect_often(often: bool = True) -> None:
@@ -46,8 +40,10 @@ def collect_often(often: bool = True) -> None:
         gc.threshold((gc.mem_free() + gc.mem_alloc()) // 64 if often else -1)
 
 
-def forget() -> None:
-    """Give up the modules that only set-up, the start of a motion or a motion needs; the next collection frees them.
+def forget(names: "tuple[str, ...]" = _NOT_ALWAYS) -> None:
+    """Give up modules, those that only set-up, the start of a motion, a motion or a sequence needs.
+
+    The next collection frees them.
 
     They are imported inside of functions, never at the head of a module that stays, and never while a motion runs.
     What a motion needs is held by its engine until it ends.
@@ -55,6 +51,6 @@ def forget() -> None:
     for module in list(sys.modules):
         if module.startswith("armtempo_"):
             package, _, name = module.rpartition(".")
-            if name in _NOT_ALWAYS or module in _NOT_ALWAYS:
+            if name in names or module in names or name.startswith(_SEQUENCE):
                 del sys.modules[module]
                 delattr(sys.modules[package], name)

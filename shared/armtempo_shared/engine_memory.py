@@ -54,7 +54,12 @@ def output_bytes(outputs: int, inputs: int) -> int:
 
 def objects_fit(joints: int, beside: int, most_joints: int) -> bool:
     """Whether the objects of an engine, and so many bytes beside them, fit where those for the most joints do."""
-    return not beside or object_bytes(joints) + beside <= object_bytes(most_joints) + _SPARE_BYTES
+    return not beside or beside <= objects_room(joints, most_joints)
+
+
+def objects_room(joints: int, most_joints: int) -> int:
+    """Bytes that outputs and inputs can have beside the objects of so many joints."""
+    return object_bytes(most_joints) - object_bytes(joints) + _SPARE_BYTES
 
 
 def blocks(room_words: int) -> "list[int]":

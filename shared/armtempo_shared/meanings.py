@@ -155,7 +155,6 @@ VALUES: "dict[str, str]" = {
     "too_long": "bytes of the record (at `put_begin`: that it takes); of a joint: its largest number",
     "too_abrupt": "steps/s²",
     "no_room": "bytes needed",
-    "no_output": "outputs that the arm has",
     "pin_taken": "16 times the port (A is 0) and the number in it",
     "leg_missing": "number of the motion in the sequence, from 1",
     "leg_elsewhere": "number of the step in the sequence",
@@ -186,7 +185,7 @@ COMMANDS: "dict[str, str]" = {
     "list": "The stored trajectory number `index` (from 0, in order of names) of `count`; `not_found` behind "
     "the last. A damaged one has `crc`, `duration` and `joints` 0. `sequence` 1: it is a sequence, whose `duration` "
     "and `joints` are 0. Tail of the answer: its name.",
-    "sequence": "Where the sequence stands, or where the last one ended. `ending`: 0 there was none since the start, "
+    "sequence": "Where the sequence stands, or where the last one ended. Unknown to a board on which none has been started. `ending`: "
     "1 it runs, 2 finished, 3 stopped, 4 an input did not come and the sequence was to stop then, 5 a fault, 6 a leg "
     "was refused; `code`: of that fault or refusal. `step`: of the sequence file; `row`: of the record; `cycle`: "
     "finished passes of its outermost repeats. Tail: its name.",
@@ -204,9 +203,10 @@ COMMANDS: "dict[str, str]" = {
     "last longer than 1 h 49 min. While nothing moves: the rate of this session's next start.",
     "clear": "Clears the fault; refused with `fault_pending` while its cause is still there.",
     "output": "Sets output `number` of the arm record (from 0) to `value`: 0 to 65535 are its whole range. Also while "
-    "a motion runs. Refused with `fault_pending` while it has to be in its safe state.",
+    "a motion runs. Refused with `fault_pending` while a fault keeps it in its safe state. This and `inputs` are "
+    "unknown to a board whose arm has neither outputs nor inputs.",
     "inputs": "Answer: `levels` has a bit for each input of the arm record, set where it is active; the tail has "
-    "an u16 for each output, the value that it has.",
+    "an u16 for each output, the value that it has. Also while a motion runs.",
     "leave": "Ends the program; the port becomes MicroPython's prompt.",
     "samples": "All samples before `acknowledged` have arrived and may go; those from there on, `wanted` of "
     "them, are to be sent again. Answer: the oldest kept and how many are kept.",

@@ -3,7 +3,8 @@
 ``wire.py`` encodes and decodes by it, ``shared/docs/protocol.md`` is generated from it. It is one text, so
 that the board can parse it and free the memory again.
 
-A row: kind (C command, A the answer to it, E event, R reply), name, number in hex, fields as ``name:type`` in
+A row: kind (C command, A the answer to it, O and P the same of commands that a board
+only knows where its arm has outputs or inputs, S and T of that which it knows when a sequence was started, E event, R reply), name, number in hex, fields as ``name:type`` in
 the letters of ``struct``, little endian without padding, then ``text`` (UTF-8) or ``bytes`` where the rest of
 the payload is such a tail. A line that begins with a blank goes on with the row.
 """
@@ -21,15 +22,15 @@ C remove 14 text
 C rename 15 old_length:B text
 C get 16 offset:I length:H text
 C set_default 17 text
-C sequence 18
 C home 20 joints:B bytes
 C start 21 flags:B crc:I text
 C stop 22 now:B
 C clear 23
 C speed 25 rate:H
 C leave 24
-C output 26 number:B value:H
-C inputs 27
+S sequence 18
+O output 26 number:B value:H
+O inputs 27
 C samples 30 acknowledged:I wanted:H
 A hello 01 protocol:B joints:B encoders:B state:B tick_hz:I max_rate:I max_rate_sum:I free_flash:I
  free_heap:I arm_crc:I program_crc:I boot:I engine_room:I engine_joints:B arm_problem:B arm_value:I text
@@ -43,15 +44,15 @@ A remove 14
 A rename 15
 A get 16 size:I bytes
 A set_default 17
-A sequence 18 ending:B code:B step:H row:H cycle:I text
 A home 20
 A start 21 run:I duration:Q
 A stop 22
 A clear 23
 A speed 25
 A leave 24
-A output 26
-A inputs 27 levels:B bytes
+T sequence 18 ending:B code:B step:H row:H cycle:I text
+P output 26
+P inputs 27 levels:B bytes
 A samples 30 first:I count:H
 E sample 40 run:I index:I ticks:Q path:Q flags:B bytes
 E done 41 run:I ticks:Q path:Q samples:I lost:I bytes

@@ -45,8 +45,8 @@ def _index(kinds: str) -> "tuple[dict[str, Any], dict[int, Any]]":
     return by_name, by_id
 
 
-COMMAND, COMMAND_BY_ID = _index("C")
-ANSWER, ANSWER_BY_ID = _index("A")
+COMMAND, COMMAND_BY_ID = _index("COS")
+ANSWER, ANSWER_BY_ID = _index("APT")
 EVENT, EVENT_BY_ID = _index("ER")
 
 

@@ -50,10 +50,10 @@ def _figures() -> str:
 
 
 def _commands() -> str:
-    answers = {row[0]: row for row in rows("A")}
+    answers = {row[0]: row for row in rows("A") + rows("P") + rows("T")}
     lines = [
         (f"`{row[0]}`", f"0x{row[1]:02X}", _fields(row), _fields(answers[row[0]]), meanings.COMMANDS[row[0]])
-        for row in rows("C")
+        for row in rows("C") + rows("O") + rows("S")
     ]
     return _table(("command", "id", "fields", "answer", "meaning"), *lines)
 

@@ -28,7 +28,8 @@ def test_page_is_current() -> None:
 
 
 def test_every_message_and_code_has_its_words() -> None:
-    assert set(meanings.COMMANDS) == {row[0] for row in rows("C")} == {row[0] for row in rows("A")}
+    commands = {row[0] for row in rows("C") + rows("O")}
+    assert set(meanings.COMMANDS) == commands == {row[0] for row in rows("A") + rows("P")}
     assert set(meanings.EVENTS) == {row[0] for row in rows("E") + rows("R")}
     numbers = {name: value for name, value in vars(codes).items() if name.isupper()}
     assert {name.upper(): code for name, code in meanings.ERROR_CODES.items()} == numbers
@@ -37,7 +38,7 @@ def test_every_message_and_code_has_its_words() -> None:
 
 
 def test_numbers_are_used_once_and_answers_match_their_commands() -> None:
-    commands, answers, others = rows("C"), rows("A"), rows("E") + rows("R")
+    commands, answers, others = rows("C") + rows("O"), rows("A") + rows("P"), rows("E") + rows("R")
     numbers = [row[1] for row in commands + others]
     assert len(set(numbers)) == len(numbers)
     assert [row[:2] for row in commands] == [row[:2] for row in answers]

@@ -1,8 +1,9 @@
 """What the board does for each command of the message table; refusals are raised as ``Refused``.
 
-While a motion runs only the commands of ``_WHILE_MOVING`` are taken, and all of them but ``hello``, ``stop`` and
-``speed`` allocate nothing.
-The commands about the store are in ``store_commands.py``, which is imported when one comes.
+While a motion runs only the commands of ``_WHILE_MOVING`` and those of ``Controller.rows`` are taken, and all of them
+but ``hello``, ``stop`` and ``speed`` allocate nothing. The commands about the store are in ``store_commands.py``, which is
+imported when one comes; those about outputs and inputs in ``output_commands.py``, which is there for arms that have
+any, and the one about sequences in ``sequence_command.py``, which is there when one has been started.
 """
 
 from struct import calcsize, pack_into, unpack_from
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from armtempo_board.app.controller import Controller
     from armtempo_board.link.serial_link import SerialLink
 
-_WHILE_MOVING = ("hello", "status", "stop", "speed", "output", "inputs", "samples", "sequence")
+_WHILE_MOVING = ("hello", "status", "stop", "speed", "samples")
 _BYTES_PER_POSITION = const(4)
 _BYTES_OF_INDEX = const(4)  # of a sample
 _ANSWER_AT = const(6)  # in a reply: its payload begins with the command's number
@@ -57,15 +58,15 @@ class Commands:
         for command, answer in zip(rows("C"), rows("A")):
             name, number, fields, _, tail = command
             _, _, values, _, _ = answer
-            handler = getattr(self, "_" + name, name)
+            if name in _WHILE_MOVING:
+                while_moving.append(number)
+            handler = getattr(type(self), "_" + name, name)
             self._table[number] = (
                 handler,
                 kept.setdefault(fields, fields),
                 kept.setdefault(values, values),
                 tail,
             )
-            if name in _WHILE_MOVING:
-                while_moving.append(number)
             if name == "hello":
                 self._hello_number = number
         self._while_moving = bytes(while_moving)
@@ -87,7 +88,8 @@ class Commands:
             raise
 
     def _dispatch(self, number: int) -> None:
-        row = self._table.get(number)
+        rows = self.controller.rows
+        row = self._table.get(number) or rows.get(number)
         if row is None:
             return self._refuse(number, codes.UNKNOWN_COMMAND)
         length = self.link.reader.length()
@@ -96,12 +98,12 @@ class Commands:
             return self._refuse(number, codes.MALFORMED)
         if not self.greeted and number != self._hello_number:
             return self._refuse(number, codes.NO_SESSION)
-        if self.controller.moving() and number not in self._while_moving:
+        if self.controller.moving() and number not in self._while_moving and number not in rows:
             return self._refuse(number, codes.BUSY)
         self.link.reply[PAYLOAD_AT] = number
         self.controller.refill()
         handler = row[_HANDLER]
-        size = self._store(handler, row, length) if isinstance(handler, str) else handler(row, length)
+        size = self._store(handler, row, length) if isinstance(handler, str) else handler(self, row, length)
         if size is not None and size < 0:
             return self._refuse(number, -size)
         if self.controller.arm_waits:
@@ -110,12 +112,9 @@ class Commands:
         self.link.answer(self._ok, _ANSWER_AT - PAYLOAD_AT + (size or 0))
 
     def _store(self, name: str, row: tuple, length: int) -> "int | None":
-        acting: Any = self.controller.sequence  # while one runs there is but the command about it
-        if not acting:
-            if self.controller.moving():
-                raise Refused(codes.BUSY)
-            from armtempo_board.app import store_commands as acting  # here, so that it can be forgotten
-        return getattr(acting, name)(self, row, length)  # type: ignore[no-any-return]
+        from armtempo_board.app import store_commands  # here, so that it can be forgotten
+
+        return getattr(store_commands, name)(self, row, length)  # type: ignore[no-any-return]
 
     def _refuse(self, number: int, code: int, joint: int = NO_JOINT, value: int = 0) -> None:
         pack_into(self._error_fields, self.link.reply, PAYLOAD_AT, number, code, joint, value)
@@ -242,29 +241,6 @@ class Commands:
         if not (rate in (0, RESUME) or SLOWEST_PERMILLE <= rate <= PERMILLE):
             raise Refused(codes.MALFORMED)
         self.controller.change_speed(rate)
-
-    def _output(self, row: tuple, length: int) -> int:
-        """Minus the code of a refusal, which allocates nothing; else 0."""
-        data = self.link.reader.data
-        outputs = self.controller.outputs
-        number = data[PAYLOAD_AT]
-        if not outputs or number >= len(outputs.values):
-            return -codes.NO_OUTPUT
-        if self.controller.fault():
-            return -codes.FAULT_PENDING
-        outputs.set(number, data[PAYLOAD_AT + 1] | data[PAYLOAD_AT + 2] << 8)
-        return 0
-
-    def _inputs(self, row: tuple, length: int) -> int:
-        reply = self.link.reply
-        inputs = self.controller.inputs
-        reply[_ANSWER_AT] = inputs.levels if inputs else 0
-        size = 1
-        if self.controller.outputs:
-            for value in self.controller.outputs.values:
-                pack_into("<H", reply, _ANSWER_AT + size, value)
-                size += 2
-        return size
 
     def _clear(self, row: tuple, length: int) -> None:
         self.controller.clear()

@@ -54,8 +54,9 @@ class Controller:
         self._root = root
         self._store: "Any" = None
         self.engine: "Any" = None
-        self.outputs: "Any" = None  # of an arm that has any
-        self.inputs: "Any" = None
+        self.outputs: "Any" = None  # of an arm that has outputs or inputs,
+        self.inputs: "Any" = None  # and these then too,
+        self.rows: "dict[int, Any]" = {}  # and their commands
         self.program_crc = program_crc
         self.board_id = _board_id()
         self.boot = int.from_bytes(os.urandom(_BOOT_BYTES), "little")  # another number after each power-up
@@ -81,7 +82,6 @@ class Controller:
         self._next_rate = _PERMILLE  # of the next run that a host starts
         self._by_host = False  # the run was started by a command
         self.sequence: "Any" = None  # the one under way
-        self.told: "Any" = None  # how the last one stands or ended, and its name
         self._assumed = 0  # joints whose position a homing motion took for granted
 
     # the loop
@@ -90,9 +90,9 @@ class Controller:
         """Keep steps and samples coming; notice the end of a run, or that the host was silent for too long."""
         self.engine.service()
         self._collect()
-        if self.outputs and self.fault():
-            self.outputs.safe()
-        if self.inputs:
+        if self.outputs:
+            if self.fault():
+                self.outputs.safe()
             self.inputs.poll(time.ticks_ms())
         if self._running:
             if not self.engine.moving:
@@ -165,8 +165,7 @@ class Controller:
         self.arm_waits = False
         self.arm_problem = self.arm_value = 0
         try:
-            data = self._stored_bytes()
-            self._take_arm(self._judged(data), data)
+            self._take_arm(self._stored_arm())
         except Refused as refused:
             if refused.code != codes.NOT_FOUND:
                 self.arm_problem, self.arm_value = refused.code, refused.value
@@ -191,7 +190,7 @@ class Controller:
         self._decide(True)
         self.arm_problem = self.arm_value = 0
         try:
-            self._take_arm(record, data)
+            self._take_arm(record)
         except Exception:
             self._drop_engine()
             raise
@@ -211,6 +210,9 @@ class Controller:
         store.Store(self._root, recover=False).take_arm(is_fit)
         heap.forget()
 
+    def _stored_arm(self) -> "ArmRecord":
+        return self._judged(self._stored_bytes())
+
     def _stored_bytes(self) -> bytes:
         try:
             return bytes(self.store().read(ARM_RECORD_NAME))
@@ -219,15 +221,15 @@ class Controller:
             heap.forget()
 
     def _judged(self, data: bytes) -> "ArmRecord":
-        """An arm record that can be taken: head, joints, crc32; else Refused."""
+        """An arm record that can be taken, unpacked; else Refused."""
         from armtempo_board.motion import arm_check  # here, so that it can be forgotten
 
         return arm_check.checked(data, self._workspace.memory.size, self._workspace.joints)
 
-    def _take_arm(self, record: "ArmRecord", data: bytes) -> None:
+    def _take_arm(self, record: "ArmRecord") -> None:
         from armtempo_shared import armrecord  # here, so that it can be forgotten
 
-        head, joints, crc = record
+        head, joints, crc, outputs, inputs = record
         if crc == self.arm_crc:
             return
         all_but_limits = armrecord.without_limits(head, joints)
@@ -245,17 +247,10 @@ class Controller:
         self.arm_crc = crc
         self._raw = array("i", [0] * (COMMANDED + 2 * self.joints))
         self.samples.configure(self.joints)
-        self._take_outputs(*armrecord.unpack_outputs(data))
+        if outputs or inputs:
+            from armtempo_board.app import output_commands  # here, as few arms have any
 
-    def _take_outputs(self, outputs: "list[dict[str, int]]", inputs: "list[dict[str, int]]") -> None:
-        if outputs:
-            from armtempo_board.hardware.outputs import Outputs  # here, as few arms have any
-
-            self.outputs = Outputs(outputs)
-        if inputs:
-            from armtempo_board.hardware.digital_inputs import DigitalInputs
-
-            self.inputs = DigitalInputs(inputs)
+            output_commands.attach(self, outputs, inputs)
 
     def _drop_engine(self) -> None:
         """Before another takes its place: the heap is to be as it was without one."""
@@ -264,6 +259,7 @@ class Controller:
         if self.outputs:
             self.outputs.close()
         self.engine = self.outputs = self.inputs = None
+        self.rows.clear()
         self.joints = self.arm_crc = 0
         self.samples.configure(0)
         self._raw = array("i", [0] * COMMANDED)

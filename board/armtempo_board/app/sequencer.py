@@ -6,14 +6,12 @@ Imported when a sequence starts and given up when it has ended. ``sequence_start
 import gc
 import time
 from array import array
-from struct import pack_into
 
 from armtempo_shared import codes, messages, sequence
-from armtempo_shared.messages import PAYLOAD_AT
 from micropython import const
 
 from armtempo_board import heap
-from armtempo_board.buffers import copy, pack_offsets
+from armtempo_board.app.sequence_command import CODE, CYCLE, ENDING, ROW, STEP, SequenceCommand
 from armtempo_board.errors import Refused
 
 TYPE_CHECKING = False
@@ -30,7 +28,7 @@ if TYPE_CHECKING:
         outputs: Any
         inputs: Any
         sequence: Any
-        told: Any
+        rows: dict[int, Any]
         pending: int
         arm_crc: int
 
@@ -44,10 +42,7 @@ if TYPE_CHECKING:
 
         def fault(self) -> int: ...
 
-_ANSWER = const(2)  # of a command's row: the format of its answer
-_ANSWER_AT = const(1)  # behind the command's number
-_ANSWER_BYTES = const(10)  # of that format
-_ENDING, _CODE, _STEP, _ROW, _CYCLE = const(0), const(1), const(2), const(3), const(4)
+
 _OP, _NUMBER, _VALUE, _AMOUNT, _STEP_OF_ROW = const(0), const(1), const(2), const(3), const(4)
 _START_BYTES = const(18_000)  # of heap that the start of a motion takes at most (docs/memory.md)
 _IDLE = (0, 0, 0, 0, 0)
@@ -66,9 +61,9 @@ class Sequencer:
         self._first = array("i", [0] * sequence.MAX_NESTING)  # of each repeat that has begun: its first row
         self._left = array("i", [0] * sequence.MAX_NESTING)  # passes left, 0: for ever
         self._depth = 0
-        self._name = name
         self.told = array("i", [sequence.RUNNING, 0, 0, 0, 0])
         self.stopping = False
+        self._command = SequenceCommand(self.told, name)
 
     def begin(self) -> None:
         """From the next turn on; Refused where the heap has no room for a motion beside this."""
@@ -81,7 +76,7 @@ class Sequencer:
             controller.sequence = None
             heap.forget()
             raise Refused(codes.NO_SEQUENCE_ROOM, value=_START_BYTES - free)
-        controller.told = (self.told, self._name)
+        self._command.attach(controller.rows)
 
     def change_rate(self, rate: int) -> None:
         """As the engine's; of the motions to come too, and while none moves."""
@@ -115,8 +110,8 @@ class Sequencer:
     def _do(self) -> None:
         """What the next row says."""
         self._row = self._record.row(self._next)
-        self.told[_STEP] = self._row[_STEP_OF_ROW]
-        self.told[_ROW] = self._next
+        self.told[STEP] = self._row[_STEP_OF_ROW]
+        self.told[ROW] = self._next
         self._next += 1
         self._since_ms = time.ticks_ms()
         op, number, value, _, _ = self._row
@@ -135,7 +130,7 @@ class Sequencer:
             self._again()
 
     def _count(self, passes: int) -> None:
-        self.told[_CYCLE] = (self.told[_CYCLE] + passes) & 0x7FFFFFFF
+        self.told[CYCLE] = (self.told[CYCLE] + passes) & 0x7FFFFFFF
 
     def _again(self) -> None:
         """The end of a repeat: from its first row again, or on."""
@@ -169,15 +164,6 @@ class Sequencer:
         return then == sequence.NEXT_THEN
 
     def _end(self, ending: int, code: int = 0) -> None:
-        self.told[_ENDING] = ending
-        self.told[_CODE] = code
+        self.told[ENDING] = ending
+        self.told[CODE] = code
         self._controller.sequence = None
-
-    def sequence(self, commands: "Any", row: tuple, length: int) -> int:
-        """The answer to the command of this name while it runs; allocates nothing."""
-        told = self.told
-        reply = commands.link.reply
-        at = PAYLOAD_AT + _ANSWER_AT
-        pack_into(row[_ANSWER], reply, at, told[_ENDING], told[_CODE], told[_STEP], told[_ROW], told[_CYCLE])
-        copy(reply, self._name, pack_offsets(at + _ANSWER_BYTES, 0), len(self._name))
-        return _ANSWER_BYTES + len(self._name)

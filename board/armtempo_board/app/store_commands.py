@@ -77,12 +77,6 @@ def list(commands: "Caller", row: tuple, length: int) -> int:
     return commands.reply_tail(size, name.encode())
 
 
-def sequence(commands: "Caller", row: tuple, length: int) -> int:
-    """How the last sequence ended; while one runs it answers this itself."""
-    told, name = commands.controller.told or ((0, 0, 0, 0, 0), b"")
-    return commands.reply_tail(commands.reply(row, *told), name)
-
-
 def remove(commands: "Caller", row: tuple, length: int) -> None:
     """Remove a motion."""
     commands.controller.store().remove(commands.text(row, length))

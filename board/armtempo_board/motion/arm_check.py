@@ -3,18 +3,21 @@
 from armtempo_shared import armrecord, codes, engine_memory
 from armtempo_shared.limits import MAX_ENCODERS
 from armtempo_shared.messages import NO_JOINT
+from micropython import const
 
 from armtempo_board.errors import Refused
 from armtempo_board.hardware import pins
 
+_LAST_TIMER = const(14)
+
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    Record = tuple[dict[str, int], list[dict[str, int]], int]
     Rows = list[dict[str, int]]
+    Record = tuple[dict[str, int], Rows, int, Rows, Rows]
 
 
 def checked(data: bytes, room_words: int, most_joints: int) -> "Record":
-    """(head, joints, crc32) of an arm record, as ``armrecord.unpack`` gives them.
+    """(head, joints, crc32, outputs, inputs) of an arm record, as ``armrecord`` unpacks them.
 
     ``room_words``, ``most_joints``: what an engine can have. Refused: BAD_RECORD where it is damaged, of another
     version, or names what the board has not; PIN_TAKEN where an output or input has what the engine takes; NO_ROOM
@@ -39,7 +42,7 @@ def checked(data: bytes, room_words: int, most_joints: int) -> "Record":
         or not engine_memory.objects_fit(len(rates), beside, most_joints)
     ):
         raise Refused(codes.NO_ROOM, NO_JOINT, 4 * engine_memory.words(rates) + beside)
-    return head, joints, crc
+    return head, joints, crc, outputs, inputs
 
 
 def _is_fit(row: "dict[str, int]") -> bool:
@@ -60,7 +63,7 @@ def _check_pins(head: "dict[str, int]", joints: "Rows", outputs: "Rows", inputs:
     if not outputs and not inputs:
         return
     timers = [2, 5, 6]  # the counters of STEP, and what fills their rings
-    taken = [pins.ENABLE, pins.BUTTON] + list(pins.LEDS)
+    taken = ["", pins.ENABLE, pins.BUTTON] + list(pins.LEDS)
     if head["flags"] & armrecord.FLAG_ESTOP_FITTED:
         taken.append(pins.ESTOP)
     for row in joints:
@@ -74,6 +77,7 @@ def _check_pins(head: "dict[str, int]", joints: "Rows", outputs: "Rows", inputs:
             timers.append(timer)
     for row in outputs + inputs:
         name = pins.name(row["pin"])
-        if name in taken or row.get("timer") in timers:
+        timer = row.get("timer", 0)
+        if name in taken or timer in timers or timer > _LAST_TIMER:
             raise Refused(codes.PIN_TAKEN, NO_JOINT, row["pin"])
         taken.append(name)

@@ -7,15 +7,17 @@ from collections import defaultdict
 from armtempo.arm_check.finding import Finding, error, note, warning
 from armtempo.model.arm import Arm, DrivenJoint, Joint
 from armtempo.model.arm_file import shared_channels
+from armtempo.model.pin_use import problems as pin_problems
 
 BUTTON_CHANNEL = 6
 """Its STEP pin is the one of the button."""
 
 
 def findings(arm: Arm) -> list[Finding]:
-    """Channels used twice, switches that contradict each other or their joint's range."""
+    """Channels and pins used twice, switches that contradict each other or their joint's range."""
     found = _channels(arm)
     found += _levels(arm)
+    found += [error(problem.where, problem.what, problem.next_step) for problem in pin_problems(arm)]
     found += [finding for joint in arm.driven for finding in _switches(joint)]
     found += [_unused(joint) for joint in arm.joints if joint.motor is None and _has_switch(joint)]
     if any(joint.motor and joint.motor.channel == BUTTON_CHANNEL for joint in arm.joints):

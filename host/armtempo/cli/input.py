@@ -32,7 +32,7 @@ def command(
     with wired.board(port, arm_path, log_traffic) as board:
         if name is not None:
             board.arm.input(name)
-        levels = board.way.levels()
+        levels = board.levels()
         found = [
             (entry, levels.active(number))
             for number, entry in enumerate(board.arm.inputs)

@@ -42,7 +42,7 @@ def command(
             output = BoardOutput(board.way, board.arm, name)
             if value is not None:
                 output.set(value)
-        levels = board.way.levels().outputs
+        levels = board.levels().outputs
         found = [
             (entry, raw)
             for entry, raw in zip(board.arm.outputs, levels, strict=True)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from armtempo.cli import chosen
 from armtempo.errors import LinkError
+from armtempo.link.board_messages import Levels
 from armtempo.model.arm import Arm
 from armtempo.robot import shared_board
 from armtempo.robot.outputs import Way
@@ -20,6 +21,10 @@ class Wired:
 
     way: Way
     arm: Arm
+
+    def levels(self) -> Levels:
+        """What the board says; it knows no such thing of an arm without outputs and inputs."""
+        return self.way.levels() if self.arm.outputs or self.arm.inputs else Levels(0, ())
 
 
 @contextmanager

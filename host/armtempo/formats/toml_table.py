@@ -78,6 +78,10 @@ class Table:
         """The value as it stands there, unchecked, or None; for one that may be of several kinds."""
         return self._values.get(key)
 
+    def is_text(self, key: str) -> bool:
+        """Whether the key is given, as a text."""
+        return isinstance(self._values.get(key), str)
+
     def known(self, *keys: str) -> None:
         """These keys may be there, whether a getter asks for them or not."""
         self._asked.extend(keys)

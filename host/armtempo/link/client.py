@@ -202,7 +202,12 @@ class Client:
 
     def sequence(self) -> board_messages.SequenceState:
         """Where the sequence stands, or where the last one since the board's start ended."""
-        (ending, code, step, row, cycle), name = self.session.command("sequence")
+        try:
+            (ending, code, step, row, cycle), name = self.session.command("sequence")
+        except BoardError as error:
+            if error.code != wire.ERROR_CODES["unknown_command"]:
+                raise
+            return board_messages.SequenceState("none", 0, 0, 0, 0, "")
         return board_messages.SequenceState(board_messages.ending_name(ending), code, step, row, cycle, name)
 
     def home(self, steps: Sequence[int | None]) -> None:

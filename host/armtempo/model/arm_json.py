@@ -9,7 +9,9 @@ from typing import Any
 from armtempo.errors import InputError
 from armtempo.formats import json_codec
 from armtempo.formats.atomic_file import replace_text, why
+from armtempo.model import boards, pin_use
 from armtempo.model.arm import Arm, Joint
+from armtempo.model.outputs import KINDS, SWITCH, Output
 
 FORMAT = "armtempo arm"
 VERSION = 1
@@ -43,6 +45,23 @@ def check(arm: Arm, where: str, hint: str) -> None:
     for joint in arm.joints:
         if problem := _problem(joint):
             raise InputError(f"{where}: {joint.name}: {problem}", hint)
+    if arm.board not in boards.BOARDS:
+        raise InputError(f"{where}: board {arm.board!r} is not known", hint)
+    for output in arm.outputs:
+        if problem := _output_problem(output):
+            raise InputError(f"{where}: output {output.name!r}: {problem}", hint)
+    for pin in pin_use.problems(arm):
+        raise InputError(f"{where}: {pin.where}: {pin.what}", hint)
+
+
+def _output_problem(output: Output) -> str:
+    if output.kind not in KINDS:
+        return f"its kind {output.kind!r} is not known"
+    if output.kind != SWITCH and output.frequency_hz <= 0:
+        return "its frequency_hz must be above 0"
+    if output.range[0] >= output.range[1]:
+        return "its angles_deg must increase"
+    return ""
 
 
 def _problem(joint: Joint) -> str:

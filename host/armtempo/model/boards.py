@@ -63,7 +63,7 @@ TIMER_OUTPUTS: dict[str, tuple[TimerOutput, ...]] = {
         "PE14": ((1, 4),),
     }.items()
 }
-"""Timer outputs by pin, the timer with the fewest channels first (data sheet DS8626, table 9); TIM2 and TIM5 count steps."""
+"""By pin, the timer with the fewest channels first (data sheet DS8626, table 9); TIM2 and TIM5 count steps."""
 
 _USB = {
     "PA9": "USB (supply sensed)",

@@ -1,4 +1,4 @@
-"""Which pins and timers the board's engine takes for an arm: from the board program's own table, ``hardware/pins.py``."""
+"""Pins and timers that the engine takes for an arm: from the board program's own table, ``hardware/pins.py``."""
 
 from __future__ import annotations
 

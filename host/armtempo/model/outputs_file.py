@@ -89,10 +89,9 @@ def _states(output: Output, table: Table | None) -> tuple[tuple[str, float], ...
 def _safe(output: Output, table: Table) -> float:
     """Without it: 0, which a servo has to have within its angles."""
     names = [name for name, _ in output.states]
-    value = table.rest().get("safe")
-    if value is None and output.kind != SERVO:
+    if not table.has("safe") and output.kind != SERVO:
         return 0.0
-    if isinstance(value, str):
+    if table.is_text("safe"):
         return output.number(table.choice("safe", names, allowed=f"a number or one of {', '.join(names)}"))
     return _checked(output, table, "safe", table.number("safe"))
 

@@ -14,7 +14,7 @@ _MOST_COUNTS = 65_535
 
 
 @dataclass(frozen=True)
-class Problem:
+class PinProblem:
     """A pin or timer that cannot be had."""
 
     where: str
@@ -42,7 +42,7 @@ class Period:
         return round(time_us * place.clock_hz / 1e6 / self.prescaler)
 
 
-def problems(arm: Arm) -> list[Problem]:
+def problems(arm: Arm) -> list[PinProblem]:
     """What stands in the way of the arm's outputs and inputs, and of its board; empty where nothing does."""
     if not (arm.outputs or arm.inputs) and arm.board == DEFAULT:
         return []
@@ -51,8 +51,10 @@ def problems(arm: Arm) -> list[Problem]:
     missing = [f"{pin} ({use})" for pin, use in engine.items() if pin not in board.pins]
     if missing:
         what = f"{board.name} has not the pins that the engine takes: {', '.join(missing)}"
-        return [Problem("board", what, "take a board whose chip has 100 pins or more")]
-    return [*_pin_problems(arm, board, engine), *_placed(arm)[1]]
+        return [PinProblem("board", what, "take a board whose chip has 100 pins or more")]
+    found = _pin_problems(arm, board, engine)
+    named = [problem.where for problem in found]
+    return [*found, *(problem for problem in _placed(arm)[1] if problem.where not in named)]
 
 
 def timer_outputs(arm: Arm) -> dict[str, TimerOutput]:
@@ -60,7 +62,7 @@ def timer_outputs(arm: Arm) -> dict[str, TimerOutput]:
     return _placed(arm)[0]
 
 
-def _pin_problems(arm: Arm, board: BoardPins, engine: dict[str, str]) -> list[Problem]:
+def _pin_problems(arm: Arm, board: BoardPins, engine: dict[str, str]) -> list[PinProblem]:
     found = []
     used = {pin: f"is taken by the engine for {use}" for pin, use in engine.items()}
     for pin, use in board.taken.items():
@@ -70,14 +72,16 @@ def _pin_problems(arm: Arm, board: BoardPins, engine: dict[str, str]) -> list[Pr
         *((f"input.{entry.name}", entry.pin) for entry in arm.inputs),
     ]:
         if pin not in board.pins:
-            found.append(Problem(where, f"the {board.name} has no pin {pin}", f"take another pin; {_MORE}"))
+            found.append(
+                PinProblem(where, f"the {board.name} has no pin {pin}", f"take another pin; {_MORE}")
+            )
         elif pin in used:
-            found.append(Problem(where, f"{pin} {used[pin]}", f"take another pin; {_MORE}"))
+            found.append(PinProblem(where, f"{pin} {used[pin]}", f"take another pin; {_MORE}"))
         used.setdefault(pin, f"is the pin of {where}")
     return found
 
 
-def _placed(arm: Arm) -> tuple[dict[str, TimerOutput], list[Problem]]:
+def _placed(arm: Arm) -> tuple[dict[str, TimerOutput], list[PinProblem]]:
     found: dict[str, TimerOutput] = {}
     failed = []
     taken = engine_pins.taken_timers(arm)
@@ -88,7 +92,7 @@ def _placed(arm: Arm) -> tuple[dict[str, TimerOutput], list[Problem]]:
         place, why = _place(output, taken, periods, list(found.values()))
         if place is None:
             next_step = f"take a pin with a timer that is free, or one frequency for both; {_MORE}"
-            failed.append(Problem(f"output.{output.name}", why, next_step))
+            failed.append(PinProblem(f"output.{output.name}", why, next_step))
             continue
         found[output.name] = place
         periods.setdefault(place.timer, (Period.of(output, place), output.name))

@@ -26,7 +26,7 @@ _WORDS = {
     "link_timeout_ms": "link time-out",
     "identity": "geometry, motors, encoders or switches",
 }
-_KEEPS = "which keeps the position, as only limits differ"
+_KEEPS = "which keeps the position, as only limits, outputs or inputs differ"
 _LOSES = "after which the position is unknown"
 
 
@@ -34,6 +34,7 @@ def describe(old: bytes, new: bytes) -> str:
     """In what a new record differs from the old one, in words."""
     try:
         (old_head, old_joints, _), (new_head, new_joints, _) = armrecord.unpack(old), armrecord.unpack(new)
+        wiring = [*zip(armrecord.unpack_outputs(old), armrecord.unpack_outputs(new), strict=True)]
     except armrecord.ArmRecordError:
         return "the board's record is of another version"
     if len(old_joints) != len(new_joints):
@@ -42,6 +43,9 @@ def describe(old: bytes, new: bytes) -> str:
     for number, rows in enumerate(zip(old_joints, new_joints, strict=True), 1):
         words = _words(*rows)
         found.append(f"joint {number}: {words}" if words else "")
+    found += [
+        what for what, (before, after) in zip(("outputs", "inputs"), wiring, strict=True) if before != after
+    ]
     return "other " + "; ".join(filter(None, found))
 
 

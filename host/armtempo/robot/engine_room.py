@@ -27,6 +27,19 @@ def check(arm: Arm, info: Hello) -> None:
             f"lower its top speeds (its joints step up to {', '.join(map(str, rates))} steps/s; "
             f"slower ones have smaller rings), drive fewer joints, {_FIRMWARE}",
         )
+    _check_outputs(arm, info)
+
+
+def _check_outputs(arm: Arm, info: Hello) -> None:
+    beside = engine_memory.output_bytes(len(arm.outputs), len(arm.inputs))
+    if engine_memory.objects_fit(len(arm.driven), beside, info.engine_joints):
+        return
+    free = engine_memory.objects_room(len(arm.driven), info.engine_joints)
+    raise InputError(
+        f"arm {arm.name!r} has {len(arm.outputs)} outputs and {len(arm.inputs)} inputs, which need {beside} bytes; "
+        f"beside its {len(arm.driven)} joints the board has {free}",
+        f"have fewer of them, drive fewer joints, {_FIRMWARE}",
+    )
 
 
 def words(info: Hello) -> str:

@@ -271,15 +271,17 @@ def case_nothing_else_is_taken_meanwhile():
     assert stands(host)[0] == "running"
 
 
-def case_while_a_motion_runs_nobody_asks_for_a_sequence():
-    _, host = ready([(WAIT, 0, 0, 10)])
-    start(host)
-    assert host.ask("sequence")[:2] == ("error", "busy")
-
-
-def case_before_any_there_is_none():
+def case_before_any_the_command_is_unknown():
     _, host = connected()
-    assert host.ask("sequence") == ("ok", (0, 0, 0, 0, 0), "")
+    assert host.ask("sequence")[:2] == ("error", "unknown_command")
+
+
+def case_while_a_motion_runs_the_last_one_is_told():
+    _, host = ready([(WAIT, 0, 0, 10)])
+    begin(host)
+    host.turn(20)
+    start(host)
+    assert stands(host) == ("finished", 0, 1, 0, 0)
 
 
 def case_hosts_come_and_go():
@@ -396,7 +398,7 @@ def case_without_room_it_is_refused():
     module.gc.mem_free = lambda: 10_000
     assert begin(host) == ("error", "no_sequence_room", 255, 8000)
     assert not app.controller.sequence and state(host) == "idle"
-    assert host.ask("sequence") == ("ok", (0, 0, 0, 0, 0), "")
+    assert host.ask("sequence")[:2] == ("error", "unknown_command")
     module.gc.mem_free = lambda: 20_000
     assert begin(host)[0] == "ok"
 

@@ -1,6 +1,6 @@
 """Turns of the loop while moving with the heap locked: MicroPython raises MemoryError where anything allocates.
 
-Samples come and go, the host asks for status and samples; prints what was done that way.
+Samples come and go, the host asks for status and samples, sets outputs and reads inputs; prints what was done that way.
 """
 
 import sys
@@ -14,6 +14,19 @@ from armtempo_board.app.app import App  # noqa: E402
 from armtempo_shared import wire  # noqa: E402
 
 TURNS = 2000
+PUMP = {
+    "pin": 0x30,
+    "timer": 0,
+    "channel": 0,
+    "spare": 0,
+    "prescaler": 0,
+    "period": 0,
+    "low": 0,
+    "high": 1,
+    "safe": 0,
+}
+GRIPPER = dict(PUMP, pin=0x18, timer=10, channel=1, prescaler=51, period=64614, low=1615, high=8077)
+PART = {"pin": 0x31, "active_high": 0, "debounce_ms": 5}
 
 
 class Still:
@@ -84,10 +97,12 @@ def prepared():
     app = App(port, sys.argv[1])
     host = stand_in.Host(app, port)
     host.hello()
-    host.upload("/arm", stand_in.arm())
-    host.upload("feed", stand_in.record(stand_in.arm()))
+    arm = stand_in.arm(outputs=(PUMP, GRIPPER), inputs=(PART,))
+    assert host.upload("/arm", arm)[-1][0] == "ok"
+    record = stand_in.record(arm)
+    host.upload("feed", record)
     host.ask("home", (3,), bytes(8))
-    assert host.ask("start", (0, wire.record_crc(stand_in.record(stand_in.arm()))), "feed")[0] == "ok"
+    assert host.ask("start", (0, wire.record_crc(record)), "feed")[0] == "ok"
     return app
 
 
@@ -95,19 +110,25 @@ app = prepared()
 frames = []
 for number in range(40):
     frames.append(command(number, "samples", 5 * number, 3) if number % 2 else command(number, "status"))
+for number in range(8):
+    frames.append(command(50 + 2 * number, "output", number % 3, 9000 * number))  # there are two
+    frames.append(command(51 + 2 * number, "inputs"))
 frames.append(b"noise" + frames[0][:-1] + b"x")
 frames.append(command(200, "home", 0) + command(201, "list", 0))
 app.link.stream = port = Port(frames)
 app.controller.engine = Still()
 app.turn()
+stand_in.Pin.levels["D1"] = 1
 micropython.heap_lock()
 for turn in range(TURNS):
     if turn % 20 == 0:
         port.open = True
     stand_in.Clock.now_ms += 1
+    stand_in.Pin.levels["D1"] = turn // 100 % 2
     app.turn()
 micropython.heap_unlock()
 assert app.controller.fault() == 0, app.controller.fault()
 assert app.controller.samples.next > TURNS // 10 - 5
 assert port.taken > TURNS
+assert app.controller.outputs.values[1] and app.controller.inputs.levels == 0
 print(app.controller.samples.next, app.controller.samples.first, port.taken)

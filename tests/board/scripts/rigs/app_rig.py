@@ -18,14 +18,14 @@ def flash():
     return ROOT + str(COUNT[0])
 
 
-def connected(flags=0, homed=True, fault=0):
+def connected(flags=0, homed=True, fault=0, outputs=(), inputs=()):
     """A configured board with "feed" stored, greeted, and its host."""
     COUNT[0] += 1
     port = stand_in.Port()
     app = App(port, flash(), 0, fault)
     host = stand_in.Host(app, port)
     assert host.hello()[0] == "ok"
-    arm = stand_in.arm(flags=flags)
+    arm = stand_in.arm(flags=flags, outputs=outputs, inputs=inputs)
     assert host.upload("/arm", arm)[-1][0] == "ok"
     host.record = stand_in.record(arm)
     assert host.upload("feed", host.record)[-1][0] == "ok"

@@ -25,17 +25,46 @@ def _install_time():
 
 
 class Pin:
-    IN, OUT_PP, PULL_DOWN = 0, 1, 2
+    IN, OUT_PP, PULL_DOWN, PULL_UP = 0, 1, 2, 3
     levels: "dict[str, int]" = {}
 
-    def __init__(self, name, mode, pull=0):
+    def __init__(self, name, mode=0, pull=0):
         self.name = name
+
+    def init(self, mode, value=None):
+        if value is not None:
+            Pin.levels[self.name] = value
+        elif mode == Pin.IN:
+            Pin.levels.pop(self.name, None)
 
     def value(self, level=None):
         if level is None:
             return Pin.levels.get(self.name, 0)
         Pin.levels[self.name] = int(level)
         return None
+
+
+class Timer:
+    """A timer whose pulse widths are the levels of its pins."""
+
+    PWM = 0
+    made: "dict[int, tuple]" = {}
+
+    def __init__(self, number, prescaler, period):
+        self._number = number
+        Timer.made[number] = (prescaler, period)
+
+    def channel(self, number, mode, pin, pulse_width):
+        pin.value(pulse_width)
+        return Channel(pin)
+
+    def deinit(self):
+        del Timer.made[self._number]
+
+
+class Channel:
+    def __init__(self, pin):
+        self.pulse_width = pin.value
 
 
 def install():
@@ -45,6 +74,7 @@ def install():
     machine.idle = lambda: None
     pyb = Module()
     pyb.Pin = Pin
+    pyb.Timer = Timer
     engine = Module()
     engine.Engine = Engine
     room = Module()
@@ -55,7 +85,7 @@ def install():
     ends.start_offset = lambda motion, joint, position: 7 - position
     from armtempo_board import heap
 
-    heap.forget = lambda: None  # what stands in for a module stays
+    heap.forget = lambda *names: None  # what stands in for a module stays
     sys.modules["machine"] = machine
     sys.modules["pyb"] = pyb
     sys.modules["armtempo_board.motion.engine"] = engine
@@ -271,7 +301,7 @@ class Host:
         return answers
 
 
-def arm(joints=2, flags=0, low=0):
+def arm(joints=2, flags=0, low=0, outputs=(), inputs=()):
     """An arm record."""
     head = {name: 1 for name, _ in armrecord.HEAD}
     head["flags"] = flags
@@ -281,7 +311,7 @@ def arm(joints=2, flags=0, low=0):
         row = {name: 1 for name, _ in armrecord.JOINT}
         row.update(channel=joint, encoder=joint, min_steps=low - 1000, max_steps=1000)
         rows.append(row)
-    return armrecord.pack(head, rows)
+    return armrecord.pack(head, rows, outputs, inputs)
 
 
 def record(arm_record, joints=2, segments=3):

@@ -1,0 +1,63 @@
+"""The commands about outputs and inputs, for an arm that has any; they allocate nothing.
+
+The functions with a command's name act on it as those of ``store_commands.py`` do; the code of a refusal comes back as
+a negative number.
+"""
+
+from struct import pack_into
+
+from armtempo_shared import codes
+from armtempo_shared.messages import PAYLOAD_AT
+from micropython import const
+
+from armtempo_board import heap
+
+_MODULES = ("output_commands", "outputs", "digital_inputs")
+_ANSWER_AT = const(6)  # in a reply
+_LEVELS_BYTES = const(1)
+_BYTES_PER_VALUE = const(2)
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from armtempo_board.app.commands import Commands
+    from armtempo_board.app.controller import Controller
+
+    Rows = list[dict[str, int]]
+
+
+def attach(controller: "Controller", outputs: "Rows", inputs: "Rows") -> None:
+    """Give the controller the outputs, the inputs and their commands."""
+    from armtempo_shared.table import rows  # here, so that they can be forgotten
+
+    from armtempo_board.hardware.digital_inputs import DigitalInputs
+    from armtempo_board.hardware.outputs import Outputs
+
+    controller.outputs = Outputs(outputs)
+    controller.inputs = DigitalInputs(inputs)
+    for command, answer, handler in zip(rows("O"), rows("P"), (output, inputs_and_outputs)):
+        controller.rows[command[1]] = (handler, command[2], answer[2], command[4])
+    heap.forget(_MODULES)  # they stay as long as their objects
+
+
+def output(commands: "Commands", row: tuple, length: int) -> int:
+    """Set an output."""
+    controller = commands.controller
+    data = commands.link.reader.data
+    number = data[PAYLOAD_AT]
+    if number >= len(controller.outputs.values):
+        return -codes.NO_OUTPUT
+    if controller.fault():
+        return -codes.FAULT_PENDING
+    controller.outputs.set(number, data[PAYLOAD_AT + 1] | data[PAYLOAD_AT + 2] << 8)
+    return 0
+
+
+def inputs_and_outputs(commands: "Commands", row: tuple, length: int) -> int:
+    """What the inputs are, and what the outputs are set to."""
+    reply = commands.link.reply
+    reply[_ANSWER_AT] = commands.controller.inputs.levels
+    size = _LEVELS_BYTES
+    for value in commands.controller.outputs.values:
+        pack_into("<H", reply, _ANSWER_AT + size, value)
+        size += _BYTES_PER_VALUE
+    return size
