@@ -302,8 +302,9 @@ class Controller:
         rate, self._next_rate = self._next_rate if self._by_host else _PERMILLE, _PERMILLE
         if self.store().is_sequence(name):
             self._new_sequence(name, crc, rate, homing)
-            return self.sequence.begin()
-        return self.begin_motion(self.load(name, crc), rate, homing, unknown)
+            self.sequence.begin()
+            return
+        self.begin_motion(self.load(name, crc), rate, homing, unknown)
 
     def _new_sequence(self, name: str, crc: "int | None", rate: int, homing: bool) -> None:
         self.forget_store()
@@ -368,7 +369,7 @@ class Controller:
         return motion
 
     def stop(self, now: int) -> None:
-        """Brake along the path; freeze where ``now``, or where the motion has no way to brake. A sequence ends there."""
+        """Brake along the path; freeze where ``now``, or where the motion has no way to. A sequence ends there."""
         if self.sequence:
             self.sequence.stopping = True
             if not self.engine.moving:

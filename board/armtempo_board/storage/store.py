@@ -3,8 +3,9 @@
 A record is written to ``NAME.new``, read back, synced and renamed. Where a power cut leaves a ``.new`` file,
 ``recover`` takes it if the old file is gone and the new one is whole, and removes it otherwise.
 
-A record's name is that of its motion or sequence, or ``ARM_RECORD_NAME``; its first bytes say which it is. The module is imported when it is needed and forgotten
-before a motion (see ``Controller.store``): no file is read or written while one runs.
+A record's name is that of its motion or sequence, or ``ARM_RECORD_NAME``; its first bytes say which it is.
+The module is imported when it is needed and forgotten before a motion (see ``Controller.store``): no file is read or
+written while one runs.
 """
 
 import os

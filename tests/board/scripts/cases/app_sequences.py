@@ -404,7 +404,7 @@ def case_without_room_it_is_refused():
 
 
 def case_no_memory_for_it_is_said_so():
-    app, host = ready([(WAIT, 0, 0, 1)])
+    _, host = ready([(WAIT, 0, 0, 1)])
 
     def none(*arguments):
         raise MemoryError
