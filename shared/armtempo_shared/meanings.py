@@ -185,10 +185,10 @@ COMMANDS: "dict[str, str]" = {
     "list": "The stored trajectory number `index` (from 0, in order of names) of `count`; `not_found` behind "
     "the last. A damaged one has `crc`, `duration` and `joints` 0. `sequence` 1: it is a sequence, whose `duration` "
     "and `joints` are 0. Tail of the answer: its name.",
-    "sequence": "Where the sequence stands, or where the last one ended. Unknown to a board on which "
-    "none has been started. `ending`: 1 it runs, 2 finished, 3 stopped, 4 an input did not come and the sequence was to stop then, 5 a fault, 6 a leg "
-    "was refused; `code`: of that fault or refusal. `step`: of the sequence file; `row`: of the record; `cycle`: "
-    "finished passes of its outermost repeats. Tail: its name.",
+    "sequence": "Where the sequence stands, or where the last one ended. Unknown to a board on which none has been "
+    "started. `ending`: 1 it runs, 2 finished, 3 stopped, 4 an input did not come and the sequence was to stop then, "
+    "5 a fault, 6 a leg was refused; `code`: of that fault or refusal. `step`: of the sequence file; `row`: of the "
+    "record; `cycle`: finished passes of its outermost repeats. Tail: its name.",
     "remove": "Removes the trajectory of that name.",
     "rename": "The tail is the old name (`old_length` bytes), then the new one. The default goes with it.",
     "get": "Up to `length` bytes of a stored record (`/arm`: the arm record) from `offset` on.",

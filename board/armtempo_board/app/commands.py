@@ -1,8 +1,8 @@
 """What the board does for each command of the message table; refusals are raised as ``Refused``.
 
 While a motion runs only the commands of ``_WHILE_MOVING`` and those of ``Controller.rows`` are taken, and all of them
-but ``hello``, ``stop`` and ``speed`` allocate nothing. The commands about the store are in ``store_commands.py``, which is
-imported when one comes; those about outputs and inputs in ``output_commands.py``, which is there for arms that have
+but ``hello``, ``stop`` and ``speed`` allocate nothing. The commands about the store are in ``store_commands.py``, which
+is imported when one comes; those about outputs and inputs in ``output_commands.py``, which is there for arms that have
 any, and the one about sequences in ``sequence_command.py``, which is there when one has been started.
 """
 

@@ -1,0 +1,272 @@
+"""Sequence files: what they become, and the message for everything that can be wrong in one."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import armtempo
+import numpy as np
+import pytest
+from armtempo.errors import ArmtempoError, InputError
+from armtempo.model import sequence_file
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
+from armtempo.model.sequence import Sequence
+from armtempo.model.sequence_plan import PAUSE_S, SequencePlan
+from armtempo.records import encoded_sequence
+from armtempo_shared import sequence as record
+from armtempo_shared import sequence_check
+
+FOLDER = Path(sequence_file.__file__).parents[1] / "data" / "pick_and_place"
+ARM = Arm.load(FOLDER / "arm.toml")
+POSTURES = """
+[posture.a]
+angles_deg = [1, -60, 40]
+[posture.b]
+angles_deg = [2, -60, 40]
+"""
+JOB = 'name = "j"\nrefine = 1\npolish = false\niterations = 2\nvia_deg = [[1, -60, 40], [2, -60, 41]]\n'
+
+
+def written(folder: Path, *steps: str, top: str = "", name: str = "seq") -> Path:
+    """A sequence file of these steps, each the inside of a table, and a job file beside it."""
+    path = folder / f"{name}.toml"
+    rows = "".join(f"[[step]]\n{step}\n" for step in steps)
+    path.write_text(f'name = "{name}"\n{top}\n{POSTURES}\n{rows}')
+    (folder / "job.toml").write_text(JOB)
+    return path
+
+
+def planned(folder: Path, *steps: str, top: str = 'start = "home"') -> SequencePlan:
+    """The plan of such a file."""
+    return armtempo.plan_sequence(ARM, Sequence.load(written(folder, *steps, top=top), ARM))
+
+
+def words(plan: SequencePlan) -> list[str]:
+    """What its rows do."""
+    return [row.words for row in plan.rows]
+
+
+def ends(plan: SequencePlan) -> list[tuple[tuple[float, ...], tuple[float, ...]]]:
+    """Where each motion begins and ends."""
+    return [(tuple(leg(0.0)), tuple(leg(leg.duration_s))) for leg in plan.legs]
+
+
+def test_each_motion_begins_where_the_one_before_it_ends(tmp_path: Path) -> None:
+    plan = planned(tmp_path, 'goto = "a"', 'run = "job.toml"', 'goto = "b"', "goto = [1, -60, 40]")
+    assert words(plan) == ["goto a", "run job", "goto b", "goto 1, -60, 40°"]
+    np.testing.assert_allclose(
+        ends(plan),
+        [
+            [(0, -60, 40), (1, -60, 40)],
+            [(1, -60, 40), (2, -60, 41)],
+            [(2, -60, 41), (2, -60, 40)],
+            [(2, -60, 40), (1, -60, 40)],
+        ],
+        atol=1e-9,
+    )
+    assert plan.start_deg == pytest.approx((0, -60, 40))
+
+
+def test_without_a_start_it_begins_where_its_first_step_leads(tmp_path: Path) -> None:
+    assert planned(tmp_path, 'goto = "a"', 'goto = "b"', top="").start_deg == pytest.approx((1, -60, 40))
+    assert planned(tmp_path, 'run = "job.toml"', top="").start_deg == pytest.approx((1, -60, 40))
+    assert planned(tmp_path, "wait_s = 1", top="").start_deg is None
+
+
+def test_equal_motions_are_planned_and_kept_once(tmp_path: Path) -> None:
+    plan = planned(tmp_path, *['goto = "a"', 'goto = "b"'] * 3)
+    assert len(plan.legs) == 3
+    assert [row.number for row in plan.rows] == [0, 1, 2, 1, 2, 1]
+
+
+def test_the_first_pass_of_a_repeat_may_begin_elsewhere(tmp_path: Path) -> None:
+    plan = planned(tmp_path, "repeat = 3", 'goto = "a"', 'goto = "b"', 'end = "repeat"', 'goto = "home"')
+    assert words(plan) == [
+        "goto a", "goto b", "repeat 3 times", "goto a", "goto b", "end of repeat", "goto home",
+    ]  # fmt: skip
+    repeat, end = plan.rows[2], plan.rows[5]
+    assert (repeat.amount, repeat.value, end.value) == (2, 1, 1)
+    assert [row.number for row in plan.rows if row.op == record.MOVE] == [0, 1, 2, 1, 3]
+    (cycle,) = plan.cycles
+    assert (cycle.times, cycle.share.motions) == (3, 2)
+    assert plan.total is not None and plan.total.motions == 7
+    whole = sum(plan.legs[n].duration_s for n in (0, 1, 2, 1, 2, 1, 3)) + 7 * PAUSE_S
+    assert plan.total.total_s == pytest.approx(whole)
+
+
+def test_a_repeat_that_begins_where_it_ends_stands_once(tmp_path: Path) -> None:
+    steps = 'goto = "b"', "repeat = 3", 'goto = "a"', 'goto = "b"', 'end = "repeat"'
+    assert words(planned(tmp_path, *steps)) == ["goto b", "repeat 3 times", "goto a", "goto b", "end of repeat"]
+
+
+def test_repeats_within_repeats(tmp_path: Path) -> None:
+    inner = "repeat = 2", 'goto = "a"', 'goto = "b"', 'end = "repeat"'
+    plan = planned(tmp_path, 'repeat = "for ever"', *inner, 'goto = "home"', 'end = "repeat"')
+    values = [(row.op, row.value, row.amount) for row in plan.rows if row.op in (record.REPEAT, record.END)]
+    assert values == [(5, 0, 0), (5, 0, 1), (6, 0, 0), (6, 1, 0)]
+    assert plan.total is None and plan.cycles[0].times == 0
+    sequence_check.check(record.Sequence(encoded_sequence.of_plan(plan).data))
+
+
+def test_outputs_waits_and_inputs(tmp_path: Path) -> None:
+    plan = planned(
+        tmp_path,
+        'output = "gripper"\nto = "closed"\nwait_s = 0.25',
+        'output = "gripper"\nto = 180',
+        'wait_input = "part"',
+        'wait_input = "part"\nactive = false\ntimeout_s = 2\non_timeout = "fault"',
+        'wait_input = "part"\ntimeout_s = 2\non_timeout = "next"',
+        'wait_input = "part"\ntimeout_s = 2',
+    )
+    closed = ARM.outputs[0].raw("closed")
+    assert [(row.op, row.value, row.amount, row.step) for row in plan.rows] == [
+        (record.OUTPUT, closed, 0, 1),
+        (record.WAIT, 0, 250, 1),
+        (record.OUTPUT, 65535, 0, 2),
+        (record.WAIT_INPUT, record.ACTIVE, 0, 3),
+        (record.WAIT_INPUT, record.FAULT_THEN, 2000, 4),
+        (record.WAIT_INPUT, record.ACTIVE | record.NEXT_THEN, 2000, 5),
+        (record.WAIT_INPUT, record.ACTIVE, 2000, 6),
+    ]
+
+
+def test_a_called_sequence_stands_in_its_place(tmp_path: Path) -> None:
+    written(tmp_path, 'goto = "b"', 'goto = "a"', name="inner")
+    plan = planned(tmp_path, 'goto = "a"', 'call = "inner.toml"')
+    assert [(row.words, row.step) for row in plan.rows] == [("goto a", 1), ("goto b", 2), ("goto a", 2)]
+
+
+def test_goto_leads_to_where_a_motion_begins(tmp_path: Path) -> None:
+    plan = planned(tmp_path, 'goto = "job.toml"', 'run = "job.toml"')
+    assert words(plan) == ["goto the start of job", "run job"]
+
+
+@pytest.mark.parametrize(
+    ("steps", "said"),
+    [
+        (['goto = "c"'], r"step\[1\]\.goto = 'c': there is no such posture"),
+        (['goto = "hom"'], "did you mean 'home'"),
+        (["goto = [0, -60]"], r"step\[1\]\.goto"),
+        (["goto = [0, -60, 400]"], "range of joint 3"),
+        (["goto = 5"], r"step\[1\]\.goto"),
+        (['gotto = "a"'], r"step\[1\]\.gotto: unknown key; did you mean 'goto'"),
+        (["to = 1"], r"step\[1\]\.: says nothing"),
+        (['goto = "a"\nrun = "job.toml"'], "says goto and run"),
+        (['goto = "a"\nwait_s = 1'], "says goto and wait_s"),
+        (['goto = "a"\ntimeout_s = 1'], "timeout_s = 1 is not allowed; give left out beside goto"),
+        (['run = "none.toml"'], "none.toml: there is no such file"),
+        (['output = "griper"\nto = 1'], r"step\[1\].*no output 'griper'.*gripper"),
+        (['output = "gripper"'], "to is missing"),
+        (['output = "gripper"\nto = 200'], r"step\[1\].*cannot take 200"),
+        (['output = "gripper"\nto = "opn"'], r"step\[1\].*no state 'opn'.*open"),
+        (['output = "gripper"\nto = true'], "to = True is not allowed"),
+        (["wait_s = 0"], "wait_s = 0 is not allowed"),
+        (["wait_s = 4000"], "wait_s = 4000 is not allowed"),
+        (['wait_input = "door"'], r"step\[1\].*no input 'door'"),
+        (['wait_input = "part"\non_timeout = "next"'], "together with timeout_s only"),
+        (['wait_input = "part"\ntimeout_s = 1\non_timeout = "go"'], "on_timeout = 'go' is not allowed"),
+        (["repeat = 0", "wait_s = 1", 'end = "repeat"'], "repeat = 0 is not allowed"),
+        (['repeat = "ever"', "wait_s = 1", 'end = "repeat"'], "repeat = 'ever' is not allowed"),
+        (["repeat = 2", "wait_s = 1"], "repeat has no end"),
+        (["wait_s = 1", 'end = "repeat"'], "end = 'repeat' is not allowed"),
+        (["repeat = 2", 'end = "repeat"'], "nothing is repeated"),
+        (["repeat = 2"] * 5 + ["wait_s = 1"] + ['end = "repeat"'] * 5, "at most 4 within each other"),
+        (['call = "seq.toml"'], "calls itself: seq.toml calls seq.toml"),
+        (['call = "job.toml"'], "no sequence"),
+        (['goto = "b"', 'run = "job.toml"'], r"step\[2\]\.run: job begins at 1, -60, 40°, but the arm is at b"),
+        (["repeat = 2", 'run = "job.toml"', 'end = "repeat"'], r"step\[2\]\.run: job begins at"),
+        (['goto = "home"'], "nothing is left to do"),
+        (["wait_s = 1"] * 501, "501 rows"),
+    ],
+)
+def test_what_is_wrong_is_named(steps: list[str], said: str, tmp_path: Path) -> None:
+    start = 'start = "home"' if steps[0] != "repeat = 2" or "run" not in steps[1] else 'start = "a"'
+    with pytest.raises(InputError) as caught:
+        planned(tmp_path, *steps, top=start)
+    assert re.search(said, str(caught.value)), caught.value
+    assert str(tmp_path) in str(caught.value)
+
+
+def test_sequences_that_call_each_other_are_refused(tmp_path: Path) -> None:
+    written(tmp_path, 'call = "seq.toml"', name="inner")
+    with pytest.raises(InputError, match=r"calls itself: seq.toml calls inner.toml calls seq.toml"):
+        planned(tmp_path, 'call = "inner.toml"')
+
+
+@pytest.mark.parametrize(
+    ("top", "said"),
+    [
+        ('start = "c"', "start = 'c': there is no such posture"),
+        ('begin = "a"', "begin: unknown key"),
+        ("[posture.home]\nangles_deg = [0, 0, 0]", "posture.home is there already"),
+        ("[posture.d]\nangles_deg = [0, 0]", r"posture.d.angles_deg"),
+        ("[posture.d]\nangels_deg = [0, 0, 0]", "angles_deg is missing"),
+    ],
+)
+def test_what_is_wrong_at_its_head_is_named(top: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=said):
+        planned(tmp_path, "wait_s = 1", top=top)
+
+
+def test_a_name_that_leaves_no_room_for_the_motions_is_refused(tmp_path: Path) -> None:
+    path = written(tmp_path, "wait_s = 1", name="n" * 21)
+    with pytest.raises(InputError, match="at most 20"):
+        Sequence.load(path, ARM)
+
+
+def test_the_file_of_a_plan_holds_all_of_it(tmp_path: Path) -> None:
+    plan = planned(tmp_path, 'goto = "a"', 'output = "gripper"\nto = "open"', "wait_s = 0.5")
+    path = tmp_path / "seq.json"
+    plan.save(path)
+    again = SequencePlan.load(path)
+    assert encoded_sequence.of_plan(again).data == encoded_sequence.of_plan(plan).data
+    assert again.total == plan.total
+    plan.save(path)  # an earlier plan of the same sequence gives way
+    with pytest.raises(InputError, match="exists and has other content"):
+        replace(plan, name="other").save(path)
+    content = json.loads(path.read_text())
+    content["sequence"]["rows"][0]["number"] = 7
+    path.write_text(json.dumps(content))
+    with pytest.raises(InputError, match="altered"):
+        SequencePlan.load(path)
+    path.write_text(path.read_text()[:-50])
+    with pytest.raises(InputError, match="damaged or cut"):
+        SequencePlan.load(path)
+
+
+def test_a_trajectory_file_is_no_sequence_and_the_other_way_round(tmp_path: Path) -> None:
+    plan = planned(tmp_path, 'goto = "a"')
+    plan.save(tmp_path / "seq.json")
+    motion = armtempo.plan(ARM, Job.load(tmp_path / "job.toml", ARM))
+    motion.save(tmp_path / "j.json")
+    with pytest.raises(InputError, match="is not a planned sequence"):
+        SequencePlan.load(tmp_path / "j.json")
+    with pytest.raises(InputError, match="is not a trajectory file"):
+        armtempo.Plan.load(tmp_path / "seq.json")
+
+
+def test_a_plan_of_another_arm_is_no_leg(tmp_path: Path) -> None:
+    motion = armtempo.plan(Arm.paper(), Job.load(written(tmp_path, "wait_s = 1").parent / "job.toml", ARM))
+    motion.save(tmp_path / "j.json")
+    with pytest.raises(ArmtempoError, match="another arm"):
+        planned(tmp_path, 'goto = "a"', 'run = "j.json"')
+
+
+def test_every_damage_of_a_record_is_seen(tmp_path: Path) -> None:
+    data = encoded_sequence.of_plan(planned(tmp_path, 'goto = "a"', "wait_s = 1")).data
+    record.Sequence(data)
+    for at in range(len(data)):
+        for damaged in (data[:at], data[:at] + bytes([data[at] ^ 0x40]) + data[at + 1 :]):
+            with pytest.raises(record.SequenceError):
+                record.Sequence(damaged)
+
+
+def test_the_shipped_sequence_plans() -> None:
+    sequence = Sequence.load(FOLDER / "sequence.toml", ARM)
+    plan = armtempo.plan_sequence(ARM, sequence)
+    assert plan.start_deg == pytest.approx(ARM.home_deg)
+    assert len({leg.name for leg in plan.legs}) == len(plan.legs) == 8

@@ -1,0 +1,88 @@
+"""A sequence on a virtual board: short motions of the shipped arm with a gripper, and what its pins did."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Several
+from dataclasses import replace
+from pathlib import Path
+
+import armtempo
+from armtempo.model import sequence_file
+from armtempo.model.arm import Arm
+from armtempo.model.sequence import Sequence
+from armtempo.model.sequence_plan import SequencePlan
+from armtempo.simulator import InjectedFault, edgelog
+
+from tests.system.pulses import PINS
+
+FOLDER = Path(sequence_file.__file__).parents[1] / "data" / "pick_and_place"
+SHIPPED = Arm.load(FOLDER / "arm.toml")
+ARM = replace(SHIPPED, safety=replace(SHIPPED.safety, estop_fitted=True))
+GRIPPER, PART = "B8", "D0"
+"""Pins of the arm's output and input."""
+ESTOP = "E15"
+SMALL = """
+name = "{name}"
+start = "home"
+[posture.pick]
+angles_deg = [0.6, -60.3, 40.5]
+[posture.place]
+angles_deg = [-0.5, -59.8, 39.6]
+[[step]]
+repeat = {times}
+[[step]]
+goto = "pick"
+[[step]]
+wait_input = "part"
+timeout_s = 1
+on_timeout = "{on_timeout}"
+[[step]]
+output = "gripper"
+to = "closed"
+wait_s = 0.02
+[[step]]
+goto = "place"
+[[step]]
+output = "gripper"
+to = "open"
+wait_s = 0.02
+[[step]]
+goto = "home"
+[[step]]
+end = "repeat"
+"""
+
+
+def small(folder: Path, times: int | str, on_timeout: str = "stop", name: str = "small") -> SequencePlan:
+    """A pick and place over fractions of a degree."""
+    path = folder / f"{name}.toml"
+    value = f'"{times}"' if isinstance(times, str) else times
+    path.write_text(SMALL.format(name=name, times=value, on_timeout=on_timeout))
+    return armtempo.plan_sequence(ARM, Sequence.load(path, ARM))
+
+
+def part_lies_there() -> InjectedFault:
+    """The part is seen from the first motion on."""
+    return InjectedFault("input", 0.01, 1, name=PART, level=0)
+
+
+def net_steps(power: edgelog.PowerCycle, arm: Arm = ARM) -> list[int]:
+    """Where the pins have moved the joints since power-up, in steps."""
+    found = []
+    for (step, direction), joint in zip(PINS, arm.driven, strict=True):
+        ticks, levels = power.pins.get(step, ((), ()))
+        turns, after = power.pins.get(direction, ((), ()))
+        found.append(_net(list(ticks), list(levels), list(turns), list(after)) * joint.motor.direction)
+    return found
+
+
+def _net(ticks: Several[int], levels: Several[int], turns: Several[int], after: Several[int]) -> int:
+    position = at = 0
+    level = 0 if not len(after) else 1 - int(after[0])
+    for tick, risen in zip(ticks, levels, strict=True):
+        while at < len(turns) and turns[at] <= tick:
+            level = int(after[at])
+            at += 1
+        if risen:
+            position += 1 if level else -1
+    return position

@@ -1,0 +1,112 @@
+"""Sequences on the virtual board, through the whole chain: file, plan, records, board, pins."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+
+import armtempo
+import pytest
+from armtempo.errors import BoardError, LinkError
+from armtempo.model.sequence_plan import PAUSE_S
+from armtempo.simulator import InjectedFault, LaunchOptions, edgelog, launch
+from armtempo_shared.limits import TICK_HZ
+
+from tests import interpreters
+from tests.system import commandline, sequences
+from tests.system.sequences import ARM, FOLDER, GRIPPER, net_steps, part_lies_there, small
+
+CYCLES = 5
+LEGS = 3
+
+
+@pytest.mark.parametrize("name", [name for name in interpreters.AVAILABLE if name != "micropython-arm"])
+def test_cycles_lead_back_to_the_step(name: str, tmp_path: Path) -> None:
+    plan = small(tmp_path, CYCLES)
+    options = LaunchOptions(
+        arm=ARM,
+        faults=[part_lies_there()],
+        edge_log=tmp_path / "edges",
+        interpreter=interpreters.starter(name),
+    )
+    seen = []
+    with launch(options) as process, armtempo.connect(process.port, ARM) as board:
+        board.home(ARM)
+        end = board.run_sequence(plan, seen.append)
+        assert (end.ending, end.cycle, end.step) == ("finished", CYCLES, 7)
+        home = [round(joint.home_deg * joint.steps_per_deg) for joint in ARM.driven]
+        assert list(board.status().positions.commanded_steps) == home
+    assert [state.cycle for state in seen] == sorted(state.cycle for state in seen)
+    (power,) = edgelog.read(tmp_path / "edges")
+    assert net_steps(power) == [0, 0, 0]
+    assert len(power.starts) == LEGS * CYCLES
+    widths = [pulses.high_ticks for pulses in power.pulses[GRIPPER]]
+    opened, closed = widths[0], max(widths)
+    changes = [width for width, _ in itertools.groupby(widths) if width]
+    assert changes == [opened, closed] * CYCLES + [opened] and closed > opened
+    grips = [pulses.tick for pulses in power.pulses[GRIPPER] if pulses.high_ticks == closed]
+    for cycle, grip in enumerate(grips):  # between the end of the first motion and the start of the next
+        assert power.ends[LEGS * cycle] < grip < power.starts[LEGS * cycle + 1]
+    joined = [(power.starts[n] - power.ends[n - 1]) / TICK_HZ for n in range(LEGS, LEGS * CYCLES, LEGS)]
+    assert max(joined) < PAUSE_S + 0.005, joined  # home, and at once to the part again
+
+
+def test_whatever_ends_it_leaves_a_board_that_says_where(tmp_path: Path) -> None:
+    """E-stop in a motion, no part, a stop; after each one the next sequence starts where the arm stands."""
+    plan = small(tmp_path, "for ever", "fault")
+    faults = [InjectedFault("input", 0.1, 2, name=sequences.ESTOP, level=1)]
+    with launch(LaunchOptions(arm=ARM, faults=[part_lies_there(), *faults])) as process:
+        with armtempo.connect(process.port, ARM) as board:
+            board.home(ARM)
+            with pytest.raises(BoardError, match="E-stop input tripped") as caught:
+                board.run_sequence(plan)
+            assert "in step 5" in str(caught.value)
+            assert board.client.sequence().ending == "fault"
+            assert board.output("gripper").state == "open"  # its safe state
+    with launch(LaunchOptions(arm=ARM)) as process, armtempo.connect(process.port, ARM) as board:
+        board.home(ARM)
+        with pytest.raises(BoardError, match="an input did not come in time") as caught:
+            board.run_sequence(plan)
+        assert "in step 3 after 0 whole cycles" in str(caught.value)
+        with pytest.raises(BoardError, match="a fault is pending"):
+            board.run_sequence("small")
+        board.clear()
+        with pytest.raises(BoardError, match="does not stand where the motion begins"):
+            board.run_sequence("small")
+        with pytest.raises(LinkError, match="does not stand where sequence 'small' begins"):
+            board.run_sequence(plan)
+        board.goto(plan)
+        stop = armtempo.StopRequest()
+        with pytest.raises(armtempo.Stopped):
+            board.run_sequence(plan, lambda state: setattr(stop, "wanted", True), stop)
+        assert board.client.sequence().ending == "stopped"
+        assert board.status().state == "idle"
+
+
+def test_from_the_command_line(tmp_path: Path) -> None:
+    """Plan, store, list, run by file and by name; a changed one replaces it and takes its old motions along."""
+
+    def said(*arguments: str, code: int = 0, port: str = "sim:board") -> str:
+        done = commandline.run(*arguments, folder=tmp_path, ARMTEMPO_PORT=port)
+        assert done.exit_code == code, done.output + done.errors
+        return done.output + done.errors
+
+    arm = str(FOLDER / "arm.toml")
+    path = tmp_path / "s.toml"
+    text = f'name = "s"\narm = "{arm}"\nstart = "home"\n[[step]]\nrepeat = 2\n[[step]]\ngoto = [0.5, -60, 40]\n'
+    text += '[[step]]\noutput = "gripper"\nto = "closed"\nwait_s = 0.1\n[[step]]\ngoto = "home"\n[[step]]\nend = "repeat"\n'
+    path.write_text(text)
+    told = said("plan", "s.toml")
+    assert "cycle (step 1, 2 times):" in told and "in 2 motions + 0.100 s waits" in told
+    assert "s: sequence and 2 motions stored" in said("upload", "s.json", "--default")
+    listed = said("list", "--arm", arm)
+    assert [line.split()[0] for line in listed.splitlines() if line.startswith("s")] == ["s", "s-1", "s-2"]
+    assert "finished in step 4 after 2 whole cycles" in said("run", "s.json")
+    assert "finished in step 4 after 2 whole cycles" in said("run", "s", "--arm", arm)
+    assert "--repeat: a sequence has no such thing" in said("run", "s.json", "--repeat", "2", code=2)
+    path.write_text(text.replace("goto = [0.5, -60, 40]", 'goto = "home"'))
+    said("plan", "s.toml")
+    assert "--force" in said("upload", "s.json", code=1)
+    said("upload", "s.json", "--force")
+    assert [line.split()[0] for line in said("list", "--arm", arm).splitlines() if line.startswith("s")] == ["s"]
+    said("plan", "s.toml", "--refine", "4", code=2)
