@@ -112,7 +112,7 @@ class Shown:
 def run_and_tell(board: Board, sequence: SequencePlan | str, replace: bool = False) -> SequenceState:
     """Run a sequence and print where it stands and how it ended; exit code 1 where an input did not come."""
     from armtempo.errors import ArmtempoError
-    from armtempo.robot.sequence_run import where
+    from armtempo.robot.sequence_run import cycles, where
     from armtempo.robot.stop_request import Stopped
 
     shown = Shown(sequence if not isinstance(sequence, str) else None)
@@ -127,5 +127,5 @@ def run_and_tell(board: Board, sequence: SequencePlan | str, replace: bool = Fal
         raise ArmtempoError(
             f"an input did not come in time {where(end)}", "see why, 'armtempo goto' its start, run it again"
         )
-    click.echo(f"{end.ending} {where(end)}")
+    click.echo(f"{end.ending} after {cycles(end)}")
     return end

@@ -133,4 +133,9 @@ def _follow(client: Client, name: str, brake: stored_motion.Brake, watcher: Sequ
 
 def where(state: SequenceState) -> str:
     """Where it stood, in words."""
-    return f"in step {state.step} after {state.cycle} whole cycle{'s' * (state.cycle != 1)}"
+    return f"in step {state.step} after {cycles(state)}"
+
+
+def cycles(state: SequenceState) -> str:
+    """How many there were, in words."""
+    return f"{state.cycle} whole cycle{'s' * (state.cycle != 1)}"
