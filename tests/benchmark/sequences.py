@@ -21,10 +21,9 @@ from armtempo.model.arm import LimitSwitches
 from armtempo.model.sequence_plan import SequencePlan
 from armtempo.robot.board import Board
 from armtempo.simulator import InjectedFault, LaunchOptions, edgelog, launch
-from armtempo_shared.limits import TICK_HZ
 
 from tests import interpreters
-from tests.system.sequences import ARM, ESTOP, PART, net_steps, part_lies_there, small
+from tests.system.sequences import ARM, ESTOP, PART, net_steps, part_lies_there, pauses_s, small
 
 LEGS = 3
 GUARDED = replace(ARM, joints=(replace(ARM.joints[0], switches=LimitSwitches(high=1)), *ARM.joints[1:]))
@@ -59,7 +58,7 @@ def cycles(number: int, numbers: random.Random, interpreter: str, folder: Path) 
             time.sleep(numbers.uniform(0.0, 1.5))
     (power,) = edgelog.read(folder / "edges")
     lost = _check_edges(power, number)
-    pauses = [(power.starts[n] - power.ends[n - 1]) / TICK_HZ for n in range(LEGS, LEGS * number, LEGS)]
+    pauses = pauses_s(power, plan)
     print(f"{interpreter}: {end.ending} after {end.cycle} cycles, {hosts} hosts, {time.monotonic() - begun_s:.0f} s")
     print(f"motions {len(power.starts)}, of other pulses than the first of their kind: {lost}")
     print(f"steps from home: {net_steps(power)}")

@@ -12,6 +12,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.sequence import Sequence
 from armtempo.model.sequence_plan import SequencePlan
 from armtempo.simulator import InjectedFault, edgelog
+from armtempo_shared.limits import TICK_HZ
 
 from tests.system.pulses import PINS
 
@@ -64,6 +65,15 @@ def small(folder: Path, times: int | str, on_timeout: str = "stop", name: str = 
 def part_lies_there() -> InjectedFault:
     """The part is seen from the first motion on."""
     return InjectedFault("input", 0.01, 1, name=PART, level=0)
+
+
+def pauses_s(power: edgelog.PowerCycle, plan: SequencePlan) -> list[float]:
+    """From the planned end of each cycle's last motion to time 0 of the next one's first, seconds."""
+    legs = len(plan.legs)
+    return [
+        (power.starts[n] - power.starts[n - 1]) / TICK_HZ - plan.legs[-1].duration_s
+        for n in range(legs, len(power.starts), legs)
+    ]
 
 
 def net_steps(power: edgelog.PowerCycle, arm: Arm = ARM) -> list[int]:

@@ -21,8 +21,8 @@ from armtempo.splines.trajectory import Trajectory
 
 FORMAT = "armtempo sequence"
 VERSION = 1
-PAUSE_S = 0.045
-"""From the end of a motion to the beginning of the next: host/docs/sequences.md."""
+PAUSE_S = 0.07
+"""From the end of a motion to the beginning of the next, on the virtual board: host/docs/sequences.md."""
 _AGAIN = "plan it again"
 _RULE = "a sequence's plan is replaced by one of a sequence of the same name"
 
