@@ -59,7 +59,9 @@ def cycles(number: int, numbers: random.Random, interpreter: str, folder: Path) 
     (power,) = edgelog.read(folder / "edges")
     lost = _check_edges(power, number)
     pauses = pauses_s(power, plan)
-    print(f"{interpreter}: {end.ending} after {end.cycle} cycles, {hosts} hosts, {time.monotonic() - begun_s:.0f} s")
+    print(
+        f"{interpreter}: {end.ending} after {end.cycle} cycles, {hosts} hosts, {time.monotonic() - begun_s:.0f} s"
+    )
     print(f"motions {len(power.starts)}, of other pulses than the first of their kind: {lost}")
     print(f"steps from home: {net_steps(power)}")
     if pauses:

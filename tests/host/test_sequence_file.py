@@ -100,7 +100,13 @@ def test_the_first_pass_of_a_repeat_may_begin_elsewhere(tmp_path: Path) -> None:
 
 def test_a_repeat_that_begins_where_it_ends_stands_once(tmp_path: Path) -> None:
     steps = 'goto = "b"', "repeat = 3", 'goto = "a"', 'goto = "b"', 'end = "repeat"'
-    assert words(planned(tmp_path, *steps)) == ["goto b", "repeat 3 times", "goto a", "goto b", "end of repeat"]
+    assert words(planned(tmp_path, *steps)) == [
+        "goto b",
+        "repeat 3 times",
+        "goto a",
+        "goto b",
+        "end of repeat",
+    ]
 
 
 def test_repeats_within_repeats(tmp_path: Path) -> None:
@@ -177,7 +183,10 @@ def test_goto_leads_to_where_a_motion_begins(tmp_path: Path) -> None:
         (["repeat = 2"] * 5 + ["wait_s = 1"] + ['end = "repeat"'] * 5, "at most 4 within each other"),
         (['call = "seq.toml"'], "calls itself: seq.toml calls seq.toml"),
         (['call = "job.toml"'], "no sequence"),
-        (['goto = "b"', 'run = "job.toml"'], r"step\[2\]\.run: job begins at 1, -60, 40°, but the arm is at b"),
+        (
+            ['goto = "b"', 'run = "job.toml"'],
+            r"step\[2\]\.run: job begins at 1, -60, 40°, but the arm is at b",
+        ),
         (["repeat = 2", 'run = "job.toml"', 'end = "repeat"'], r"step\[2\]\.run: job begins at"),
         (['goto = "home"'], "nothing is left to do"),
         (["wait_s = 1"] * 501, "501 rows"),

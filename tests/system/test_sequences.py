@@ -92,7 +92,9 @@ def test_from_the_command_line(tmp_path: Path) -> None:
 
     arm = str(FOLDER / "arm.toml")
     path = tmp_path / "s.toml"
-    text = f'name = "s"\narm = "{arm}"\nstart = "home"\n[[step]]\nrepeat = 2\n[[step]]\ngoto = [0.5, -60, 40]\n'
+    text = (
+        f'name = "s"\narm = "{arm}"\nstart = "home"\n[[step]]\nrepeat = 2\n[[step]]\ngoto = [0.5, -60, 40]\n'
+    )
     text += '[[step]]\noutput = "gripper"\nto = "closed"\nwait_s = 0.1\n[[step]]\ngoto = "home"\n[[step]]\nend = "repeat"\n'
     path.write_text(text)
     told = said("plan", "s.toml")
@@ -107,5 +109,7 @@ def test_from_the_command_line(tmp_path: Path) -> None:
     said("plan", "s.toml")
     assert "--force" in said("upload", "s.json", code=1)
     said("upload", "s.json", "--force")
-    assert [line.split()[0] for line in said("list", "--arm", arm).splitlines() if line.startswith("s")] == ["s"]
+    assert [line.split()[0] for line in said("list", "--arm", arm).splitlines() if line.startswith("s")] == [
+        "s"
+    ]
     said("plan", "s.toml", "--refine", "4", code=2)

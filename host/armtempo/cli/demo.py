@@ -6,9 +6,10 @@ from pathlib import Path
 
 import click
 
-from armtempo.cli import chosen, messages, options
+from armtempo.cli import chosen, messages, options, sequences
 from armtempo.cli.progress import ProgressBar
 from armtempo.cli.run import run_and_tell
+from armtempo.errors import InputError
 from armtempo.ports.names import SIM
 
 
@@ -21,12 +22,22 @@ from armtempo.ports.names import SIM
     metavar="PORT",
     help="Where to replay it: a virtual board, unless this option names another port.",
 )
+@click.option(
+    "--pick-and-place",
+    is_flag=True,
+    help="Instead: a sequence with a gripper and a part sensor, on a virtual board only.",
+)
 @options.log_traffic
-def command(out: Path | None, port: str, log_traffic: Path | None) -> None:
+def command(out: Path | None, port: str, pick_and_place: bool, log_traffic: Path | None) -> None:
     """Plan, replay and report the paper's feeding motion.
 
     Without --port a virtual board replays it, faster than in real time, whatever is plugged in.
     """
+    if pick_and_place:
+        if port != SIM:
+            raise InputError(f"--port {port}: this demo is for a virtual board", "leave --port out")
+        _pick_and_place()
+        return
     from armtempo import pipeline
     from armtempo.errors import ArmtempoError, MissingPackageError
     from armtempo.model.arm import Arm
@@ -45,3 +56,29 @@ def command(out: Path | None, port: str, log_traffic: Path | None) -> None:
         messages.show(
             ArmtempoError(error.problem, f"{error.hint}, then: armtempo report {run.path}"), "no report"
         )
+
+
+def _pick_and_place() -> None:
+    """The shipped sequence on a virtual board whose part sensor sees a part from the first motion on."""
+    import armtempo
+    from armtempo.model.arm import Arm
+    from armtempo.model.sequence import Sequence
+    from armtempo.simulator import InjectedFault, LaunchOptions, launch
+
+    folder = Path(armtempo.__file__).parent / "data" / "pick_and_place"
+    arm = Arm.load(folder / "arm.toml")
+    with ProgressBar("planning") as progress:
+        plan = armtempo.plan_sequence(arm, Sequence.load(folder / "sequence.toml", arm), progress)
+    click.echo(f"arm: {chosen.words(arm)}")
+    for line in sequences.lines(plan):
+        click.echo(line)
+    part = arm.inputs[arm.input("part")]
+    lies_there = InjectedFault(
+        "input", 0.1, 1, name=part.pin.removeprefix("P"), level=int(part.active == "high")
+    )
+    with (
+        launch(LaunchOptions(arm=arm, faults=[lies_there])) as process,
+        armtempo.connect(process.port, arm) as board,
+    ):
+        board.home(arm)
+        sequences.run_and_tell(board, plan)
