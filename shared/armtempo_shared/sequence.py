@@ -108,7 +108,7 @@ class SequenceRecord:
             raise SequenceError("a motion's name")
 
 
-class Sequence(SequenceRecord):
+class SequenceData(SequenceRecord):
     """A checked view of a record in memory."""
 
     def __init__(self, data: bytes) -> None:

@@ -93,7 +93,8 @@ def test_the_first_pass_of_a_repeat_may_begin_elsewhere(tmp_path: Path) -> None:
     assert [row.number for row in plan.rows if row.op == record.MOVE] == [0, 1, 2, 1, 3]
     (cycle,) = plan.cycles
     assert (cycle.times, cycle.share.motions) == (3, 2)
-    assert plan.total is not None and plan.total.motions == 7
+    assert plan.total is not None
+    assert plan.total.motions == 7
     whole = sum(plan.legs[n].duration_s for n in (0, 1, 2, 1, 2, 1, 3)) + 7 * PAUSE_S
     assert plan.total.total_s == pytest.approx(whole)
 
@@ -114,8 +115,9 @@ def test_repeats_within_repeats(tmp_path: Path) -> None:
     plan = planned(tmp_path, 'repeat = "for ever"', *inner, 'goto = "home"', 'end = "repeat"')
     values = [(row.op, row.value, row.amount) for row in plan.rows if row.op in (record.REPEAT, record.END)]
     assert values == [(5, 0, 0), (5, 0, 1), (6, 0, 0), (6, 1, 0)]
-    assert plan.total is None and plan.cycles[0].times == 0
-    sequence_check.check(record.Sequence(encoded_sequence.of_plan(plan).data))
+    assert plan.total is None
+    assert plan.cycles[0].times == 0
+    sequence_check.check(record.SequenceData(encoded_sequence.of_plan(plan).data))
 
 
 def test_outputs_waits_and_inputs(tmp_path: Path) -> None:
@@ -267,11 +269,11 @@ def test_a_plan_of_another_arm_is_no_leg(tmp_path: Path) -> None:
 
 def test_every_damage_of_a_record_is_seen(tmp_path: Path) -> None:
     data = encoded_sequence.of_plan(planned(tmp_path, 'goto = "a"', "wait_s = 1")).data
-    record.Sequence(data)
+    record.SequenceData(data)
     for at in range(len(data)):
         for damaged in (data[:at], data[:at] + bytes([data[at] ^ 0x40]) + data[at + 1 :]):
             with pytest.raises(record.SequenceError):
-                record.Sequence(damaged)
+                record.SequenceData(damaged)
 
 
 def test_the_shipped_sequence_plans() -> None:

@@ -42,7 +42,8 @@ def test_cycles_lead_back_to_the_step(name: str, tmp_path: Path) -> None:
     widths = [pulses.high_ticks for pulses in power.pulses[GRIPPER]]
     opened, closed = widths[0], max(widths)
     changes = [width for width, _ in itertools.groupby(widths) if width]
-    assert changes == [opened, closed] * CYCLES + [opened] and closed > opened
+    assert changes == [opened, closed] * CYCLES + [opened]
+    assert closed > opened
     grips = [pulses.tick for pulses in power.pulses[GRIPPER] if pulses.high_ticks == closed]
     for cycle, grip in enumerate(grips):  # between the end of the first motion and the start of the next
         begun = power.starts[LEGS * cycle]
@@ -54,14 +55,14 @@ def test_whatever_ends_it_leaves_a_board_that_says_where(tmp_path: Path) -> None
     """E-stop in a motion, no part, a stop; after each one the next sequence starts where the arm stands."""
     plan = small(tmp_path, 20, "fault")
     faults = [InjectedFault("input", 0.1, 2, name=sequences.ESTOP, level=0)]
-    with launch(LaunchOptions(arm=ARM, faults=[part_lies_there(), *faults])) as process:
-        with armtempo.connect(process.port, ARM) as board:
-            board.home(ARM)
-            with pytest.raises(BoardError, match="E-stop input tripped") as caught:
-                board.run_sequence(plan)
-            assert "in step 5" in str(caught.value)
-            assert board.client.sequence().ending == "fault"
-            assert board.output("gripper").state == "open"  # its safe state
+    options = LaunchOptions(arm=ARM, faults=[part_lies_there(), *faults])
+    with launch(options) as process, armtempo.connect(process.port, ARM) as board:
+        board.home(ARM)
+        with pytest.raises(BoardError, match="E-stop input tripped") as caught:
+            board.run_sequence(plan)
+        assert "in step 5" in str(caught.value)
+        assert board.client.sequence().ending == "fault"
+        assert board.output("gripper").state == "open"  # its safe state
     with launch(LaunchOptions(arm=ARM)) as process, armtempo.connect(process.port, ARM) as board:
         board.home(ARM)
         with pytest.raises(BoardError, match="an input did not come in time") as caught:
@@ -95,10 +96,12 @@ def test_from_the_command_line(tmp_path: Path) -> None:
     text = (
         f'name = "s"\narm = "{arm}"\nstart = "home"\n[[step]]\nrepeat = 2\n[[step]]\ngoto = [0.5, -60, 40]\n'
     )
-    text += '[[step]]\noutput = "gripper"\nto = "closed"\nwait_s = 0.1\n[[step]]\ngoto = "home"\n[[step]]\nend = "repeat"\n'
+    text += '[[step]]\noutput = "gripper"\nto = "closed"\nwait_s = 0.1\n'
+    text += '[[step]]\ngoto = "home"\n[[step]]\nend = "repeat"\n'
     path.write_text(text)
     told = said("plan", "s.toml")
-    assert "cycle (step 1, 2 times):" in told and "in 2 motions + 0.100 s waits" in told
+    assert "cycle (step 1, 2 times):" in told
+    assert "in 2 motions + 0.100 s waits" in told
     assert "s: sequence and 2 motions stored" in said("upload", "s.json", "--default")
     listed = said("list", "--arm", arm)
     assert [line.split()[0] for line in listed.splitlines() if line.startswith("s")] == ["s", "s-1", "s-2"]

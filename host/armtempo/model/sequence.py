@@ -16,7 +16,7 @@ FOR_EVER = "for ever"
 
 
 @dataclass(frozen=True)
-class Posture:
+class NamedAngles:
     """Angles of the driven joints (J,), and what the user calls them."""
 
     name: str
@@ -24,7 +24,7 @@ class Posture:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class SourceMotion:
     """A job that is still to be planned, or a plan, by its file."""
 
     name: str
@@ -37,16 +37,16 @@ class Goto:
 
     where: str
     step: int
-    target: Posture | Motion
+    target: NamedAngles | SourceMotion
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class RunMotion:
     """Run a motion from its beginning."""
 
     where: str
     step: int
-    motion: Motion
+    motion: SourceMotion
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class Repeat:
     steps: tuple[Step, ...]
 
 
-Step = Goto | Run | SetOutput | Wait | WaitInput | Repeat
+Step = Goto | RunMotion | SetOutput | Wait | WaitInput | Repeat
 """``where`` names file and step for messages; ``step`` is the number in the sequence's own file, from 1."""
 
 
@@ -101,7 +101,7 @@ class Sequence:
     """What the arm is to do, step by step."""
 
     name: str
-    start: Posture | None
+    start: NamedAngles | None
     """Where it begins; None: where its first step that moves says."""
     steps: tuple[Step, ...]
     source: str

@@ -20,12 +20,12 @@ from armtempo.model.sequence import (
     ON_TIMEOUT,
     STOP,
     Goto,
-    Motion,
-    Posture,
+    NamedAngles,
     Repeat,
-    Run,
+    RunMotion,
     Sequence,
     SetOutput,
+    SourceMotion,
     Step,
     Wait,
     WaitInput,
@@ -64,15 +64,15 @@ def arm_named(path: Path | str) -> Path | None:
     return beside if beside.is_file() else named
 
 
-def _postures(top: Table, arm: Arm) -> dict[str, Posture]:
+def _postures(top: Table, arm: Arm) -> dict[str, NamedAngles]:
     """The arm's postures by name, the arm's home, and those of the sequence itself."""
-    found = {HOME: Posture(HOME, tuple(float(angle) for angle in arm.home_deg))}
+    found = {HOME: NamedAngles(HOME, tuple(float(angle) for angle in arm.home_deg))}
     own = top.table("posture")
     for name in own.rest() if own else ():
         table = own.table(name) if own else None
         if table is None or name in found:
             raise InputError(f"{top.file}: posture.{name} is there already", "choose another name")
-        found[name] = Posture(name, job_file.angles(table, "angles_deg", arm))
+        found[name] = NamedAngles(name, job_file.angles(table, "angles_deg", arm))
         table.done()
     return found
 
@@ -83,11 +83,11 @@ class _Reader:
 
     arm: Arm
     file: Path
-    postures: dict[str, Posture]
+    postures: dict[str, NamedAngles]
     callers: tuple[Path, ...] = ()
     number: int = 0
     """Of the calling step, for all steps of a file that was called; 0: each has its own."""
-    motions: dict[Path, Motion] = field(default_factory=dict)
+    motions: dict[Path, SourceMotion] = field(default_factory=dict)
 
     def steps(self, top: Table) -> tuple[Step, ...]:
         """All steps of a file; repeats hold what stands between them and their end."""
@@ -140,18 +140,18 @@ class _Reader:
 
     def goto(self, table: Table, step: int) -> list[Step]:
         only(table, "goto")
-        target: Posture | Motion
+        target: NamedAngles | SourceMotion
         if table.has("goto") and str(table.peek("goto")).endswith((".toml", ".json")):
             target = self._motion(table, "goto")
         else:
             target = self.posture(table, "goto")
         return [Goto(_place(table), step, target)]
 
-    def posture(self, table: Table, key: str) -> Posture:
+    def posture(self, table: Table, key: str) -> NamedAngles:
         """A posture by name, or as angles."""
         if not isinstance(table.peek(key), str):
             angles = job_file.angles(table, key, self.arm)
-            return Posture(", ".join(f"{angle:g}" for angle in angles) + "°", angles)
+            return NamedAngles(", ".join(f"{angle:g}" for angle in angles) + "°", angles)
         name = table.text(key)
         if name not in self.postures:
             near = did_you_mean(name, self.postures)
@@ -163,13 +163,13 @@ class _Reader:
 
     def run(self, table: Table, step: int) -> list[Step]:
         only(table, "run")
-        return [Run(_place(table), step, self._motion(table, "run"))]
+        return [RunMotion(_place(table), step, self._motion(table, "run"))]
 
-    def _motion(self, table: Table, key: str) -> Motion:
+    def _motion(self, table: Table, key: str) -> SourceMotion:
         path = self.file.parent / table.text(key)
         if path not in self.motions:
             source = trajectory_file.load(path) if path.suffix == ".json" else job_file.load(path, self.arm)
-            self.motions[path] = Motion(path.stem, source)
+            self.motions[path] = SourceMotion(path.stem, source)
         return self.motions[path]
 
     def output(self, table: Table, step: int) -> list[Step]:

@@ -28,7 +28,7 @@ _RULE = "a sequence's plan is replaced by one of a sequence of the same name"
 
 
 @dataclass(frozen=True)
-class Row:
+class SequenceRow:
     """One row of the record (``armtempo_shared.sequence``), with what it does in words."""
 
     op: int
@@ -78,7 +78,7 @@ class SequencePlan:
     name: str
     legs: tuple[Trajectory, ...]
     """Its motions, each once; NAME-1, NAME-2 … on the board."""
-    rows: tuple[Row, ...]
+    rows: tuple[SequenceRow, ...]
     versions: Mapping[str, str]
 
     @property
@@ -100,7 +100,7 @@ class SequencePlan:
         return self._times()[0]
 
     def _times(self) -> tuple[Share | None, tuple[Cycle, ...]]:
-        open_: list[tuple[Row, Share]] = []
+        open_: list[tuple[SequenceRow, Share]] = []
         share, endless = Share(), False
         cycles = []
         for row in self.rows:

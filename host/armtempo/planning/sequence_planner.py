@@ -15,17 +15,17 @@ from armtempo.model.sequence import (
     FAULT,
     NEXT,
     Goto,
-    Motion,
-    Posture,
+    NamedAngles,
     Repeat,
-    Run,
+    RunMotion,
     Sequence,
     SetOutput,
+    SourceMotion,
     Step,
     Wait,
     WaitInput,
 )
-from armtempo.model.sequence_plan import Row, SequencePlan, check_size
+from armtempo.model.sequence_plan import SequencePlan, SequenceRow, check_size
 from armtempo.planning import checks, planner
 from armtempo.progress import Progress
 from armtempo.splines.trajectory import Trajectory
@@ -71,23 +71,23 @@ class _Compiler:
     _plans: dict[int, Trajectory] = field(default_factory=dict)
     _depth: int = 0
 
-    def rows(self, steps: tuple[Step, ...], here: Angles | None, name: str) -> tuple[list[Row], _End]:
+    def rows(self, steps: tuple[Step, ...], here: Angles | None, name: str) -> tuple[list[SequenceRow], _End]:
         """The rows of some steps from a posture on, and where they lead."""
         end = _End(here, name)
-        found: list[Row] = []
+        found: list[SequenceRow] = []
         for step in steps:
             if isinstance(step, Repeat):
                 rows, end = self._repeat(step, end)
             elif isinstance(step, Goto):
                 rows, end = self._goto(step, end)
-            elif isinstance(step, Run):
+            elif isinstance(step, RunMotion):
                 rows, end = self._run(step, end)
             else:
                 rows = [_still(step)]
             found += rows
         return found, end
 
-    def _repeat(self, step: Repeat, before: _End) -> tuple[list[Row], _End]:
+    def _repeat(self, step: Repeat, before: _End) -> tuple[list[SequenceRow], _End]:
         """The first pass stands before the others where it begins elsewhere than they do."""
         outermost = not self._depth
         self._depth += 1
@@ -102,11 +102,11 @@ class _Compiler:
         if apart and step.times == 1:
             return first, end
         words = f"{step.times} times" if step.times else "for ever"
-        begin = Row(record.REPEAT, 0, int(apart and outermost), times, step.step, f"repeat {words}")
-        close = Row(record.END, 0, int(outermost), 0, step.step, "end of repeat")
+        begin = SequenceRow(record.REPEAT, 0, int(apart and outermost), times, step.step, f"repeat {words}")
+        close = SequenceRow(record.END, 0, int(outermost), 0, step.step, "end of repeat")
         return [*(first if apart else ()), begin, *rows, close], last
 
-    def _goto(self, step: Goto, here: _End) -> tuple[list[Row], _End]:
+    def _goto(self, step: Goto, here: _End) -> tuple[list[SequenceRow], _End]:
         target = self._posture(step.target)
         if here.angles_deg is None or here.angles_deg == target.angles_deg:
             return [], _End(target.angles_deg, target.name)
@@ -116,7 +116,7 @@ class _Compiler:
         words = f"goto {target.name}"
         return [_move(self._known[key], step.step, words)], _End(target.angles_deg, target.name)
 
-    def _run(self, step: Run, here: _End) -> tuple[list[Row], _End]:
+    def _run(self, step: RunMotion, here: _End) -> tuple[list[SequenceRow], _End]:
         trajectory = self._planned(step.motion, step.where)
         start, end = _angles(trajectory(0.0)), _angles(trajectory(trajectory.duration_s))
         if here.angles_deg is not None and not self._same(here.angles_deg, start):
@@ -132,13 +132,13 @@ class _Compiler:
             end, f"the end of {step.motion.name}"
         )
 
-    def _posture(self, target: Posture | Motion) -> Posture:
-        if isinstance(target, Posture):
+    def _posture(self, target: NamedAngles | SourceMotion) -> NamedAngles:
+        if isinstance(target, NamedAngles):
             return target
         trajectory = self._planned(target, "")
-        return Posture(f"the start of {target.name}", _angles(trajectory(0.0)))
+        return NamedAngles(f"the start of {target.name}", _angles(trajectory(0.0)))
 
-    def _planned(self, motion: Motion, where: str) -> Trajectory:
+    def _planned(self, motion: SourceMotion, where: str) -> Trajectory:
         if id(motion) not in self._plans:
             self._plans[id(motion)] = self._of(motion.source, where)
         return self._plans[id(motion)]
@@ -172,20 +172,20 @@ class _Compiler:
         )
 
 
-def _still(step: SetOutput | Wait | WaitInput) -> Row:
+def _still(step: SetOutput | Wait | WaitInput) -> SequenceRow:
     """The row of a step that moves nothing."""
     if isinstance(step, SetOutput):
-        return Row(record.OUTPUT, step.number, step.raw, 0, step.step, f"output {step.words}")
+        return SequenceRow(record.OUTPUT, step.number, step.raw, 0, step.step, f"output {step.words}")
     if isinstance(step, Wait):
-        return Row(record.WAIT, 0, 0, round(step.wait_s * 1000), step.step, f"wait {step.wait_s:g} s")
+        return SequenceRow(record.WAIT, 0, 0, round(step.wait_s * 1000), step.step, f"wait {step.wait_s:g} s")
     value = int(step.active) | _THEN.get(step.on_timeout, record.STOP_THEN)
     limit = f", at most {step.timeout_s:g} s, then {step.on_timeout}" if step.timeout_s else ""
     words = f"wait for input {step.words}{limit}"
-    return Row(record.WAIT_INPUT, step.number, value, round(step.timeout_s * 1000), step.step, words)
+    return SequenceRow(record.WAIT_INPUT, step.number, value, round(step.timeout_s * 1000), step.step, words)
 
 
-def _move(leg: int, step: int, words: str) -> Row:
-    return Row(record.MOVE, leg, 0, 0, step, words)
+def _move(leg: int, step: int, words: str) -> SequenceRow:
+    return SequenceRow(record.MOVE, leg, 0, 0, step, words)
 
 
 def _angles(values: np.ndarray) -> Angles:

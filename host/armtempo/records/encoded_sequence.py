@@ -38,5 +38,5 @@ def of_plan(plan: SequencePlan) -> EncodedSequence:
     motions = tuple(encoded_motion.of_trajectory(leg, plan.arm) for leg in plan.legs)
     keys = [(motion.name, motion.key.crc) for motion in motions]
     data = sequence.pack(record_crc(encode.arm_record(plan.arm)), rows_of(plan), keys)
-    sequence_check.check(sequence.Sequence(data))
+    sequence_check.check(sequence.SequenceData(data))
     return EncodedSequence(plan, motions, data)

@@ -72,7 +72,7 @@ def store(
 def _legs_of(client: Client, old: StoredMotion) -> dict[str, int]:
     """Names and checksums of the motions of a stored sequence; none where it cannot be read."""
     try:
-        found = record.Sequence(client.fetch(old.name))
+        found = record.SequenceData(client.fetch(old.name))
         return dict(found.motion(index) for index in range(found.motions))
     except record.SequenceError:
         return {}
