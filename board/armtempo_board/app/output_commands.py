@@ -13,16 +13,34 @@ from micropython import const
 from armtempo_board import heap
 
 _MODULES = ("output_commands", "outputs", "digital_inputs")
+_VALUE_AT = const(6)  # in the command: behind its number, a byte
+_VALUE_HIGH_AT = const(7)
 _ANSWER_AT = const(6)  # in a reply
 _LEVELS_BYTES = const(1)
 _BYTES_PER_VALUE = const(2)
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from armtempo_board.app.commands import Commands
-    from armtempo_board.app.controller import Controller
+    from typing import Any, Protocol
 
     Rows = list[dict[str, int]]
+
+    class Controller(Protocol):
+        """What has outputs and inputs, see ``controller.Controller``."""
+
+        outputs: Any
+        inputs: Any
+        rows: "dict[int, Any]"
+
+        def fault(self) -> int: ...
+
+    class Caller(Protocol):
+        """What is asked of the caller, see ``commands.Commands``."""
+
+        @property
+        def controller(self) -> Controller: ...
+
+        link: Any
 
 
 def attach(controller: "Controller", outputs: "Rows", inputs: "Rows") -> None:
@@ -35,11 +53,13 @@ def attach(controller: "Controller", outputs: "Rows", inputs: "Rows") -> None:
     controller.outputs = Outputs(outputs)
     controller.inputs = DigitalInputs(inputs)
     for command, answer, handler in zip(rows("O"), rows("P"), (output, inputs_and_outputs)):
-        controller.rows[command[1]] = (handler, command[2], answer[2], command[4])
+        _, number, fields, _, tail = command
+        _, _, values, _, _ = answer
+        controller.rows[number] = (handler, fields, values, tail)
     heap.forget(_MODULES)  # they stay as long as their objects
 
 
-def output(commands: "Commands", row: tuple, length: int) -> int:
+def output(commands: "Caller", row: tuple, length: int) -> int:
     """Set an output."""
     controller = commands.controller
     data = commands.link.reader.data
@@ -48,11 +68,11 @@ def output(commands: "Commands", row: tuple, length: int) -> int:
         return -codes.NO_OUTPUT
     if controller.fault():
         return -codes.FAULT_PENDING
-    controller.outputs.set(number, data[PAYLOAD_AT + 1] | data[PAYLOAD_AT + 2] << 8)
+    controller.outputs.set(number, data[_VALUE_AT] | data[_VALUE_HIGH_AT] << 8)
     return 0
 
 
-def inputs_and_outputs(commands: "Commands", row: tuple, length: int) -> int:
+def inputs_and_outputs(commands: "Caller", row: tuple, length: int) -> int:
     """What the inputs are, and what the outputs are set to."""
     reply = commands.link.reply
     reply[_ANSWER_AT] = commands.controller.inputs.levels

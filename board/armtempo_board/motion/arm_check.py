@@ -67,7 +67,8 @@ def _check_pins(head: "dict[str, int]", joints: "Rows", outputs: "Rows", inputs:
     if head["flags"] & armrecord.FLAG_ESTOP_FITTED:
         taken.append(pins.ESTOP)
     for row in joints:
-        taken += [pins.STEP[row["channel"]][0], pins.DIR[row["channel"]]]
+        step, _, _, _, _, _ = pins.STEP[row["channel"]]
+        taken += [step, pins.DIR[row["channel"]]]
         taken += [
             pins.LIMIT[row[side]] for side in ("limit_low", "limit_high") if row[side] != armrecord.NONE
         ]
