@@ -21,6 +21,7 @@ _ONLY_FOR_SET_UP = (
     "table",
     "program_hash",
     "basis",
+    "output_setup",
 )
 
 

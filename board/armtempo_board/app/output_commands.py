@@ -1,6 +1,6 @@
 """The commands about outputs and inputs, for an arm that has any; they allocate nothing.
 
-The functions with a command's name act on it as those of ``store_commands.py`` do; the code of a refusal comes back as
+The functions act on a command as those of ``store_commands.py`` do; the code of a refusal comes back as
 a negative number.
 """
 
@@ -10,9 +10,6 @@ from armtempo_shared import codes
 from armtempo_shared.messages import PAYLOAD_AT
 from micropython import const
 
-from armtempo_board import heap
-
-_MODULES = ("output_commands", "outputs", "digital_inputs")
 _VALUE_AT = const(6)  # in the command: behind its number, a byte
 _VALUE_HIGH_AT = const(7)
 _ANSWER_AT = const(6)  # in a reply
@@ -23,14 +20,11 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any, Protocol
 
-    Rows = list[dict[str, int]]
-
     class Controller(Protocol):
         """What has outputs and inputs, see ``controller.Controller``."""
 
         outputs: Any
         inputs: Any
-        rows: "dict[int, Any]"
 
         def fault(self) -> int: ...
 
@@ -41,22 +35,6 @@ if TYPE_CHECKING:
         def controller(self) -> Controller: ...
 
         link: Any
-
-
-def attach(controller: "Controller", outputs: "Rows", inputs: "Rows") -> None:
-    """Give the controller the outputs, the inputs and their commands."""
-    from armtempo_shared.table import rows  # here, so that they can be forgotten
-
-    from armtempo_board.hardware.digital_inputs import DigitalInputs
-    from armtempo_board.hardware.outputs import Outputs
-
-    controller.outputs = Outputs(outputs)
-    controller.inputs = DigitalInputs(inputs)
-    for command, answer, handler in zip(rows("O"), rows("P"), (output, inputs_and_outputs)):
-        _, number, fields, _, tail = command
-        _, _, values, _, _ = answer
-        controller.rows[number] = (handler, fields, values, tail)
-    heap.forget(_MODULES)  # they stay as long as their objects
 
 
 def output(commands: "Caller", row: tuple, length: int) -> int:

@@ -36,11 +36,7 @@ def checked(data: bytes, room_words: int, most_joints: int) -> "Record":
     _check_pins(head, joints, outputs, inputs)
     rates = [row["max_rate"] for row in joints]
     beside = engine_memory.output_bytes(len(outputs), len(inputs))
-    if (
-        len(rates) > most_joints
-        or not engine_memory.fits(rates, room_words)
-        or not engine_memory.objects_fit(len(rates), beside, most_joints)
-    ):
+    if len(rates) > most_joints or not engine_memory.fits(rates, room_words, beside):
         raise Refused(codes.NO_ROOM, NO_JOINT, 4 * engine_memory.words(rates) + beside)
     return head, joints, crc, outputs, inputs
 

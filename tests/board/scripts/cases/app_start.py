@@ -88,9 +88,7 @@ def case_what_the_board_has_not_is_named():
 class Cramped:
     """A board with less memory for engines."""
 
-    class memory:
-        size = engine_memory.words([1])
-
+    words = engine_memory.words([1])
     joints = 6
 
 
