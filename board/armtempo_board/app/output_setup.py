@@ -2,19 +2,17 @@
 
 from array import array
 
-from armtempo_shared.table import rows
 from pyb import Pin, Timer
 
 from armtempo_board import heap
-from armtempo_board.app import output_commands
-from armtempo_board.hardware import pins
-from armtempo_board.hardware.digital_inputs import DigitalInputs
-from armtempo_board.hardware.outputs import Outputs
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any, Protocol
+
+    from armtempo_board.hardware.digital_inputs import DigitalInputs
+    from armtempo_board.hardware.outputs import Outputs
 
     Rows = list[dict[str, int]]
 
@@ -27,7 +25,7 @@ if TYPE_CHECKING:
 
 
 _MODULES = ("output_commands", "outputs", "digital_inputs")
-_HANDLERS = (output_commands.output, output_commands.inputs_and_outputs)
+"""What stays in memory with the outputs and inputs, and is not known by name any more."""
 
 
 def attach(controller: "Controller", outputs: "Rows", inputs: "Rows") -> None:
@@ -35,13 +33,18 @@ def attach(controller: "Controller", outputs: "Rows", inputs: "Rows") -> None:
 
     ``outputs``, ``inputs``: rows of the arm record (``armrecord.OUTPUT``, ``INPUT``).
     """
+    from armtempo_shared.table import rows  # here, as ``detach`` needs none of them
+
+    from armtempo_board.app import output_commands
+
     controller.outputs = outputs_of(outputs)
     controller.inputs = inputs_of(inputs)
-    for command, answer, handler in zip(rows("O"), rows("P"), _HANDLERS):
+    handlers = output_commands.output, output_commands.inputs_and_outputs
+    for command, answer, handler in zip(rows("O"), rows("P"), handlers):
         _, number, fields, _, tail = command
         _, _, values, _, _ = answer
         controller.rows[number] = (handler, fields, values, tail)
-    heap.forget(_MODULES)  # what they hold stays as long as it is used
+    heap.forget(_MODULES)
 
 
 def detach(controller: "Controller") -> None:
@@ -57,8 +60,11 @@ def detach(controller: "Controller") -> None:
     controller.rows.clear()
 
 
-def outputs_of(table: "Rows") -> Outputs:
+def outputs_of(table: "Rows") -> "Outputs":
     """All take their safe values."""
+    from armtempo_board.hardware import pins
+    from armtempo_board.hardware.outputs import Outputs
+
     numbers = array("H")
     for row in table:
         numbers.extend(array("H", [row["low"], row["high"], row["safe"]]))
@@ -89,8 +95,11 @@ def _driven(
     return timer.channel(row["channel"], Timer.PWM, pin=pin, pulse_width=level).pulse_width
 
 
-def inputs_of(table: "Rows") -> DigitalInputs:
+def inputs_of(table: "Rows") -> "DigitalInputs":
     """Each has the level that it has now."""
+    from armtempo_board.hardware import pins
+    from armtempo_board.hardware.digital_inputs import DigitalInputs
+
     found = []
     numbers = array("I")
     for row in table:

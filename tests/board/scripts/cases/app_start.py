@@ -66,7 +66,7 @@ def case_damaged_records_are_named():
 
 def case_another_version_is_named():
     arm = bytearray(stand_in.arm()[:-4])
-    arm[4] = armrecord.VERSION + 1
+    arm[4] = armrecord.VERSION_WITH_OUTPUTS + 1
     names_it(with_crc(bytes(arm)), "bad_record")
 
 

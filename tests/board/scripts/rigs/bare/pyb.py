@@ -48,6 +48,9 @@ class Timer:
         Timer.callbacks[self._number, number] = callback
         return None
 
+    def deinit(self):
+        """Nothing to stop."""
+
 
 class Channel:
     """A channel that makes pulses."""
