@@ -30,6 +30,7 @@ _IMPORTED_LATER = (
     "armtempo_board.motion.endpoints",
     "armtempo_board.storage.motion_file",
     "armtempo_board.storage.store",
+    "armtempo_board.app.room",
     "armtempo_board.app.store_commands",
 )
 _USB_BUFFER = 1024

@@ -26,6 +26,7 @@ _NOT_ALWAYS = (
     "table",
     "program_hash",
     "basis",
+    "output_setup",
 )
 _SEQUENCE = "sequence"  # how the names of the modules begin that only sequences need
 

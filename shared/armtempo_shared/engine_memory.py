@@ -17,8 +17,6 @@ The queue of steps, the solver, the law of time; pieces of angle and of time, th
 """
 GENERATOR_WORDS = sum(GENERATOR_PARTS)
 _BLOCK_WORDS = 1026  # for a ring of 1024 entries, or two of 512
-_SPARE_BYTES = 2048
-"""Heap that is kept for other work and that an arm's outputs and inputs may take."""
 LARGEST_WORDS = 6 * GENERATOR_WORDS + 5 * 513 + 257
 """For any arm whose joints' highest step rates sum up to 240 000 steps/s."""
 
@@ -47,19 +45,8 @@ def object_bytes(joints: int) -> int:
 
 
 def output_bytes(outputs: int, inputs: int) -> int:
-    """Bytes of heap that outputs and inputs take besides, with their code: measured, see board/docs/memory.md."""
-    found = 1400 + 120 * outputs if outputs else 0
-    return found + (900 + 80 * inputs if inputs else 0)
-
-
-def objects_fit(joints: int, beside: int, most_joints: int) -> bool:
-    """Whether the objects of an engine, and so many bytes beside them, fit where those for the most joints do."""
-    return not beside or beside <= objects_room(joints, most_joints)
-
-
-def objects_room(joints: int, most_joints: int) -> int:
-    """Bytes that outputs and inputs can have beside the objects of so many joints."""
-    return object_bytes(most_joints) - object_bytes(joints) + _SPARE_BYTES
+    """Bytes that outputs and inputs take of the engine's room, with their code: measured, see board/docs/memory.md."""
+    return 2200 + 144 * outputs + 48 * inputs if outputs or inputs else 0
 
 
 def blocks(room_words: int) -> "list[int]":
@@ -67,9 +54,12 @@ def blocks(room_words: int) -> "list[int]":
     return [min(_BLOCK_WORDS, room_words - begin) for begin in range(0, room_words, _BLOCK_WORDS)]
 
 
-def fits(rates: "list[int]", room_words: int) -> bool:
-    """Whether all parts of the engine find their place: the largest rings first, each in the first block with room."""
-    free = blocks(room_words)
+def fits(rates: "list[int]", room_words: int, beside_bytes: int = 0) -> bool:
+    """Whether all parts of the engine find their place: the largest rings first, each in the first block with room.
+
+    ``beside_bytes``: what else comes out of the room.
+    """
+    free = blocks(room_words - beside_bytes // 4)
     parts = sorted([ring_words(rate) for rate in rates], reverse=True)
     for _ in rates:
         parts.extend(GENERATOR_PARTS)

@@ -16,8 +16,8 @@ from click.testing import CliRunner, Result
 
 from tests.host.error_messages import ErrorMessage, in_host, in_source
 
-TAKES_DASHES = ("goto", "home", "fk")
-"""Their argument may begin with a minus: what looks like an option is taken for angles."""
+TAKES_DASHES = ("goto", "home", "fk", "output")
+"""Their argument may begin with a minus: what looks like an option is taken for angles, or for an output."""
 UNKNOWN_CODE = 200
 
 
@@ -77,7 +77,9 @@ def test_every_usage_error_has_a_next_step(name: str) -> None:
     result = armtempo(name, "--no-such-option")
     assert result.exit_code == 2
     if name in TAKES_DASHES:
-        assert re.search("\nhint: (give angles in degrees|write it like)", result.output)
+        assert re.search(
+            "\nhint: (give angles in degrees|write it like|see 'armtempo output --help')", result.output
+        )
     else:
         assert f"Try 'armtempo {name} --help' for help." in result.output
 

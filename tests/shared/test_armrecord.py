@@ -29,8 +29,54 @@ def test_round_trip(joints: int) -> None:
     assert crc == int.from_bytes(data[-4:], "little") == armrecord.crc32(data[:-4])
 
 
-def test_any_changed_bit_or_length_is_refused() -> None:
-    data = armrecord.pack(*made(2))
+def wired(outputs: int, inputs: int, seed: int = 5) -> tuple[list[dict[str, int]], list[dict[str, int]]]:
+    rng = random.Random(seed)
+    fields = ((armrecord.OUTPUT, outputs), (armrecord.INPUT, inputs))
+    first, second = (
+        [{name: rng.getrandbits(BITS[kind]) for name, kind in table} for _ in range(count)]
+        for table, count in fields
+    )
+    return first, second
+
+
+@pytest.mark.parametrize(
+    ("outputs", "inputs"), [(1, 0), (0, 1), (3, 2), (limits.MAX_OUTPUTS, limits.MAX_INPUTS)]
+)
+def test_round_trip_with_outputs_and_inputs(outputs: int, inputs: int) -> None:
+    head, rows = made(3)
+    data = armrecord.pack(head, rows, *wired(outputs, inputs))
+    assert armrecord.unpack(data)[:2] == (head, rows)
+    assert armrecord.unpack_outputs(data) == wired(outputs, inputs)
+
+
+def test_an_arm_without_has_the_bytes_that_it_always_had() -> None:
+    """Layout of version 2, written out here: a board of that version takes it."""
+    head, rows = made(2)
+    wanted = struct.pack("<4sBBHHHHHHI", b"ATA1", 2, 2, *head.values())
+    wanted += b"".join(struct.pack("<BBBBiiiiIIBBBB", *row.values()) for row in rows)
+    assert armrecord.pack(head, rows) == wanted + struct.pack("<I", armrecord.crc32(wanted))
+    assert armrecord.unpack_outputs(armrecord.pack(head, rows)) == ([], [])
+
+
+def test_a_program_from_before_refuses_what_it_does_not_know() -> None:
+    """It takes version 2 only, and the record with outputs is none."""
+    assert (
+        armrecord.pack(*made(1), *wired(1, 0))[4] == armrecord.VERSION_WITH_OUTPUTS != armrecord.VERSION == 2
+    )
+
+
+@pytest.mark.parametrize(("place", "count"), [(0, 9), (0, 2), (1, 9), (1, 0), (0, 0)])
+def test_wrong_counts_are_refused_even_with_a_right_checksum(place: int, count: int) -> None:
+    plain = armrecord.pack(*made(1))
+    data = bytearray(armrecord.pack(*made(1), *wired(1, 1))[:-4])
+    data[len(plain) - 4 + place] = count
+    with pytest.raises(armrecord.ArmRecordError, match="length"):
+        armrecord.unpack(bytes(data) + struct.pack("<I", armrecord.crc32(data)))
+
+
+@pytest.mark.parametrize("outputs", [0, 2])
+def test_any_changed_bit_or_length_is_refused(outputs: int) -> None:
+    data = armrecord.pack(*made(2), *wired(outputs, outputs))
     for bit in range(8 * len(data)):
         broken = bytearray(data)
         broken[bit // 8] ^= 1 << bit % 8
@@ -41,7 +87,9 @@ def test_any_changed_bit_or_length_is_refused() -> None:
             armrecord.unpack(data[:size])
 
 
-@pytest.mark.parametrize(("offset", "value"), [(4, armrecord.VERSION + 1), (5, 0), (5, 7), (0, 0)])
+@pytest.mark.parametrize(
+    ("offset", "value"), [(4, armrecord.VERSION + 2), (4, armrecord.VERSION - 1), (5, 0), (5, 7), (0, 0)]
+)
 def test_other_versions_are_refused_even_with_a_right_checksum(offset: int, value: int) -> None:
     data = bytearray(armrecord.pack(*made(2))[:-4])
     data[offset] = value

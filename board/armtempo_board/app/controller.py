@@ -224,7 +224,7 @@ class Controller:
         """An arm record that can be taken, unpacked; else Refused."""
         from armtempo_board.motion import arm_check  # here, so that it can be forgotten
 
-        return arm_check.checked(data, self._workspace.memory.size, self._workspace.joints)
+        return arm_check.checked(data, self._workspace.words, self._workspace.joints)
 
     def _take_arm(self, record: "ArmRecord") -> None:
         from armtempo_shared import armrecord  # here, so that it can be forgotten
@@ -237,6 +237,7 @@ class Controller:
         if self.engine and all_but_limits == self._all_but_limits:  # the same arm: it stands where it stood
             known, steps = self.engine.known, [self.engine.commanded(joint) for joint in range(self.joints)]
         self._drop_engine()
+        self._share_room(len(outputs), len(inputs))
         self.engine = Engine(head, joints, self._workspace)
         self._all_but_limits = all_but_limits
         if known:
@@ -248,18 +249,24 @@ class Controller:
         self._raw = array("i", [0] * (COMMANDED + 2 * self.joints))
         self.samples.configure(self.joints)
         if outputs or inputs:
-            from armtempo_board.app import output_commands  # here, as few arms have any
+            from armtempo_board.app import output_setup  # here, so that it can be forgotten
 
-            output_commands.attach(self, outputs, inputs)
+            output_setup.attach(self, outputs, inputs)
+
+    def _share_room(self, outputs: int, inputs: int) -> None:
+        from armtempo_board.app import room  # here, so that it can be forgotten
+
+        room.share(self._workspace, outputs, inputs)
 
     def _drop_engine(self) -> None:
         """Before another takes its place: the heap is to be as it was without one."""
         if self.engine:
             self.engine.close()
         if self.outputs:
-            self.outputs.close()
-        self.engine = self.outputs = self.inputs = None
-        self.rows.clear()
+            from armtempo_board.app import output_setup  # here, so that it can be forgotten
+
+            output_setup.detach(self)
+        self.engine = None
         self.joints = self.arm_crc = 0
         self.samples.configure(0)
         self._raw = array("i", [0] * COMMANDED)
@@ -268,7 +275,7 @@ class Controller:
 
     def engine_room(self) -> int:
         """Bytes of memory that an engine can have (``armtempo_shared.engine_memory``)."""
-        return int(4 * self._workspace.memory.size)
+        return int(4 * self._workspace.words)
 
     def engine_joints(self) -> int:
         """Joints that an engine can have."""

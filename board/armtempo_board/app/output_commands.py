@@ -1,6 +1,6 @@
 """The commands about outputs and inputs, for an arm that has any; they allocate nothing.
 
-The functions with a command's name act on it as those of ``store_commands.py`` do; the code of a refusal comes back as
+The functions act on a command as those of ``store_commands.py`` do; the code of a refusal comes back as
 a negative number.
 """
 
@@ -10,36 +10,34 @@ from armtempo_shared import codes
 from armtempo_shared.messages import PAYLOAD_AT
 from micropython import const
 
-from armtempo_board import heap
-
-_MODULES = ("output_commands", "outputs", "digital_inputs")
+_VALUE_AT = const(6)  # in the command: behind its number, a byte
+_VALUE_HIGH_AT = const(7)
 _ANSWER_AT = const(6)  # in a reply
 _LEVELS_BYTES = const(1)
 _BYTES_PER_VALUE = const(2)
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from armtempo_board.app.commands import Commands
-    from armtempo_board.app.controller import Controller
+    from typing import Any, Protocol
 
-    Rows = list[dict[str, int]]
+    class Controller(Protocol):
+        """What has outputs and inputs, see ``controller.Controller``."""
+
+        outputs: Any
+        inputs: Any
+
+        def fault(self) -> int: ...
+
+    class Caller(Protocol):
+        """What is asked of the caller, see ``commands.Commands``."""
+
+        @property
+        def controller(self) -> Controller: ...
+
+        link: Any
 
 
-def attach(controller: "Controller", outputs: "Rows", inputs: "Rows") -> None:
-    """Give the controller the outputs, the inputs and their commands."""
-    from armtempo_shared.table import rows  # here, so that they can be forgotten
-
-    from armtempo_board.hardware.digital_inputs import DigitalInputs
-    from armtempo_board.hardware.outputs import Outputs
-
-    controller.outputs = Outputs(outputs)
-    controller.inputs = DigitalInputs(inputs)
-    for command, answer, handler in zip(rows("O"), rows("P"), (output, inputs_and_outputs)):
-        controller.rows[command[1]] = (handler, command[2], answer[2], command[4])
-    heap.forget(_MODULES)  # they stay as long as their objects
-
-
-def output(commands: "Commands", row: tuple, length: int) -> int:
+def output(commands: "Caller", row: tuple, length: int) -> int:
     """Set an output."""
     controller = commands.controller
     data = commands.link.reader.data
@@ -48,11 +46,11 @@ def output(commands: "Commands", row: tuple, length: int) -> int:
         return -codes.NO_OUTPUT
     if controller.fault():
         return -codes.FAULT_PENDING
-    controller.outputs.set(number, data[PAYLOAD_AT + 1] | data[PAYLOAD_AT + 2] << 8)
+    controller.outputs.set(number, data[_VALUE_AT] | data[_VALUE_HIGH_AT] << 8)
     return 0
 
 
-def inputs_and_outputs(commands: "Commands", row: tuple, length: int) -> int:
+def inputs_and_outputs(commands: "Caller", row: tuple, length: int) -> int:
     """What the inputs are, and what the outputs are set to."""
     reply = commands.link.reply
     reply[_ANSWER_AT] = commands.controller.inputs.levels

@@ -9,6 +9,7 @@ import gc
 from armtempo_shared import engine_memory
 from armtempo_shared.limits import MAX_JOINTS
 
+from armtempo_board.memory import Memory
 from armtempo_board.motion.workspace import Workspace
 
 _RESERVE = 25_000  # bytes of heap for the rest
@@ -35,6 +36,24 @@ def workspace() -> "Workspace":
         try:
             return Workspace(words, joints)
         except MemoryError:  # the heap has no such blocks
+            words -= _STEP_WORDS
+            gc.collect()
+
+
+def share(workspace: "Workspace", outputs: int, inputs: int) -> None:
+    """Leave heap for so many outputs and inputs, out of the engine's memory, which nobody uses now.
+
+    What the heap has not in one piece any more, the engine goes without, until the program starts again.
+    """
+    words = workspace.words - engine_memory.output_bytes(outputs, inputs) // 4
+    if workspace.memory.size == words:
+        return
+    workspace.memory = Memory([])
+    gc.collect()
+    while not workspace.memory.size:
+        try:
+            workspace.memory = Memory(engine_memory.blocks(words))
+        except MemoryError:
             words -= _STEP_WORDS
             gc.collect()
 

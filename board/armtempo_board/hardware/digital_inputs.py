@@ -1,26 +1,31 @@
 """The arm's inputs: levels that have been steady for their debounce time. Reading them allocates nothing."""
 
 import time
-from array import array
 
-from pyb import Pin
+from micropython import const
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from array import array
+
+    from pyb import Pin
+
+# in the numbers of an input
+_ACTIVE = const(0)
+_DEBOUNCE_MS = const(1)
+_CHANGED_MS = const(2)
+_NUMBERS = const(3)
 
 
 class DigitalInputs:
-    """``rows`` of the arm record (``armrecord.INPUT``)."""
+    """``numbers``: of each pin its active level, its debounce time, and a word in which it notes when it changed."""
 
-    def __init__(self, rows: "list[dict[str, int]]") -> None:
-        self.count = len(rows)
-        self._pins = [_input(row) for row in rows]
-        self._active = bytes([row["active_high"] for row in rows])
-        self._debounce_ms = array("H", [row["debounce_ms"] for row in rows])
-        self._changed_ms = array("I", [0] * len(rows))
+    def __init__(self, pins: "list[Pin]", numbers: "array[int]") -> None:
         self.levels = 0
-        for number in range(len(rows)):
-            self.levels |= self._is_active(number) << number
-
-    def _is_active(self, number: int) -> int:
-        return 1 if self._pins[number].value() == self._active[number] else 0
+        """Bit an input: it is active."""
+        self.count = len(pins)
+        self._pins = pins
+        self._numbers = numbers
 
     def level(self, number: int) -> int:
         """1 where input ``number`` (from 0) is active, debounced."""
@@ -28,15 +33,12 @@ class DigitalInputs:
 
     def poll(self, now_ms: int) -> None:
         """Look at the pins; call it every few milliseconds. A level counts when it has been steady."""
+        numbers = self._numbers
+        at = 0
         for number in range(len(self._pins)):
-            if self._is_active(number) == self.level(number):
-                self._changed_ms[number] = now_ms
-            elif time.ticks_diff(now_ms, self._changed_ms[number]) >= self._debounce_ms[number]:
+            is_active = self._pins[number].value() == numbers[at + _ACTIVE]
+            if is_active == (self.levels >> number & 1):
+                numbers[at + _CHANGED_MS] = now_ms
+            elif time.ticks_diff(now_ms, numbers[at + _CHANGED_MS]) >= numbers[at + _DEBOUNCE_MS]:
                 self.levels ^= 1 << number
-
-
-def _input(row: "dict[str, int]") -> Pin:
-    from armtempo_board.hardware import pins  # here, so that it can be forgotten
-
-    pull = Pin.PULL_DOWN if row["active_high"] else Pin.PULL_UP
-    return Pin(pins.name(row["pin"]), Pin.IN, pull=pull)
+            at += _NUMBERS

@@ -6,6 +6,9 @@ data sheet, table 9.
 
 from micropython import const
 
+_PORTS = "ABCDE"
+_PORT_SHIFT = const(4)
+_LINE_MASK = const(15)
 _LETTER = const(1)  # of the port, in front of the number
 STEP = (
     # STEP pin, timer, its channel, alternate function, DMA1 stream, DMA channel
@@ -32,8 +35,9 @@ LEDS = ("D12", "D13", "D14", "D15")  # green, orange, red, blue
 
 
 def name(number: int) -> str:
-    """The name of a pin by the number that the arm record has for it: 16 times its port, and the number in it."""
-    return "ABCDE"[number >> 4] + str(number & 15) if number >> 4 < 5 else ""
+    """A pin by its number in the arm record, 16 times its port and the number in it; "" where there is none."""
+    port = number >> _PORT_SHIFT
+    return _PORTS[port] + str(number & _LINE_MASK) if port < len(_PORTS) else ""
 
 
 def port(pin: str) -> str:

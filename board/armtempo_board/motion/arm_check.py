@@ -36,11 +36,7 @@ def checked(data: bytes, room_words: int, most_joints: int) -> "Record":
     _check_pins(head, joints, outputs, inputs)
     rates = [row["max_rate"] for row in joints]
     beside = engine_memory.output_bytes(len(outputs), len(inputs))
-    if (
-        len(rates) > most_joints
-        or not engine_memory.fits(rates, room_words)
-        or not engine_memory.objects_fit(len(rates), beside, most_joints)
-    ):
+    if len(rates) > most_joints or not engine_memory.fits(rates, room_words, beside):
         raise Refused(codes.NO_ROOM, NO_JOINT, 4 * engine_memory.words(rates) + beside)
     return head, joints, crc, outputs, inputs
 
@@ -67,7 +63,8 @@ def _check_pins(head: "dict[str, int]", joints: "Rows", outputs: "Rows", inputs:
     if head["flags"] & armrecord.FLAG_ESTOP_FITTED:
         taken.append(pins.ESTOP)
     for row in joints:
-        taken += [pins.STEP[row["channel"]][0], pins.DIR[row["channel"]]]
+        step, _, _, _, _, _ = pins.STEP[row["channel"]]
+        taken += [step, pins.DIR[row["channel"]]]
         taken += [
             pins.LIMIT[row[side]] for side in ("limit_low", "limit_high") if row[side] != armrecord.NONE
         ]

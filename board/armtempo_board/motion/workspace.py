@@ -19,6 +19,7 @@ class Workspace:
         from armtempo_shared.engine_memory import blocks  # here, so that it can be forgotten
 
         self.joints = joints
+        self.words = words  # as many as can be; ``memory`` has less while outputs and inputs need heap
         self.memory = Memory(blocks(words))
         self.sampler = Sampler()
         self.feeder = RingFeeder(self.sampler.block)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from armtempo.cli import chosen, options
+from armtempo.errors import InputError
 
 if TYPE_CHECKING:
     from armtempo.model.outputs import Output
@@ -37,6 +38,8 @@ def command(
     from armtempo.cli import wired
     from armtempo.robot.outputs import BoardOutput
 
+    if name is not None and name.startswith("-"):
+        raise InputError(f"no such option: {name}", "see 'armtempo output --help'")
     with wired.board(port, arm_path, log_traffic) as board:
         if name is not None:
             output = BoardOutput(board.way, board.arm, name)

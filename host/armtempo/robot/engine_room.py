@@ -20,26 +20,15 @@ def check(arm: Arm, info: Hello) -> None:
             f"arm {arm.name!r} drives {len(rates)} joints; the board has memory for {info.engine_joints}",
             f"drive fewer joints, {_FIRMWARE}",
         )
-    if not engine_memory.fits(rates, info.engine_room // 4):
+    beside = engine_memory.output_bytes(len(arm.outputs), len(arm.inputs))
+    if not engine_memory.fits(rates, info.engine_room // 4, beside):
+        outputs = f", and {beside} for its outputs and inputs" if beside else ""
         raise InputError(
-            f"arm {arm.name!r} needs {4 * engine_memory.words(rates)} bytes for its engine, the board has "
+            f"arm {arm.name!r} needs {4 * engine_memory.words(rates)} bytes for its engine{outputs}; the board has "
             f"{info.engine_room}",
             f"lower its top speeds (its joints step up to {', '.join(map(str, rates))} steps/s; "
             f"slower ones have smaller rings), drive fewer joints, {_FIRMWARE}",
         )
-    _check_outputs(arm, info)
-
-
-def _check_outputs(arm: Arm, info: Hello) -> None:
-    beside = engine_memory.output_bytes(len(arm.outputs), len(arm.inputs))
-    if engine_memory.objects_fit(len(arm.driven), beside, info.engine_joints):
-        return
-    free = engine_memory.objects_room(len(arm.driven), info.engine_joints)
-    raise InputError(
-        f"arm {arm.name!r} has {len(arm.outputs)} outputs and {len(arm.inputs)} inputs, which need {beside} bytes; "
-        f"beside its {len(arm.driven)} joints the board has {free}",
-        f"have fewer of them, drive fewer joints, {_FIRMWARE}",
-    )
 
 
 def words(info: Hello) -> str:

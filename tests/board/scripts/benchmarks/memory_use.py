@@ -66,6 +66,9 @@ class Pins:
         """Low."""
         return 0
 
+    def init(self, mode, pull=0, value=0):
+        """Nothing to set."""
+
 
 def free():
     """What is left of the heap that the program finds."""

@@ -66,7 +66,7 @@ def case_damaged_records_are_named():
 
 def case_another_version_is_named():
     arm = bytearray(stand_in.arm()[:-4])
-    arm[4] = armrecord.VERSION + 1
+    arm[4] = armrecord.VERSION_WITH_OUTPUTS + 1
     names_it(with_crc(bytes(arm)), "bad_record")
 
 
@@ -88,9 +88,7 @@ def case_what_the_board_has_not_is_named():
 class Cramped:
     """A board with less memory for engines."""
 
-    class memory:
-        size = engine_memory.words([1])
-
+    words = engine_memory.words([1])
     joints = 6
 
 

@@ -55,9 +55,15 @@ def largest():
     return low
 
 
-def arm_of(rates):
+def arm_of(rates, outputs):
+    """So many switches, or a servo too, on pins of ports C and D; as many inputs on port B."""
     rows = [row(channel=n, max_rate=rate, counts_num=0, counts_den=1) for n, rate in enumerate(rates)]
-    return armrecord.pack(dict(HEAD, identity=1), rows)
+    names = [name for name, _ in armrecord.OUTPUT]
+    table = [dict(dict.fromkeys(names, 0), pin=0x20 + number) for number in range(outputs)]
+    if outputs > 1:
+        table[0].update(timer=10, channel=1, prescaler=51, period=64614, high=8077)
+    inputs = [{"pin": 0x11 + number, "active_high": 0, "debounce_ms": 5} for number in range(outputs)]
+    return armrecord.pack(dict(HEAD, identity=1), rows, table, inputs)
 
 
 def motion_of(arm, segments):
@@ -67,13 +73,14 @@ def motion_of(arm, segments):
     return motion.pack(5, [points] * arm[5], [times] * arm[5], 1, 84_000, wire.record_crc(arm))
 
 
-def change(host, rates, segments):
+def change(host, rates, segments, outputs):
     """Whether the arm was taken, and its motion run."""
-    arm = arm_of(rates)
+    arm = arm_of(rates, outputs)
     before = host.hello()[1]
     answer = host.upload("/arm", arm)[-1]
     if answer[0] == "error":
-        assert answer[1] == "no_room" and answer[3] == 4 * engine_memory.words(rates), answer
+        needed = 4 * engine_memory.words(rates) + engine_memory.output_bytes(outputs, outputs)
+        assert answer[1] == "no_room" and answer[3] == needed, answer
         assert host.hello()[1][9] == before[9], "the old arm stays in force"
         return False
     record = motion_of(arm, segments)
@@ -81,6 +88,8 @@ def change(host, rates, segments):
     assert host.ask("home", ((1 << len(rates)) - 1,), bytes(4 * len(rates)))[0] == "ok"
     started = host.ask("start", (0, wire.record_crc(record)), "go")
     assert started[0] == "ok", started
+    if outputs:
+        assert host.ask("output", (0, 65535))[0] == "ok"
     assert host.ask("stop", (1,))[0] == "ok"
     assert host.ask("list", (0,))[0] == "ok"
     assert host.ask("remove", (), "go")[0] == "ok"
@@ -96,12 +105,14 @@ def main(root, count, seed):
     port = stand_in.Port()
     app = App(port, root)
     host = stand_in.Host(app, port)
+    assert change(host, [20_000], 3, 2)  # names stay in memory for good
     taken = 0
     for number in range(count):
         rates = [random.randrange(1_000, 240_001) for _ in range(random.randrange(1, 7))]
+        outputs = random.choice((0, 0, 1, 2, 8))
         if number in (0, count - 1):
-            rates = [20_000] * 3
-        taken += change(host, rates, random.randrange(3, 60))
+            rates, outputs = [20_000] * 3, 0
+        taken += change(host, rates, random.randrange(3, 60), outputs)
         host.events = []
         if number in (0, count - 1):
             rates = None

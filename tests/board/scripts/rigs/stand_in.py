@@ -80,6 +80,7 @@ def install():
     room = Module()
     room.workspace = Workspace
     room.sample_bytes = lambda: 4096
+    room.share = lambda workspace, outputs, inputs: None
     ends = Module()
     ends.duration_ticks = lambda motion: 84000
     ends.start_offset = lambda motion, joint, position: 7 - position
@@ -99,9 +100,7 @@ def install():
 class Workspace:
     """Says only how large it is."""
 
-    class memory:
-        size = engine_memory.LARGEST_WORDS
-
+    words = engine_memory.LARGEST_WORDS
     joints = 6
 
 

@@ -16,8 +16,8 @@ from virtual_board.firmware.external_interrupts import set_level
 # isort: split
 import struct
 
-from armtempo_board.hardware.digital_inputs import DigitalInputs
-from armtempo_board.hardware.outputs import Outputs
+from armtempo_board.app import output_setup
+from armtempo_board.app.output_setup import inputs_of, outputs_of
 
 SCRATCH = sys.argv[1]
 MS = 84_000
@@ -53,7 +53,7 @@ def pulses(name):
 
 
 def case_a_switch_is_a_level():
-    outputs = Outputs([PUMP, FAN])
+    outputs = outputs_of([PUMP, FAN])
     assert (line("D0").mode(), line("D0").level) == (1, 1)
     outputs.set(0, 65535)
     assert line("D0").level == 0
@@ -64,7 +64,7 @@ def case_a_switch_is_a_level():
 
 
 def case_servos_have_the_pulses_of_the_record():
-    outputs = Outputs([GRIPPER, HAND, ARM, TONE])
+    outputs = outputs_of([GRIPPER, HAND, ARM, TONE])
     period = 64615 * 26  # both clocks: 52 at 168 MHz, 26 at 84 MHz
     assert pulses("B8")[1] == pulses("B15")[1] == pulses("B14")[1] == period
     for value, high in ((0, 1615), (65535, 8077), (32768, 4846)):
@@ -81,7 +81,7 @@ def case_servos_have_the_pulses_of_the_record():
 
 
 def case_safe_values():
-    outputs = Outputs([PUMP, GRIPPER])
+    outputs = outputs_of([PUMP, GRIPPER])
     safe = pulses("B8")
     assert abs(safe[0] / 84 - 722) < 1  # us: 500 + 2000 * 20 / 180
     outputs.set(0, 65535)
@@ -92,16 +92,26 @@ def case_safe_values():
     assert (pulses("B8"), line("D0").level) == (safe, 1)
 
 
+class Board:
+    """In the place of the controller."""
+
+    def __init__(self):
+        self.rows = {}
+
+
 def case_what_is_closed_can_be_made_anew():
-    Outputs([GRIPPER, HAND]).close()
+    board = Board()
+    output_setup.attach(board, [GRIPPER, HAND], [])
+    output_setup.detach(board)
+    assert (board.outputs, board.inputs, board.rows) == (None, None, {})
     assert pulses("B8") == pulses("B15") == (0, 0)
     assert line("B8").mode() == 0
-    Outputs([dict(GRIPPER, prescaler=51, period=32307)])
+    outputs_of([dict(GRIPPER, prescaler=51, period=32307)])
     assert pulses("B8")[1] == 32308 * 26
 
 
 def case_inputs_have_their_pull_and_debounce():
-    inputs = DigitalInputs([PART, DOOR])
+    inputs = inputs_of([PART, DOOR])
     assert (inputs.level(0), inputs.level(1), inputs.levels) == (0, 0, 0)
     set_level("D1", 0)
     set_level("D3", 1)
@@ -109,13 +119,13 @@ def case_inputs_have_their_pull_and_debounce():
         inputs.poll(now_ms)
         assert inputs.level(1) == 1
         assert inputs.level(0) == (now_ms >= 10), now_ms
-    assert DigitalInputs([PART, DOOR]).levels == 3
+    assert inputs_of([PART, DOOR]).levels == 3
 
 
 def case_the_edge_log_tells_of_pulses():
     path = SCRATCH + "/log"
     standalone.start(edge_log=path)
-    outputs = Outputs([GRIPPER])
+    outputs = outputs_of([GRIPPER])
     machine_state.board.spend(50 * MS)
     outputs.set(0, 65535)
     machine_state.edges.flush()

@@ -16,6 +16,9 @@ class Pin:
         self.level = level
         return None
 
+    def init(self, mode, pull=0, value=0):
+        """Nothing to set."""
+
 
 class ExtInt:
     """An external interrupt."""
@@ -30,6 +33,7 @@ class Timer:
     """A timer."""
 
     OC_TIMING = 1
+    PWM = 0
     callbacks = {}
 
     def __init__(self, number, prescaler=0, period=0, freq=0, callback=None):
@@ -37,6 +41,22 @@ class Timer:
         if callback:
             Timer.callbacks[number, 0] = callback
 
-    def channel(self, number, mode, callback=None):
-        """Remember the callback."""
+    def channel(self, number, mode, callback=None, pin=None, pulse_width=0):
+        """Remember the callback; of pulses a channel that takes their width."""
+        if mode == Timer.PWM:
+            return Channel()
         Timer.callbacks[self._number, number] = callback
+        return None
+
+    def deinit(self):
+        """Nothing to stop."""
+
+
+class Channel:
+    """A channel that makes pulses."""
+
+    width = 0
+
+    def pulse_width(self, width):
+        """Remember it."""
+        self.width = width

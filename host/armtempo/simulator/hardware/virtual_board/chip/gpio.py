@@ -101,9 +101,17 @@ class GpioPort:
         self._drive(now)
         routing = tuple(memory.words[self.at + at] for at in (MODER, AFR, AFR + 1))
         changed = routing != self.routing
+        if changed:
+            self._end_pulses(now)
         self.routing = routing
         self.refresh()
         return changed
+
+    def _end_pulses(self, now):
+        """A pin that is no timer's any more makes none."""
+        for line in self.lines:
+            if line.pulses != (0, 0) and line.mode() != ALTERNATE:
+                line.pulse((0, 0), now)
 
     def _drive(self, now):
         modes = memory.words[self.at + MODER]

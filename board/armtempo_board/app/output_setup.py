@@ -1,0 +1,112 @@
+"""Makes the outputs and inputs of an arm, and lets go of them; only needed then, so it is forgotten after it."""
+
+from array import array
+
+from pyb import Pin, Timer
+
+from armtempo_board import heap
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any, Protocol
+
+    from armtempo_board.hardware.digital_inputs import DigitalInputs
+    from armtempo_board.hardware.outputs import Outputs
+
+    Rows = list[dict[str, int]]
+
+    class Controller(Protocol):
+        """What has outputs and inputs, see ``controller.Controller``."""
+
+        outputs: Any
+        inputs: Any
+        rows: "dict[int, Any]"
+
+
+_MODULES = ("output_commands", "outputs", "digital_inputs")
+"""What stays in memory with the outputs and inputs, and is not known by name any more."""
+
+
+def attach(controller: "Controller", outputs: "Rows", inputs: "Rows") -> None:
+    """Give the controller the outputs, with their safe values, the inputs, and the commands about them.
+
+    ``outputs``, ``inputs``: rows of the arm record (``armrecord.OUTPUT``, ``INPUT``).
+    """
+    from armtempo_shared.table import rows  # here, as ``detach`` needs none of them
+
+    from armtempo_board.app import output_commands
+
+    controller.outputs = outputs_of(outputs)
+    controller.inputs = inputs_of(inputs)
+    handlers = output_commands.output, output_commands.inputs_and_outputs
+    for command, answer, handler in zip(rows("O"), rows("P"), handlers):
+        _, number, fields, _, tail = command
+        _, _, values, _, _ = answer
+        controller.rows[number] = (handler, fields, values, tail)
+    heap.forget(_MODULES)
+
+
+def detach(controller: "Controller") -> None:
+    """Safe values, then let go of pins and timers."""
+    outputs = controller.outputs
+    outputs.safe()
+    for held in outputs.held:
+        if isinstance(held, Timer):
+            held.deinit()
+        else:
+            held.init(Pin.IN)
+    controller.outputs = controller.inputs = None
+    controller.rows.clear()
+
+
+def outputs_of(table: "Rows") -> "Outputs":
+    """All take their safe values."""
+    from armtempo_board.hardware import pins
+    from armtempo_board.hardware.outputs import Outputs
+
+    numbers = array("H")
+    for row in table:
+        numbers.extend(array("H", [row["low"], row["high"], row["safe"]]))
+    outputs = Outputs(numbers)
+    timers: "dict[int, Timer]" = {}
+    for number, row in enumerate(table):
+        pin = Pin(pins.name(row["pin"]))
+        outputs.held.append(pin)
+        level: "list[int]" = []  # where its safe value would be written, before there is anything to take it
+        outputs.writes.append(level.append)
+        outputs.set(number, row["safe"])
+        outputs.writes[number] = _driven(pin, row, level.pop(), timers)
+    outputs.held.extend(timers.values())
+    return outputs
+
+
+def _driven(
+    pin: Pin, row: "dict[str, int]", level: int, timers: "dict[int, Timer]"
+) -> "Callable[[int], Any]":
+    """What takes the level or pulse width; a bound method, made once, as that allocates."""
+    if not row["timer"]:
+        pin.init(Pin.OUT_PP, value=level)
+        return pin.value
+    timer = timers.get(row["timer"])
+    if timer is None:
+        timer = Timer(row["timer"], prescaler=row["prescaler"], period=row["period"])
+        timers[row["timer"]] = timer
+    return timer.channel(row["channel"], Timer.PWM, pin=pin, pulse_width=level).pulse_width
+
+
+def inputs_of(table: "Rows") -> "DigitalInputs":
+    """Each has the level that it has now."""
+    from armtempo_board.hardware import pins
+    from armtempo_board.hardware.digital_inputs import DigitalInputs
+
+    found = []
+    numbers = array("I")
+    for row in table:
+        pull = Pin.PULL_DOWN if row["active_high"] else Pin.PULL_UP
+        found.append(Pin(pins.name(row["pin"]), Pin.IN, pull=pull))
+        numbers.extend(array("I", [row["active_high"], row["debounce_ms"], 0]))
+    inputs = DigitalInputs(found, numbers)
+    for number, pin in enumerate(found):
+        inputs.levels |= (pin.value() == table[number]["active_high"]) << number
+    return inputs
