@@ -22,6 +22,8 @@ from click.testing import CliRunner
 from tests import browser
 from tests.host import made_runs
 
+pytestmark = pytest.mark.slow
+
 FIGURES = ("tracking", "errors", "motion", "convergence", "postures")
 
 
