@@ -14,8 +14,8 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-SLOW = ("micropython-arm", "anywhere]")
-"""What in a test's name says that it takes long: the emulator, and cases that try many moments."""
+SLOW = ("micropython-arm", "[cpython-engine", "anywhere]")
+"""What in a test's name says that it takes long: the emulator, the engine on CPython, cases of many moments."""
 
 
 @pytest.fixture(params=interpreters.AVAILABLE)
