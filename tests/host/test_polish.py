@@ -13,6 +13,8 @@ from armtempo.splines import bspline, time_axis
 from tests.host import problems
 from tests.host.feeding import FEEDING, LIMITS
 
+pytestmark = pytest.mark.slow
+
 PROBLEMS = {problem.name: problem for problem in problems.load()}
 
 
