@@ -2,13 +2,14 @@
 # make test: bring the interpreters, run all tests
 # make quick: those that take less than a minute together, for the inner loop of work
 # make check: lint and types
+# make docs: the documentation site, in build/site
 # Each sets up its own environment in .venv; nothing outside the checkout is touched.
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test quick check clean
+.PHONY: demo test quick check docs clean
 
 demo: $(VENV)/demo
 	"$(BIN)/armtempo" demo
@@ -34,7 +35,7 @@ $(VENV)/demo: pyproject.toml | $(BIN)/python
 	@touch $@
 
 $(VENV)/test: pyproject.toml | $(BIN)/python
-	"$(BIN)/python" -m pip install --quiet --disable-pip-version-check -e '.[plot,cluster,mpy,urdf]' -r tests/requirements.txt
+	"$(BIN)/python" -m pip install --quiet --disable-pip-version-check -e '.[plot,cluster,mpy,urdf,docs]' -r tests/requirements.txt
 	@touch $@ $(VENV)/demo
 
 .cache/typings: board/mypy.ini | $(VENV)/test
@@ -43,6 +44,10 @@ $(VENV)/test: pyproject.toml | $(BIN)/python
 	sed -i.old 's/def viper(_func: Callable\[_Param, _Ret\], \/) -> Callable\[_Param, _Ret\]/def viper(_func: Callable[_Param, _Ret], \/) -> Callable[..., _Ret]/' $@/micropython.pyi
 	grep -q 'Callable\[..., _Ret\]' $@/micropython.pyi
 	@touch $@
+
+docs: $(VENV)/test
+	"$(BIN)/python" -m sphinx -q -W --keep-going -c host/docs/site . build/site
+	@echo "build/site/index.html"
 
 clean:
 	rm -rf $(VENV) .cache build dist

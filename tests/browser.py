@@ -22,20 +22,30 @@ _QUIET = [
     "--disable-sync",
     "--disable-quic",
     "--no-first-run",
+    "--hide-scrollbars",
     "--host-resolver-rules=MAP * ~NOTFOUND",
 ]
 _PROBE = """<script>addEventListener('load', () => {
   const style = getComputedStyle(document.body);
-  document.body.setAttribute('data-probe', JSON.stringify({
+  const figures = [...document.querySelectorAll('figure svg:not(.sheet)')];
+  parent.postMessage(JSON.stringify({
     fetched: performance.getEntriesByType('resource').map(entry => entry.name),
     overflow: document.documentElement.scrollWidth - document.documentElement.clientWidth,
     width: document.documentElement.clientWidth,
-    figures: [...document.querySelectorAll('figure svg')].map(svg => svg.getBoundingClientRect().height),
+    figures: figures.map(svg => svg.getBoundingClientRect().height),
+    scales: figures.map(svg => svg.getBoundingClientRect().width / svg.viewBox.baseVal.width),
+    cut: [...document.querySelectorAll('body *')].filter(one => !one.closest('svg') && (
+      one.scrollWidth > one.clientWidth + 1 && getComputedStyle(one).overflowX != 'visible'
+      || one.getBoundingClientRect().right > document.documentElement.clientWidth + 1)).map(one => one.outerHTML),
     tables: document.querySelectorAll('table').length,
     text: document.body.innerText,
     colour: style.color, background: style.backgroundColor,
-  }));
+  }), '*');
 });</script>"""
+_FRAME = """<!DOCTYPE html><meta charset="utf-8"><meta name="color-scheme" content="light dark">
+<body><script>addEventListener('message', got => document.body.setAttribute('data-probe', got.data));</script>
+<iframe src="{page}" style="width: {width}px; height: 900px; border: 0"></iframe></body>"""
+"""The page as wide as a phone: a window of its own cannot be narrower than 500 pixels."""
 
 
 def needed() -> None:
@@ -55,11 +65,14 @@ def _run(page: Path, profile: Path, *options: str) -> str:
 
 
 def probe(page: Path, folder: Path, width: int, dark: bool = False) -> dict[str, Any]:
-    """What the browser finds in the page at this window width: see ``_PROBE``."""
+    """What the browser finds in the page at this width: see ``_PROBE``."""
     copy = folder / f"probe-{width}-{dark}.html"
     copy.write_text(page.read_text(encoding="utf-8").replace("</body>", _PROBE + "</body>"), encoding="utf-8")
     scheme = f"--blink-settings=preferredColorScheme={0 if dark else 1}"
-    dom = _run(copy, folder / "profile", f"--window-size={width},900", scheme, "--dump-dom")
+    frame = folder / f"frame-{width}-{dark}.html"
+    frame.write_text(_FRAME.format(page=copy.name, width=width), encoding="utf-8")
+    # A virtual clock: the page has its time however busy the machine is.
+    dom = _run(frame, folder / "profile", "--virtual-time-budget=10000", scheme, "--dump-dom")
     found = re.search(r'data-probe="([^"]*)"', dom)
     assert found, dom[-2000:]
     text = found.group(1).replace("&quot;", '"').replace("&lt;", "<").replace("&gt;", ">")

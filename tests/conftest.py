@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
+import tempfile
+from collections.abc import Iterator
 
 import pytest
 
@@ -12,6 +15,19 @@ from tests import interpreters
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # Started in the background: the commands that the tests start would inherit it and not mind Ctrl-C.
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def own_settings() -> Iterator[None]:
+    """No setting of the user's reaches a test, and no port that a test opens is known outside of it."""
+    for name in [
+        name for name in os.environ if name.startswith("ARMTEMPO_") and name != "ARMTEMPO_MICROPYTHON"
+    ]:
+        del os.environ[name]
+    folder = tempfile.mkdtemp(prefix="run-")  # short: the path of a socket has 100 bytes
+    os.environ["XDG_RUNTIME_DIR"] = folder
+    yield
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 SLOW = ("micropython-arm", "[cpython-engine", "anywhere]")

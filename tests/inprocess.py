@@ -26,7 +26,9 @@ _SAMPLE_S = 0.1
 _TURNS = 3
 _IMPORTED_LATER = (
     "armtempo_board.heap",
+    "armtempo_board.motion.arm_check",
     "armtempo_board.motion.endpoints",
+    "armtempo_board.storage.motion_file",
     "armtempo_board.storage.store",
     "armtempo_board.app.store_commands",
 )
@@ -103,6 +105,7 @@ class Pipe:
         with board_modules():
             from armtempo_board.app import store_commands  # noqa: F401  the program imports them when it needs them
             from armtempo_board.app.app import App
+            from armtempo_board.motion import arm_check  # noqa: F401
             from armtempo_board.storage import store  # noqa: F401  the program imports them when it needs them
 
             self._later = {name: sys.modules[name] for name in _IMPORTED_LATER}
@@ -130,6 +133,9 @@ class Pipe:
             if data or self.clock() >= end_s:
                 return data
             self.wait(_STEP_S)
+
+    def wake(self) -> None:
+        """See Transport."""
 
     def close(self) -> None:
         """See Transport."""

@@ -37,5 +37,8 @@ class ReplayTransport:
                 f"replay: the recording has {expected.hex()!r} where the host says {data.hex()!r}"
             )
 
+    def wake(self) -> None:
+        """See Transport."""
+
     def close(self) -> None:
         """Nothing to free."""

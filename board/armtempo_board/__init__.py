@@ -9,7 +9,7 @@
     stepgen/   from splines to the times of steps; integers only, no hardware
     hardware/  timers, DMA, pins, interrupts
 
-Each imports only from those below it, and from ``errors``, ``buffers`` and ``heap``. The functions here are for
+Each imports only from those below it, and from the modules beside the packages. The functions here are for
 ``boot.py``, ``main.py`` and the prompt; nothing in the packages uses them.
 """
 
@@ -29,8 +29,15 @@ def load_program() -> "Any":
 
 
 def start() -> None:
-    """Run the program until a host asks for the prompt."""
-    load_program().main()
+    """Run the program until a host asks for the prompt; where it ends by itself the traceback waits for that too."""
+    program = load_program()
+    try:
+        program.main()
+    except Exception:
+        from armtempo_board import prompt
+
+        prompt.wait()
+        raise
 
 
 def keep_watchdog_fed() -> None:

@@ -2,6 +2,7 @@
 
 import pyb
 
+pyb.Pin("A15", pyb.Pin.OUT_PP, value=0)  # STEP 1, low before all else: a JTAG pin, which a reset pulls up
 pyb.usb_mode("VCP")
 
 try:

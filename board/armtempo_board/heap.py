@@ -9,6 +9,11 @@ _ONLY_FOR_SET_UP = (
     "motion_check",
     "rate_check",
     "endpoints",
+    "arm_check",
+    "motion_file",
+    "engine_memory",
+    "room",
+    "armtempo_shared.motion",
     "bezier_weights",
     "store",
     "store_commands",
@@ -37,6 +42,6 @@ def forget() -> None:
     for module in list(sys.modules):
         if module.startswith("armtempo_"):
             package, _, name = module.rpartition(".")
-            if name in _ONLY_FOR_SET_UP:
+            if name in _ONLY_FOR_SET_UP or module in _ONLY_FOR_SET_UP:
                 del sys.modules[module]
                 delattr(sys.modules[package], name)

@@ -20,13 +20,12 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
-
 __all__ = [
     "Arm",
     "ArmtempoError",
     "Board",
     "BoardError",
+    "BoardState",
     "InputError",
     "Job",
     "LinkError",
@@ -36,12 +35,14 @@ __all__ = [
     "Pose",
     "Run",
     "RunFolderError",
+    "SharedBoard",
     "Spline",
     "StopRequest",
     "Stopped",
     "Trajectory",
     "Watcher",
     "__version__",
+    "attach",
     "compare",
     "connect",
     "deploy",
@@ -55,6 +56,8 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
+    __version__: str
+
     from armtempo import deploy, optimise, simulator
     from armtempo.errors import (
         ArmtempoError,
@@ -66,15 +69,17 @@ if TYPE_CHECKING:
         RunFolderError,
     )
     from armtempo.kinematics.of_arm import forward, inverse
-    from armtempo.link.ports import find_ports
     from armtempo.model.arm import Arm
     from armtempo.model.job import Job
     from armtempo.model.plan import Plan
     from armtempo.model.tool_pose import Pose
     from armtempo.pipeline import compare, connect, plan, summary
+    from armtempo.ports.listing import find_ports
     from armtempo.robot.board import Board
+    from armtempo.robot.board_state import BoardState
     from armtempo.robot.recording import Watcher
     from armtempo.robot.run import Run
+    from armtempo.robot.shared_board import SharedBoard, attach
     from armtempo.robot.stop_request import Stopped, StopRequest
     from armtempo.splines.spline import Spline
     from armtempo.splines.trajectory import Trajectory
@@ -90,15 +95,17 @@ _HOMES = {
         "RunFolderError",
     ),
     "armtempo.kinematics.of_arm": ("forward", "inverse"),
-    "armtempo.link.ports": ("find_ports",),
+    "armtempo.ports.listing": ("find_ports",),
     "armtempo.model.arm": ("Arm",),
     "armtempo.model.job": ("Job",),
     "armtempo.model.plan": ("Plan",),
     "armtempo.model.tool_pose": ("Pose",),
     "armtempo.pipeline": ("compare", "connect", "plan", "summary"),
     "armtempo.robot.board": ("Board",),
+    "armtempo.robot.board_state": ("BoardState",),
     "armtempo.robot.recording": ("Watcher",),
     "armtempo.robot.run": ("Run",),
+    "armtempo.robot.shared_board": ("SharedBoard", "attach"),
     "armtempo.robot.stop_request": ("StopRequest", "Stopped"),
     "armtempo.splines.spline": ("Spline",),
     "armtempo.splines.trajectory": ("Trajectory",),
@@ -112,10 +119,23 @@ def __getattr__(name: str) -> Any:
     """A public name, imported when it is first used (PEP 562)."""
     if name in _MODULES:
         return import_module(f"{__name__}.{name}")
-    if name not in _HOME_OF:
+    if name == "__version__":
+        value = _installed_version()
+    elif name in _HOME_OF:
+        value = getattr(import_module(_HOME_OF[name]), name)
+    else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = globals()[name] = getattr(import_module(_HOME_OF[name]), name)
+    globals()[name] = value
     return value
+
+
+def _installed_version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("armtempo")
+    except PackageNotFoundError:  # run from a folder that was never installed
+        return "0+unknown"
 
 
 def __dir__() -> list[str]:

@@ -6,6 +6,7 @@
     ├── InputError                 the user's file, option or argument is wrong (exit code 2)
     ├── PlanError                  no plan under these limits, or no posture for this pose
     ├── MissingPackageError        an optional package is not installed
+    ├── ToolError                  a program of the system that armtempo calls is missing or fails
     ├── RunFolderError             a recorded run cannot be read, is not whole, or cannot be written
     └── LinkError                  the board cannot be reached or stopped answering
         ├── PortError              the port is there and cannot be opened
@@ -15,8 +16,8 @@
         ├── OtherBoardError        another board answers than before, or the same one started anew
         └── BoardError             the board refused a command or a fault ended a motion; carries the code
 
-Every message says what is wrong, where, and what to do. Beside the tree stands Stopped, a KeyboardInterrupt: a
-motion was brought to rest because a stop was asked for.
+Every error says what is wrong and where (``problem``) and what to do next (``hint``). Beside the tree stands
+Stopped, a KeyboardInterrupt: a motion was brought to rest because a stop was asked for.
 """
 
 from __future__ import annotations
@@ -26,9 +27,20 @@ INTERRUPTED = 130
 
 
 class ArmtempoError(Exception):
-    """Base of all errors that are shown to the user as one message, without a traceback."""
+    """Base of all errors that are shown to the user without a traceback.
+
+    ``problem`` says what is wrong and where; ``hint`` what to do about it, as a clause without a full stop.
+    """
 
     exit_code = 1
+
+    def __init__(self, problem: str, hint: str = "") -> None:
+        super().__init__(problem, hint)
+        self.problem = problem
+        self.hint = hint
+
+    def __str__(self) -> str:
+        return f"{self.problem}; {self.hint}" if self.hint else self.problem
 
 
 class InputError(ArmtempoError):
@@ -46,8 +58,13 @@ class MissingPackageError(ArmtempoError):
 
     def __init__(self, what: str, package: str, extra: str) -> None:
         super().__init__(
-            f"{what} needs {package}, which is not installed; install it with: pip install 'armtempo[{extra}]'"
+            f"{what} needs {package}, which is not installed",
+            f"install it with: pip install 'armtempo[{extra}]'",
         )
+
+
+class ToolError(ArmtempoError):
+    """A program of the system is not installed, or did not do what it was called for."""
 
 
 class RunFolderError(ArmtempoError):
@@ -84,6 +101,6 @@ class BoardError(LinkError):
     ``code`` is the number from ``armtempo_shared.codes``.
     """
 
-    def __init__(self, message: str, code: int) -> None:
-        super().__init__(message)
+    def __init__(self, problem: str, hint: str, code: int) -> None:
+        super().__init__(problem, hint)
         self.code = code

@@ -22,15 +22,18 @@ from armtempo.model import trajectory_file
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
-from armtempo.planning import planner
-from armtempo.progress import Progress
+from armtempo.planning import checks, planner
+from armtempo.planning import corridor_curve as corridors
+from armtempo.planning import split as cut
+from armtempo.planning.corridor_curve import CorridorTime
+from armtempo.progress import Progress, part
 from armtempo.records import encode
 from armtempo.report import comparison, text_summary
-from armtempo.robot.board import connect
+from armtempo.robot.connect import connect
 from armtempo.robot.recording import Watcher
 from armtempo.robot.run import Run
 
-__all__ = ["compare", "connect", "load", "plan", "report", "run", "summary"]
+__all__ = ["compare", "connect", "corridor_curve", "load", "plan", "report", "run", "split", "summary"]
 
 
 def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
@@ -42,31 +45,58 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     return planner.plan(arm, job, progress)
 
 
+def split(arm: Arm, job: Job, progress: Progress | None = None) -> list[Plan]:
+    """Plans of the job's parts from rest to rest, each short enough for the board; one where the whole is.
+
+    On the spline through the via points, which rests at its ends only, a part for each stretch between stops. Raises
+    PlanError where a part is still too long or there is no stop; else as ``plan``.
+    """
+    if checks.is_free(job) or not job.stops:
+        whole = planner.plan(arm, job, progress)
+        if whole.total_s <= cut.LONGEST_S:
+            return [whole]
+        parts = cut.at_few_stops(job, whole.via_deg, whole.trajectory)
+    else:
+        parts = cut.at_all_stops(job, planner.via_angles(arm, job)[0])
+    return [planner.plan(arm, one, part(progress, number, len(parts))) for number, one in enumerate(parts)]
+
+
+def corridor_curve(arm: Arm, job: Job, progress: Progress | None = None) -> list[CorridorTime]:
+    """Motion time against corridor, for a job whose path is free; see ``planning.corridor_curve.curve``."""
+    return corridors.curve(arm, job, progress or (lambda _done, _whole: None))
+
+
 def summary(plan: Plan) -> list[str]:
     """A plan in a few lines: motion times beside their lower bounds, extremes beside their limits."""
     return text_summary.lines(plan)
 
 
-def load(path: Path | str, arm: Arm | None = None) -> Plan:
+def load(path: Path | str, arm: Arm | None = None, altered: bool = False) -> Plan:
     """The plan of a trajectory file.
 
-    Raises InputError where the file is none or damaged, or was planned for another arm than ``arm``.
+    ``altered``: also of one that was altered after it had been written. Raises InputError where the file is none,
+    damaged or altered, or was planned for another arm than ``arm``.
     """
-    found = trajectory_file.load(path)
+    found = trajectory_file.load(path, altered)
     if arm is not None and encode.arm_record(arm) != encode.arm_record(found.arm):
-        raise InputError(f"{path} was planned for another arm than {arm.source}; plan it again with this arm")
+        raise InputError(
+            f"{path} was planned for another arm than {arm.name!r} ({arm.source})",
+            "plan it again with this arm",
+        )
     return found
 
 
 def run(
     plan: Plan,
-    port: str = "sim",
+    port: str | None = None,
     repeat: int = 1,
     out: Path | str = "runs",
     progress: Progress | None = None,
     watcher: Watcher | None = None,
 ) -> Run:
-    """Replay a plan on the board of ``port`` and record it: ``Board.run`` with a connection of its own."""
+    """Replay a plan on the board of ``port`` (as for ``connect``) and record it: ``Board.run`` with a connection of
+    its own.
+    """
     with connect(port, plan.arm) as board:
         return board.run(plan, repeat, out, progress, watcher)
 

@@ -21,6 +21,7 @@ HEAD = (
     ("dir_setup_ticks", "H"),  # DIR stable before the rising STEP edge
     ("dir_hold_ticks", "H"),  # DIR stable after the falling STEP edge
     ("link_timeout_ms", "H"),  # after this silence of the host while moving: see FLAG_STOP_ON_LINK_LOSS
+    ("identity", "I"),  # hash of the arm's geometry, motors, encoders and switches: of all but its limits
 )
 FLAG_ENABLE_HIGH = 1  # ENABLE pin is active high
 FLAG_ESTOP_RELEASES = 2  # an E-stop also releases ENABLE
@@ -48,7 +49,9 @@ _HEAD_FORMAT = "<4sBB" + "".join(kind for _, kind in HEAD)
 _JOINT_FORMAT = "<" + "".join(kind for _, kind in JOINT)
 _HEAD_SIZE = struct.calcsize(_HEAD_FORMAT)
 _JOINT_SIZE = struct.calcsize(_JOINT_FORMAT)
-VERSION = 1
+VERSION = 2
+_LIMITS = ("min_steps", "max_steps", "max_rate", "following_counts", "link_timeout_ms")
+"""Fields that may change without any doubt about where the joints are; beside them FLAG_STOP_ON_LINK_LOSS."""
 
 
 class ArmRecordError(ValueError):
@@ -61,6 +64,20 @@ def pack(head: "dict[str, int]", joints: "list[dict[str, int]]") -> bytes:
     for joint in joints:
         data += struct.pack(_JOINT_FORMAT, *[joint[name] for name, _ in JOINT])
     return data + struct.pack("<I", crc32(data))
+
+
+def without_limits(head: "dict[str, int]", joints: "list[dict[str, int]]") -> int:
+    """crc32 of all but the limits: two records with the same one are of one arm, with other limits at most."""
+    rows = [dict(head)] + [dict(joint) for joint in joints]
+    rows[0]["flags"] &= ~FLAG_STOP_ON_LINK_LOSS
+    for row in rows:
+        for name in _LIMITS:
+            row.pop(name, 0)
+    crc = 0
+    for row in rows:
+        for name in sorted(row):
+            crc = crc32(struct.pack("<I", row[name] & 0xFFFFFFFF), crc)
+    return crc
 
 
 def unpack(data: bytes) -> "tuple[dict[str, int], list[dict[str, int]], int]":

@@ -29,6 +29,9 @@ WRONG_START = 22
 TOO_LONG = 23
 TOO_ABRUPT = 24
 NO_SESSION = 25
+NO_ROOM = 26
+NO_MEMORY = 27
+FAILED = 28
 # faults: they stop the motion and stay until cleared
 ESTOP = 40
 LIMIT_SWITCH = 41

@@ -10,12 +10,24 @@ _ROWS = (
     ("busy", "the board is moving", "wait for the end of the motion, or 'armtempo stop'"),
     ("not_moving", "nothing is moving", "no action needed"),
     ("fault_pending", "a fault is pending", "remove its cause, then 'armtempo clear'"),
-    ("unconfigured", "the board has no arm record", "the host sends it when it connects; reconnect"),
+    (
+        "unconfigured",
+        "the board has no arm record",
+        "run 'armtempo home' with your arm file (--arm), which sends it",
+    ),
     ("arm_mismatch", "the motion was planned for another arm file", "plan it again with this arm"),
     ("unhomed", "the position is unknown", "bring the arm to its posture and run 'armtempo home'"),
     ("not_found", "no trajectory of this name is stored", "see 'armtempo list'"),
-    ("bad_name", "the name is empty, too long or has other characters than a-z A-Z 0-9 - _", "rename it"),
-    ("flash_full", "the flash has no room; what was stored is kept", "'armtempo remove' something"),
+    (
+        "bad_name",
+        "the name is empty, too long or has other characters than a-z A-Z 0-9 - _",
+        "choose another name",
+    ),
+    (
+        "flash_full",
+        "the flash has no room; what was stored is kept",
+        "remove motions that are no longer needed: 'armtempo remove'",
+    ),
     ("flash_error", "the flash could not be written or read", "see host/docs/recovery.md"),
     ("bad_record", "the record is damaged or of an unknown kind", "upload it again"),
     ("bad_offset", "a piece of the upload is out of order", "upload it again"),
@@ -24,18 +36,49 @@ _ROWS = (
     ("wrong_joints", "the motion has another number of joints than the arm", "plan it for this arm"),
     ("time_order", "the time control points do not increase", "plan it again"),
     ("out_of_range", "the motion leaves the joint's range", "check the via points or the range"),
-    ("too_fast", "the motion needs more steps per second than the board can make", "lower the limits"),
-    ("wrong_start", "the arm does not stand where the motion begins", "'armtempo goto' its start"),
+    (
+        "too_fast",
+        "a joint is faster than its speed limit, or all together faster than the board can step",
+        "plan it again with this arm file; where that does not help, lower the speed limits in it",
+    ),
+    (
+        "wrong_start",
+        "the arm does not stand where the motion begins",
+        "bring it there: 'armtempo goto' with the motion's name or file",
+    ),
     (
         "too_long",
         "the motion is longer or larger than the board can hold",
         "lower refine, use shared timing or fewer via points, or split it",
     ),
     ("too_abrupt", "the motion reverses too fast for the step generator", "lower the limits"),
-    ("no_session", "the board has started anew, or was never greeted in this session", "reconnect"),
+    (
+        "no_session",
+        "the board has started anew, or was never greeted in this session",
+        "run the command again",
+    ),
+    (
+        "no_room",
+        "the engine for this arm does not fit into the board's memory; nothing was changed",
+        "lower its top speeds, drive fewer joints, or put the program into the firmware (board/docs/firmware.md)",
+    ),
+    (
+        "no_memory",
+        "the board ran out of memory in this command",
+        "try it again; where that fails, 'armtempo status', and report it with the log",
+    ),
+    (
+        "failed",
+        "the board program failed in this command; its traceback comes as a notice",
+        "report it with the log",
+    ),
     ("estop", "the E-stop input tripped", "release it, then 'armtempo clear' and home"),
-    ("limit_switch", "a limit switch tripped", "clear, then move away from it"),
-    ("following", "the encoder is too far from the command (stall or slip)", "find the cause, then home"),
+    ("limit_switch", "a limit switch tripped", "'armtempo clear', then move the arm away from it"),
+    (
+        "following",
+        "the encoder is too far from the command (stall or slip)",
+        "find the cause, 'armtempo clear', then home",
+    ),
     (
         "underrun",
         "the board fell behind with the steps",
@@ -47,7 +90,7 @@ _ROWS = (
         "report it with the log; home again where the position is unknown",
     ),
     ("watchdog", "the watchdog restarted the board", "home again; report it"),
-    ("link_lost", "the host disappeared during the motion", "reconnect"),
+    ("link_lost", "the host disappeared during the motion", "check the cable, then 'armtempo clear'"),
     ("start_failed", "the timers did not start as set up", "power-cycle the board"),
 )
 ERRORS: "dict[int, tuple[str, str, str]]" = {}
@@ -66,18 +109,21 @@ VALUES: "dict[str, str]" = {
     "wrong_joints": "joints of the motion",
     "time_order": "number of the control point",
     "out_of_range": "position in steps",
-    "too_fast": "steps/s",
+    "too_fast": "steps/s needed",
     "wrong_start": "steps from there to the start",
     "too_long": "bytes of the record (at `put_begin`: that it takes); of a joint: its largest number",
     "too_abrupt": "steps/s²",
+    "no_room": "bytes needed",
 }
 """What ``value`` of a refusal is, by name; the others have none."""
 
 COMMANDS: "dict[str, str]" = {
     "hello": "Begins a session; `session` is a number that differs between hosts, so that the board knows a "
     "new one. Refused with `protocol` where the versions differ. Answer: who the board is; `joints` and "
-    "`arm_crc` are 0 without an arm record; `boot` differs after every start of the program; the tail is the "
-    "unique id in hex and the firmware.",
+    "`arm_crc` are 0 without an arm record; `boot` differs after every start of the program; "
+    "`engine_room`, `engine_joints`: bytes of memory and joints that an engine can have; `arm_problem`: code of "
+    "what is wrong with the stored arm record, 0 where it is in force or there is none; `arm_value`: its value; the "
+    "tail is the unique id in hex and the firmware.",
     "status": "What the board is doing. `known`: bit a joint, its position is known. `run`: number of the "
     "current or last run since the start. `ticks`: motion clock. Tail: per joint commanded steps and encoder "
     "counts (two i32).",
@@ -86,7 +132,8 @@ COMMANDS: "dict[str, str]" = {
     "put_data": "The bytes from `offset` on; pieces may overlap what came before but leave no hole. Answer: "
     "the offset that comes next.",
     "put_commit": "All bytes are there: the record is read back from the flash, checked against `crc` and "
-    "for being whole, and takes the place of the old one. An arm record takes effect at once.",
+    "for being whole, and takes the place of the old one. An arm record whose engine would not fit is refused "
+    "before that (`no_room`), and the old one stays in force; else it takes effect at once.",
     "list": "The stored trajectory number `index` (from 0, in order of names) of `count`; `not_found` behind "
     "the last. A damaged one has `crc`, `duration` and `joints` 0. Tail of the answer: its name.",
     "remove": "Removes the trajectory of that name.",
@@ -112,7 +159,7 @@ EVENTS: "dict[str, str]" = {
     "it is about none. Tail as in `sample`.",
     "notice": "Words, such as the traceback behind an `internal` fault.",
     "ok": "The command was carried out; behind its number the answer's fields.",
-    "error": "The command was refused, nothing was changed. `code` from the table below, `joint` 255 where "
-    "it is about none, `value` as the code says.",
+    "error": "The command was refused, nothing was changed (behind `failed` and `no_memory` look at `status`). "
+    "`code` from the table below, `joint` 255 where it is about none, `value` as the code says.",
 }
 """What each event and reply says."""

@@ -20,10 +20,15 @@ angles in steps / 2**28, times in ticks / 2**16.
     end     I      crc32 over all before it
 """
 
+import io
 import struct
 from binascii import crc32
 
 from armtempo_shared.limits import MAX_JOINTS, MAX_SEGMENTS
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import BinaryIO
 
 MAGIC = b"ATM1"
 SHARED_AXIS = 1
@@ -70,18 +75,18 @@ def pack(
     return data + struct.pack("<I", crc32(data))
 
 
-class Motion:
-    """A checked view of a motion record; copies nothing but the header.
+class MotionHead:
+    """What the head of a motion record says; ``length``: bytes of the whole record.
 
-    Raises MotionError where the record is cut, damaged or of an unknown kind. It does not check the
-    motion itself (ranges, rates, order of times): the board does before a start.
+    Raises MotionError where the record is cut or of an unknown kind. Who subclasses it checks the checksum, and gives
+    the control points in ``stream``.
     """
 
-    def __init__(self, data: bytes) -> None:
-        if len(data) < HEAD_SIZE + 4:
+    def __init__(self, head: bytes, length: int) -> None:
+        if length < HEAD_SIZE + 4 or len(head) < HEAD_SIZE:
             raise MotionError("too short")
         (magic, self.degree, self.joints, flags, zero, self.segments, self.refine, self.brake_ticks,
-         self.arm_crc) = struct.unpack_from(_HEAD, data, 0)  # fmt: skip
+         self.arm_crc) = struct.unpack_from(_HEAD, head, 0)  # fmt: skip
         if magic != MAGIC or zero != 0 or flags & ~SHARED_AXIS:
             raise MotionError("not a motion record of this version")
         if self.degree not in (3, 5) or not 1 <= self.joints <= MAX_JOINTS:
@@ -89,11 +94,8 @@ class Motion:
         if self.segments < 1 or self.refine < 1 or self.segments * self.refine > MAX_SEGMENTS:
             raise MotionError("number of segments out of range")
         self.shared = bool(flags & SHARED_AXIS)
-        if len(data) != size(self.degree, self.joints, self.shared, self.segments, self.refine):
+        if length != size(self.degree, self.joints, self.shared, self.segments, self.refine):
             raise MotionError("length does not fit the header")
-        if crc32(memoryview(data)[:-4]) != struct.unpack_from("<I", data, len(data) - 4)[0]:
-            raise MotionError("checksum")
-        self.data = data
 
     def angle_offset(self, joint: int) -> int:
         """Byte offset of the joint's first angle control point."""
@@ -106,3 +108,34 @@ class Motion:
         """Byte offset of the joint's first time control point."""
         last = self.joints - 1 if self.shared else joint
         return self.angle_offset(last) + 8 * int(self.segments + self.degree)
+
+    def stream(self, offset: int) -> "BinaryIO":
+        """A file that stands at a byte offset of the record; who asks for it closes it."""
+        raise NotImplementedError
+
+    def points(self, offset: int, count: int) -> "tuple[int, ...]":
+        """``count`` control points from a byte offset on."""
+        stream = self.stream(offset)
+        try:
+            return struct.unpack("<%dq" % count, stream.read(8 * count))
+        finally:
+            stream.close()
+
+
+class Motion(MotionHead):
+    """A checked view of a motion record in memory; copies nothing but the header.
+
+    Raises MotionError where the record is cut, damaged or of an unknown kind. It does not check the
+    motion itself (ranges, rates, order of times): the board does before a start.
+    """
+
+    def __init__(self, data: bytes) -> None:
+        super().__init__(data, len(data))
+        if crc32(memoryview(data)[:-4]) != struct.unpack_from("<I", data, len(data) - 4)[0]:
+            raise MotionError("checksum")
+        self.data = data
+
+    def stream(self, offset: int) -> "BinaryIO":
+        """See ``MotionHead``."""
+        found: BinaryIO = io.BytesIO(self.data[offset:])
+        return found

@@ -28,6 +28,7 @@ import micropython  # noqa: E402, F401  (puts ptr32 and its like into place)
 from armtempo_board.stepgen import (  # noqa: E402
     bezier,
     braking,
+    control_points,
     cubics,
     interval_steps,
     newton,
@@ -56,8 +57,16 @@ machine code over its lines. A call in it takes CALL more."""
 CALL = 250
 """Instructions of calling one compiled function from another (see board/docs/hardware.md)."""
 
-COMPILED = (bezier, subdivision, newton, cubics, step_queue, braking)
+COMPILED = (bezier, control_points, subdivision, newton, cubics, step_queue, braking)
 ALL = (*COMPILED, subintervals, interval_steps, step_generator)
+
+
+class Arrays:
+    """In the place of ``armtempo_board.memory.Memory``: every part is an array of its own, as the emulator wants it."""
+
+    def take(self, words: int) -> Any:
+        """So many words."""
+        return array("i", bytes(4 * words))
 
 
 class Count:
@@ -96,7 +105,7 @@ class Count:
     def walk(self, record: bytes, joint: int, skip: int, steps: int, batch: int = 512) -> dict[str, float]:
         """Instructions per step of ``steps`` steps behind the first ``skip``, in batches of entries."""
         motion = Motion(record)
-        subject = step_generator.StepGenerator()
+        subject = step_generator.StepGenerator(Arrays())
         ring = array("I", bytes(4096))
         subject.load(motion, joint, oracle.start_steps(motion, joint), 168, 20_000)
         head = self._fill(subject, ring, 0, skip, batch)

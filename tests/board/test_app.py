@@ -11,7 +11,8 @@ from tests import interpreters, scripted
 SCRIPTS = Path(__file__).parent / "scripts"
 BASICS = SCRIPTS / "probes" / "app_basics.py"
 SUBJECTS = [
-    SCRIPTS / "cases" / f"app_{name}.py" for name in ("commands", "storing", "runs", "faults", "prompt")
+    SCRIPTS / "cases" / f"app_{name}.py"
+    for name in ("commands", "storing", "runs", "faults", "prompt", "start")
 ]
 
 

@@ -16,11 +16,11 @@ BELOW = {
     "link": {""},
     "storage": {""},
     "motion": {"stepgen", "hardware", ""},
-    "stepgen": set(),
+    "stepgen": {""},
     "hardware": {""},
     "": set(),
 }
-"""What the modules of a package may import besides each other; "": errors, buffers, heap."""
+"""What the modules of a package may import besides each other; "": errors, buffers, memory, heap."""
 TOP = ("__init__", "boot", "main")
 HARDWARE = {"machine", "pyb", "stm", "uctypes", "os", "time"}
 

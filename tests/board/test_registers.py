@@ -46,8 +46,8 @@ for _timer in (1, 3, 4, 8):  # encoders
         f"TIM{_timer}+18": 0b0011 << 4 | 0b01 | 0b0011 << 12 | 0b01 << 8,  # IC1F, CC1S, IC2F, CC2S
         f"TIM{_timer}+2c": 0xFFFF,
     }
-# stream: request channel, compare register as seen from TIM2 (blocks of the virtual board are 256 bytes)
-_STREAMS = {5: (3, 0x34), 6: (3, 0x38), 1: (3, 0x3C), 2: (6, 0x334), 0: (6, 0x33C), 3: (6, 0x340)}
+# stream: request channel, compare register as seen from TIM2 (TIM5 lies 0xC00 behind it)
+_STREAMS = {5: (3, 0x34), 6: (3, 0x38), 1: (3, 0x3C), 2: (6, 0xC34), 0: (6, 0xC3C), 3: (6, 0xC40)}
 for _stream, (_request, _compare) in _STREAMS.items():
     _at = 0x10 + 0x18 * _stream
     EXPECTED[f"DMA1+{_at:02x}"] = _request << 25 | _STREAM
@@ -81,9 +81,11 @@ def test_pins() -> None:
     alternate = {
         "A15": 1, "A1": 1, "B10": 1, "A2": 2, "A3": 2, "A0": 2,
         "E9": 1, "E11": 1, "B4": 2, "B5": 2, "C6": 3, "C7": 3, "B6": 2, "B7": 2,
+        "A13": 0, "A14": 0, "B3": 0,  # the debugger's, as after a reset
     }  # fmt: skip
     outputs = {"E7", "E8", "E10", "E13", "E14", "E6", "E12"}
     pulls = {"E9": 1, "E11": 1, "B4": 1, "B5": 1, "C6": 1, "C7": 1, "B6": 1, "B7": 1, "D8": 2, "D10": 2}
+    pulls |= {"A13": 1, "A14": 2}
     for port in "ABCDE":
         for number in range(16):
             pin = f"{port}{number}"

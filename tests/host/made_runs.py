@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 from armtempo.link.board_messages import Positions, Sample
-from armtempo.model import trajectory_file
+from armtempo.model import arm_json, trajectory_file
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
-from armtempo.planning.planner import plan
+from armtempo.planning import planner
+from armtempo.records import encoded_motion
 from armtempo.runs import run_folder
 from armtempo_shared.limits import SAMPLE_TICKS, TICK_HZ
 
@@ -20,18 +22,41 @@ from armtempo_shared.limits import SAMPLE_TICKS, TICK_HZ
 def shipped_plan() -> Plan:
     """The plan of the shipped job."""
     arm = Arm.paper()
-    return plan(arm, Job.paper(arm))
+    return planner.plan(arm, Job.paper(arm))
+
+
+def blind_plan(*joints: int) -> Plan:
+    """The shipped plan for the same arm without encoders at these joints."""
+    whole = shipped_plan()
+    left = tuple(
+        replace(joint, encoder=None if number in joints else joint.encoder)
+        for number, joint in enumerate(whole.arm.joints)
+    )
+    return replace(whole, arm=replace(whole.arm, joints=left))
 
 
 def make(
-    path: Path, repetitions: int = 3, scatter_deg: float = 0.02, seed: int = 1, drop: tuple[int, ...] = ()
+    path: Path,
+    repetitions: int = 3,
+    scatter_deg: float = 0.02,
+    seed: int = 1,
+    drop: tuple[int, ...] = (),
+    plan: Plan | None = None,
+    on_board: bool = False,
 ) -> Path:
-    """A run folder at ``path``; ``drop``: indices of samples that the first repetition lost."""
-    made = shipped_plan()
+    """A run folder at ``path``; ``drop``: indices of samples that the first repetition lost.
+
+    ``plan``: what was run, else the shipped one; ``on_board``: only the board had it, so the folder has no plan.
+    """
+    made = plan or shipped_plan()
     rng = np.random.default_rng(seed)
     path.mkdir(parents=True)
-    trajectory_file.save(made, path / run_folder.TRAJECTORY)
     folder = run_folder.RunFolder(path, made.job.name, run_folder.scales(made.arm), {"port": "sim"})
+    folder.write_motion(encoded_motion.of_plan(made).data)
+    if on_board:
+        arm_json.save(made.arm, path / run_folder.ARM)
+    else:
+        trajectory_file.save(made, path / run_folder.TRAJECTORY)
     for number in range(repetitions):
         with folder.begin_repetition() as file:
             for sample in _samples(made, scatter_deg, rng):

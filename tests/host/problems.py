@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from armtempo.model.arm import Arm, Joint, Limits, Motor
-from armtempo.model.job import Job
+from armtempo.model.job import Job, Stop
 
 FILE = Path(__file__).parents[1] / "data" / "problems.toml"
 
@@ -55,7 +55,8 @@ def _problem(entry: dict[str, Any]) -> Problem:
     arm = make_arm(entry.pop("limits"), (low, high), entry.pop("microsteps", 1))
     expect, best_s = entry.pop("expect", "plan"), tuple(entry.pop("best_s", ()))
     via = tuple(tuple(row) for row in entry.pop("via_deg"))
-    return Problem(entry["name"], arm, Job(via=via, **entry), expect, best_s)
+    settings = {"timing": "per-joint", "refine": 1, "polish": False, "bounds_s": (0.1, 3.0), **entry}
+    return Problem(entry["name"], arm, Job(via=via, **settings), expect, best_s)
 
 
 def random_problem(seed: int) -> tuple[Arm, Job]:
@@ -87,8 +88,29 @@ def random_problem(seed: int) -> tuple[Arm, Job]:
         via=tuple(map(tuple, via.tolist())),
         degree=int(rng.choice([3, 5])),
         timing=str(rng.choice(["shared", "per-joint"])),
+        refine=1,
+        polish=False,
         population=4,
         iterations=1,
         seed=seed,
+        bounds_s=(0.1, 3.0),
     )
     return make_arm(limits.tolist()), job
+
+
+def random_free_problem(seed: int) -> tuple[Arm, Job]:
+    """The same with a free path: stops, dwells, corridors, fixed and automatic numbers of pieces."""
+    arm, job = random_problem(seed)
+    rng = np.random.default_rng([seed, 1])
+    count = len(job.via)
+    refine: int | str = "auto" if rng.random() < 0.3 else int(rng.integers(3, 9))
+    job = replace(job, path="free", degree=5, refine=refine, starts=int(rng.integers(1, 3)))
+    if job.timing != "shared":
+        return arm, job
+    if rng.random() < 0.3:
+        widest = float(np.ptp(np.array(job.via)))
+        return arm, replace(job, corridor_deg=widest * 10.0 ** rng.uniform(-3, -1))
+    if count > 2 and rng.random() < 0.5:
+        vias = sorted(rng.choice(np.arange(1, count - 1), size=min(2, count - 2), replace=False).tolist())
+        return arm, replace(job, stops=tuple(Stop(via, float(rng.choice([0.0, 0.5]))) for via in vias))
+    return arm, job

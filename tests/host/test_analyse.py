@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from armtempo.model.arm import Limits
 from armtempo.runs import analysis
 from armtempo.runs.reader import RepetitionData
 from armtempo.splines import bspline
@@ -21,7 +20,6 @@ def joint(via: tuple[float, ...], interval_s: float) -> JointSpline:
 
 
 PLAN = Trajectory("t", (joint(VIA[0], 2.0), joint(VIA[1], 2.2)), False)
-LIMITS = (Limits(70.0, 80.0, 500.0), Limits(40.0, 80.0, 500.0))
 
 
 def samples(delay_s: float = 0.0, seed: int | None = None, resolution: float = 0.0) -> RepetitionData:
@@ -72,16 +70,6 @@ def test_a_gap_leaves_a_hole_and_nothing_else() -> None:
     assert not np.isnan(np.delete(found.mean, np.s_[20:25], axis=1)).any()
     both = analysis.curves([cut, whole], PLAN)
     assert not np.isnan(both.mean).any()
-
-
-def test_limits_are_judged_with_the_encoders_rounding() -> None:
-    found = analysis.curves([samples(resolution=0.09)], PLAN)
-    checks = analysis.limit_checks(found, LIMITS, (0.09, 0.09))
-    assert checks[0][0].verdict == "kept"
-    peak = checks[0][0].peak
-    near = replace(checks[0][0], limit=peak - checks[0][0].sigma)
-    assert near.verdict == "kept within uncertainty"
-    assert replace(near, limit=0.9 * peak).verdict == "exceeded"
 
 
 def test_final_errors_are_taken_at_the_last_sample() -> None:

@@ -437,3 +437,4 @@ def test_a_dollar_in_a_name_is_no_formula(tmp_path: Path) -> None:
     path = changed(tmp_path, ('name = "joint 1"', 'name = "$$ \\\\theta"'), ('"paper-1to5"', '"$x^$"'))
     result = run("--arm", path, "--picture", tmp_path / "arm.svg")
     assert result.exit_code == 0, result.output
+    assert ">$$ \\theta: " in (tmp_path / "arm.svg").read_text()

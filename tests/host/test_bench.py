@@ -59,7 +59,7 @@ def test_problem_is_the_planners_fitness(problem: cases.Problem) -> None:
 def test_problem_refuses_joints_that_cannot_be_timed() -> None:
     arm = Arm.paper()
     job = Job.paper(arm)
-    with pytest.raises(InputError, match="joints 1 to 3"):
+    with pytest.raises(InputError, match="give one of 1 to 3"):
         cases.problem_of(arm, job, 4, "stretched", 1)
 
 
@@ -126,7 +126,7 @@ def test_goes_on_where_it_was_interrupted(tmp_path: Path) -> None:
     assert process.returncode == 130, said
     kept = file.read_bytes()
     count = kept.count(b"\n") - 1
-    assert said.strip() == (
+    assert said.strip().splitlines()[-1] == (
         f"armtempo: interrupted; {count} of 40 runs are kept in {file}, "
         "and the same command goes on from there"
     )
@@ -225,11 +225,11 @@ def test_without_matplotlib_the_tables_stand(tmp_path: Path, monkeypatch: pytest
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--algorithms", "acs,moth"], "'moth' is not one of"),
+        (["--algorithms", "acs,moth"], "'moth' is not known"),
         (["--populations", "10,many"], "whole numbers"),
         (["--populations", "3"], "from 4 to 100000"),
         (["--populations", "10,1000000000"], "from 4 to 100000"),
-        (["--joint", "7"], "joints 1 to 3"),
+        (["--joint", "7"], "give one of 1 to 3"),
     ],
 )
 def test_wrong_options_are_explained(arguments: list[str], said: str, tmp_path: Path) -> None:

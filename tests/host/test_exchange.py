@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import csv
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from armtempo.cli import main
 from armtempo.errors import InputError
-from armtempo.model import exchange, trajectory_file
+from armtempo.model import arm_file, exchange, thinning, trajectory_file
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from click.testing import CliRunner
+from scipy.interpolate import CubicSpline
 
 from tests.host.made_runs import shipped_plan
 
@@ -59,15 +61,19 @@ def test_an_impossible_rate_is_refused(rate: float) -> None:
         ("0,-60,40\n20,-75,50\n", False),
         ("a,b,c\n0,-60,40\n\n20,-75,50\n", False),
         ("joint 3,joint 1,joint 2\n40,0,-60\n50,20,-75\n", False),
-        ("time_s,j1_angle_deg,j2_angle_deg,j3_angle_deg\n9,0,-60,40\n9,20,-75,50\n", False),
+        ("time_s,j1_angle_deg,j2_angle_deg,j3_angle_deg\n8,0,-60,40\n9,20,-75,50\n", False),
+        ("0;-60;40\n20;-75;50\n", False),
+        ("joint 1;joint 2;joint 3\n0,0;-60,0;40,0\n20,0;-75,0;50,0\n", False),
+        ("0\t-60\t40\n20\t-75\t50\n", False),
+        ("\ufeffa\tb\tc\r\n0\t-60\t4e1\r\n20\t-75\t50\r\n", False),
         ("0,-1.0471975511965976,0.6981317007977318\n0.349065850,-1.308996939,0.872664626\n", True),
     ],
 )
 def test_via_points_come_from_any_sensible_table(tmp_path: Path, text: str, radians: bool) -> None:
     table = tmp_path / "via.csv"
-    table.write_text(text)
+    table.write_text(text, encoding="utf-8")
     np.testing.assert_allclose(
-        exchange.via_from_csv(table, ARM, radians), [[0, -60, 40], [20, -75, 50]], atol=1e-6
+        exchange.via_from_csv(table, ARM, radians).via_deg, [[0, -60, 40], [20, -75, 50]], atol=1e-6
     )
 
 
@@ -80,7 +86,10 @@ def test_via_points_come_from_any_sensible_table(tmp_path: Path, text: str, radi
         ("0,-60,40\n20,x,50\n", "line 2: 'x' is not a finite number"),
         ("0,-60,40\n20,nan,50\n", "line 2: 'nan'"),
         ("0,-60,inf\n20,-75,50\n", "line 1: 'inf'"),
-        ("joint 1,joint 2\n1,2\n", "line 1: the header must name"),
+        ("joint 1,joint 2\n1,2\n", "line 1: the header does not name"),
+        ("joint 1;joint 2;joint 3\n0;-60;40\n1;2\n", "line 3: 2 values"),
+        ("time_s,joint 1,joint 2,joint 3\n1,0,-60,40\n1,20,-75,50\n", "line 3: time_s does not increase"),
+        ("header:\n  stamp: {sec: 0, nanosec: 0}\n", "is a ROS message, not a table; export"),
     ],
 )
 def test_a_table_that_will_not_do_is_refused_with_its_line(tmp_path: Path, text: str, said: str) -> None:
@@ -90,18 +99,64 @@ def test_a_table_that_will_not_do_is_refused_with_its_line(tmp_path: Path, text:
         exchange.via_from_csv(table, ARM)
 
 
+@pytest.mark.parametrize("tolerance", [1.0, 0.1, 0.01])
+def test_an_exported_motion_comes_back_thinned_to_the_tolerance(tmp_path: Path, tolerance: float) -> None:
+    plan = shipped_plan()
+    table = tmp_path / "feed.csv"
+    table.write_text(plan.to_csv(60.0))
+    found = exchange.via_from_csv(table, ARM, tolerance_deg=tolerance)
+    assert found.lines == 409
+    assert 5 < len(found.via_deg) < {1.0: 15, 0.1: 25, 0.01: 50}[tolerance]
+    times = exchange.times_s(plan.trajectory.duration_s, 60.0)
+    angles = plan.trajectory(times)
+    kept = [int(np.abs(angles - via).max(axis=1).argmin()) for via in found.via_deg]
+    assert kept[0] == 0
+    assert kept[-1] == len(times) - 1
+    assert kept == sorted(kept)
+    spline = CubicSpline(times[kept], found.via_deg, bc_type="clamped")
+    assert np.abs(spline(times) - angles).max() <= tolerance + 1e-6
+
+
+def test_a_path_without_times_is_thinned_where_asked(tmp_path: Path) -> None:
+    table = tmp_path / "arc.csv"
+    turn = np.linspace(0.0, np.pi, 600)
+    table.write_text("".join(f"{20 * np.cos(a)},{-60 + 20 * np.sin(a)},40\n" for a in np.repeat(turn, 2)))
+    assert len(exchange.via_from_csv(table, ARM).via_deg) == 1200
+    found = exchange.via_from_csv(table, ARM, tolerance_deg=0.1)
+    assert 3 < len(found.via_deg) < 25
+    np.testing.assert_allclose(found.via_deg[[0, -1]], [[20, -60, 40], [-20, -60, 40]], atol=1e-9)
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1.0, float("nan"), 91.0])
+def test_an_impossible_tolerance_is_refused(tolerance: float) -> None:
+    with pytest.raises(InputError, match=r"a tolerance of .* is not allowed"):
+        thinning.thinned(np.zeros((3, 2)), tolerance)
+
+
+def test_what_cannot_be_thinned_to_a_motion_is_refused() -> None:
+    noise = np.random.default_rng(12).normal(size=(700, 3))
+    with pytest.raises(InputError, match=r"more than 513 via points are needed"):
+        thinning.thinned(noise, 0.001, np.arange(700.0))
+
+
 def test_the_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     trajectory_file.save(shipped_plan(), "feed.json")
-    run = CliRunner().invoke
+    run = CliRunner(env={"ARMTEMPO_ARM": str(arm_file.default_path())}).invoke
     assert run(main, ["export", "feed.json", "--rate", "2", "-o", "feed.csv"]).exit_code == 0
     assert run(main, ["export", "feed.json", "--format", "ros"]).output.startswith("header:")
     made = run(main, ["import", "feed.csv", "--name", "again"])
     assert made.exit_code == 0, made.output
-    assert len(Job.load("again.toml", ARM).via) == len(Path("feed.csv").read_text().splitlines()) - 1
+    assert re.match(
+        r"15 lines thinned to \d+ via points: .* within 0.1 deg; the times are planned anew\n", made.output
+    )
+    assert Job.load("again.toml", ARM).timing == "shared"
+    assert run(main, ["import", "feed.csv", "--name", "again"]).exit_code == 0  # the same content
+    Path("again.toml").write_text("# mine")
     again = run(main, ["import", "feed.csv", "--name", "again"])
     assert again.exit_code == 2
     assert "exists" in again.output
+    assert Path("again.toml").read_text() == "# mine"
     Path("out.csv").write_text("0,-60,40\n900,0,0\n")
     outside = run(main, ["import", "out.csv"])
     assert outside.exit_code == 2

@@ -101,11 +101,11 @@ def test_angles_out_of_range_are_shown_with_a_note() -> None:
     [
         (
             ("1,2",),
-            "2 angles given, but arm 'paper-1to5' has 6 joints, of which 3 have a motor; give one angle",
+            "2 angles given, but arm 'paper-1to5' has 6 joints, of which 3 have a motor\nhint: give one angle",
         ),
         (("1,2,x",), "the angles: 'x' is not a number"),
         (("1,2,nan",), "the angles: 'nan' is not a finite number"),
-        (("P99",), "has the via points P0 to P6, not P99"),
+        (("P99",), "has no via point P99\nhint: give one of P0 to P6"),
         (("none.json",), "none.json: no such file"),
         (("0,0,0", "--arm", "none.toml"), "none.toml: there is no such file"),
     ],

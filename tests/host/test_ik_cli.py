@@ -21,7 +21,9 @@ POSITION = ("--position", "-536.404", "0", "434.698")
 
 
 def run(*arguments: str | Path) -> Result:
-    return CliRunner().invoke(main, ["ik", *map(str, arguments)])
+    return CliRunner(env={"ARMTEMPO_ARM": str(arm_file.default_path())}).invoke(
+        main, ["ik", *map(str, arguments)]
+    )
 
 
 def solutions(*arguments: str | Path) -> list[dict[str, Any]]:
@@ -35,7 +37,7 @@ def test_table_shows_all_eight_with_reasons_and_the_choice() -> None:
     result = run("--matrix", EQ_16_AT_1_TO_5)
     assert result.exit_code == 0
     head, columns, *rows, tool, driven = result.stdout.splitlines()
-    assert head == "pose 1: region II of Fig. 3: 4 arm postures"
+    assert head == "pose 1: 4 of 4 arm postures reach the wrist centre (the paper's region II)"
     assert columns.split()[:4] == ["no", "branch", "theta1", "deg"]
     assert len(rows) == 8
     assert [row[0] for row in rows] == ["*"] + [" "] * 7
@@ -99,12 +101,14 @@ def test_previous_posture_chooses_the_branch() -> None:
 def test_out_of_reach_ends_with_1_and_the_inequality() -> None:
     result = run("--position", "900", "0", "300", "--rpy", "0", "0", "0")
     assert result.exit_code == 1
-    assert "region IV of Fig. 3: 0 arm postures" in result.stdout
+    assert "0 of 4 arm postures reach the wrist centre (the paper's region IV)" in result.stdout
     assert result.stdout.count("(Eq. (3), line 1)") == 8
     assert (
         "rejected: no posture reaches this pose within 0.1 mm and 0.1 deg: the nearest one" in result.stdout
     )
-    assert result.stderr.startswith("armtempo: no solution for pose 1; the reasons are listed with it; bring")
+    assert result.stderr.startswith(
+        "armtempo: no solution for pose 1; the reasons are listed with it\nhint: bring it nearer"
+    )
     unreachable = run("--position", "900", "0", "300", "--rpy", "0", "0", "0", "--json")
     assert unreachable.exit_code == 1
     (answer,) = json.loads(unreachable.stdout)["poses"]
@@ -117,7 +121,7 @@ def test_singular_poses_say_so() -> None:
     result = run("--matrix", " ".join(map(repr, straight)), "--previous", "0 0 0 12 0 0")
     assert "theta5 = 0: joint 4 kept as before, joint 6 makes up the sum" in result.stdout
     result = run("--position", "0", "0", "600", "--rpy", "0", "0", "0", "--previous", "33 0 0 0 0 0")
-    assert "any angle of joint 1, and 4 arm postures" in result.stdout
+    assert "4 of 4 arm postures reach the wrist centre, with any angle of joint 1 (" in result.stdout
     assert "     33.0000" in result.stdout
 
 
@@ -226,25 +230,28 @@ def test_numerical_finds_the_eight_too() -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ((), "give one of --matrix, --position or --poses"),
+        ((), "give one of --matrix, --position and --poses"),
         (("--matrix", EQ_16_AT_1_TO_5, *POSITION, "--rpy", "0", "0", "0"), "give one of"),
         (("--matrix", EQ_16_AT_1_TO_5, "--rpy", "0", "0", "0"), "--position goes alone or with one of"),
         (("--matrix", EQ_16_AT_1_TO_5, "--pitch", "0"), "--position goes alone or with one of"),
-        (("--pitch", "0"), "give one of --matrix, --position or --poses"),
+        (("--pitch", "0"), "give one of --matrix, --position and --poses"),
         (
             (*POSITION, "--rpy", "0", "0", "0", "--quaternion", "1", "0", "0", "0"),
             "--position goes alone or with one of",
         ),
         ((*POSITION, "--rpy", "0", "0", "0", "--pitch", "0"), "--position goes alone or with one of"),
         ((*POSITION, "--roll", "0", "--yaw", "0"), "roll and yaw without pitch leave too much open"),
-        ((*POSITION, "--approach", "0", "0", "0"), "--approach: the approach is a direction such as 0 0 -1"),
+        (
+            (*POSITION, "--approach", "0", "0", "0"),
+            "--approach: the approach has length 0",
+        ),
         ((*POSITION, "--pitch", "nan"), "must be finite"),
         ((*POSITION, "--tolerance-mm", "0"), "--tolerance-mm"),
         ((*POSITION, "--tolerance-deg", "181"), "--tolerance-deg"),
-        (("--matrix", "1 2 3"), "--matrix: 3 numbers are no pose; give 12 (3 rows of a matrix), 16"),
+        (("--matrix", "1 2 3"), "--matrix: 3 numbers are no pose\nhint: give 12 (3 rows of a matrix), 16"),
         (("--matrix", "1 0 0 0 0 1 0 0 0 0 x 0"), "--matrix: 'x' is not a number"),
         (("--matrix", "2 0 0 0 0 1 0 0 0 0 1 0"), "--matrix: the 3 x 3 part is not a rotation"),
-        ((*POSITION, "--quaternion", "1", "1", "0", "0"), "length 1 is needed; this one has length 1.41421"),
+        ((*POSITION, "--quaternion", "1", "1", "0", "0"), "--quaternion: this quaternion has length 1.41421"),
         ((*POSITION, "--rpy", "nan", "0", "0"), "must be finite"),
         ((*POSITION, "--rpy", "one", "0", "0"), "'one' is not a valid float"),
         (("--poses", "no-such-file.txt"), "no-such-file.txt: cannot be read"),

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from armtempo.errors import InputError
 from armtempo.model.arm import Arm
-from armtempo.model.job import Job, Pose
+from armtempo.model.job import Job
+from armtempo.model.tool_pose import Pose
 
 ARM = Arm.paper()
 TWO = "via_deg = [[0, -60, 40], [20, -75, 50]]\n"
@@ -86,11 +87,11 @@ def test_a_position_may_ask_for_a_part_of_the_orientation(
     [
         (
             "position_mm = [1, 2, 3]\nrpy_deg = [0, 0, 0]\npitch_deg = 3",
-            "position_mm goes alone or with one of",
+            "give position_mm alone, with one of",
         ),
         (
             "position_mm = [1, 2, 3]\napproach = [0, 0, 1]\nyaw_deg = 3",
-            "position_mm goes alone or with one of",
+            "give position_mm alone, with one of",
         ),
         (
             "position_mm = [1, 2, 3]\nroll_deg = 0\nyaw_deg = 3",
@@ -126,7 +127,7 @@ def test_what_can_be_wrong_with_a_turned_position(via: str, said: str, tmp_path:
         ("via_deg = [[0, -60, 40], [20, nan, 50]]\n", ["via_deg[2]", "list of 3 numbers"]),
         ("via_deg = [[0, -60, 40], [200, -75, 50]]\n", ["via_deg[2]", "range of joint 1, -10 to 190"]),
         (TWO + "degree = 4\n", ["degree = 4", "3, 5"]),
-        (TWO + 'timing = "fast"\n', ["timing = 'fast'", "'per-joint', 'shared'"]),
+        (TWO + 'timing = "fast"\n', ["timing = 'fast'", "'shared', 'per-joint'"]),
         (TWO + 'optimiser = "magic"\n', ["optimiser = 'magic'", "'acs'"]),
         (TWO + "population = 2\n", ["population = 2", "from 4"]),
         (TWO + "bounds_s = [3.0, 0.1]\n", ["bounds_s", "shorter first"]),

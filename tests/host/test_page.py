@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 from armtempo.kinematics import chain
-from armtempo.report import html_page, plots
+from armtempo.report import arm_figure, drawing, html_page, plots
 from armtempo.research.bench import result_plot
 from armtempo.research.bench.cases import Case, Trial
 from armtempo.research.bench.result_table import rows
@@ -23,11 +23,27 @@ def test_a_column_is_aligned_as_a_whole() -> None:
     assert cells == [
         '<th class="number">n',
         "<th>what",
-        '<td class="number">1.5',
-        "<td>5, per-joint",
-        '<td class="number">–',
-        '<td class="bad">word',
+        '<td class="number" data-column="n">1.5',
+        '<td data-column="what">5, per-joint',
+        '<td class="number" data-column="n">–',
+        '<td class="bad" data-column="what">word',
     ]
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 37.0, 90.0, 160.0, 250.0])
+def test_labels_of_the_arms_figure_are_inside_of_it(turn_deg: float) -> None:
+    plan = shipped_plan()
+    times = np.linspace(0.0, plan.trajectory.duration_s, 50)
+    turn = np.radians(turn_deg)
+    about_z = np.array([[np.cos(turn), np.sin(turn), 0], [-np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
+    chains = chain.chains_mm(plan.arm, plan.via_deg) @ about_z
+    drawn = arm_figure.postures(chains, chain.tool_path_mm(plan.arm, plan.trajectory, times) @ about_z)
+    drawn.draw_without_rendering()
+    (axis,) = drawn.axes
+    for part in (axis.xaxis, axis.yaxis, axis.zaxis):
+        box = part.label.get_window_extent()
+        assert drawn.bbox.x0 <= box.x0 < box.x1 <= drawn.bbox.x1, part.label.get_text()
+        assert drawn.bbox.y0 <= box.y0 < box.y1 <= drawn.bbox.y1, part.label.get_text()
 
 
 def test_text_is_escaped() -> None:
@@ -44,7 +60,9 @@ def figure(name: str) -> str:
     limits = [joint.limits for joint in plan.arm.driven if joint.limits]
     times = np.linspace(0.0, plan.trajectory.duration_s, 50)
     theory = np.stack([plan.trajectory(times, order) for order in range(3)])
-    seen = analysis.Curves(times, theory[None], theory, 0.1 * np.abs(theory), theory, theory)
+    seen = analysis.Curves(
+        times, theory[None], theory, 0.1 * np.abs(theory), theory, theory, np.ones(3, bool)
+    )
     runs = [Trial(Case("acs", 10, seed), (), 1, 1.0, ((0, 6.0 + seed),)) for seed in (1, 2)]
     chains = chain.chains_mm(plan.arm, plan.via_deg)
     drawn = {
@@ -53,10 +71,10 @@ def figure(name: str) -> str:
         "errors": lambda: plots.errors(seen, names),
         "overlay": lambda: plots.overlay({"one": (times, theory[:, :, 0], times)}),
         "convergence": lambda: plots.convergence({"one": np.arange(9.0)}),
-        "postures": lambda: plots.postures(chains, chain.tool_path_mm(plan.arm, plan.trajectory, times)),
+        "postures": lambda: arm_figure.postures(chains, chain.tool_path_mm(plan.arm, plan.trajectory, times)),
         "searches": lambda: result_plot.convergence(rows(runs, 5)),
     }
-    return plots.inline_svg(drawn[name](), name, "what it shows")
+    return drawing.inline_svg(drawn[name](), name, "what it shows")
 
 
 @pytest.mark.slow
@@ -70,7 +88,7 @@ def test_every_label_takes_the_colour_of_the_page(name: str) -> None:
     assert labels
     assert len(labels) == svg.count("<text")
     assert [label for label in labels if "fill: currentColor" not in label] == []
-    assert 'aria-label="what it shows"' in svg
+    assert re.search(r'aria-label="(joint \d: |x: )?what it shows"', svg)
 
 
 def test_figures_are_no_larger_than_they_must_be() -> None:

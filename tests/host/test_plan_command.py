@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from armtempo.cli import main
-from armtempo.model import shipped, trajectory_file
+from armtempo.model import arm_file, shipped, trajectory_file
 from armtempo.model.arm import Arm
 from armtempo.planning import planner
 from click.testing import CliRunner, Result
@@ -19,8 +19,9 @@ iterations = 10
 
 
 def run(*arguments: str) -> Result:
-    """The command's outcome."""
-    return CliRunner().invoke(main, ["plan", *arguments])
+    """The command's outcome; a job is for the arm that ships with armtempo."""
+    arm = {"ARMTEMPO_ARM": str(arm_file.default_path())} if "--job" in arguments else {}
+    return CliRunner(env=arm).invoke(main, ["plan", *arguments])
 
 
 @pytest.fixture(autouse=True)
@@ -62,7 +63,7 @@ def test_an_arm_that_ships_is_taken_by_its_name() -> None:
     Path("ar4.toml").write_text('name = "lift"\nvia_deg = [[0,0,0,0,0,0],[10,5,5,0,5,0]]\niterations = 5\n')
     result = run("--job", "ar4.toml", "--arm", "ar4")
     assert result.exit_code == 0, result.output
-    assert "arm: ar4, as it ships with armtempo" in result.stderr
+    assert "arm: AR4-MK3 (as it ships with armtempo)" in result.stdout
     assert trajectory_file.load("lift.json").arm == Arm.load("ar4")
 
 
@@ -122,7 +123,8 @@ def test_too_little_memory_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     result = run("--job", "move.toml")
     assert (result.exit_code, result.output) == (
         1,
-        "armtempo: this takes more memory than there is: Unable to allocate 44.7 GiB\n",
+        "armtempo: this takes more memory than there is: Unable to allocate 44.7 GiB\n"
+        "hint: close other programs, or ask for less: lower refine, a smaller population\n",
     )
 
 
@@ -131,3 +133,111 @@ def test_says_why_there_is_no_plan() -> None:
     result = run("--job", "still.toml")
     assert result.exit_code == 1
     assert "nothing moves" in result.output
+
+
+RESTING = """
+name = "rests"
+timing = "shared"
+refine = 4
+iterations = 5
+starts = 1
+[[via]]
+angles_deg = [0, -60, 40]
+[[via]]
+angles_deg = [20, -75, 50]
+stop = true
+dwell_s = 0.5
+[[via]]
+angles_deg = [40, -60, 40]
+"""
+
+
+def test_plans_a_free_path_with_a_stop_and_says_its_starts_and_record() -> None:
+    Path("rests.toml").write_text(RESTING)
+    result = run("--job", "rests.toml", "--path", "free", "--refine", "auto")
+    assert result.exit_code == 0, result.output
+    assert "free path, shared timing" in result.output
+    assert "1 starts, driven joint" in result.output
+    assert "bytes of the 16384 that the board takes" in result.output
+    plan = trajectory_file.load("rests.json")
+    assert plan.trajectory.joints[0].via_segments is not None
+    assert plan.job.stops[0].dwell_s == 0.5
+
+
+def test_a_stop_on_the_spline_is_refused_and_split_makes_two_motions_of_it() -> None:
+    Path("rests.toml").write_text(RESTING)
+    refused = run("--job", "rests.toml")
+    assert refused.exit_code == 2
+    assert "--split" in refused.output
+    result = run("--job", "rests.toml", "--split")
+    assert result.exit_code == 0, result.output
+    first, second = (trajectory_file.load(f"rests-{number}.json") for number in (1, 2))
+    assert first.via_deg[-1].tolist() == second.via_deg[0].tolist() == [20.0, -75.0, 50.0]
+    assert not Path("rests.json").exists()
+
+
+SLOW = """
+name = "slow"
+refine = 32
+polish = false
+iterations = 5
+[[via]]
+angles_deg = [0, -60, 40]
+[[via]]
+angles_deg = [20, -75, 50]
+stop = true
+[[via]]
+angles_deg = [40, -60, 40]
+"""
+
+
+def test_a_motion_too_long_for_the_board_ends_with_1_and_is_split_on_request() -> None:
+    """Beyond 3272 s; joint 1 at 0.012 deg/s takes about 1700 s to each via point."""
+    text = shipped.files()[shipped.PAPER].read_text()
+    assert text.count("speed_deg_s = 50.0") == 1
+    Path("slow_arm.toml").write_text(text.replace("speed_deg_s = 50.0", "speed_deg_s = 0.012"))
+    Path("slow.toml").write_text(SLOW.replace("stop = true\n", ""))
+    whole = run("--job", "slow.toml", "--arm", "slow_arm.toml")
+    assert whole.exit_code == 1
+    assert "--split" in whole.output
+    assert not Path("slow.json").exists()
+    Path("slow.toml").write_text(SLOW)
+    parts = run("--job", "slow.toml", "--arm", "slow_arm.toml", "--split")
+    assert parts.exit_code == 0, parts.output
+    assert Path("slow-1.json").exists()
+    assert Path("slow-2.json").exists()
+
+
+@pytest.mark.parametrize("value", ["0", "65", "many", "1.5"])
+def test_refine_is_auto_or_a_number(value: str) -> None:
+    result = run("--job", "move.toml", "--refine", value)
+    assert result.exit_code == 2
+    assert "give auto or a whole number from 1 to 64" in result.output
+
+
+def test_a_corridor_curve_needs_a_free_path() -> None:
+    result = run("--job", "move.toml", "--corridor-curve")
+    assert result.exit_code == 2
+    assert 'needs path = "free"' in result.output
+
+
+def test_a_job_that_does_not_say_otherwise_is_planned_on_one_polished_axis() -> None:
+    result = run("--job", "move.toml")
+    assert result.exit_code == 0, result.output
+    plan = trajectory_file.load("move.json")
+    assert (plan.job.timing, plan.job.refine, plan.job.polish, plan.job.bounds_s) == (
+        "shared",
+        "auto",
+        True,
+        None,
+    )
+    assert plan.trajectory.shared
+
+
+@pytest.mark.parametrize("name", ["move-corridor.csv", "move-corridor.png"])
+def test_a_corridor_curve_keeps_what_is_there(name: str) -> None:
+    Path(name).write_bytes(b"mine")
+    result = run("--job", "move.toml", "--path", "free", "--corridor-curve")
+    assert result.exit_code == 2
+    assert name in result.output
+    assert Path(name).read_bytes() == b"mine"

@@ -12,6 +12,7 @@ from armtempo.model.arm import Arm, Limits
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.planning import lower_bounds, planner
+from armtempo.planning.lower_bounds import Floor
 from armtempo_shared.limits import MAX_STEP_RATE
 
 from tests.host import problems
@@ -83,7 +84,7 @@ def test_problem(problem: problems.Problem) -> None:
 @pytest.mark.parametrize("thousand", range(10))
 def test_random_jobs_keep_their_limits_or_say_why_not(thousand: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """10 000 jobs; floors, which a plan only quotes, have their own test."""
-    monkeypatch.setattr(lower_bounds, "floor", lambda *_: (math.ulp(0.0), "rests"))
+    monkeypatch.setattr(lower_bounds, "of_path", lambda *_: Floor(math.ulp(0.0), "rests"))
     planned = 0
     for seed in range(1000 * thousand, 1000 * thousand + 1000):
         arm, job = problems.random_problem(seed)

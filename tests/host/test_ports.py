@@ -7,9 +7,11 @@ from pathlib import Path
 
 import pytest
 from armtempo import deploy
+from armtempo.deploy import program_files
 from armtempo.errors import InputError, LinkError
-from armtempo.link import diagnose, ports
+from armtempo.link import diagnose
 from armtempo.link.transport import SerialTransport
+from armtempo.ports import listing, names
 
 
 class Silent:
@@ -25,6 +27,8 @@ class Silent:
         return data
 
     def write(self, data: bytes) -> None: ...
+
+    def wake(self) -> None: ...
 
     def close(self) -> None: ...
 
@@ -45,6 +49,25 @@ class Silent:
 )
 def test_what_else_sits_on_a_port(answer: bytes, words: str) -> None:
     assert words in str(diagnose.explain(Silent(answer), b""))
+
+
+class Prompt(Silent):
+    """MicroPython's prompt, as mpremote leaves it; it says that the program is in the flash."""
+
+    def write(self, data: bytes) -> None:
+        echo = data + b"\n"
+        self.answer = echo + (b"armtempo is here\r\n>>> " if data.startswith(b"print(") else b">>> ")
+
+
+def test_a_program_that_mpremote_has_ended_needs_a_reset_only() -> None:
+    said = str(diagnose.explain(Prompt(), b""))
+    assert "mpremote connect there reset" in said
+    assert "reset button" in said
+
+
+def test_compiled_files_for_a_virtual_board_under_cpython() -> None:
+    with pytest.raises(LinkError, match="CPython, or a MicroPython built without them; deploy without --mpy"):
+        program_files._compiler(0)
 
 
 def test_port_that_does_not_exist() -> None:
@@ -70,7 +93,7 @@ def test_port_in_use() -> None:
 
 
 def test_found_ports_put_boards_first() -> None:
-    found = ports.find_ports()
+    found = listing.find_ports()
     assert [port.board for port in found] == sorted([port.board for port in found], reverse=True)
 
 
@@ -81,4 +104,4 @@ def test_what_is_no_serial_port_is_said_to_be_none(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=f"{path} is not a serial port"):
             SerialTransport(str(path))
     with pytest.raises(InputError, match="names no folder"):
-        ports.sim_flash("sim:")
+        names.sim_flash("sim:")

@@ -22,7 +22,7 @@ SAID = {
     "fault_pending": "no: a fault is pending (joint 2) [code of the fault: 4711]; remove its cause, then "
     "'armtempo clear'",
     "flash_full": "no: the flash has no room; what was stored is kept (joint 2) [bytes free: 4711]; "
-    "'armtempo remove' something",
+    "remove motions that are no longer needed: 'armtempo remove'",
     "bad_offset": "no: a piece of the upload is out of order (joint 2) [bytes received so far: 4711]; "
     "upload it again",
     "wrong_joints": "no: the motion has another number of joints than the arm (joint 2) [joints of the motion: "
@@ -32,9 +32,12 @@ SAID = {
     "out_of_range": "no: the motion leaves the joint's range (joint 2) [position in steps: 4711]; check the via "
     "points or the range",
     "wrong_start": "no: the arm does not stand where the motion begins (joint 2) [steps from there to the start: "
-    "4711]; 'armtempo goto' its start",
+    "4711]; bring it there: 'armtempo goto' with the motion's name or file",
     "too_long": "no: the motion is longer or larger than the board can hold (joint 2) [its numbers reach 4711]; "
     "lower refine, use shared timing or fewer via points, or split it",
+    "no_room": "no: the engine for this arm does not fit into the board's memory; nothing was changed (joint 2) "
+    "[bytes needed: 4711]; lower its top speeds, drive fewer joints, or put the program into the firmware "
+    "(board/docs/firmware.md)",
     "too_abrupt": "no: the motion reverses too fast for the step generator (joint 2) [steps/s²: 4711]; lower the "
     "limits",
 }
@@ -50,7 +53,19 @@ def test_every_number_is_said_with_what_it_is(name: str) -> None:
 def test_every_code_with_a_number_is_tried() -> None:
     assert set(SAID) | {"too_fast"} == set(VALUES)
     error = str(refusal("no", wire.ERROR_CODES["too_fast"], 1, 4711))
-    assert re.fullmatch(r"no: .* \(joint 2\) \[steps/s[^\]]*: 4711\]; lower the limits", error), error
+    assert re.fullmatch(
+        r"no: .* \(joint 2\) \[steps/s needed: 4711\]; plan it again with this arm file.*", error
+    ), error
+
+
+def test_a_limit_of_the_arm_is_not_taken_for_one_of_the_board() -> None:
+    code = wire.ERROR_CODES["too_fast"]
+    assert "speed limit in the arm file that the board has (joint 2) [steps/s needed: 395]; " in str(
+        refusal("no", code, 1, 395)
+    )
+    assert "together need more steps per second than the board can make [steps/s needed: 3950]; " in str(
+        refusal("no", code, 255, 3950)
+    )
 
 
 def test_what_has_no_number_or_joint_says_none() -> None:
@@ -61,7 +76,6 @@ def test_what_has_no_number_or_joint_says_none() -> None:
 @pytest.mark.parametrize(
     ("joint", "value", "words"),
     [
-        (255, 9352, "9352 bytes, for which it has no memory free in one piece"),
         (255, MAX_MOTION_BYTES, "it takes 16384 bytes at most"),
         (0, 1 << 38, "its numbers reach 274877906944"),
     ],
@@ -77,18 +91,14 @@ def test_a_record_larger_than_the_board_takes(tmp_path: Path) -> None:
         board.upload("big", bytes(MAX_MOTION_BYTES + 1))
 
 
-def test_a_record_for_which_the_board_has_no_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_command_for_which_the_board_has_no_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is answered by its own code."""
     pipe = Pipe(tmp_path / "flash")
     board, data = ready(pipe)
 
-    store = pipe._later["armtempo_board.storage.store"].Store
-    guarded = store._guard
+    def short_of_memory(self: Any, name: str) -> Any:
+        raise MemoryError
 
-    def short_of_memory(self: Any, call: Any, *arguments: Any) -> Any:
-        if call.__name__ == "read":
-            raise MemoryError
-        return guarded(self, call, *arguments)
-
-    monkeypatch.setattr(store, "_guard", short_of_memory)
-    with pytest.raises(BoardError, match=rf"refused 'start'.* \[{len(data)} bytes, for which"):
+    monkeypatch.setattr(pipe._later["armtempo_board.storage.store"].Store, "motion", short_of_memory)
+    with pytest.raises(BoardError, match=r"refused 'start'.*ran out of memory in this command"):
         board.start("feed", wire.record_crc(data))

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import html
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from armtempo.cli import main
 from armtempo.errors import RunFolderError
 from armtempo.model import trajectory_file
-from armtempo.model.arm import Driver
+from armtempo.model.arm import Driver, Joint, Limits
 from armtempo.model.plan import Plan
 from armtempo.planning import path_deviation
-from armtempo.report import comparison, run_report
+from armtempo.report import comparison, run_report, verdict
+from armtempo.report.evaluation import evaluate
+from armtempo.runs.run_folder import MOTION
 from click.testing import CliRunner
 
 from tests import browser
@@ -25,6 +29,8 @@ from tests.host import made_runs
 pytestmark = pytest.mark.slow
 
 FIGURES = ("tracking", "errors", "motion", "convergence", "postures")
+PARTS = 11
+"""The first three have a part for each joint."""
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +43,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_page_and_every_figure_are_written(folder: Path) -> None:
     text = (folder / run_report.PAGE).read_text()
-    assert text.count("<svg") == len(FIGURES)
+    assert text.count("<figure") == len(FIGURES)
     for name in FIGURES:
         assert (folder / f"{name}.png").read_bytes().startswith(b"\x89PNG")
         assert (folder / f"{name}.svg").read_text().lstrip().startswith("<?xml")
@@ -59,7 +65,7 @@ def test_a_repetition_that_is_missing_does_not_hide_the_others(tmp_path: Path) -
     path = made_runs.make(tmp_path / "run")
     (path / "samples-02.csv").unlink()
     (path / "samples-03.csv").write_text((path / "samples-03.csv").read_text()[:900])
-    found = run_report.evaluate(path)
+    found = evaluate(path)
     assert any("samples-02.csv" in text and "missing" in text for text in found.complaints)
     assert len(found.curves.each) == 2
 
@@ -68,7 +74,7 @@ def test_a_reset_in_the_middle_is_said(tmp_path: Path) -> None:
     path = made_runs.make(tmp_path / "run")
     lines = (path / "samples-01.csv").read_text().splitlines()
     (path / "samples-01.csv").write_text("\n".join(lines[:20] + lines[1:5]) + "\n")
-    assert any("starts again" in text for text in run_report.evaluate(path).complaints)
+    assert any("starts again" in text for text in evaluate(path).complaints)
 
 
 def describe(path: Path, **changes: object) -> None:
@@ -87,20 +93,151 @@ def test_a_cell_beyond_reason_makes_the_file_damaged(tmp_path: Path, cell: int, 
     lines = [line.split(",") for line in path.read_text().splitlines()]
     lines[5][cell] = value
     path.write_text("\n".join(map(",".join, lines)) + "\n")
-    found = run_report.evaluate(path.parent)
+    found = evaluate(path.parent)
     assert found.complaints[0].startswith("samples-01.csv: damaged (")
     assert len(found.curves.each) == 1
 
 
-def test_a_joint_without_an_encoder_is_not_judged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = made_runs.shipped_plan()
-    joints = list(whole.arm.joints)
-    joints[1] = replace(joints[1], encoder=None)
-    blind = replace(whole, arm=replace(whole.arm, joints=tuple(joints)))
-    monkeypatch.setattr(made_runs, "shipped_plan", lambda: blind)
-    page = run_report.write(made_runs.make(tmp_path / "run")).read_text()
-    assert page.count("not measured") == 2
-    assert "nan" not in re.sub("<svg.*?</svg>", "", page, flags=re.DOTALL)
+def words(page: Path) -> str:
+    """The text of a page without its drawings."""
+    text = re.sub("<style.*?</style>|<svg.*?</svg>", "", page.read_text(), flags=re.DOTALL)
+    return html.unescape(re.sub("<[^>]*>", " ", text))
+
+
+def row(page: Path, *starts: str) -> list[str]:
+    """The cells of the table row that begins with these."""
+    text = page.read_text()
+    rows = [re.findall("<td[^>]*>([^<]*)</td>", one) for one in re.findall("<tr>(<td.*?)</tr>", text)]
+    (found,) = [cells for cells in rows if cells[: len(starts)] == [*starts]]
+    return found
+
+
+def test_a_joint_without_an_encoder_is_shown_as_commanded(tmp_path: Path) -> None:
+    page = run_report.write(made_runs.make(tmp_path / "run", plan=made_runs.blind_plan(1)))
+    text = words(page)
+    assert "OK as far as it was measured" in text
+    assert "joint 2 has no encoder: that the steps were sent is known, not that the arm made them" in text
+    assert "an encoder would show lost steps" in text
+    assert text.count("not measured") == 2
+    assert row(page, "joint 2", "speed") == ["joint 2", "speed", "39.47", "40 °/s", "–", "not measured"]
+    assert row(page, "joint 2", "1955")[2] == "1955"
+    assert "nan" not in text
+    assert page.read_text().count(">commanded</text>") == 1
+    assert page.read_text().count(">measured</text>") == 2
+
+
+def test_an_arm_without_encoders_gets_a_report_of_what_is_known(tmp_path: Path) -> None:
+    path = made_runs.make(tmp_path / "run", plan=made_runs.blind_plan(0, 1, 2))
+    page = run_report.write(path)
+    text = words(page)
+    assert "joint 1, joint 2 and joint 3 have no encoder" in text
+    assert "Measured against the plan" not in text  # no table of dashes
+    assert "not measured" not in text
+    assert row(page, "joint 2", "speed") == ["joint 2", "speed", "39.47", "40 °/s"]
+    assert [row(page, f"joint {n}", str(steps))[2] for n, steps in ((1, 6400), (2, 1955), (3, -3271))] == [
+        "6400",
+        "1955",
+        "-3271",
+    ]
+    assert "the board made every step pulse of the motion" in text
+    assert "the commanded motion keeps the limits of speed and acceleration" in text
+    found = evaluate(path)
+    np.testing.assert_allclose(found.curves.mean[0], found.curves.theory[0], atol=0.015)  # half a step
+    slower = [Limits(20.0, *limit.values[1:]) for limit in found.limits]
+    arm = replace(found.arm, joints=tuple(limited(found.arm.joints, slower)))
+    beyond = verdict.of(replace(found, arm=arm)).line
+    assert beyond.startswith(
+        "Not OK: the commanded motion exceeds the speed or acceleration limit of joint 1, "
+    )
+    assert page.read_text().count(">commanded</text>") == 3
+    assert verdict.of(found).summary == "OK as far as it was measured"
+
+
+def limited(joints: Sequence[Joint], limits: Sequence[Limits]) -> Iterator[Joint]:
+    """The joints with other limits where they are driven."""
+    left = iter(limits)
+    for joint in joints:
+        yield replace(joint, limits=next(left)) if joint.motor else joint
+
+
+@pytest.mark.parametrize("blind", [(), (0, 1, 2)])
+def test_a_motion_that_only_the_board_had_is_reported(tmp_path: Path, blind: tuple[int, ...]) -> None:
+    plan = made_runs.blind_plan(*blind)
+    path = made_runs.make(tmp_path / "run", plan=plan, on_board=True)
+    result = CliRunner().invoke(main, ["report", str(path)])
+    assert result.exit_code == 0, result.output
+    page = path / run_report.PAGE
+    text = words(page)
+    assert "it was on the board, and is read back from its record" in text
+    assert "armtempo run feed --repeat 3" in text
+    assert page.read_text().count("<figure") == len(FIGURES) - 1  # all but the search
+    found, whole = evaluate(path), plan.trajectory
+    times = np.linspace(0.0, whole.duration_s, 99)
+    np.testing.assert_allclose(found.trajectory(times), whole(times), atol=1e-6)
+    assert found.limits == [joint.limits for joint in plan.arm.driven]
+
+
+def test_of_a_folder_without_an_arm_the_limits_are_not_known(tmp_path: Path) -> None:
+    path = made_runs.make(tmp_path / "run", on_board=True)
+    (path / "arm.json").write_text("{")
+    found = evaluate(path)
+    assert found.arm is None
+    assert "arm.json: cannot be read" in found.complaints[0]
+    (path / "arm.json").unlink()
+    text = words(run_report.write(path))
+    assert "does not say which arm it was, so the motion is not held against limits" in text
+    assert evaluate(path).complaints == ()
+
+
+def test_the_verdict_of_a_good_run_is_ok(folder: Path, tmp_path: Path) -> None:
+    whole = made_runs.make(tmp_path / "whole")
+    told = verdict.of(evaluate(whole))
+    assert (told.state, told.summary, told.line) == ("good", "OK", "OK")
+    text = words(run_report.write(whole))
+    assert text.index("OK") < text.index("Result")
+    lossy = verdict.of(evaluate(folder))
+    assert lossy.line == "OK as far as it was measured: samples-01.csv: samples 5 to 6 are missing"
+
+
+def entry(path: Path, number: int, **changes: object) -> None:
+    """Change what run.json says of a repetition."""
+    entries = json.loads((path / "run.json").read_text())["repetitions"]
+    entries[number] |= changes
+    describe(path, repetitions=entries)
+
+
+def test_the_verdict_names_what_is_wrong(tmp_path: Path) -> None:
+    path = made_runs.make(tmp_path / "run")
+    entry(path, 1, commanded_steps=[6400, -1353, -1849], state="complete")
+    told = verdict.of(evaluate(path))
+    assert told.summary == "Not OK"
+    assert "joint 2 ended up to 1 steps" not in told.line
+    entry(path, 1, commanded_steps=[6398, -3378, -1849])
+    assert "joint 1 ended up to 2 steps from where the motion ends" in verdict.of(evaluate(path)).line
+    entry(path, 1, state="fault", fault="following")
+    assert verdict.of(evaluate(path)).line == "Not OK: 2 of 3 repetitions complete"
+
+
+def test_an_arm_that_does_not_follow_is_not_ok(tmp_path: Path) -> None:
+    path = made_runs.make(tmp_path / "run", scatter_deg=3.0)
+    line = verdict.of(evaluate(path)).line
+    assert line.startswith("Not OK: ")
+    assert re.search(r"joint 1 was up to \d+\.\d\d° from the plan, 2° are allowed", line)
+
+
+def test_every_column_is_explained(folder: Path) -> None:
+    text = (folder / run_report.PAGE).read_text()
+    explained = set(re.findall("<dt>([^<]*)</dt>", text))
+    for name in (
+        "angle RMS (°)",
+        "final (°)",
+        "lag at end (ms)",
+        "steps made",
+        "planned",
+        "verdict",
+        "floor (s)",
+    ):
+        assert name in explained
 
 
 @pytest.mark.parametrize(
@@ -108,7 +245,11 @@ def test_a_joint_without_an_encoder_is_not_judged(tmp_path: Path, monkeypatch: p
     [
         (lambda path: (path / "run.json").unlink(), "not a run folder"),
         (lambda path: (path / "run.json").write_text("{"), "damaged"),
-        (lambda path: (path / "trajectory.json").unlink(), "no trajectory.json"),
+        (
+            lambda path: [(path / name).unlink() for name in ("trajectory.json", MOTION)],
+            "what was to move is not",
+        ),
+        (lambda path: [(path / "trajectory.json").unlink(), (path / MOTION).write_bytes(b"x")], MOTION),
         (lambda path: describe(path, name=None), "'name' is missing"),
         (lambda path: describe(path, started=None), "'started' is missing"),
         (lambda path: describe(path, joints=[]), "run.json tells of 0 joints, trajectory.json of 3"),
@@ -120,7 +261,7 @@ def test_a_folder_that_is_no_run_is_refused(tmp_path: Path, spoil: object, said:
     path = made_runs.make(tmp_path / "run", repetitions=1)
     spoil(path)  # type: ignore[operator]
     with pytest.raises(RunFolderError, match=said):
-        run_report.evaluate(path)
+        evaluate(path)
     result = CliRunner().invoke(main, ["report", str(path)])
     assert result.exit_code == 1
     assert said in result.output
@@ -135,7 +276,7 @@ def test_two_runs_are_compared_on_one_page(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     page = (tmp_path / comparison.PAGE).read_text()
     assert "run-1" in page
-    assert page.count("<svg") == 3
+    assert page.count("<figure") == 3
     three = CliRunner().invoke(main, ["report", *runs, str(broken), "--out", str(tmp_path / "three.html")])
     assert three.exit_code == 0, three.output
     assert "broken is not a run folder" in three.stderr
@@ -158,7 +299,7 @@ def test_a_run_cut_short_is_said_and_the_rest_reported(tmp_path: Path) -> None:
     text = (path / run_report.PAGE).read_text()
     assert "samples-02.csv: cut short, ended as fault (following) after 2.9 s" in text
     assert "1 of 2 repetitions complete" in text
-    assert text.count("<svg") == len(FIGURES)
+    assert text.count("<figure") == len(FIGURES)
 
 
 def test_when_the_joints_pass_the_via_points_is_told(folder: Path) -> None:
@@ -166,7 +307,7 @@ def test_when_the_joints_pass_the_via_points_is_told(folder: Path) -> None:
     text = (folder / run_report.PAGE).read_text()
     times = [joint.via_times_s[2] for joint in plan.trajectory.joints]
     cells = ("P2", *(f"{time:.3f}" for time in times), f"{max(times) - min(times):.3f}")
-    row = re.search(r"<tr><td>P2.*?</tr>", text)
+    row = re.search(r"<tr><td[^>]*>P2.*?</tr>", text)
     assert row
     assert tuple(re.findall(r">([^<]+)<", row.group())) == cells
     assert f"strays up to {path_deviation.tool_stray_mm(plan.arm, plan.trajectory):.1f} mm" in text
@@ -186,7 +327,7 @@ def test_shared_timing_needs_no_such_section(tmp_path: Path) -> None:
 def spoil_plan(path: Path, change: Callable[[Plan], Plan]) -> None:
     """Change the plan in a run folder."""
     file = path / "trajectory.json"
-    trajectory_file.save(change(trajectory_file.load(file)), file)
+    trajectory_file.save(change(trajectory_file.load(file)), file, force=True)
 
 
 @pytest.mark.parametrize("changes", [{"name": "another"}, {"driver": Driver(pulse_us=9.0)}])
@@ -198,25 +339,26 @@ def test_runs_of_different_arms_are_told_apart(tmp_path: Path, changes: dict[str
     comparison.write(runs, tmp_path / "page.html")
     text = (tmp_path / "page.html").read_text()
     assert "different arms" in text
-    assert text.count("<svg") == 3
+    assert text.count("<figure") == 3
 
 
-def test_in_a_browser(folder: Path, tmp_path: Path) -> None:
-    """Wide, on a phone, light and dark: nothing fetched, nothing cut off, all figures there."""
+@pytest.mark.parametrize(("width", "dark"), [(1200, False), (1200, True), (768, False), (375, True)])
+def test_in_a_browser(folder: Path, tmp_path: Path, width: int, dark: bool) -> None:
+    """Wide and narrow, light and dark: nothing fetched, nothing cut off or to be scrolled sideways, all to be read."""
     browser.needed()
-    page = folder / run_report.PAGE
-    light = browser.probe(page, tmp_path, 1200)
-    dark = browser.probe(page, tmp_path, 1200, dark=True)
-    phone = browser.probe(page, tmp_path, 500)
-    for found in (light, dark, phone):
-        assert found["fetched"] == []
-        assert found["overflow"] <= 0
-        assert len(found["figures"]) == len(FIGURES)
-        assert min(found["figures"]) > 80
-        assert found["tables"] == 5
-        assert "How to repeat it" in found["text"]
-        assert "Per-joint timing" in found["text"]
-    assert phone["width"] <= 500
-    assert light["background"] == "rgb(255, 255, 255)"
-    assert dark["background"] != light["background"]
-    assert dark["colour"] != light["colour"]
+    found = browser.probe(folder / run_report.PAGE, tmp_path, width, dark)
+    assert found["width"] == width
+    assert found["fetched"] == []
+    assert found["overflow"] <= 0
+    assert found["cut"] == []
+    assert len(found["figures"]) == PARTS
+    assert min(found["figures"]) > 80
+    assert (
+        min(found["scales"]) > 0.9
+    )  # against CSS pixels a point: text of 10 points is at least 9 pixels high
+    assert found["tables"] == 6
+    assert "How to repeat it" in found["text"]
+    assert "Per-joint timing" in found["text"]
+    light = found["background"] == "rgb(255, 255, 255)"
+    assert light != dark
+    assert found["colour"] != found["background"]

@@ -13,8 +13,9 @@ import pytest
 from armtempo.errors import InputError
 from armtempo.model import trajectory_file
 from armtempo.model.arm import Arm
-from armtempo.model.job import Job, Pose
+from armtempo.model.job import Job
 from armtempo.model.plan import Plan
+from armtempo.model.tool_pose import Pose
 from armtempo.planning import planner
 
 ARM = Arm.paper()
@@ -84,9 +85,11 @@ def test_refuses_every_cut_of_the_file(path: Path, tmp_path: Path) -> None:
 
 
 def edited(path: Path, edit: Callable[[Any], None]) -> Path:
-    """The file with its content changed."""
+    """The file with its content changed, and its checksum with it."""
     content = json.loads(path.read_text(encoding="utf-8"))
     edit(content)
+    if "plan" in content and "sha256" in content:
+        content["sha256"] = trajectory_file._checksum(content["plan"])
     path.write_text(json.dumps(content), encoding="utf-8")
     return path
 
@@ -95,7 +98,16 @@ def edited(path: Path, edit: Callable[[Any], None]) -> Path:
     ("edit", "message"),
     [
         (lambda c: c.update(format="gcode"), "not a trajectory file"),
-        (lambda c: c.update(version=2), "version 2"),
+        (lambda c: c.update(version=3), "version 3"),
+        (lambda c: c["plan"]["job"].update(refine="some"), "a number or 'auto'"),
+        (
+            lambda c: c["plan"]["trajectory"]["joints"][0].update(via_segments=[0, 1, 1, 3, 4, 5, 6]),
+            "do not increase",
+        ),
+        (
+            lambda c: c["plan"]["trajectory"]["joints"][0].update(via_segments=[0, 6]),
+            "must name 7 via points",
+        ),
         (lambda c: c.update(extra=1), "unknown or missing key"),
         (lambda c: c["plan"].update(colour="red"), "plan: unknown key colour"),
         (lambda c: c["plan"]["job"].pop("seed"), "plan.job: missing key seed"),
@@ -156,7 +168,7 @@ def test_writes_whole_or_not_at_all(plan: Plan, tmp_path: Path, monkeypatch: pyt
 
     monkeypatch.setattr("os.replace", broken)
     with pytest.raises(InputError, match="No space left"):
-        trajectory_file.save(plan, target)
+        trajectory_file.save(plan, target, force=True)
     assert target.read_text() == "old"
     assert list(tmp_path.iterdir()) == [target]
 
@@ -164,3 +176,93 @@ def test_writes_whole_or_not_at_all(plan: Plan, tmp_path: Path, monkeypatch: pyt
 def test_says_where_it_cannot_write(plan: Plan, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be written"):
         trajectory_file.save(plan, tmp_path / "none" / "feed.json")
+
+
+ALTERATIONS: list[Callable[[Any], None]] = [
+    lambda plan: plan["trajectory"]["joints"][0]["angle_points_deg"].__setitem__(3, 0.123),
+    lambda plan: plan["arm"]["joints"][0]["limits"].update(speed_deg_s=51.0),
+    lambda plan: plan["arm"]["joints"][1]["motor"].update(gear_ratio=21.0),
+    lambda plan: plan["job"].update(seed=2),
+    lambda plan: plan.update(notes=["nothing to see"]),
+]
+
+
+@pytest.mark.parametrize("alter", ALTERATIONS)
+def test_an_altered_file_is_refused_unless_it_is_asked_for(
+    path: Path, alter: Callable[[Any], None], caplog: pytest.LogCaptureFixture
+) -> None:
+    content = json.loads(path.read_text(encoding="utf-8"))
+    alter(content["plan"])
+    path.write_text(json.dumps(content), encoding="utf-8")
+    with pytest.raises(InputError, match=r"feed\.json was altered .* --altered"):
+        trajectory_file.load(path)
+    assert not caplog.records
+    trajectory_file.load(path, altered=True)
+    assert "was altered" in caplog.text
+
+
+def test_blanks_and_line_breaks_are_no_alteration(path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    path.write_text(json.dumps(json.loads(path.read_text())), encoding="utf-8")
+    trajectory_file.load(path)
+    assert not caplog.records
+
+
+def test_a_checksum_that_was_taken_away_is_missed(path: Path) -> None:
+    content = json.loads(path.read_text(encoding="utf-8"))
+    del content["sha256"]
+    path.write_text(json.dumps(content), encoding="utf-8")
+    with pytest.raises(InputError, match="missing key"):
+        trajectory_file.load(path)
+
+
+def test_a_file_from_before_the_checksum_is_read_with_a_note(
+    path: Path, plan: Plan, caplog: pytest.LogCaptureFixture
+) -> None:
+    content = json.loads(path.read_text(encoding="utf-8"))
+    del content["sha256"]
+    path.write_text(json.dumps({**content, "version": 1}), encoding="utf-8")
+    assert trajectory_file.load(path).job == plan.job
+    assert "before trajectory files had a checksum" in caplog.text
+
+
+def test_an_altered_file_in_a_run_folder_is_to_be_brought_back(path: Path) -> None:
+    (path.parent / "run.json").write_text("{}")
+    content = json.loads(path.read_text(encoding="utf-8"))
+    content["plan"]["job"]["seed"] = 7
+    path.write_text(json.dumps(content), encoding="utf-8")
+    with pytest.raises(InputError, match="bring the original back"):
+        trajectory_file.load(path)
+
+
+def test_only_an_earlier_plan_of_the_same_job_and_arm_is_replaced(plan: Plan, path: Path) -> None:
+    trajectory_file.save(replace(plan, job=replace(plan.job, seed=9)), path)
+    assert trajectory_file.load(path).job.seed == 9
+    for other in (
+        replace(plan, job=replace(plan.job, name="another")),
+        replace(plan, arm=replace(plan.arm, name="another")),
+    ):
+        with pytest.raises(InputError, match=r"exists and has other content.*the same job.*--force"):
+            trajectory_file.save(other, path)
+        assert trajectory_file.load(path).job.seed == 9
+        trajectory_file.save(other, path.with_name("new.json"), force=True)
+        trajectory_file.save(other, path, force=True)
+        trajectory_file.save(replace(plan, job=replace(plan.job, seed=9)), path, force=True)
+
+
+def test_an_altered_plan_of_the_same_job_is_kept(plan: Plan, path: Path) -> None:
+    content = json.loads(path.read_text(encoding="utf-8"))
+    content["plan"]["job"]["seed"] = 7
+    path.write_text(json.dumps(content), encoding="utf-8")
+    before = path.read_bytes()
+    with pytest.raises(InputError, match="--force"):
+        trajectory_file.save(plan, path)
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("text", ["", "name = 'arm'", "[1]", '{"format": "armtempo trajectory"}', "\xff"])
+def test_what_is_no_trajectory_file_is_kept(plan: Plan, tmp_path: Path, text: str) -> None:
+    target = tmp_path / "arm.toml"
+    target.write_bytes(text.encode("latin-1"))
+    with pytest.raises(InputError, match="--force"):
+        trajectory_file.save(plan, target)
+    assert target.read_bytes() == text.encode("latin-1")

@@ -134,7 +134,7 @@ def test_the_tip_chooses_the_chain(tmp_path: Path) -> None:
 
 
 REFUSED = [
-    ("gripper", [], ["Choose with --tip: left_finger, right_finger"]),
+    ("gripper", [], ["choose with --tip: left_finger, right_finger"]),
     ("gripper", ["--tip", "right_finger"], ["joint 'right': it mimics 'left'"]),
     ("gripper", ["--tip", "thumb"], ["has no link 'thumb' for --tip", "left_finger"]),
     ("gripper", ["--base", "hand", "--tip", "l1"], ["no chain leads from link 'hand' to 'l1'"]),

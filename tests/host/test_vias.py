@@ -10,10 +10,11 @@ import pytest
 from armtempo.cli import main
 from armtempo.errors import InputError, PlanError
 from armtempo.kinematics import Geometry, forward
-from armtempo.model import trajectory_file
+from armtempo.model import arm_file, trajectory_file
 from armtempo.model.arm import Arm
-from armtempo.model.job import Job, Pose
+from armtempo.model.job import Job
 from armtempo.model.pose import from_rpy
+from armtempo.model.tool_pose import Pose
 from armtempo.planning import planner, via_points
 from click.testing import CliRunner
 
@@ -170,7 +171,9 @@ def test_plan_prints_the_notes(tmp_path: Path) -> None:
         f"[[via]]\nmatrix = {[list(map(float, row)) for row in rows]}\n"
     )
     output = tmp_path / "posed.json"
-    result = CliRunner().invoke(main, ["plan", "--job", str(file), "-o", str(output)])
+    result = CliRunner().invoke(
+        main, ["plan", "--arm", str(arm_file.default_path()), "--job", str(file), "-o", str(output)]
+    )
     assert result.exit_code == 0, result.output
     assert "note: via 2: the pose needs joints that have no motor: joint 5 at 30 deg" in result.output
     plan = trajectory_file.load(output)

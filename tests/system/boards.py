@@ -16,10 +16,19 @@ ARM = Arm.paper()
 TIMEOUT_S = commandline.SLOW_S
 
 
-def small_plan(path: Path, end_deg: tuple[float, ...] = (20.0, -75.0, 50.0)) -> Path:
+def small_plan(path: Path, end_deg: tuple[float, ...] = (20.0, -75.0, 50.0), name: str = "small") -> Path:
     """A trajectory file that needs little search: from the paper arm's home straight to ``end_deg``."""
     start_deg = tuple(joint.home_deg for joint in ARM.driven)
-    job = Job("small", (start_deg, end_deg), population=5, iterations=20)
+    job = Job(
+        name,
+        (start_deg, end_deg),
+        timing="per-joint",
+        refine=1,
+        polish=False,
+        bounds_s=(0.1, 3.0),
+        population=5,
+        iterations=20,
+    )
     trajectory_file.save(planner.plan(ARM, job), path)
     return path
 

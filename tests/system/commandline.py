@@ -36,11 +36,11 @@ def run(*arguments: str | Path, folder: Path, **environment: str) -> Ended:
 
 
 def start(*arguments: str | Path, folder: Path, **environment: str) -> subprocess.Popen[str]:
-    """Start in ``folder``, away from the terminal's signals."""
+    """Start in ``folder``, away from the terminal's signals; on a virtual board unless another port is named."""
     return subprocess.Popen(
         [*COMMAND, *map(str, arguments)],
         cwd=folder,
-        env={**os.environ, **environment},
+        env={**os.environ, "ARMTEMPO_PORT": "sim", **environment},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

@@ -13,7 +13,7 @@ from armtempo.model.arm import Arm, DrivenJoint
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.planning import planner
-from armtempo.robot.board import connect
+from armtempo.robot.connect import connect
 from armtempo.runs import reader
 from armtempo.simulator import edgelog
 from armtempo.splines.trajectory import JointSpline

@@ -38,7 +38,9 @@ def test_a_wrong_file(kind: str, old: str | None, new: str, what: str, cure: str
     old = old or text[text.index("via_deg") :]
     assert old in text
     (tmp_path / "wrong.toml").write_text(text.replace(old, new), encoding="utf-8")
-    done = commandline.run("plan", f"--{kind}", "wrong.toml", folder=tmp_path)
+    done = commandline.run(
+        "plan", f"--{kind}", "wrong.toml", *(("--arm", "paper") if kind == "job" else ()), folder=tmp_path
+    )
     done.said("wrong.toml", what, cure)
     assert done.exit_code == 2
     assert [path.name for path in tmp_path.iterdir()] == ["wrong.toml"]

@@ -8,7 +8,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from armtempo.deploy import deploy, firmware, package, remote
+from armtempo.deploy import deploy, package, remote
+from armtempo.deploy.firmware import frozen
 from armtempo.errors import LinkError
 from armtempo.simulator import LaunchOptions, VirtualBoard, edgelog, launch
 
@@ -16,7 +17,7 @@ from tests import interpreters
 from tests.system import commandline
 from tests.system.boards import armtempo, small_plan
 
-SOURCES_BLOCKS = 600
+SOURCES_BLOCKS = 800
 """A flash in which the sources have room; the chip takes compiled files."""
 INTERPRETERS = [name for name in interpreters.AVAILABLE if name != "micropython-arm"]
 
@@ -41,7 +42,7 @@ def steps_of_a_run(folder: Path, deployed: bool) -> dict[str, list[int]]:
     ) as found:
         if deployed:
             armtempo("deploy", "--port", found.port, cwd=folder)
-        armtempo("home", "--port", found.port, cwd=folder)
+        armtempo("home", "--arm", "paper", "--port", found.port, cwd=folder)
         armtempo("run", small_plan(folder / "small.json"), "--port", found.port, cwd=folder)
     edges = edgelog.read(log)[-1].motion()
     return {pin: edges[pin][0].tolist() for pin in ("A15", "A1", "B10")}
@@ -74,7 +75,7 @@ def test_from_an_empty_board_and_back(tmp_path: Path, name: str) -> None:
         damaged = next((flash / "lib" / "armtempo_board").rglob("program.*py"))
         damaged.write_bytes(b"")
         assert "1 files of the library written" in armtempo("deploy", "--port", port, cwd=tmp_path)
-        armtempo("home", "--port", port, cwd=tmp_path)
+        armtempo("home", "--arm", "paper", "--port", port, cwd=tmp_path)
         file = small_plan(tmp_path / "small.json")
         assert "complete" in armtempo("run", file, "--port", port, cwd=tmp_path)
         assert "boot.py" in mpremote(port, "ls", ":/flash")
@@ -114,7 +115,7 @@ def test_mip_installs_the_package(tmp_path: Path) -> None:
 def test_program_in_the_firmware_needs_only_start_files(tmp_path: Path) -> None:
     """What is in the firmware is found before /flash/lib; here the root of the flash stands for it."""
     flash = tmp_path / "flash"
-    firmware.write(tmp_path / "firmware")
+    frozen.write(tmp_path / "firmware")
     shutil.copytree(tmp_path / "firmware", flash)
     old = flash / "lib" / "armtempo_board" / "app.py"
     old.parent.mkdir(parents=True)
@@ -130,5 +131,5 @@ def test_program_in_the_firmware_needs_only_start_files(tmp_path: Path) -> None:
         assert "up to date" in armtempo("deploy", "--port", port, cwd=tmp_path)
         assert "does not start" in armtempo("undeploy", "--port", port, cwd=tmp_path)
         (flash / "armtempo_shared" / "firmware.py").write_text("CRC = 1\n")
-        assert "deploy --firmware" in armtempo("deploy", "--port", port, cwd=tmp_path, code=1)
+        assert "a new firmware is due" in armtempo("deploy", "--port", port, cwd=tmp_path, code=1)
         assert not (flash / "main.py").exists()

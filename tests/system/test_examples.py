@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -69,10 +70,9 @@ def started(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("examples")
     (folder / "my_arm.toml").write_text(arm_file.default_path().read_text())
     (folder / "my_job.toml").write_text(job_file.default_path().read_text())
-    plan = small_plan(folder / "feed.json")
+    plan = small_plan(folder / "feed.json", name="feed")
     done = commandline.run("run", plan, "--repeat", "2", folder=folder)
     assert done.exit_code == 0, done.errors
-    (folder / "runs" / "small-001").rename(folder / "runs" / "feed-001")
     return folder
 
 
@@ -96,6 +96,7 @@ def test_python_example(name: str, code: str, started: Path) -> None:
 def test_commands(page: str, block: list[list[str]], port: str, started: Path, tmp_path: Path) -> None:
     for name in ("my_arm.toml", "my_job.toml"):
         (tmp_path / name).write_text((started / name).read_text())
+    shutil.copytree(started / "runs" / "feed-001", tmp_path / "runs" / "feed-001")  # the demo's
     environment = {}
     for words in block:
         if words[0] == "export":

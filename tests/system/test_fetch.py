@@ -24,7 +24,7 @@ def test_button_then_fetch(tmp_path: Path) -> None:
         def on_board(*arguments: str | Path, code: int = 0) -> str:
             return armtempo(*arguments, "--port", port, cwd=tmp_path, code=code)
 
-        on_board("home", "1,-60,40")
+        on_board("home", "1,-60,40", "--arm", "paper")
         assert "fetched" in on_board("fetch", file, code=1)
         on_board("upload", file, "--default")
         on_board("goto", file)  # the first motion

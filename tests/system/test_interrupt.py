@@ -19,7 +19,7 @@ from tests.system.boards import TIMEOUT_S, armtempo, small_plan, start
 def test_interrupted_run(tmp_path: Path, number: signal.Signals) -> None:
     file = small_plan(tmp_path / "small.json", (90.0, -75.0, 50.0))
     with launch(LaunchOptions(virtual_time=False)) as board:
-        armtempo("home", "--port", board.port, cwd=tmp_path)
+        armtempo("home", "--arm", "paper", "--port", board.port, cwd=tmp_path)
         process = start("run", file, "--port", board.port, cwd=tmp_path)
         samples = tmp_path / "runs" / "small-001" / "samples-01.csv"
         _wait_for_lines(samples, 4)
@@ -42,7 +42,7 @@ def test_interrupted_run(tmp_path: Path, number: signal.Signals) -> None:
 def test_killed_host_leaves_a_readable_folder_and_a_board_to_talk_to(tmp_path: Path) -> None:
     file = small_plan(tmp_path / "small.json")
     with launch(LaunchOptions(virtual_time=False)) as board:
-        armtempo("home", "--port", board.port, cwd=tmp_path)
+        armtempo("home", "--arm", "paper", "--port", board.port, cwd=tmp_path)
         process = start("run", file, "--port", board.port, cwd=tmp_path)
         _wait_for_lines(tmp_path / "runs" / "small-001" / "samples-01.csv", 4)
         process.kill()

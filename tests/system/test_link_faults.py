@@ -20,7 +20,7 @@ def test_run_over_a_bad_cable_is_complete(tmp_path: Path, kind: str) -> None:
     file = small_plan(tmp_path / "small.json")
     to_board, from_board = Noise(f"to {kind}", 0.002, (kind,)), Noise(f"from {kind}", 0.002, (kind,))
     with launch() as board, Relay(board.port, tmp_path / "port", to_board, from_board) as relay:
-        armtempo("home", "--port", relay.port, cwd=tmp_path)
+        armtempo("home", "--arm", "paper", "--port", relay.port, cwd=tmp_path)
         output = armtempo("run", file, "--port", relay.port, cwd=tmp_path)
     assert "complete" in output
     assert to_board.hits + from_board.hits > 0
@@ -35,7 +35,7 @@ def test_cable_pulled_during_a_run_and_put_back(tmp_path: Path) -> None:
         launch(LaunchOptions(virtual_time=False)) as board,
         Relay(board.port, tmp_path / "port", clean, clean) as relay,
     ):
-        armtempo("home", "--port", relay.port, cwd=tmp_path)
+        armtempo("home", "--arm", "paper", "--port", relay.port, cwd=tmp_path)
         process = start("run", file, "--port", relay.port, cwd=tmp_path)
         path = tmp_path / "runs" / "small-001" / "samples-01.csv"
         limit = time.monotonic() + TIMEOUT_S
@@ -58,9 +58,9 @@ def test_cable_put_into_another_board_during_a_run(tmp_path: Path) -> None:
     file = small_plan(tmp_path / "small.json", (90.0, -75.0, 50.0))
     path = tmp_path / "runs" / "small-001" / "samples-01.csv"
     with launch(LaunchOptions(virtual_time=False)) as board, launch(LaunchOptions(seed=1)) as other:
-        armtempo("home", "--port", other.port, cwd=tmp_path)
+        armtempo("home", "--arm", "paper", "--port", other.port, cwd=tmp_path)
         with Relay(board.port, tmp_path / "port", clean, clean) as relay:
-            armtempo("home", "--port", relay.port, cwd=tmp_path)
+            armtempo("home", "--arm", "paper", "--port", relay.port, cwd=tmp_path)
             process = start("run", file, "--port", relay.port, cwd=tmp_path)
             wait_for(lambda: path.is_file() and path.read_text().count("\n") > 4, "the first samples")
         with Relay(other.port, tmp_path / "port", clean, clean):
@@ -76,7 +76,7 @@ def test_interrupt_while_the_cable_is_out(tmp_path: Path) -> None:
         launch(LaunchOptions(virtual_time=False)) as board,
         Relay(board.port, tmp_path / "port", clean, clean) as relay,
     ):
-        armtempo("home", "--port", relay.port, cwd=tmp_path)
+        armtempo("home", "--arm", "paper", "--port", relay.port, cwd=tmp_path)
         process = start("run", file, "--port", relay.port, cwd=tmp_path)
         path = tmp_path / "runs" / "small-001" / "samples-01.csv"
         limit = time.monotonic() + TIMEOUT_S

@@ -284,7 +284,7 @@ def test_what_the_page_quotes_of_messages_is_said() -> None:
         "is in use",
         "no permission to open",
         "set up for another arm",
-        "needs an STM32F405",
+        "connect an STM32F405",
     ):
         assert words in PAGE
         assert words in re.sub(r'"\s+f?"', "", sources), words

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.model import arm_file
+from armtempo.model import arm_file, job_file
 from armtempo.runs import reader
 from armtempo.simulator import LaunchOptions, launch
 
@@ -22,8 +22,10 @@ def test_board_on_a_port(tmp_path: Path) -> None:
             return armtempo(*arguments, "--port", board.port, cwd=tmp_path, code=code)
 
         assert "armtempo home" in on_board("run", file, code=1)
-        on_board("home")
-        assert "20.00, -75.0" in on_board("goto", "P1")
+        on_board("home", "--arm", "paper")
+        said = on_board("goto", "P1", "--job", job_file.default_path())
+        assert "20.00°" in said
+        assert "-75.0" in said
         assert "armtempo goto" in on_board("run", file, code=1)
         on_board("goto", file)
         output = on_board("run", file, "--repeat", "2", "--log-traffic", "traffic.log")
@@ -49,7 +51,10 @@ def test_board_set_up_for_another_arm(tmp_path: Path) -> None:
     text = arm_file.default_path().read_text().replace("microsteps = 8", "microsteps = 16")
     (tmp_path / "other.toml").write_text(text)
     armtempo("home", "--arm", "other.toml", "--port", "sim:flash", cwd=tmp_path)
-    assert "--arm" in armtempo("home", "--port", "sim:flash", cwd=tmp_path, code=1)
+    assert "give --arm" in armtempo("home", "--port", "sim:flash", cwd=tmp_path, code=2)
+    refused = armtempo("home", "--arm", "paper", "--port", "sim:flash", cwd=tmp_path, code=1)
+    assert "set up for another arm" in refused
+    assert "armtempo configure" in refused
     armtempo("home", "--arm", "other.toml", "--port", "sim:flash", cwd=tmp_path)
 
 

@@ -20,6 +20,7 @@ from tests.interpreters import ROOT
 COMMAND = (sys.executable, "-X", "importtime", "-c", "from armtempo.__main__ import main; main()", "plan")
 SHORT = ("--iterations", "1", "--population", "4")
 ENDLESS = ("--iterations", "1000000")
+SAID = "no arm and no job are named; these are the feeding job and the arm that ship with armtempo\n"
 MOMENTS = 8
 SEED = 20266
 
@@ -94,7 +95,7 @@ def test_an_interrupt_during_the_imports_ends_it_quietly(number: int, whole: Wat
     run = Watched(tmp_path, ENDLESS, after, interrupt)
     what = f"seed {SEED}, after {whole.imported[after - 1]}, module {after}"
     assert run.exit_code == 130, f"{what}: {run.errors}"
-    assert run.errors == "armtempo: interrupted\n", what
+    assert run.errors.removeprefix(SAID) == "armtempo: interrupted\n", what
     assert not list(tmp_path.iterdir()), what
 
 

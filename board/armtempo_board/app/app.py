@@ -13,6 +13,7 @@ import sys
 import time
 
 from armtempo_shared import codes
+from armtempo_shared.messages import MAX_PAYLOAD
 from micropython import const
 
 from armtempo_board import heap
@@ -22,6 +23,7 @@ from armtempo_board.app.events import Events
 from armtempo_board.link.serial_link import SerialLink
 
 _EXTRA_SERVICES_PER_TURN = const(3)  # of the engine, while something moves
+_SPARE_BYTES = const(1024)  # kept for telling of a failure: a traceback, and its end for the host
 _MOST_FAILURES = const(10)  # turns of the loop that fail one after the other; then the program gives up
 
 
@@ -38,6 +40,7 @@ class App:
         self.events = Events(self.controller, self.link)
         self.turns = self._failed = 0  # turns of the loop, and the last of them that failed
         self._failures = 0
+        self._spare: "bytearray | None" = bytearray(_SPARE_BYTES)
         heap.forget()
         self.controller.configure()
 
@@ -89,13 +92,20 @@ class App:
         self._failures = self._failures + 1 if again else 1
         self._failed = self.turns
         self.controller.fail()
-        self.events.note(_traceback(error))
         self.events.note_fault(codes.INTERNAL)
+        self._spare = None
+        try:
+            self.events.note(_traceback(error))
+            self._spare = bytearray(_SPARE_BYTES)
+        except MemoryError:
+            self.events.note_bytes(b"MemoryError, and no memory left to say where")
         if self._failures >= _MOST_FAILURES:
             raise error
 
 
 def _traceback(error: "BaseException") -> str:
+    """The end of it, as it says what is wrong."""
     text = io.StringIO()
     sys.print_exception(error, text)
-    return str(text.getvalue())
+    text.seek(max(0, text.tell() - MAX_PAYLOAD))
+    return str(text.read())

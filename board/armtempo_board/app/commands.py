@@ -70,6 +70,12 @@ class Commands:
             self._dispatch(number)
         except Refused as refused:
             self._refuse(number, refused.code, refused.joint, refused.value)
+        except MemoryError:
+            self._refuse(number, codes.NO_MEMORY)
+            raise
+        except Exception:
+            self._refuse(number, codes.FAILED)
+            raise
 
     def _dispatch(self, number: int) -> None:
         row = self._table.get(number)
@@ -87,6 +93,8 @@ class Commands:
         self.controller.refill()
         handler = row[_HANDLER]
         size = self._store(handler, row, length) if isinstance(handler, str) else handler(row, length)
+        if self.controller.arm_waits:
+            self.controller.take_new_arm()
         self.controller.refill()
         self._link.answer(self._ok, _ANSWER_AT - PAYLOAD_AT + (size or 0))
 
@@ -150,6 +158,10 @@ class Commands:
             controller.arm_crc,
             controller.program_crc,
             controller.boot,
+            controller.engine_room(),
+            controller.engine_joints(),
+            controller.arm_problem,
+            controller.arm_value,
         )
         return self.reply_tail(size, controller.board_id)
 

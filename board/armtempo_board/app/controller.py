@@ -15,9 +15,7 @@ from array import array
 
 import machine
 from armtempo_shared import codes, messages
-from armtempo_shared.limits import MAX_JOINTS
 from armtempo_shared.messages import ARM_RECORD_NAME, NO_JOINT, SAMPLE_BRAKING, START_HOMING
-from armtempo_shared.motion import Motion, MotionError
 from micropython import const
 
 from armtempo_board import heap
@@ -31,11 +29,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any
 
-_MOST_SAMPLES = const(4096)  # bytes of the sample buffer at most,
-_LEAST_SAMPLES = const(1024)  # and at least;
-_SAMPLES_SHARE = const(16)  # between them, this part of the free heap
+    from armtempo_board.motion.arm_check import Record as ArmRecord
+    from armtempo_board.storage.motion_file import MotionFile
+
 _BYTES_PER_JOINT = const(8)  # in a sample on the wire
-_CRC_BYTES = const(4)
 _BOOT_BYTES = const(4)
 _NEVER_MS = const((1 << 30) - 1)
 
@@ -46,16 +43,26 @@ class Controller:
     def __init__(self, root: str, program_crc: int, fault: int) -> None:
         from armtempo_shared.table import offset  # here, so that it can be forgotten
 
+        from armtempo_board.app import room
+
         flags_at = offset("E", "sample", "flags") - offset("E", "sample", "ticks")
+        heap.forget()
+        self._workspace = room.workspace()  # before anything can stand in the way of the largest pieces
+        self.samples = SampleBuffer(room.sample_bytes(), flags_at)
         self._root = root
         self._store: "Any" = None
         self.engine: "Any" = None
-        self.samples = SampleBuffer(MAX_JOINTS, 0, flags_at)
         self.program_crc = program_crc
         self.board_id = _board_id()
         self.boot = int.from_bytes(os.urandom(_BOOT_BYTES), "little")  # another number after each power-up
         self.joints = 0
         self.arm_crc = 0
+        self._all_but_limits = 0  # of the arm record: what makes two of them the same arm
+        self.arm_waits = False  # an arm record has been stored, and is to be taken
+        self.arm_problem = (
+            0  # code: why the stored arm record is not in force, 0 where it is or there is none,
+        )
+        self.arm_value = 0  # and its value
         self.free_flash = 0
         self.free_heap = 0
         self.run_number = 0
@@ -132,36 +139,114 @@ class Controller:
     # what commands, button and prompt ask for
 
     def configure(self) -> None:
-        """Take the stored arm record; without one the board stays unconfigured."""
-        from armtempo_shared.armrecord import FLAG_STOP_ON_LINK_LOSS  # here, so that it can be forgotten
+        """Take the stored arm record; without one, or where it cannot be used, the board stays unconfigured.
 
-        record = self._arm_record()
-        if record is None:
-            return
+        What stands in the flash never keeps the program from starting: ``arm_problem`` says what is wrong with it.
+        """
+        self.arm_waits = False
+        self.arm_problem = self.arm_value = 0
+        try:
+            self._take_arm(self._stored_arm())
+        except Refused as refused:
+            if refused.code != codes.NOT_FOUND:
+                self.arm_problem, self.arm_value = refused.code, refused.value
+        except Exception as error:
+            self._drop_engine()
+            self.arm_problem = codes.NO_MEMORY if isinstance(error, MemoryError) else codes.FAILED
+        heap.forget()
+
+    def take_new_arm(self) -> None:
+        """Take the arm record that was uploaded; Refused where it cannot be, and the one in force stays that.
+
+        Step by step, so that never more than one of store, check and engine needs memory. Each step is a function of
+        its own: what its frame leaves on the stack would keep its modules in memory.
+        """
+        self.arm_waits = False
+        data = self._new_arm()
+        try:
+            record = self._judged(data)
+        except Refused:
+            self._decide(False)
+            raise
+        self._decide(True)
+        self.arm_problem = self.arm_value = 0
+        try:
+            self._take_arm(record)
+        except Exception:
+            self._drop_engine()
+            raise
+        heap.forget()
+
+    def _new_arm(self) -> bytes:
+        try:
+            return bytes(self.store().new_arm())
+        finally:
+            self._store = None
+            heap.forget()
+
+    def _decide(self, is_fit: bool) -> None:
+        heap.forget()
+        from armtempo_board.storage import store  # here, so that it can be forgotten
+
+        store.Store(self._root, recover=False).take_arm(is_fit)
+        heap.forget()
+
+    def _stored_arm(self) -> "ArmRecord":
+        return self._judged(self._stored_bytes())
+
+    def _stored_bytes(self) -> bytes:
+        try:
+            return bytes(self.store().read(ARM_RECORD_NAME))
+        finally:
+            self.forget_store()
+            heap.forget()
+
+    def _judged(self, data: bytes) -> "ArmRecord":
+        """An arm record that can be taken: head, joints, crc32; else Refused."""
+        from armtempo_board.motion import arm_check  # here, so that it can be forgotten
+
+        return arm_check.checked(data, self._workspace.memory.size, self._workspace.joints)
+
+    def _take_arm(self, record: "ArmRecord") -> None:
+        from armtempo_shared import armrecord  # here, so that it can be forgotten
+
         head, joints, crc = record
         if crc == self.arm_crc:
             return
-        self.forget_store()
-        heap.forget()
-        if self.engine:
-            self.engine.close()
-            self.engine = None
-            self.arm_crc = 0
-        self.engine = Engine(head, joints)
-        self._silence_ms = head["link_timeout_ms"] if head["flags"] & FLAG_STOP_ON_LINK_LOSS else _NEVER_MS
+        all_but_limits = armrecord.without_limits(head, joints)
+        known, steps = 0, []
+        if self.engine and all_but_limits == self._all_but_limits:  # the same arm: it stands where it stood
+            known, steps = self.engine.known, [self.engine.commanded(joint) for joint in range(self.joints)]
+        self._drop_engine()
+        self.engine = Engine(head, joints, self._workspace)
+        self._all_but_limits = all_but_limits
+        if known:
+            self.engine.home(known, steps)
+        stops = head["flags"] & armrecord.FLAG_STOP_ON_LINK_LOSS
+        self._silence_ms = head["link_timeout_ms"] if stops else _NEVER_MS
         self.joints = len(joints)
         self.arm_crc = crc
         self._raw = array("i", [0] * (COMMANDED + 2 * self.joints))
-        self.samples = SampleBuffer(self.joints, _sample_memory(), self.samples.flags_at)
+        self.samples.configure(self.joints)
 
-    def _arm_record(self) -> "tuple[dict[str, int], list[dict[str, int]], int] | None":
-        """The stored one: head, joints, crc32; None where there is none."""
-        from armtempo_shared import armrecord  # here, so that it can be forgotten
+    def _drop_engine(self) -> None:
+        """Before another takes its place: the heap is to be as it was without one."""
+        if self.engine:
+            self.engine.close()
+        self.engine = None
+        self.joints = self.arm_crc = 0
+        self.samples.configure(0)
+        self._raw = array("i", [0] * COMMANDED)
+        heap.forget()
+        gc.collect()
 
-        try:
-            return armrecord.unpack(self.store().read(ARM_RECORD_NAME))
-        except (Refused, armrecord.ArmRecordError):
-            return None
+    def engine_room(self) -> int:
+        """Bytes of memory that an engine can have (``armtempo_shared.engine_memory``)."""
+        return int(4 * self._workspace.memory.size)
+
+    def engine_joints(self) -> int:
+        """Joints that an engine can have."""
+        return int(self._workspace.joints)
 
     def check_ready(self) -> None:
         """Refuses while a fault is pending or no arm is configured."""
@@ -209,7 +294,7 @@ class Controller:
         self._running = True
         self.engine.start(homing)
 
-    def _assume(self, motion: "Motion", mask: int) -> None:
+    def _assume(self, motion: "MotionFile", mask: int) -> None:
         """A homing motion may begin anywhere; joints that are not known to stand there are unknown after it."""
         from armtempo_board.motion import endpoints  # here, so that it can be forgotten
 
@@ -225,14 +310,10 @@ class Controller:
             self.engine.known &= ~self._assumed
             self._assumed = 0
 
-    def load(self, name: str, crc: "int | None" = None) -> "Motion":
+    def load(self, name: str, crc: "int | None" = None) -> "MotionFile":
         """The stored motion, checked as far as its head and checksum go, or refused."""
-        data = self.store().read(name)
-        try:
-            motion = Motion(data)
-        except MotionError:
-            raise Refused(codes.BAD_RECORD)
-        if crc is not None and int.from_bytes(data[-_CRC_BYTES:], "little") != crc:
+        motion: MotionFile = self.store().motion(name)
+        if crc is not None and motion.crc != crc:
             raise Refused(codes.BAD_CHECKSUM)
         if motion.arm_crc != self.arm_crc:
             raise Refused(codes.ARM_MISMATCH)
@@ -315,9 +396,3 @@ def _lowest(mask: int) -> int:
 def _free_heap() -> int:
     free = getattr(gc, "mem_free", None)
     return free() if free else 0
-
-
-def _sample_memory() -> int:
-    gc.collect()
-    free = _free_heap()
-    return min(max(free // _SAMPLES_SHARE, _LEAST_SAMPLES), _MOST_SAMPLES) if free else _MOST_SAMPLES

@@ -39,8 +39,12 @@ class Events:
 
     def note(self, text: str) -> None:
         """Keep the end of a text for the host, as it says what is wrong; until that is sent, others are dropped."""
+        self.note_bytes(text.encode()[-MAX_PAYLOAD:])
+
+    def note_bytes(self, text: bytes) -> None:
+        """The same of at most MAX_PAYLOAD bytes; allocates nothing."""
         if not self._notice:
-            self._notice = text.encode()[-MAX_PAYLOAD:]
+            self._notice = text
 
     def push(self) -> bool:
         """Hand the link what is waiting and has room, one sample at most; whether there was one."""

@@ -18,13 +18,17 @@ _BYTES_PER_JOINT = const(8)
 class SampleBuffer:
     """First in, first out; where the memory ends the oldest is dropped, and counted in ``lost``."""
 
-    def __init__(self, joints: int, memory: int, flags_at: int) -> None:
+    def __init__(self, memory: int, flags_at: int) -> None:
         """``memory``: bytes to keep samples in; ``flags_at``: bytes of a sample before its flags."""
         self.flags_at = flags_at
-        self.size = flags_at + 1 + _BYTES_PER_JOINT * joints
+        self._buffer = bytearray(memory)
+        self.configure(0)
+
+    def configure(self, joints: int) -> None:
+        """Samples of so many joints from now on."""
+        self.size = self.flags_at + 1 + _BYTES_PER_JOINT * joints
         self._joints = joints
-        self._capacity = memory // self.size
-        self._buffer = bytearray(self._capacity * self.size)
+        self._capacity = len(self._buffer) // self.size
         self.clear()
 
     def clear(self) -> None:

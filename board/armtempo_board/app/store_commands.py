@@ -6,14 +6,11 @@ command's row in the table of ``Commands``; ``length``: bytes of its payload. It
 
 from armtempo_shared import codes
 from armtempo_shared.messages import ARM_RECORD_NAME, MAX_PAYLOAD
-from armtempo_shared.motion import Motion, MotionError
 from micropython import const
 
-from armtempo_board.buffers import u32
 from armtempo_board.errors import Refused
 from armtempo_board.motion import endpoints
 
-_CRC_BYTES = const(4)
 _NUMBER_BYTES = const(1)  # of the command, in front of the answer
 
 TYPE_CHECKING = False
@@ -51,10 +48,10 @@ def put_data(commands: "Caller", row: tuple, length: int) -> int:
 
 
 def put_commit(commands: "Caller", row: tuple, length: int) -> None:
-    """Check it and put it in place; an arm record is taken at once."""
+    """Check it and put it in place; an arm record is taken when this has returned."""
     (crc,) = commands.fields(row)
-    if commands.controller.store().commit(crc) == ARM_RECORD_NAME:
-        commands.controller.configure()
+    controller = commands.controller
+    controller.arm_waits = controller.store().commit(crc) == ARM_RECORD_NAME
 
 
 def list(commands: "Caller", row: tuple, length: int) -> int:
@@ -65,18 +62,13 @@ def list(commands: "Caller", row: tuple, length: int) -> int:
     if index >= len(names):
         raise Refused(codes.NOT_FOUND)
     name = names[index]
-    data = store.read(name)
     try:
-        motion = Motion(data)
-        crc, duration, joints = (
-            u32(data, len(data) - _CRC_BYTES),
-            endpoints.duration_ticks(motion),
-            motion.joints,
-        )
-    except MotionError:
+        motion = store.motion(name)
+        crc, duration, joints = motion.crc, endpoints.duration_ticks(motion), motion.joints
+    except Refused:
         crc = duration = joints = 0
     default = name == store.default()
-    size = commands.reply(row, len(names), len(data), crc, duration, joints, default)
+    size = commands.reply(row, len(names), store.size_of(name), crc, duration, joints, default)
     return commands.reply_tail(size, name.encode())
 
 

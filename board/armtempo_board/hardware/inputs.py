@@ -1,10 +1,10 @@
 """E-stop and limit switches: hard interrupts that freeze the outputs; and the ENABLE output.
 
-How long it takes from the edge to frozen outputs: docs/hardware.md. The pull resistors draw towards the tripped level,
-so a switch that opens when it trips also trips when its wire breaks.
+The interrupts' callback (``isr.freezer``) only stops the outputs and releases the drivers. Which switch it was, and so
+which fault, the main loop notes when it finds the outputs frozen. How long it takes from the edge to frozen outputs:
+docs/hardware.md. The pull resistors draw towards the tripped level, so a switch that opens when it trips also trips
+when its wire breaks.
 """
-
-from array import array
 
 import micropython
 import stm
@@ -31,26 +31,43 @@ class Inputs:
 
         flags = head["flags"]
         self._block = sampler.block
-        self._timer2, self._timer5, self._port = stm.TIM2, stm.TIM5, stm.GPIOE
-        self._step_ports = (stm.GPIOA, stm.GPIOB)
+        self._port = stm.GPIOE
         self._on = 1 if flags & armrecord.FLAG_ENABLE_HIGH else 0
         self.enable_pin = Pin(pins.ENABLE, Pin.OUT_PP, value=1 - self._on)
         self.releases = bool(flags & armrecord.FLAG_ESTOP_RELEASES)
         self._estop = None
+        self._estop_line = pins.line(pins.ESTOP)
         self._limits: "list[tuple[Pin, int, int]]" = []  # pin, level when tripped, line
-        self._pairs = array("I", bytearray(4 * isr.PAIR_WORDS * 2 * len(joints)))
-        self._count = 0
+        self._towards: "list[tuple[int, int, int, int]]" = []  # line, bit of DIR, its level, joint
+        self._freeze = self._make_freezer()
         if flags & armrecord.FLAG_ESTOP_FITTED:
             self._estop_level = 1 if flags & armrecord.FLAG_ESTOP_ACTIVE_HIGH else 0
-            self._estop = self._hook(pins.ESTOP, self._estop_level, self._on_estop)  # type: ignore[arg-type]
+            self._set_line(self._estop_line, isr.ALWAYS, isr.ALWAYS)
+            if self.releases:
+                self._block[self._line_at(self._estop_line) + isr.LINE_RELEASE] = self._release_word()
+            self._estop = self._hook(pins.ESTOP, self._estop_level)
         self._add_limits(joints, armrecord.NONE)
 
-    def _hook(self, name: str, level: int, callback: "Callable[[int], None]") -> Pin:
+    def _make_freezer(self) -> "Callable[[int], object]":
+        block = self._block
+        block[isr.TIM2_AT] = stm.TIM2 & 0x3FFFFFFF
+        block[isr.TIM2_AT + 1] = stm.TIM2 >> 30
+        block[isr.PORT_A_BEHIND] = stm.GPIOA - stm.TIM2
+        self._set_line(isr.SOFTWARE_LINE, isr.ALWAYS, isr.ALWAYS)
+        return isr.freezer(block)
+
+    def _release_word(self) -> int:
+        from armtempo_board.hardware import pins  # here, so that it can be forgotten
+
+        bit = 1 << pins.line(pins.ENABLE)
+        return bit << 16 if self._on else bit  # the upper half of BSRR clears
+
+    def _hook(self, name: str, level: int) -> Pin:
         mode = ExtInt.IRQ_RISING if level else ExtInt.IRQ_FALLING
         pull = Pin.PULL_UP if level else Pin.PULL_DOWN
         pin = Pin(name, Pin.IN, pull=pull)
         ExtInt(pin, mode, pull, None)  # removes an earlier engine's callback: a line takes only one
-        ExtInt(pin, mode, pull, callback)
+        ExtInt(pin, mode, pull, self._freeze)  # type: ignore[arg-type]  # what it returns does not matter
         return pin
 
     def _add_limits(self, joints: "list[dict[str, int]]", none: int) -> None:
@@ -58,66 +75,90 @@ class Inputs:
 
         fitted = {}
         for number, joint in enumerate(joints):
+            bit = 1 << pins.line(pins.DIR[joint["channel"]])
             for side, positive in (("limit_low", 0), ("limit_high", 1)):
                 switch = joint[side]
                 if switch == none:
                     continue
                 fitted[switch] = joint["limit_active_high"]
-                self._add_pair(number, joint, pins.line(pins.LIMIT[switch]), positive)
+                level = positive ^ joint["dir_inverted"]
+                self._towards.append((pins.line(pins.LIMIT[switch]), bit, level, number))
         for switch, level in fitted.items():
-            pin = self._hook(pins.LIMIT[switch], level, self._on_limit)  # type: ignore[arg-type]
-            self._limits.append((pin, level, pins.line(pins.LIMIT[switch])))
+            self._limits.append((self._hook(pins.LIMIT[switch], level), level, pins.line(pins.LIMIT[switch])))
 
-    def _add_pair(self, number: int, joint: "dict[str, int]", line: int, positive: int) -> None:
-        from armtempo_board.hardware import pins  # here, so that it can be forgotten
+    def _line_at(self, line: int) -> int:
+        return isr.FIRST_LINE + (line - isr.SOFTWARE_LINE) * isr.LINE_WORDS
 
-        at = isr.PAIR_WORDS * self._count
-        direction = pins.line(pins.DIR[joint["channel"]])
-        for word, value in enumerate((line, direction, positive ^ joint["dir_inverted"], number, 0)):
-            self._pairs[at + word] = value
-        self._count += 1
+    def _set_line(self, line: int, levels: int, mask: int) -> None:
+        """What the interrupt of a line freezes at; it may come in between."""
+        at = self._line_at(line)
+        self._block[at + isr.LINE_MASK] = 0
+        self._block[at + isr.LINE_LEVELS] = levels
+        self._block[at + isr.LINE_MASK] = mask
 
-    @micropython.viper
-    def _freeze(self) -> object:
-        if int(isr.freeze(self._block, self._timer2, self._timer5)):
-            isr.finish_pulses(self._block, self._timer2, self._timer5, self._step_ports)
-
-    @micropython.viper
-    def _on_estop(self, line: object) -> object:
-        self._freeze()
-        isr.set_fault(self._block, codes.ESTOP, NO_JOINT)
-        if self.releases:
-            self.enable_pin.value(1 - int(self._on))
-
-    @micropython.viper
-    def _on_limit(self, line: object) -> object:
-        joint = int(isr.joint_towards(self._pairs, self._count, line, isr.output_levels(self._port)))
-        if joint:
-            self._freeze()
-            isr.set_fault(self._block, codes.LIMIT_SWITCH, joint - 1)
+    def watch(self, on: int) -> None:
+        """A switch stops joints only while they move: ``on`` 1 or 0."""
+        for _, _, line in self._limits:
+            levels = mask = 0
+            for pair_line, bit, level, _ in self._towards:
+                if pair_line == line and on:
+                    if mask & bit:  # one switch at both ends
+                        bit = isr.ALWAYS
+                        level = 0
+                    mask |= bit
+                    levels |= 0 if level else bit
+            self._set_line(line, levels, mask)
 
     def trip_estop(self) -> None:
         """As the E-stop's interrupt does."""
-        self._on_estop(None)
+        self._trip(self._estop_line)
 
     @micropython.viper
     def freeze(self) -> object:
-        """Stop all outputs now."""
+        """Stop all outputs now; interrupts call it too."""
+        self._trip(isr.SOFTWARE_LINE)
+
+    @micropython.viper
+    def _trip(self, line: int) -> object:
         before = disable_irq()
-        self._freeze()
+        self._freeze(line)
         enable_irq(before)
+
+    def thaw(self) -> None:
+        """The outputs may move again."""
+        self._block[isr.FROZEN] = 0
 
     def poll(self) -> None:
         """A switch that tripped before the joint turned towards it: its interrupt came too early."""
         for pin, level, line in self._limits:
             if pin.value() == level:
-                self._on_limit(line)
+                self._trip(line)
 
-    def watch(self, joint: int, moves: int) -> None:
-        """A switch stops a joint only while it moves: ``moves`` 1 or 0."""
-        for pair in range(self._count):
-            if self._pairs[isr.PAIR_WORDS * pair + isr.PAIR_JOINT] == joint:
-                self._pairs[isr.PAIR_WORDS * pair + isr.PAIR_MOVES] = moves
+    def note_trip(self) -> bool:
+        """Note the fault of a switch that tripped since the last call, the E-stop's above all. Whether it was that."""
+        for _, _, line in self._limits:
+            if self._has_tripped(line):
+                isr.set_fault(self._block, codes.LIMIT_SWITCH, self._joint_towards(line))
+        if not self._has_tripped(self._estop_line):
+            return False
+        self._block[isr.FAULT] = 0
+        isr.set_fault(self._block, codes.ESTOP, NO_JOINT)
+        return True
+
+    def _has_tripped(self, line: int) -> bool:
+        at = self._line_at(line) + isr.LINE_TRIPPED
+        tripped = self._block[at] != 0
+        if tripped:
+            self._block[at] = 0
+        return tripped
+
+    def _joint_towards(self, line: int) -> int:
+        """The first joint that moves towards a switch."""
+        levels = isr.output_levels(self._port)  # DIR is not turned behind a freeze
+        for pair_line, bit, level, joint in self._towards:
+            if pair_line == line and (levels & bit != 0) == level:
+                return joint
+        return NO_JOINT
 
     def estop_active(self) -> bool:
         """Whether the E-stop is tripped at this moment."""

@@ -9,7 +9,13 @@ Ki ticks are 1024 ticks (12.2 us): the counter in them has 22 bits, which are a 
 """
 
 import micropython
+import uctypes
 from micropython import const
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from array import array
+    from collections.abc import Callable
 
 # TIM2, TIM5 and encoder timers: RM0090 18.4.21
 CR1 = const(0)
@@ -46,31 +52,43 @@ RAW_IN = const(4)  # raw samples taken
 RAW_OUT = const(5)  # raw samples converted
 RAW_LOST = const(6)  # raw samples that found no room
 NOW = const(7)  # counter when the interrupt came
-FROZEN = const(8)  # outputs are frozen
+FROZEN = const(8)  # outputs are frozen; here stands why, bits as in LINE_MASK
 FAULT = const(9)
 FAULT_JOINT = const(10)
-STEP_HIGH = const(11)  # bit a joint: its STEP was high when frozen, so the pulse was finished
+HIGH_A = const(11)  # port A when frozen: a STEP pin that was high finishes its pulse;
 PULSE_TICKS = const(12)  # STEP high time
 JOINTS = const(13)
 ENCODERS = const(14)
 TURN_LATE = const(15)  # a turn of DIR came too late
 TURN_SLACK_TICKS = const(16)  # how late it may come
 DIR_SETUP_TICKS = const(17)  # DIR stable before a rising edge
-BLOCK_HEAD = const(18)
+HIGH_B = const(18)  # and port B
+TIM2_AT = const(19)  # its address: the low 30 bits, and in the next word the rest
+PORT_A_BEHIND = const(21)  # bytes from TIM2 to port A
+BLOCK_HEAD = const(22)
+ALWAYS = const(1 << 16)  # in LINE_LEVELS and LINE_MASK, where no pin is: whatever DIR says
 # words of a joint in the block, behind the head
 DIR_BIT = const(0)  # in the DIR port
 TURNS_IN = const(1)  # turns of DIR that were queued,
 TURNS_OUT = const(2)  # and made
-ON_TIM5 = const(3)  # else on TIM2
-CCR_AT = const(4)  # word of its compare register in the timer
-CCMR_AT = const(5)  # and of the register that has its mode,
-MODE_SHIFT = const(6)  # with the mode's place there
-ON_PORT_B = const(7)  # its STEP pin; else on port A
-PIN_BIT = const(8)
-TURN_TIMES = const(9)  # when the queued turns are due
+CCR_AT = const(3)  # word of its compare register in the timer
+CCMR_AT = const(4)  # and of the register that has its mode,
+MODE_SHIFT = const(5)  # with the mode's place there
+ON_PORT_B = const(6)  # its STEP pin; else on port A
+PIN_BIT = const(7)
+TURN_TIMES = const(8)  # when the queued turns are due
 TURN_ROOM = const(8)  # so many
-RING = const(17)  # the state of its ring
-JOINT_WORDS = const(26)
+RING = const(16)  # the state of its ring
+JOINT_WORDS = const(25)
+# words of a line behind six joints: of an external interrupt, 8 to 15, or of the program itself
+FIRST_LINE = const(172)
+SOFTWARE_LINE = const(7)
+LINE_LEVELS = const(0)  # DIR pins that freeze where they are low,
+LINE_MASK = const(1)  # and all that freeze at one of their levels
+LINE_RELEASE = const(2)  # written to port E's BSRR
+LINE_TRIPPED = const(3)  # it has called for a freeze
+LINE_WORDS = const(4)
+BLOCK_WORDS = const(208)
 # words of a ring's state
 WRITTEN = const(0)  # entries written since the stream was started
 MATCHED = const(1)  # words that the stream has handed on since; so many matches have been
@@ -83,13 +101,6 @@ FED = const(7)  # the interrupt writes to the ring; it stops that when the ring 
 ROOM = const(8)  # entries that may be written now
 STATE_WORDS = const(9)
 
-# words of a pair of limit switch and joint
-PAIR_LINE = const(0)  # of the switch
-PAIR_DIR_BIT = const(1)
-PAIR_LEVEL = const(2)  # of DIR, that moves towards the switch
-PAIR_JOINT = const(3)
-PAIR_MOVES = const(4)  # whether the joint moves
-PAIR_WORDS = const(5)
 # words of a raw sample
 RAW_COUNTER = const(0)
 RAW_MATCHES = const(1)  # six, one a joint
@@ -106,8 +117,6 @@ _SAMPLE_TICKS = const(8400000)
 
 _FIRST_ENTRY = const(0)
 _HERE = const(0)  # the word at which a pointer stands
-_PORT_A = const(0)
-_PORT_B = const(1)
 _LEAST_AHEAD_TICKS = const(84)  # 1 us: a compare value nearer than that may be missed
 _CALL_TICKS = const(336)  # 4 us
 SPARE_ENTRIES = const(8)  # of a ring, that are not overwritten: those matched last, and the far-away entry
@@ -118,6 +127,15 @@ _MOST_ENTRIES = const(512)  # and so many at most, which takes less than the 390
 _MODE_BITS = const(7)
 _TO_TOGGLE = const(4)  # 3: toggle on match
 _TO_FORCED_LOW = const(3)  # 4: forced inactive
+# what the freeze reaches by constant distances (RM0090 2.3), in words
+_TIM5 = const(768)  # behind TIM2
+_PORT_B = const(256)  # behind port A
+_PORT_E = const(1024)
+_CCMR2 = const(7)
+_LINE_0 = const(144)  # FIRST_LINE - SOFTWARE_LINE * LINE_WORDS
+_LINE_BYTES = const(16)
+_LOW = const(64)  # forced inactive for the first channel of a CCMR register,
+_BOTH_LOW = const(16448)  # for both of them; less 1 in a mode's place: toggle
 
 
 @micropython.viper
@@ -390,60 +408,48 @@ def take_sample(raw: ptr32, block: ptr32, dma: ptr32, encoders: object) -> objec
         block[SAMPLES_DONE] = 1
 
 
-@micropython.viper
-def freeze(block: ptr32, timer2: ptr32, timer5: ptr32) -> int:
-    """Stop all STEP outputs now; ``finish_pulses`` has to follow; 0 where that is done. 125 + 27 a joint.
+def freezer(shared: "array[int]") -> "Callable[[int], object]":
+    """What stops all STEP outputs: the callback of E-stop and limit switches. ``shared``: the block.
 
-    First no more words come from DMA, then every compare value goes half a round of the counter away: from there on
-    the pins stand still. A request that DMA had before is served within a few bus cycles, long before the compare
-    value is overwritten here.
+    Looking up a name takes 110 to 150 instructions of an interrupt, so nothing is looked up: all that it needs stands
+    in the block. It takes the same time whatever the joints do (docs/hardware.md).
+
+    The counters stand meanwhile: no edge comes, and what it reads belongs together. DMA has long brought each compare
+    register its next edge when its requests are switched off. Pins that are low are held low. One that is high has its
+    falling edge in its compare register, which comes when the counters go on.
     """
-    if block[FROZEN]:
-        return 0
-    block[FROZEN] = 1
-    timer2[DIER] = 0
-    timer5[DIER] = 0
-    far = 1
-    far = (far << 31) + timer2[CNT]
-    joints = block[JOINTS]
-    block = ptr32(int(block) + 4 * BLOCK_HEAD)
-    while joints:
-        joints -= 1
-        if block[ON_TIM5]:
-            timer5[block[CCR_AT]] = far
-        else:
-            timer2[block[CCR_AT]] = far
-        block = ptr32(int(block) + 4 * JOINT_WORDS)
-    return 1
+    address = uctypes.addressof(shared)
 
+    @micropython.viper
+    def freeze(line: int) -> object:
+        block = ptr32(int(address))
+        tim2 = ptr32((block[TIM2_AT + 1] << 30) + block[TIM2_AT])
+        port_a = ptr32(int(tim2) + block[PORT_A_BEHIND])
+        words = ptr32(int(block) + _LINE_BYTES * line)
+        why = (port_a[_PORT_E + ODR] ^ words[_LINE_0 + LINE_LEVELS]) & words[_LINE_0 + LINE_MASK]
+        if why:
+            if not block[FROZEN]:
+                block[FROZEN] = why
+                runs = tim2[CR1]
+                tim2[CR1] = 0
+                tim2[_TIM5 + CR1] = 0
+                high = port_a[IDR]
+                high_b = port_a[_PORT_B + IDR]
+                # PA0 and PA2, PA3 on TIM5; PA15 and PA1, PB10 on TIM2: see pins.py
+                tim2[_TIM5 + CCMR1] = _BOTH_LOW - ((high & 1) << 4)
+                tim2[_TIM5 + _CCMR2] = _BOTH_LOW - ((high & 4) << 2) - ((high & 8) << 9)
+                tim2[CCMR1] = _BOTH_LOW - ((high & 2) << 11) - ((high >> 11) & 16)
+                tim2[_CCMR2] = _LOW - ((high_b >> 6) & 16)
+                tim2[_TIM5 + DIER] = 0
+                tim2[DIER] = 0
+                tim2[CR1] = runs  # starts TIM5 as well
+                block[HIGH_A] = high
+                block[HIGH_B] = high_b
+            port_a[_PORT_E + BSRR] = words[_LINE_0 + LINE_RELEASE]
+            words[_LINE_0 + LINE_TRIPPED] = 1
+        return shared  # so that the callback keeps it alive
 
-@micropython.viper
-def finish_pulses(block: ptr32, timer2: ptr32, timer5: ptr32, ports: object) -> object:
-    """After ``freeze``: a STEP pin that is high gets its falling edge, one that is low is held low."""
-    port_a = ptr32(ports[_PORT_A])  # type: ignore[index]
-    port_b = ptr32(ports[_PORT_B])  # type: ignore[index]
-    head = block
-    high = 0
-    joint = block[JOINTS]
-    block = ptr32(int(block) + 4 * BLOCK_HEAD + joint * (4 * JOINT_WORDS))
-    while joint:
-        joint -= 1
-        block = ptr32(int(block) - 4 * JOINT_WORDS)
-        timer = timer2
-        if block[ON_TIM5]:
-            timer = timer5
-        port = port_a
-        if block[ON_PORT_B]:
-            port = port_b
-        if (port[IDR] >> block[PIN_BIT]) & 1:
-            high |= 1 << joint
-            timer[block[CCR_AT]] = timer[CNT] + head[PULSE_TICKS]
-        else:
-            mode = block[CCMR_AT]
-            timer[mode] = (timer[mode] | (_MODE_BITS << block[MODE_SHIFT])) - (
-                _TO_FORCED_LOW << block[MODE_SHIFT]
-            )
-    head[STEP_HIGH] = high
+    return freeze
 
 
 @micropython.viper
@@ -452,21 +458,6 @@ def set_fault(block: ptr32, code: int, joint: int) -> object:
     if not block[FAULT]:
         block[FAULT] = code
         block[FAULT_JOINT] = joint
-
-
-@micropython.viper
-def joint_towards(pairs: ptr32, count: int, line: int, levels: int) -> int:
-    """1 + the active joint that moves towards the switch on ``line``, or 0; ``levels`` of the DIR port."""
-    while count:
-        if (
-            pairs[PAIR_LINE] == line
-            and pairs[PAIR_MOVES]
-            and ((levels >> pairs[PAIR_DIR_BIT]) & 1) == pairs[PAIR_LEVEL]
-        ):
-            return pairs[PAIR_JOINT] + 1
-        pairs = ptr32(int(pairs) + 4 * PAIR_WORDS)
-        count -= 1
-    return 0
 
 
 @micropython.viper

@@ -5,8 +5,6 @@ and the one behind it can no longer be changed. Therefore new entries are added 
 ahead (see ``isr.rings_to_refill``), and a ring that has run out of entries is started anew.
 """
 
-from array import array
-
 import stm
 import uctypes
 from machine import disable_irq, enable_irq, mem32
@@ -15,41 +13,29 @@ from pyb import Pin
 
 from armtempo_board.hardware import isr
 
-_LASTS_MS = const(4)
-_LEAST_ENTRIES = const(64)
-_MOST_ENTRIES = const(1024)
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from array import array
+
 _FAR_KITICKS = const(1 << 20)
-_TIM5 = const(5)
 _FIRST_FED = const(1)  # entry that the stream begins with: entry 0 goes into the compare register by hand
-
-
-def size(rate: int) -> int:
-    """Entries for a joint of at most ``rate`` steps/s: a power of two. A full ring lasts 4 ms, or has 1024 entries.
-
-    The interrupt that fills it comes every 0.5 ms; nothing is added in the last 390 us.
-    """
-    wanted = 2 * rate * _LASTS_MS // 1000 + isr.SPARE_ENTRIES
-    entries = _LEAST_ENTRIES
-    while entries < min(wanted, _MOST_ENTRIES):
-        entries *= 2
-    return entries
 
 
 class Ring:
     """``channel``: row of ``pins.STEP``. ``block``: the memory of the interrupts; ``at``: the joint's words in it.
 
-    ``entries``: see ``size``.
+    ``words``: of the edge times, one more than the ring has entries; the hardware uses them until it is stopped.
     """
 
-    def __init__(self, channel: int, block: "array[int]", at: int, entries: int) -> None:
+    def __init__(self, channel: int, block: "array[int]", at: int, words: "memoryview") -> None:
         from armtempo_board.hardware import pins, registers  # here, so that they can be forgotten
 
         pin, timer, compare, alternate, stream, dma_channel = pins.STEP[channel]
-        self.entries = entries
-        self.words = array("I", bytearray(4 * entries + 4))
+        self.entries = entries = len(words) - 1
+        self.words = words
         self.state = memoryview(block)[at + isr.RING : at + isr.RING + isr.STATE_WORDS]
         self.state[isr.MASK] = entries - 1
-        self._fed = memoryview(self.words)[_FIRST_FED:]
+        self._fed = words[_FIRST_FED:]
         self._block = block
         self._at = at
         self._mode = registers.stream_mode(dma_channel)
@@ -69,7 +55,6 @@ class Ring:
 
         block, at = self._block, self._at
         self.state[isr.NDTR_AT] = (self._ndtr - stm.DMA1) // 4
-        block[at + isr.ON_TIM5] = timer == _TIM5
         block[at + isr.CCR_AT] = isr.CCR1 + compare - 1
         block[at + isr.CCMR_AT] = isr.CCMR1 + (compare - 1) // 2
         block[at + isr.MODE_SHIFT] = 12 if compare % 2 == 0 else 4
@@ -114,7 +99,7 @@ class Ring:
         self.state[isr.MATCHED] = 0
         self.state[isr.NDTR_AT_START] = self.entries
 
-    def run(self, queue: "array[int]") -> int:
+    def run(self, queue: "memoryview[int]") -> int:
         """Take in what was written from entry 0 on, switch the stream on and let the output toggle.
 
         1 where the first entry came too late. ``queue``: see step_queue.py.

@@ -7,7 +7,7 @@ from array import array
 
 import micropython
 import stm
-from armtempo_shared.limits import MAX_JOINTS, SAMPLE_TICKS
+from armtempo_shared.limits import SAMPLE_TICKS
 from machine import mem32
 from micropython import const
 from pyb import Timer
@@ -21,21 +21,26 @@ _OVERDUE_KITICKS = const(-40)  # 0.5 ms ago
 
 
 class Sampler:
-    """Owns the memory that the interrupts share. ``counters``: addresses of the encoder timers in use."""
+    """Owns the memory that the interrupts share. It is made once; ``configure`` it for an arm."""
 
-    def __init__(self, joints: int, counters: "tuple[int, ...]") -> None:
-        words = isr.BLOCK_HEAD + MAX_JOINTS * isr.JOINT_WORDS
-        self.block = array("I", bytearray(4 * words))
+    def __init__(self) -> None:
+        self.block = array("I", bytearray(4 * isr.BLOCK_WORDS))
         self.raw = array("I", bytearray(4 * isr.RAW_WORDS * isr.RAW_ROOM))
-        self.block[isr.JOINTS] = joints
-        self.block[isr.ENCODERS] = len(counters)
-        self.block[isr.SAMPLES_DONE] = 1
-        self._counters = counters
+        self._counters: "tuple[int, ...]" = ()
         self._timer2 = stm.TIM2
         self._directions = stm.GPIOE
         self._dma = stm.DMA1
         self._regular = 0
         self._hook = self._interrupt  # bound once: making a bound method allocates
+
+    def configure(self, joints: int, counters: "tuple[int, ...]") -> None:
+        """For an arm of so many joints; ``counters``: addresses of the encoder timers in use."""
+        for word in range(isr.BLOCK_WORDS):
+            self.block[word] = 0
+        self.block[isr.JOINTS] = joints
+        self.block[isr.ENCODERS] = len(counters)
+        self.block[isr.SAMPLES_DONE] = 1
+        self._counters = counters
 
     def connect(self) -> None:
         """Set the interrupt up. It starts TIM2, so set the timers up after it."""
@@ -58,7 +63,7 @@ class Sampler:
         for joint in range(block[isr.JOINTS]):
             at = self.joint_at(joint)
             block[at + isr.TURNS_OUT] = block[at + isr.TURNS_IN]
-        for word in (isr.RAW_IN, isr.RAW_OUT, isr.RAW_LOST, isr.FROZEN, isr.STEP_HIGH, isr.TURN_LATE):
+        for word in (isr.RAW_IN, isr.RAW_OUT, isr.RAW_LOST, isr.TURN_LATE):
             block[word] = 0
         block[isr.NEXT_SAMPLE] = 0
         self._regular = -(-duration_ticks // SAMPLE_TICKS)  # samples before the last

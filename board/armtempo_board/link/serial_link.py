@@ -12,6 +12,7 @@ from micropython import const
 
 from armtempo_board.buffers import APPEND, CRC_TABLE, apply_crc, copy, equal, pack_offsets
 from armtempo_board.link.frame_reader import FrameReader
+from armtempo_board.prompt import PromptRequest
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -20,9 +21,6 @@ if TYPE_CHECKING:
 _OUT_SIZE = const(700)
 _SEQUENCE_AND_NUMBER = const(2)  # bytes
 _CRC = const(4)  # bytes
-_ESCAPE_QUIET_MS = const(50)
-_CTRL_C = const(3)
-_CONTROLS = b"\r\x03"
 
 
 class SerialLink:
@@ -41,19 +39,17 @@ class SerialLink:
         self._reply_waits = False
         self._answered = bytearray(_SEQUENCE_AND_NUMBER + _CRC)  # of the command that it answers
         self._events = 0  # sequence number of the next
-        self._controls = 0  # CR and Ctrl-C since the last good frame; -1: other bytes among them
-        self._interrupt = False  # whether one of them was Ctrl-C
-        self._control_ms = 0
+        self._prompt = PromptRequest()
 
     def poll(self) -> bool:
         """Whether a command that has not been acted on stands in ``reader.data``."""
         now_ms = time.ticks_ms()
         reader = self.reader
         if not reader.poll(self.stream, now_ms):
-            self._watch_escape(reader.outside, now_ms)
+            if self._prompt.comes(reader.outside, now_ms):
+                self.escape = True
             return False
-        self._controls = 0
-        self._interrupt = False
+        self._prompt.clear()
         self.heard_ms = now_ms
         if self._repeated():
             self._reply_waits = True
@@ -136,27 +132,3 @@ class SerialLink:
             equal(self._answered, data, pack_offsets(0, SEQUENCE_AT), _SEQUENCE_AND_NUMBER)
             and equal(self._answered, data, pack_offsets(_SEQUENCE_AND_NUMBER, crc_at), _CRC)
         )
-
-    def _watch_escape(self, byte: int, now_ms: "Any") -> None:
-        """Find a Ctrl-C (of mpremote, or typed twice) that is no noise: after quiet only CR and Ctrl-C came.
-
-        Three in a row count at once, also right behind a frame. mpremote sends Ctrl-A after them, once, and the
-        prompt is to get it.
-        """
-        quiet = time.ticks_diff(now_ms, self._control_ms) >= _ESCAPE_QUIET_MS
-        if byte < 0:
-            needed = 2 if quiet else 3
-        else:
-            needed = 3
-            self._control_ms = now_ms
-            self._count_control(byte, quiet)
-        if self._controls >= needed and self._interrupt:
-            self.escape = True
-            self._controls = -1  # told once; one that comes while something moves is not kept
-
-    def _count_control(self, byte: int, quiet: bool) -> None:
-        if byte not in _CONTROLS:
-            self._controls = -1
-        elif self._controls > 0 or quiet:
-            self._controls = max(0, self._controls) + 1
-            self._interrupt = self._interrupt or byte == _CTRL_C

@@ -1,24 +1,25 @@
 """Where a motion begins and when it ends, from its control points in exact integers."""
 
-import struct
-
 from armtempo_shared.basis import BASIS, FACTORIAL
 from armtempo_shared.limits import STEP_FRACTION_BITS, TICK_FRACTION_BITS
-from armtempo_shared.motion import Motion
 from micropython import const
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from armtempo_shared.motion import MotionHead
 
 _CONSTANT = const(0)  # the power of u in a row of BASIS
 
 
-def _at_node(motion: Motion, offset: int, node: int) -> "tuple[int, int]":
+def _at_node(motion: "MotionHead", offset: int, node: int) -> "tuple[int, int]":
     """(numerator, denominator) of a spline at the start of its segment ``node``, Eq. (15) at u = 0."""
     degree = motion.degree
-    points = struct.unpack_from("<%dq" % degree, motion.data, offset + 8 * node)
+    points = motion.points(offset + 8 * node, degree)
     weights = BASIS[degree][_CONSTANT]
     return sum([weights[i] * points[i] for i in range(degree)]), FACTORIAL[degree]
 
 
-def duration_ticks(motion: Motion) -> int:
+def duration_ticks(motion: "MotionHead") -> int:
     """Time at which the last joint is done, in whole ticks, rounded up."""
     longest = 0
     for joint in range(1 if motion.shared else motion.joints):
@@ -27,7 +28,7 @@ def duration_ticks(motion: Motion) -> int:
     return longest
 
 
-def start_offset(motion: Motion, joint: int, position_steps: int) -> int:
+def start_offset(motion: "MotionHead", joint: int, position_steps: int) -> int:
     """0 where the joint stands at the motion's start, else how many steps the start is away (not 0).
 
     Within half a step and 1/64 counts as standing there: the step generator takes it from that.

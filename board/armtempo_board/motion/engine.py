@@ -22,7 +22,6 @@ from array import array
 import stm
 from armtempo_shared import codes
 from armtempo_shared.messages import NO_JOINT
-from armtempo_shared.motion import Motion
 from machine import mem32
 from micropython import const
 
@@ -32,11 +31,14 @@ from armtempo_board.errors import Refused
 from armtempo_board.hardware import isr
 from armtempo_board.hardware.encoders import EncoderInput, NoEncoder
 from armtempo_board.hardware.inputs import Inputs
-from armtempo_board.hardware.sampler import Sampler
 from armtempo_board.motion.following_error import FollowingError
 from armtempo_board.motion.joint_drive import LOOKAHEAD_KITICKS, JointDrive
 from armtempo_board.motion.readings import Readings
-from armtempo_board.motion.ring_feeder import RingFeeder
+from armtempo_board.motion.workspace import Workspace
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from armtempo_shared.motion import MotionHead
 
 LEAD_TICKS = const(1680000)
 """Time from the start of the counters to time 0: 20 ms, in which drivers switch on and DIR settles."""
@@ -57,27 +59,37 @@ _LIMITS = ("min_steps", "max_steps", "max_rate")  # what of a joint's row in the
 
 
 class Engine:
-    """``head`` and ``joints`` as ``armrecord.unpack`` gives them. Nothing moves, drivers are off."""
+    """``head`` and ``joints`` as ``armrecord.unpack`` gives them. Nothing moves, drivers are off.
 
-    def __init__(self, head: "dict[str, int]", joints: "list[dict[str, int]]") -> None:
+    ``workspace``: what the engine before worked in and this one takes over; MemoryError where it is too small.
+    """
+
+    def __init__(self, head: "dict[str, int]", joints: "list[dict[str, int]]", workspace: Workspace) -> None:
         from armtempo_shared import armrecord  # here, so that they can be forgotten
 
         from armtempo_board.hardware import registers
 
+        self._feeder = workspace.feeder
+
         rows = [row for row in joints if row["encoder"] != armrecord.NONE]
         fitted = [EncoderInput(row["encoder"], row["encoder_inverted"]) for row in rows]
-        self._sampler = Sampler(len(joints), tuple([encoder.address for encoder in fitted]))
+        self._sampler = workspace.sampler
+        self._sampler.configure(len(joints), tuple([encoder.address for encoder in fitted]))
         self._block = self._sampler.block
         self._sampler.connect()
         registers.apply(registers.CLOCKS)
         registers.apply(registers.TIMERS)
-        self._joints = [JointDrive(n, head, row, self._sampler) for n, row in enumerate(joints)]
+        rings = workspace.rings([row["max_rate"] for row in joints])
+        arm = head, joints
+        self._joints = [
+            JointDrive(n, arm, self._sampler, ring, workspace.memory) for n, ring in enumerate(rings)
+        ]
         self._encoders = [fitted[rows.index(row)] if row in rows else NoEncoder() for row in joints]
         slots = [isr.RAW_ENCODERS + rows.index(row) if row in rows else 0 for row in joints]
         self._readings = Readings(self._sampler, self._joints, self._encoders, slots)
         self._following = [FollowingError(row) for row in joints]
         self._inputs = Inputs(head, joints, self._sampler)
-        RingFeeder(self._inputs, self._joints, self._block)  # its timer's callback keeps it alive
+        self._feeder.connect(self._inputs, self._joints)
         registers.apply(registers.PRIORITIES)
         self.limits = [{name: row[name] for name in _LIMITS} for row in joints]
         self._pulse_us = head["pulse_ticks"] // _TICKS_PER_US + _PULSE_SPARE_US
@@ -105,7 +117,7 @@ class Engine:
                 self._encoders[number].declare(self._following[number].expected(steps[number]))
         self.known |= mask
 
-    def load(self, motion: Motion) -> None:
+    def load(self, motion: "MotionHead") -> None:
         """Check a motion and fill the rings; Refused where something is wrong."""
         self._check(motion)
         self._inputs.enable(True)
@@ -117,13 +129,14 @@ class Engine:
         self._braked = self._end_moves = False
         for number, joint in enumerate(self._joints):
             joint.load(motion, number)
-            self._inputs.watch(number, 1)
             self._prefill(joint)
+        self._inputs.watch(1)
         self.finished = False
 
-    def _check(self, motion: Motion) -> None:
+    def _check(self, motion: "MotionHead") -> None:
         if self.moving:
             raise Refused(codes.BUSY)
+        self._inputs.thaw()  # before it looks: a switch that trips from here on is found now or freezes the motion
         self._watch_idle()
         if self.fault:
             raise Refused(codes.FAULT_PENDING, self.fault_joint, self.fault)
@@ -139,7 +152,7 @@ class Engine:
             if off:
                 raise Refused(codes.WRONG_START, number, off)
 
-    def _check_splines(self, motion: Motion) -> None:
+    def _check_splines(self, motion: "MotionHead") -> None:
         from armtempo_board.motion.motion_check import check  # here, so that it can be forgotten
 
         joint = self._joints[_ANY_JOINT]  # the gap is the same for all
@@ -248,8 +261,14 @@ class Engine:
             encoder.update()
         if self._inputs.estop_active():
             self._inputs.trip_estop()
+        self._note_trip()
         if self._block[isr.FAULT] and not self.fault:
             self._take_fault()
+
+    def _note_trip(self) -> None:
+        """A switch may have tripped: know of it, and that an E-stop released the drivers."""
+        if self._inputs.note_trip() and self._inputs.releases:
+            self.known = 0
 
     def freeze(self) -> None:
         """Stop all outputs now; not a fault."""
@@ -288,6 +307,7 @@ class Engine:
 
     def _fail(self, code: int, joint: int) -> None:
         self._inputs.freeze()
+        self._note_trip()
         isr.set_fault(self._block, code, joint)
         self._stopped()
 
@@ -300,13 +320,14 @@ class Engine:
         self._end_ticks = max(self.motion_ticks(), 0)
         self._clock()
         self._readings.convert(self._epoch, self._counter_kiticks)
-        high = self._block[isr.STEP_HIGH]
-        for number, joint in enumerate(self._joints):
-            joint.settle(high >> number & 1)
+        for joint in self._joints:
+            joint.settle()
         self._sampler.take_now()
         self._readings.convert(self._epoch, self._counter_kiticks)
         if self._block[isr.TURN_LATE]:
             self.known = 0
+        self._inputs.watch(0)  # a switch that bounces is noted once
+        self._note_trip()
         if self._block[isr.FAULT] == codes.LIMIT_SWITCH and self._homing:
             self._block[isr.FAULT] = 0
         if self._block[isr.FAULT]:
@@ -316,14 +337,13 @@ class Engine:
     def _take_fault(self) -> None:
         self.fault = self._block[isr.FAULT]
         self.fault_joint = self._block[isr.FAULT_JOINT]
-        if self.fault == codes.ESTOP and self._inputs.releases:
-            self.known = 0
 
     def _finish(self) -> None:
         self._stop_counters()
-        for number, joint in enumerate(self._joints):
+        for joint in self._joints:
             joint.empty()
-            self._inputs.watch(number, 0)
+            joint.generator.close()
+        self._inputs.watch(0)
         self.moving = False
         self.finished = True
 
@@ -343,8 +363,11 @@ class Engine:
         return True
 
     def close(self) -> None:
-        """Release the hardware; the rings are not used after it."""
+        """Release the hardware, the workspace and the motion's file; the engine is not used after it."""
         self.freeze()
+        for joint in self._joints:
+            joint.close()
+        self._feeder.disconnect()
         self._inputs.close()
 
     # what it knows

@@ -8,14 +8,18 @@ from array import array
 
 import stm
 from armtempo_shared import codes
-from armtempo_shared.motion import Motion
 from micropython import const
 from pyb import Pin
 
 from armtempo_board.hardware import isr
-from armtempo_board.hardware.ring import Ring, size
+from armtempo_board.hardware.ring import Ring
 from armtempo_board.hardware.sampler import Sampler
+from armtempo_board.memory import Memory
 from armtempo_board.stepgen.step_generator import StepGenerator
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from armtempo_shared.motion import MotionHead
 
 LOOKAHEAD_KITICKS = const(4096)
 """How far ahead steps are computed: 50 ms. Braking begins behind what is computed."""
@@ -29,16 +33,28 @@ _TURNS = const(8)
 
 
 class JointDrive:
-    """``head`` and ``row``: the arm record's; ``sampler`` has the memory that the interrupts read."""
+    """``arm``: head and joints of the arm record; ``sampler`` has the memory that the interrupts read.
 
-    def __init__(self, number: int, head: "dict[str, int]", row: "dict[str, int]", sampler: Sampler) -> None:
+    ``ring_words``: see ``Ring``; ``memory``: where the step generator takes its words from.
+    """
+
+    def __init__(
+        self,
+        number: int,
+        arm: "tuple[dict[str, int], list[dict[str, int]]]",
+        sampler: Sampler,
+        ring_words: "memoryview",
+        memory: Memory,
+    ) -> None:
         from armtempo_board.hardware import pins  # here, so that it can be forgotten
 
+        head, rows = arm
+        row = rows[number]
         self._sampler = sampler
         block = sampler.block
         self._words_at = sampler.joint_at(number)
-        self.ring = Ring(row["channel"], block, self._words_at, size(row["max_rate"]))
-        self.generator = StepGenerator()
+        self.ring = Ring(row["channel"], block, self._words_at, ring_words)
+        self.generator = StepGenerator(memory)
         self._inverted = row["dir_inverted"]
         self._turn_delay = head["dir_hold_ticks"] + _TURN_SLACK_TICKS
         self.gap_ticks = max(
@@ -64,7 +80,7 @@ class JointDrive:
         self._base_steps = 0
         self._turns_in = self._turns_out = 0
 
-    def load(self, motion: Motion, number: int) -> None:
+    def load(self, motion: "MotionHead", number: int) -> None:
         """Stand before a motion; the clock stands before 0."""
         position = self._base
         self.generator.load(motion, number, position, self._sampler.block[isr.PULSE_TICKS], self.gap_ticks)
@@ -157,17 +173,24 @@ class JointDrive:
         self._count_from(self.position(self.ring.matches()))
         self.ring.stop()
 
-    def settle(self, high: int) -> None:
-        """The outputs were frozen: count the last step. ``high``: STEP was high when they were.
+    def settle(self) -> None:
+        """The outputs were frozen: count the last step.
 
-        A rising edge that came after the last word from DMA is not in the ring's count, but the pin shows it.
+        A rising edge behind which DMA was too late is not in the ring's count, but the pin was high.
         """
+        block, at = self._sampler.block, self._words_at
+        port = block[isr.HIGH_B] if block[at + isr.ON_PORT_B] else block[isr.HIGH_A]
         matches = self.ring.matches()
-        if high and matches & 1 == 0:
+        if port >> block[at + isr.PIN_BIT] & 1 and matches & 1 == 0:
             self.position(matches)
             self._base += self._direction
         self.ring.release()
         self.ended = True
+
+    def close(self) -> None:
+        """The motion is read no further; the stream does not read the ring any more."""
+        self.generator.close()
+        self.ring.stop()
 
     def declare(self, steps: int) -> None:
         """The joint stands at ``steps``; nothing moves."""

@@ -30,28 +30,26 @@ from armtempo_board.stepgen.subdivision import (
     MOST,
     SCALE,
 )
-from armtempo_board.stepgen.subintervals import Subintervals
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from array import array
+    from armtempo_shared.motion import MotionHead
 
-    from armtempo_shared.motion import Motion
-
-GAP_TICKS = const(25200)
-"""Least time between opposite steps that is assumed where none is given: 0.3 ms."""
+    from armtempo_board.stepgen.subintervals import Subintervals
 
 _SHORT_TICKS = const(1024)
+_OLDEST = const(0)
+_POINT_BYTES = const(8)
 _HIGH_TICKS_BITS = const(12)  # a high word of time counts 2**12 ticks
 _PASS = const(0)
 _SPLIT = const(-1)
 
 
 def check(
-    motion: "Motion",
+    motion: "MotionHead",
     joints: "list[dict[str, int]]",
-    gap_ticks: int = GAP_TICKS,
-    interval: "Subintervals | None" = None,
+    gap_ticks: int,
+    interval: "Subintervals",
 ) -> None:
     """Refused for the first thing that is wrong, with the joint and a value.
 
@@ -60,42 +58,57 @@ def check(
     The value is, by code: time_order, the control point; too_long, ticks or steps of 2**28; out_of_range, the position
     in steps; too_fast, steps/s; too_abrupt, steps/s**2.
     """
-    interval = interval or Subintervals()
-    for joint in range(motion.joints):
-        _check_numbers(motion, joint)
-        interval.load(motion, joint)
-        judge = Judge(interval, joints[joint], gap_ticks)
-        while measured := interval.measure():
-            code = judge.verdict(measured)
-            if code == _SPLIT:
-                interval.split()
-            elif code:
-                raise Refused(code, joint, judge.value)
-            else:
-                interval.skip()
-    rate_check.check_sum(motion, joints, interval)
+    try:
+        for joint in range(motion.joints):
+            _check_numbers(motion, joint)
+            interval.load(motion, joint)
+            _check_joint(interval, Judge(interval, joints[joint], gap_ticks), joint)
+        rate_check.check_sum(motion, joints, interval)
+    finally:
+        interval.close()
 
 
-def _check_numbers(motion: "Motion", joint: int) -> None:
+def _check_joint(interval: "Subintervals", judge: "Judge", joint: int) -> None:
+    while measured := interval.measure():
+        code = judge.verdict(measured)
+        if code == _SPLIT:
+            interval.split()
+        elif code:
+            raise Refused(code, joint, judge.value)
+        else:
+            interval.skip()
+
+
+def _check_numbers(motion: "MotionHead", joint: int) -> None:
     """Increasing time control points, and all numbers within what step generation can hold."""
-    count = motion.degree + 1
-    for offset, segments, is_time in (
-        (motion.time_offset(joint), motion.segments * motion.refine, True),
-        (motion.angle_offset(joint), motion.segments, False),
-    ):
+    _check_spline(motion, joint, motion.time_offset(joint), motion.segments * motion.refine, True)
+    _check_spline(motion, joint, motion.angle_offset(joint), motion.segments, False)
+
+
+def _check_spline(motion: "MotionHead", joint: int, offset: int, segments: int, is_time: bool) -> None:
+    stream = motion.stream(offset)
+    try:
+        control = list(struct.unpack("<%dq" % motion.degree, stream.read(_POINT_BYTES * motion.degree)))
         for segment in range(segments):
-            control = struct.unpack_from("<%dq" % count, motion.data, offset + 8 * segment)
-            if is_time:
-                for i in range(count - 1):
-                    if control[i] >= control[i + 1]:
-                        raise Refused(codes.TIME_ORDER, joint, segment + i + 1)
-            span = max(control) - min(control)
-            most = max(max(control), -min(control))
-            # the same for time: LONGEST_SPAN_TICKS with its fraction bits is this number too
-            if span >= MOST_SPAN_STEPS << STEP_FRACTION_BITS or most >= MOST_STEPS << STEP_FRACTION_BITS:
-                raise Refused(codes.TOO_LONG, joint, most)
-            if is_time and most >> TICK_FRACTION_BITS >= LONGEST_TICKS:
-                raise Refused(codes.TOO_LONG, joint, most >> TICK_FRACTION_BITS)
+            control.extend(struct.unpack("<q", stream.read(_POINT_BYTES)))
+            _check_segment(control, joint, segment, is_time)
+            control.pop(_OLDEST)
+    finally:
+        stream.close()
+
+
+def _check_segment(control: "list[int]", joint: int, segment: int, is_time: bool) -> None:
+    if is_time:
+        for i in range(len(control) - 1):
+            if control[i] >= control[i + 1]:
+                raise Refused(codes.TIME_ORDER, joint, segment + i + 1)
+    span = max(control) - min(control)
+    most = max(max(control), -min(control))
+    # the same for time: LONGEST_SPAN_TICKS with its fraction bits is this number too
+    if span >= MOST_SPAN_STEPS << STEP_FRACTION_BITS or most >= MOST_STEPS << STEP_FRACTION_BITS:
+        raise Refused(codes.TOO_LONG, joint, most)
+    if is_time and most >> TICK_FRACTION_BITS >= LONGEST_TICKS:
+        raise Refused(codes.TOO_LONG, joint, most >> TICK_FRACTION_BITS)
 
 
 class Judge:
@@ -164,7 +177,7 @@ class Judge:
         return codes.TOO_ABRUPT
 
 
-def _acceleration(angle: "array[int]", time: "array[int]") -> "tuple[int, int]":
+def _acceleration(angle: "memoryview[int]", time: "memoryview[int]") -> "tuple[int, int]":
     """An upper bound of |angle'' / time'**2 - angle' time'' / time'**3|, steps/tick**2: (numerator, denominator)."""
     least = time[LEAST] - DIFFERENCE_BIAS
     most = max(abs(angle[LEAST] - DIFFERENCE_BIAS), abs(angle[MOST] - DIFFERENCE_BIAS))
@@ -174,6 +187,6 @@ def _acceleration(angle: "array[int]", time: "array[int]") -> "tuple[int, int]":
     return (numerator << scale, denominator) if scale >= 0 else (numerator, denominator << -scale)
 
 
-def _second_difference(measures: "array[int]") -> int:
+def _second_difference(measures: "memoryview[int]") -> int:
     """The greatest second difference of the points, absolute."""
     return max([abs(measures[i + 1] - measures[i]) for i in range(FIRST_DIFFERENCE, LAST_DIFFERENCE)])

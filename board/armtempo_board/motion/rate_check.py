@@ -20,7 +20,7 @@ from armtempo_board.stepgen.subdivision import (
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from armtempo_shared.motion import Motion
+    from armtempo_shared.motion import MotionHead
 
     from armtempo_board.stepgen.subintervals import Subintervals
 
@@ -102,7 +102,7 @@ def _rate(interval: "Subintervals", steps: int, ticks: int) -> int:
     return min((steps * TICK_HZ << up) // (ticks << interval.angle_measures[SCALE]), TICK_HZ)
 
 
-def check_sum(motion: "Motion", joints: "list[dict[str, int]]", interval: "Subintervals") -> None:
+def check_sum(motion: "MotionHead", joints: "list[dict[str, int]]", interval: "Subintervals") -> None:
     """Refused (too_fast, no joint, rate) where all joints together may step too fast in one of many spans of time."""
     limit = MAX_STEP_RATE_SUM + MAX_STEP_RATE_SUM // 100
     if sum([row["max_rate"] for row in joints]) <= limit:
@@ -117,13 +117,14 @@ def check_sum(motion: "Motion", joints: "list[dict[str, int]]", interval: "Subin
         raise Refused(codes.TOO_FAST, value=worst)
 
 
-def _end_high(motion: "Motion", joint: int) -> int:
+def _end_high(motion: "MotionHead", joint: int) -> int:
     """The last time control point in 4096 ticks, rounded up."""
     at = motion.time_offset(joint) + _POINT_BYTES * (motion.segments * motion.refine + motion.degree - 1)
-    return (int.from_bytes(motion.data[at : at + _POINT_BYTES], "little") >> LOW_BITS) + 1
+    (last,) = motion.points(at, 1)
+    return (last >> LOW_BITS) + 1
 
 
-def _add(interval: "Subintervals", motion: "Motion", joint: int, width: int, sums: "array[int]") -> None:
+def _add(interval: "Subintervals", motion: "MotionHead", joint: int, width: int, sums: "array[int]") -> None:
     """Add the joint's highest rate in each span of ``width`` * 4096 ticks."""
     peaks = array("I", bytes(4 * (_SPANS + 1)))
     interval.load(motion, joint)

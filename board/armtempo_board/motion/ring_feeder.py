@@ -19,24 +19,36 @@ from armtempo_board.stepgen.step_queue import emit
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from array import array
+    from typing import Any
 
 _PERIOD_TICKS = const(42000)
 _CR1 = const(0)  # of TIM6
 
 
 class RingFeeder:
-    """``inputs`` freezes all where a ring was written too late; ``block``: the memory that the interrupts share."""
+    """``block``: the memory that the interrupts share. It is made once; ``connect`` gives it rings."""
 
-    def __init__(self, inputs: Inputs, joints: "list[JointDrive]", block: "array[int]") -> None:
-        self._inputs = inputs
+    def __init__(self, block: "array[int]") -> None:
         self._block = block
+        self._dma, self._timer2, self._timer6 = stm.DMA1, stm.TIM2, stm.TIM6
+        self._hook = self.feed  # bound once
+        self.disconnect()
+
+    def connect(self, inputs: Inputs, joints: "list[JointDrive]") -> None:
+        """Feed the joints' rings; ``inputs`` freezes all where one was written too late."""
+        self._inputs: "Any" = inputs
         self._words = [joint.ring.words for joint in joints]
         self._masks = [joint.ring.entries - 1 for joint in joints]
         self._states = [joint.ring.state for joint in joints]
         self._queues = [joint.generator.queue for joint in joints]
-        self._dma, self._timer2, self._timer6 = stm.DMA1, stm.TIM2, stm.TIM6
-        Timer(6, prescaler=0, period=_PERIOD_TICKS - 1, callback=self.feed)  # type: ignore[arg-type]
+        Timer(6, prescaler=0, period=_PERIOD_TICKS - 1, callback=self._hook)  # type: ignore[arg-type]
         mem32[stm.TIM6] = 0
+
+    def disconnect(self) -> None:
+        """Hold no ring; none is fed any more."""
+        mem32[stm.TIM6] = 0
+        self._inputs = None
+        self._words = self._masks = self._states = self._queues = ()  # type: ignore[assignment]
 
     @micropython.viper
     def feed(self, timer: object) -> object:

@@ -13,10 +13,6 @@ from micropython import const
 from armtempo_board.stepgen import bezier
 from armtempo_board.stepgen.newton import LAW
 
-TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from array import array
-
 # words of the law
 LENGTH = const(0)  # 28 bits; in 2**UNIT ticks
 START_HIGH = const(1)  # 4096 ticks, + bezier.BIAS
@@ -41,7 +37,7 @@ _FAR = const(1 << 17)  # in 4096 ticks: longer than any length
 _MOST_ROUNDS = const(60)
 
 
-def set_law(solver: "array[int]", start_ticks: int, length_ticks: int) -> None:
+def set_law(solver: "memoryview[int]", start_ticks: int, length_ticks: int) -> None:
     """Brake from a time on over ``length_ticks`` of real time; more than 2**30 (12.8 s) counts as that."""
     length_ticks = min(length_ticks, _LONGEST_TICKS)
     unit = 0
@@ -53,7 +49,7 @@ def set_law(solver: "array[int]", start_ticks: int, length_ticks: int) -> None:
     solver[LAW + UNIT] = unit
 
 
-def is_past(solver: "array[int]", high: int) -> bool:
+def is_past(solver: "memoryview[int]", high: int) -> bool:
     """Whether a time (4096 ticks, + bezier.BIAS) lies behind the end of the way."""
     return bool(high - solver[LAW + START_HIGH] > (solver[LAW + LENGTH] >> 13) + 1 << solver[LAW + UNIT])
 

@@ -4,10 +4,9 @@ A monotone subinterval's first step is solved by itself, the others as two cubic
 long as the error bound allows it. Its last step is held back until it is known not to be followed by an opposite one.
 """
 
-from array import array
-
 from micropython import const
 
+from armtempo_board.memory import Memory
 from armtempo_board.stepgen import braking, newton, step_queue, subdivision
 from armtempo_board.stepgen.bezier import BIAS, HIGH, LOW
 from armtempo_board.stepgen.braking import is_past
@@ -43,7 +42,9 @@ from armtempo_board.stepgen.subintervals import Subintervals
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from armtempo_shared.motion import Motion
+    from array import array
+
+    from armtempo_shared.motion import MotionHead
 
 _ITEMS_PER_CALL = const(2)  # put into the queue by one call of ``prepare`` at most,
 _SEARCHES = const(4)  # and so many times a part of the motion looked at for each: bounds its time
@@ -54,17 +55,18 @@ _FAR = const(1 << 16)  # in 4096 ticks: longer than any subinterval and gap, and
 
 
 class StepGenerator:
-    """Goes through one joint's motion; every buffer is made once.
+    """Goes through one joint's motion.
 
     Steps go into ``queue`` (step_queue.py). ``direction`` (1 or -1) is that of the steps put in now. ``at_turn``: the
     next step goes the other way, ``turn`` lets it come. ``ended``: no more steps are put in. Between motions
     ``subintervals`` is free for the check of the next.
     """
 
-    def __init__(self) -> None:
-        self.subintervals = Subintervals()
-        self._solver = array("i", bytes(4 * newton.SOLVER_SIZE))
-        self.queue = array("i", bytes(4 * step_queue.QUEUE_SIZE))
+    def __init__(self, memory: Memory) -> None:
+        """``memory``: where its words are taken from (``armtempo_shared.engine_memory`` counts them)."""
+        self.queue = memory.take(step_queue.QUEUE_SIZE)
+        self._solver = memory.take(newton.SOLVER_SIZE)
+        self.subintervals = Subintervals(memory)
         self.direction = self._heading = 1
         self.at_turn = False
         self.ended = True
@@ -77,7 +79,7 @@ class StepGenerator:
         self._found = NOT_YET  # what is known of the next subinterval
 
     def load(
-        self, motion: "Motion", joint: int, position_steps: int, pulse_ticks: int, gap_ticks: int
+        self, motion: "MotionHead", joint: int, position_steps: int, pulse_ticks: int, gap_ticks: int
     ) -> None:
         """Stand at the start of a motion with the joint at ``position_steps``.
 
@@ -103,6 +105,10 @@ class StepGenerator:
             if not self._prepare() and self.at_turn:
                 self.turn()
 
+    def close(self) -> None:
+        """The motion is read no further."""
+        self.subintervals.close()
+
     def prepare(self, until_kiticks: int) -> bool:
         """Put the next steps into the queue, unless it is full or goes on beyond a time already.
 
@@ -118,7 +124,7 @@ class StepGenerator:
                 return False
         return True
 
-    def write(self, ring: array, mask: int, head: int, room: int) -> int:
+    def write(self, ring: "array[int] | memoryview[int]", mask: int, head: int, room: int) -> int:
         """Write up to ``room`` edge times (rise, fall, ...; ticks modulo 2**32) to ``ring`` from ``head`` on.
 
         ``ring``: array('I') of ``mask`` + 1 entries, ``head`` even. Returns how many were written.
@@ -126,11 +132,11 @@ class StepGenerator:
         queue = self.queue
         queue[step_queue.HEAD] = head
         emit(room, ring, queue, mask)
-        return queue[step_queue.HEAD] - head
+        return int(queue[step_queue.HEAD] - head)
 
     def latest_kiticks(self) -> int:
         """Time of the last step in the queue."""
-        return self.queue[LATEST_KITICKS]
+        return int(self.queue[LATEST_KITICKS])
 
     def waits(self) -> bool:
         """Whether steps wait in the queue."""

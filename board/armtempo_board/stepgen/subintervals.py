@@ -6,41 +6,43 @@ convex hull of its Bezier points holds no step and is passed over whole. So no s
 curve, and differences of one sign prove it monotone.
 """
 
-from array import array
-
 from micropython import const
 
+from armtempo_board.memory import Memory
 from armtempo_board.stepgen import bezier, subdivision
-from armtempo_board.stepgen.subdivision import search
+from armtempo_board.stepgen.control_points import WINDOW_WORDS, ControlPoints
+from armtempo_board.stepgen.subdivision import MEASURES_SIZE, PIECES_SIZE, search
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from armtempo_shared.motion import Motion
+    from armtempo_shared.motion import MotionHead
 
 _START_LEVEL = const(4)
 
 
 class Subintervals:
-    """Walks through a joint's motion; all buffers are made once.
+    """Walks through a joint's motion.
 
     ``angle`` and ``time`` begin with the Bezier points of the subinterval (bezier.py); ``angle_measures`` and
     ``time_measures`` are what was measured of them (subdivision.py). ``min_ticks``: a subinterval no longer than
     this that comes back to the position where it began is passed over.
     """
 
-    def __init__(self) -> None:
-        self.angle = array("i", bytes(4 * subdivision.PIECES_SIZE))
-        self.time = array("i", bytes(4 * subdivision.PIECES_SIZE))
-        self.angle_measures = array("i", bytes(4 * subdivision.MEASURES_SIZE))
-        self.time_measures = array("i", bytes(4 * subdivision.MEASURES_SIZE))
+    def __init__(self, memory: Memory) -> None:
+        """``memory``: where its words are taken from (``armtempo_shared.engine_memory`` counts them)."""
+        self.angle = memory.take(PIECES_SIZE)
+        self.time = memory.take(PIECES_SIZE)
+        self._angle_points = ControlPoints(memory.take(WINDOW_WORDS))
+        self._time_points = ControlPoints(memory.take(WINDOW_WORDS))
+        self.angle_measures = memory.take(MEASURES_SIZE)
+        self.time_measures = memory.take(MEASURES_SIZE)
         self.min_ticks = 0
 
-    def load(self, motion: "Motion", joint: int) -> None:
+    def load(self, motion: "MotionHead", joint: int) -> None:
         """Stand before the first subinterval."""
-        self._data = motion.data
+        self._angle_points.open(motion.stream(motion.angle_offset(joint)), motion.degree)
+        self._time_points.open(motion.stream(motion.time_offset(joint)), motion.degree)
         self._weights = bezier.weights(motion.degree)
-        self._angle_offset = motion.angle_offset(joint) >> 2
-        self._time_offset = motion.time_offset(joint) >> 2
         self._refine = motion.refine
         self._segments = motion.segments * motion.refine
         self._number = -1
@@ -49,16 +51,24 @@ class Subintervals:
         self.time_measures[subdivision.MOVE] = subdivision.STAY
         self.load_segment()
 
+    def close(self) -> None:
+        """The motion is read no further."""
+        self._angle_points.close()
+        self._time_points.close()
+
     def load_segment(self) -> bool:
         """Load the next time segment and the part of the angle segment that belongs to it; False: there is none."""
         number = self._number + 1
         if number == self._segments:
             return False
         self._number = number
-        offset = self._angle_offset + 2 * (number // self._refine)
-        bezier.from_control_points(self._data, offset, self._weights, self.angle)
+        points = self._angle_points
+        bezier.from_control_points(
+            points.words, points.seek(number // self._refine), self._weights, self.angle
+        )
         bezier.restrict(self.angle, number % self._refine, self._refine)
-        bezier.from_control_points(self._data, self._time_offset + 2 * number, self._weights, self.time)
+        points = self._time_points
+        bezier.from_control_points(points.words, points.seek(number), self._weights, self.time)
         bezier.restrict(self.time, 0, 1)
         return True
 

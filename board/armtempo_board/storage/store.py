@@ -1,4 +1,4 @@
-"""Records in flash: motions, the arm record, the name of the default motion; never half written.
+"""Records in flash: motions, the arm record, the default by name and checksum; never half written.
 
 A record is written to ``NAME.new``, read back, synced and renamed. Where a power cut leaves a ``.new`` file,
 ``recover`` takes it if the old file is gone and the new one is whole, and removes it otherwise.
@@ -8,15 +8,16 @@ before a motion (see ``Controller.store``): no file is read or written while one
 """
 
 import os
-from binascii import crc32
+from binascii import crc32, hexlify
 
 from armtempo_shared import codes
 from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_NAME
 from armtempo_shared.messages import ARM_RECORD_NAME
-from armtempo_shared.motion import Motion, MotionError
+from armtempo_shared.motion import MotionError
 from micropython import const
 
 from armtempo_board.errors import Refused
+from armtempo_board.storage.motion_file import MotionFile, stated_crc
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -58,35 +59,23 @@ def _sync() -> None:
         sync()
 
 
-def _whole(file_name: str, data: bytes) -> bool:
-    """Whether the bytes are a whole record, of the kind that the file's name says."""
-    if file_name.endswith(_MOTION):
-        try:
-            Motion(data)
-        except MotionError:
-            return False
-        return True
-    if file_name == _ARM:
-        from armtempo_shared import armrecord  # here, so that it can be forgotten
-
-        try:
-            armrecord.unpack(data)
-        except armrecord.ArmRecordError:
-            return False
-        return True
-    return data.endswith(b"\n")
+def _check_crc(data: bytes, crc: int) -> None:
+    if int.from_bytes(data[-_CRC_BYTES:], "little") != crc or crc32(memoryview(data)[:-_CRC_BYTES]) != crc:
+        raise Refused(codes.BAD_CHECKSUM)
 
 
 class Store:
     """The folder ``root``; every method refuses with FLASH_ERROR or FLASH_FULL where the flash fails."""
 
-    def __init__(self, root: str) -> None:
+    def __init__(self, root: str, recover: bool = True) -> None:
+        """``recover``: nothing is under way that another object began."""
         self._root = root
         self._file: "Any" = None  # the upload under way,
         self._target = ""  # its file name,
         self._size = 0  # bytes announced
         self._received = 0  # and received so far
-        self.recover()
+        if recover:
+            self.recover()
 
     def recover(self) -> None:
         """Make the folder if it is missing, finish or undo what a power cut interrupted."""
@@ -141,18 +130,37 @@ class Store:
         return self._received
 
     def commit(self, crc: int) -> str:
-        """Check the upload as it stands in the flash and put it in place; returns the record's name."""
+        """Check the upload as it stands in the flash and put it in place; returns the record's name.
+
+        An arm record is not put in place before it is judged: see ``take_arm``.
+        """
         if not self._file or self._received != self._size:
             raise Refused(codes.BAD_OFFSET, value=self._received)
         name = self._target
         try:
             self._close()
-            self._check(name, crc)
+            if name == _ARM:
+                _check_crc(self._read(name + _NEW), crc)
+            else:
+                self._check_motion(name + _NEW, crc)
         except Refused:
             self._discard(name + _NEW)
             raise
+        if name == _ARM:
+            return ARM_RECORD_NAME
         self._replace(name)
-        return ARM_RECORD_NAME if name == _ARM else name[: -len(_MOTION)]
+        return name[: -len(_MOTION)]
+
+    def new_arm(self) -> bytes:
+        """The arm record that was uploaded and waits to be judged."""
+        return self._read(_ARM + _NEW)
+
+    def take_arm(self, is_fit: bool) -> None:
+        """Put it in place, or give it up."""
+        if is_fit:
+            self._replace(_ARM)
+        else:
+            self._discard(_ARM + _NEW)
 
     def abandon(self) -> None:
         """Give up the upload under way, if any."""
@@ -165,10 +173,18 @@ class Store:
             self._discard(self._target + _NEW)
 
     def read(self, name: str) -> bytes:
-        """All bytes of a record; NOT_FOUND, or TOO_LONG where they do not fit into memory; "" is none."""
+        """All bytes of a small record; NOT_FOUND, or TOO_LONG where they do not fit into memory."""
+        return self._read(_file_name(name))
+
+    def motion(self, name: str) -> MotionFile:
+        """A stored motion, checked as far as its head and checksum go; "" is none."""
         if not name:
             raise Refused(codes.NOT_FOUND)
-        return self._read(_file_name(name))
+        return self._motion(_motion_file(name))
+
+    def size_of(self, name: str) -> int:
+        """Bytes of a record; NOT_FOUND."""
+        return self._size_of(_file_name(name))
 
     def part(self, name: str, offset: int, length: int) -> "tuple[int, bytes]":
         """(size of the record, bytes from offset on)."""
@@ -196,29 +212,37 @@ class Store:
             raise Refused(codes.EXISTS)
         was_default = self.default() == old
         if was_default:
-            self._write_default(new + "\n" + old)
+            crc = self._crc(old)
+            self._write_default(new + crc + "\n" + old + crc)
         self._guard(os.rename, self._path(old_file), self._path(new_file))
         self._guard(_sync)
         if was_default:
-            self._write_default(new)
+            self._write_default(new + crc)
 
     def default(self) -> str:
-        """Name of the default motion, "" for none."""
+        """Name of the default motion; "" for none, or where it is no longer the one that was chosen."""
         try:
             lines = self._read(_DEFAULT).decode().split("\n")
         except (Refused, UnicodeError):
             return ""
         names = self.names()
-        for name in lines:
-            if name in names:
+        for line in lines:
+            name, _, _ = line.partition(" ")
+            if name in names and line == name + self._crc(name):
                 return name
         return ""
 
     def set_default(self, name: str) -> None:
         """Make a stored motion the default; "" for none."""
         if name:
-            self._size_of(_motion_file(name))
+            name += self._crc(name)
         self._write_default(name)
+
+    def _crc(self, name: str) -> str:
+        """A motion's checksum as it stands in its last bytes, behind a blank."""
+        size = self._size_of(_motion_file(name))
+        _, crc = self.part(name, max(0, size - 4), 4)
+        return " " + hexlify(crc).decode()
 
     def _write_default(self, text: str) -> None:
         file = self._guard(open, self._path(_DEFAULT + _NEW), "wb")
@@ -277,15 +301,39 @@ class Store:
         self._guard(file.close)
         self._guard(_sync)
 
-    def _check(self, name: str, crc: int) -> None:
-        data = self._read(name + _NEW)
-        if (
-            int.from_bytes(data[-_CRC_BYTES:], "little") != crc
-            or crc32(memoryview(data)[:-_CRC_BYTES]) != crc
-        ):
+    def _check_motion(self, file_name: str, crc: int) -> None:
+        try:
+            found = self._guard(stated_crc, self._path(file_name), self._size_of(file_name))
+        except MotionError:
             raise Refused(codes.BAD_CHECKSUM)
-        if not _whole(name, data):
+        if found != crc:
+            raise Refused(codes.BAD_CHECKSUM)
+        self._motion(file_name)
+
+    def _motion(self, file_name: str) -> MotionFile:
+        size = self._size_of(file_name)
+        try:
+            return self._guard(MotionFile, self._path(file_name), size)  # type: ignore[no-any-return]
+        except MotionError:
             raise Refused(codes.BAD_RECORD)
+
+    def _is_whole(self, file_name: str) -> bool:
+        """Whether a ``.new`` file is a whole record, of the kind that the file's name says."""
+        try:
+            if file_name.endswith(_MOTION):
+                return self._motion(file_name + _NEW) is not None
+            data = self._read(file_name + _NEW)
+        except Refused:
+            return False
+        if file_name == _ARM:
+            from armtempo_shared import armrecord  # here, so that it can be forgotten
+
+            try:
+                armrecord.unpack(data)
+            except armrecord.ArmRecordError:
+                return False
+            return True
+        return data.endswith(b"\n")
 
     def _replace(self, name: str) -> None:
         try:
@@ -302,11 +350,7 @@ class Store:
             pass
 
     def _recover(self, name: str) -> None:
-        try:
-            whole = name not in self._files() and _whole(name, self._read(name + _NEW))
-        except Refused:
-            whole = False
-        if not whole:
+        if name in self._files() or not self._is_whole(name):
             return self._discard(name + _NEW)
         try:
             os.rename(self._path(name + _NEW), self._path(name))

@@ -13,40 +13,34 @@ from typing import Any
 import click
 
 from armtempo import __version__
+from armtempo.cli import messages
 from armtempo.cli.interrupts import raised_by_signals
 from armtempo.errors import INTERRUPTED, ArmtempoError
+from armtempo.formats.spelling import did_you_mean
 
-COMMANDS = (
-    "demo",
-    "plan",
-    "ik",
-    "fk",
-    "bench",
-    "paper",
-    "upload",
-    "run",
-    "fetch",
-    "report",
-    "export",
-    "import",
-    "import-urdf",
-    "check",
-    "goto",
-    "home",
-    "stop",
-    "clear",
-    "status",
-    "list",
-    "show",
-    "remove",
-    "rename",
-    "deploy",
-    "undeploy",
-    "ports",
-    "virtual-board",
-    "monitor",
-)
-"""In the order of the help page. Each is ``command`` in its module: '-' as '_', a keyword with '_' behind."""
+GROUPS = {
+    "Plan": ("new", "plan", "ik", "fk", "check", "import", "export", "import-urdf"),
+    "Run": ("demo", "home", "goto", "run", "stop", "clear", "status", "watch", "fetch", "report"),
+    "Board": (
+        *("ports", "deploy", "undeploy", "firmware", "flash", "configure"),
+        *("upload", "list", "show", "remove", "rename"),
+        *("virtual-board", "monitor", "config", "doctor"),
+    ),
+    "Develop": ("bench", "paper", "completion"),
+}
+"""Commands in the order of the help page. Each is ``command`` in its module: '-' as '_', a keyword with '_' behind."""
+COMMANDS = tuple(name for names in GROUPS.values() for name in names)
+
+_EXAMPLES = """\
+Examples:
+
+\b
+  armtempo demo                        the paper's motion on a virtual board
+  armtempo new my_arm                  a folder for an own arm; the commands below are for inside
+  armtempo plan                        a job as a trajectory file
+  armtempo run first.json --repeat 3   replay and record it
+  armtempo COMMAND --help              more about one of them
+"""
 
 
 class LazyGroup(click.Group):
@@ -56,6 +50,16 @@ class LazyGroup(click.Group):
         """All names, in the order of the table."""
         return [*COMMANDS]  # "list" may be the module of that command here
 
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The commands with what they do, group by group."""
+        width = formatter.width - 6 - max(map(len, COMMANDS))
+        for title, names in GROUPS.items():
+            with formatter.section(title):
+                commands = [(name, self.get_command(ctx, name)) for name in names]
+                formatter.write_dl(
+                    [(name, command.get_short_help_str(width)) for name, command in commands if command]
+                )
+
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
         """The command of that name."""
         if name not in COMMANDS:
@@ -63,6 +67,15 @@ class LazyGroup(click.Group):
         module = import_module(f"{__name__}.{name.replace('-', '_')}{'_' * iskeyword(name)}")
         command: click.Command = module.command
         return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command that is meant; the error for one that there is not names the nearest."""
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            near = did_you_mean(args[0], COMMANDS) or ". 'armtempo --help' lists them"
+            ctx.fail(f"no command {args[0]!r}{near}")
+        return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; an error that the user can correct is one message, without a traceback."""
@@ -74,28 +87,35 @@ class LazyGroup(click.Group):
             with raised_by_signals():
                 return super().invoke(ctx)
         except ArmtempoError as error:
-            click.echo(f"armtempo: {error}", err=True)
+            messages.show(error)
             ctx.exit(error.exit_code)
         except OSError as error:
             if error.errno == errno.EPIPE:  # whoever read the output has gone: click ends quietly
                 raise
-            click.echo(f"armtempo: {_of_file(error)}", err=True)
+            messages.show(_of_file(error))
             ctx.exit(1)
         except MemoryError as error:
-            click.echo(f"armtempo: this takes more memory than there is: {error}".rstrip(": "), err=True)
+            messages.show(
+                ArmtempoError(
+                    f"this takes more memory than there is: {error}".rstrip(": "),
+                    "close other programs, or ask for less: lower refine, a smaller population",
+                )
+            )
             ctx.exit(1)
-        except KeyboardInterrupt:
-            click.echo("armtempo: interrupted", err=True)
+        except KeyboardInterrupt as error:
+            click.echo(f"armtempo: interrupted{': ' if error.args else ''}{error}", err=True)
             ctx.exit(INTERRUPTED)
 
 
-def _of_file(error: OSError) -> str:
+def _of_file(error: OSError) -> ArmtempoError:
     """The operating system's reason for an error with a file, and what to check."""
     where = f"{error.filename}: " if error.filename else ""
-    return f"{where}{error.strerror or error}; look after the path, its permissions and the room on the disk"
+    return ArmtempoError(
+        f"{where}{error.strerror or error}", "check the path, its permissions and the room on the disk"
+    )
 
 
-@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]}, epilog=_EXAMPLES)
 @click.version_option(__version__, prog_name="armtempo")
 def main() -> None:
     """Time-optimal B-spline motions for stepper arms, replayed by an STM32F407 with MicroPython."""

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import chosen, messages, options
 from armtempo.cli.progress import ProgressBar
-from armtempo.errors import INTERRUPTED, MissingPackageError
+from armtempo.errors import INTERRUPTED, InputError, MissingPackageError
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -23,12 +23,15 @@ if TYPE_CHECKING:
 
 def _names(ctx: click.Context, parameter: click.Parameter, value: str) -> list[str]:
     """Algorithms, separated by commas."""
-    from armtempo.optimise import ALGORITHMS
+    from armtempo.model.job_file import OPTIMISERS
 
     names = [name.strip().lower() for name in value.split(",")]
     for name in names:
-        if name not in ALGORITHMS:
-            raise click.BadParameter(f"{name!r} is not one of {', '.join(sorted(ALGORITHMS))}")
+        if name not in OPTIMISERS:
+            raise InputError(
+                f"--algorithms: {name!r} is not known",
+                f"give some of {', '.join(sorted(OPTIMISERS))}, separated by commas",
+            )
     return names
 
 
@@ -39,10 +42,16 @@ def _sizes(ctx: click.Context, parameter: click.Parameter, value: str) -> list[i
     try:
         sizes = [int(size) for size in value.split(",")]
     except ValueError:
-        raise click.BadParameter(f"{value!r} must be whole numbers separated by commas") from None
+        raise InputError(
+            f"--populations: {value!r} is not a list of whole numbers",
+            "write whole numbers separated by commas, such as 20,50",
+        ) from None
     least, most = POPULATION
     if min(sizes) < least or max(sizes) > most:
-        raise click.BadParameter(f"a population is from {least} to {most}")
+        raise InputError(
+            f"--populations: {value} goes beyond what a search takes",
+            f"give populations from {least} to {most}",
+        )
     return sizes
 
 
@@ -78,17 +87,17 @@ def _sizes(ctx: click.Context, parameter: click.Parameter, value: str) -> list[i
 @click.option("--plot/--no-plot", default=True, help="Draw convergence.png (needs matplotlib), or do not.")
 @click.pass_context
 def command(
-    ctx: click.Context, /, out: Path, workers: int | None, scheduler: str | None, plot: bool, **chosen: Any
+    ctx: click.Context, /, out: Path, workers: int | None, scheduler: str | None, plot: bool, **given: Any
 ) -> None:
     """Compare the search algorithms as the paper does in Table 4 and Fig. 6."""
+    from armtempo.model.arm import Arm
+    from armtempo.model.job import Job
     from armtempo.research.bench import cases, result_table, worker_pool
     from armtempo.research.bench.result_store import ResultStore
 
-    arm_path, job_path = chosen["arm_path"], chosen["job_path"]
-    arm = options.load_arm(arm_path)
-    job = options.load_job(job_path, arm)
-    problem = cases.problem_of(arm, job, chosen["joint"], chosen["fitness"], chosen["iterations"])
-    wanted = cases.cases(chosen["algorithms"], chosen["populations"], range(1, chosen["seeds"] + 1))
+    arm, job = chosen.arm_and_job(given["arm_path"], given["job_path"])
+    problem = cases.problem_of(arm, job, given["joint"], given["fitness"], given["iterations"])
+    wanted = cases.cases(given["algorithms"], given["populations"], range(1, given["seeds"] + 1))
     store = ResultStore(out, problem)
     place = worker_pool.cluster(scheduler) if scheduler else worker_pool.local(workers)
     try:
@@ -102,7 +111,7 @@ def command(
             err=True,
         )
         ctx.exit(INTERRUPTED)
-    with_paper = chosen["joint"] == 1 and arm_path is None and job_path is None
+    with_paper = given["joint"] == 1 and (arm.source, job.source) == (Arm.paper().source, Job.paper().source)
     found = result_table.rows((store.runs[case] for case in wanted), problem.iterations)
     _write(out, found, with_paper, plot)
 
@@ -139,12 +148,12 @@ def _write(out: Path, found: Sequence[Row], with_paper: bool, plot: bool) -> Non
 
 def _plot(path: Path, found: Sequence[Row]) -> list[str]:
     """Draws the curves; without matplotlib it says so, and the tables stand."""
-    from armtempo.report import plots
+    from armtempo.report import drawing
     from armtempo.research.bench import result_plot
 
     try:
-        plots.save(result_plot.convergence(found), path)
+        drawing.save(result_plot.convergence(found), path)
     except MissingPackageError as error:
-        click.echo(f"no plot: {error}", err=True)
+        messages.show(error, "no plot")
         return []
     return [path.name]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import chosen, options
 
 if TYPE_CHECKING:
     from armtempo.arm_check import Finding
@@ -17,34 +17,30 @@ if TYPE_CHECKING:
 
 @click.command()
 @options.arm
-@click.option(
-    "--job",
-    "job_path",
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help="Job file (TOML) to look at too.",
-)
+@options.job
 @click.option(
     "--picture",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
     help="Draw the arm at home and at the ends of its ranges into FILE (PNG or SVG). Needs the extra 'plot'.",
 )
-@click.option("--force", is_flag=True, help="Replace the picture if it is there.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@options.force("the picture if it is there")
+@options.as_json
 def command(
     arm_path: Path | None, job_path: Path | None, picture: Path | None, force: bool, as_json: bool
 ) -> None:
-    """Hold an arm file, and a job, against common sense, and say what looks wrong and what to do about it.
+    """Hold an arm file, and a job if named, against common sense: what looks wrong, and what to do about it.
 
     Steps, step rates, resolution at the tool, torque, encoders, ranges, wiring. Exit code 1 where there are
     errors; warnings and notes leave it 0.
     """
     from armtempo.arm_check import Level, check, figures
+    from armtempo.project.settings import JOB, ProjectSettings
 
     _check_picture(picture, force)
-    path = options.arm_file(arm_path)
-    arm, found = check(path, job_path)
+    path = chosen.arm_file(arm_path)
+    job = ProjectSettings().get(JOB, job_path)
+    arm, found = check(path, job.path if job else None)
     joints = figures.of(arm) if arm else ()
     (_print_json if as_json else _print_text)(path, arm, joints, found)
     if arm and picture:
@@ -54,13 +50,17 @@ def command(
 
 
 def _check_picture(picture: Path | None, force: bool) -> None:
-    """Raise UsageError where the picture cannot be written as asked."""
+    """Raise InputError where the picture cannot be written as asked."""
+    from armtempo.errors import InputError
+
     if picture is None:
         return
     if picture.suffix not in (".png", ".svg"):
-        raise click.UsageError(f"--picture {picture}: give a name that ends in .png or .svg")
+        raise InputError(
+            f"--picture {picture}: not a kind of picture", "give a name that ends in .png or .svg"
+        )
     if picture.exists() and not force:
-        raise click.UsageError(f"--picture {picture}: is there already; choose another name, or add --force")
+        raise InputError(f"--picture {picture}: is there already", "choose another name, or add --force")
 
 
 def _print_text(path: Path, arm: Arm | None, joints: tuple[JointFigures, ...], found: list[Finding]) -> None:
@@ -99,7 +99,7 @@ def _print_json(path: Path, arm: Arm | None, joints: tuple[JointFigures, ...], f
 
 
 def _draw(arm: Arm, picture: Path) -> None:
-    from armtempo.report import arm_picture, plots
+    from armtempo.report import arm_picture, drawing
 
-    plots.save(arm_picture.arm_picture(arm), picture)
+    drawing.save(arm_picture.arm_picture(arm), picture)
     click.echo(f"wrote {picture}", err=True)

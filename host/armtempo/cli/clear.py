@@ -6,17 +6,17 @@ from pathlib import Path
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import chosen, options
 
 
 @click.command()
 @options.port
 @options.log_traffic
-def command(port: str, log_traffic: Path | None) -> None:
+def command(port: str | None, log_traffic: Path | None) -> None:
     """Clear the pending fault, once its cause is gone."""
     from armtempo.robot.stored_motion import fault_name
 
-    with options.board(port, log_traffic) as board:
+    with chosen.board(port, log_traffic) as board:
         before = board.status()
         board.clear()
         after = board.status()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import chosen, options
 from armtempo.cli.progress import ProgressBar
 
 
@@ -18,35 +18,20 @@ from armtempo.cli.progress import ProgressBar
     metavar="FOLDER",
     help="Instead write FOLDER for 'mpremote mip install --target /flash FOLDER/package.json'.",
 )
-@click.option(
-    "--firmware",
-    type=click.Path(file_okay=False, path_type=Path),
-    metavar="FOLDER",
-    help="Instead write FOLDER with a manifest.py that makes the program a part of MicroPython's firmware.",
-)
 @options.port
-def command(mpy: bool, package: Path | None, firmware: Path | None, port: str) -> None:
+def command(mpy: bool, package: Path | None, port: str | None) -> None:
     """Put the board program on a board, or bring it up to date.
 
     mpremote copies what differs below /flash/lib; every file is read back. A boot.py or main.py that was
     there before is kept aside. Interrupted, do it again.
     """
     from armtempo.deploy import deploy
-    from armtempo.deploy import firmware as firmwares
     from armtempo.deploy import package as packages
 
-    if package is not None and firmware is not None:
-        raise click.UsageError("--package and --firmware exclude each other")
     if package is not None:
         packages.write(package)
         click.echo(f"written: {package}")
         return
-    if firmware is not None:
-        firmwares.write(firmware)
-        click.echo(
-            f"written: {firmware}; for MicroPython's make: FROZEN_MANIFEST={firmware.resolve()}/manifest.py"
-        )
-        return
     with ProgressBar("copying") as progress:
-        deploy(port, mpy, click.echo, progress)
+        deploy(chosen.port(port), mpy, click.echo, progress)
     click.echo("the board runs armtempo")

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from armtempo.cli import options
+
 
 @click.command()
 @click.argument("trajectory", type=click.Path(dir_okay=False, path_type=Path))
@@ -24,17 +26,29 @@ import click
     "--output",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="File to write; without it standard output.",
+    help="File to write; without it standard output. An existing FILE of other content is kept.",
 )
-def command(trajectory: Path, kind: str, rate: float, frame_id: str, output: Path | None) -> None:
+@options.force("an existing FILE of other content")
+@options.altered
+def command(
+    trajectory: Path,
+    kind: str,
+    rate: float,
+    frame_id: str,
+    output: Path | None,
+    force: bool,
+    altered: bool,
+) -> None:
     """Write the trajectory file TRAJECTORY as CSV or as a ROS JointTrajectory, sampled at any rate."""
-    from armtempo.formats.atomic_file import replace_text
+    from armtempo.formats.atomic_file import check_not_input, check_replaceable, replace_text
     from armtempo.model.plan import Plan
 
-    plan = Plan.load(trajectory)
+    plan = Plan.load(trajectory, altered)
     text = plan.to_csv(rate) if kind == "csv" else plan.to_ros(rate, frame_id)
     if output is None:
         click.echo(text.encode(), nl=False)  # UTF-8 as in a file, whatever the terminal
     else:
+        check_not_input(output, (trajectory,))
+        check_replaceable(output, text, force)
         replace_text(output, text)
         click.echo(f"written: {output}")

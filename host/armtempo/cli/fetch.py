@@ -6,16 +6,24 @@ from pathlib import Path
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import chosen, options
 
 
 @click.command()
 @click.argument("what", required=False)
 @options.out
 @options.arm_of_file
+@options.altered
 @options.port
 @options.log_traffic
-def command(what: str | None, out: Path, arm_path: Path | None, port: str, log_traffic: Path | None) -> None:
+def command(
+    what: str | None,
+    out: Path | None,
+    arm_path: Path | None,
+    altered: bool,
+    port: str | None,
+    log_traffic: Path | None,
+) -> None:
     """Fetch the samples that the board keeps of its last run, such as one that its button started.
 
     WHAT is what was run: a trajectory file, or the name of a motion on the board; without it the motion that
@@ -23,10 +31,10 @@ def command(what: str | None, out: Path, arm_path: Path | None, port: str, log_t
     """
     from armtempo.cli.live import repetition_line
 
-    plan = options.load_plan(what, arm_path) if what else None
-    arm = plan.arm if plan else options.load_arm(arm_path)
-    with options.board(port, log_traffic, arm) as board:
-        board.configure(arm, replace=False)
-        run = board.fetch(plan or what, out)
+    plan = chosen.load_plan(Path(what), arm_path, altered) if what and chosen.is_file(what) else None
+    named = plan.arm if plan else chosen.named_arm(arm_path)
+    with chosen.board(port, log_traffic, named) as board:
+        board.configure(chosen.arm_of_board(board, named))
+        run = board.fetch(plan or what, chosen.runs(out))
         click.echo(f"{run.name}: {run.path}")
         click.echo(repetition_line(run.entries[-1]))

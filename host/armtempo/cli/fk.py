@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import chosen, options
 
 if TYPE_CHECKING:
     from armtempo.arrays import Array
@@ -18,18 +18,31 @@ if TYPE_CHECKING:
 @click.argument("where", nargs=-1)
 @options.job
 @options.arm
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-def command(where: tuple[str, ...], job_path: Path | None, arm_path: Path | None, as_json: bool) -> None:
+@options.altered
+@options.as_json
+def command(
+    where: tuple[str, ...], job_path: Path | None, arm_path: Path | None, altered: bool, as_json: bool
+) -> None:
     """Print the tool's pose and every frame for given joint angles.
 
     WHERE: angles in degrees ('0,-60,40', or as separate numbers), of all joints or of those that have a motor, the
-    others at home; a via point such as P0; or a trajectory file for its start. Without it the arm's home. Hold the
-    frames against the arm: a wrong row of its table shows at once.
+    others at home; a via point such as P0; or a trajectory file for its start. Without it, or for 'home', the arm's
+    home. Hold the frames against the arm: a wrong row of its table shows at once.
     """
+    from armtempo.cli import posture
     from armtempo.kinematics import frame_listing
+    from armtempo.kinematics.chain import spread_deg
 
-    arm = options.load_arm(arm_path)
-    angles_deg = _angles(where, arm, job_path)
+    if len(where) == 1 and posture.is_via(where[0]):
+        arm, job = chosen.arm_and_job(arm_path, job_path)
+        angles_deg = spread_deg(arm, posture.via_deg(where[0], arm, job).tolist())
+    elif len(where) == 1 and posture.is_named(where[0]):
+        wanted = posture.NamedPosture.of(where[0], arm_path, altered)
+        arm = wanted.arm or chosen.arm_or_paper(arm_path)
+        angles_deg = spread_deg(arm, wanted.angles_deg(arm, job_path).tolist())
+    else:
+        arm = chosen.arm_or_paper(arm_path)
+        angles_deg = _angles(where, arm)
     if as_json:
         import json
 
@@ -38,14 +51,11 @@ def command(where: tuple[str, ...], job_path: Path | None, arm_path: Path | None
         click.echo("\n".join(frame_listing.lines(arm, angles_deg)))
 
 
-def _angles(where: tuple[str, ...], arm: Arm, job_path: Path | None) -> Array:
+def _angles(where: tuple[str, ...], arm: Arm) -> Array:
     """Angles of all joints, deg (joints,)."""
-    from armtempo.cli import posture
     from armtempo.kinematics.chain import spread_deg
     from armtempo.kinematics.pose_file import numbers
 
-    if len(where) == 1 and posture.is_named(where[0]):
-        return spread_deg(arm, posture.parse(where[0], arm, job_path).tolist())
     if not where:
         return spread_deg(arm, arm.all_home_deg)
     return spread_deg(arm, numbers(" ".join(where), "the angles"))

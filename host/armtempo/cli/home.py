@@ -6,38 +6,47 @@ from pathlib import Path
 
 import click
 
-from armtempo.cli import options, posture
+from armtempo.cli import chosen, options, posture
+from armtempo.errors import InputError
 
 
 @click.command(context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
-@click.argument("where", required=False)
+@click.argument("where", default=posture.HOME)
 @click.option("--switches", is_flag=True, help="Move to the limit switches instead of taking WHERE on trust.")
 @options.job
-@options.arm
+@options.arm_of_board
+@options.replace_arm
+@options.altered
 @options.port
 @options.log_traffic
 def command(
-    where: str | None,
+    where: str,
     switches: bool,
     job_path: Path | None,
     arm_path: Path | None,
-    port: str,
+    replace_arm: bool,
+    altered: bool,
+    port: str | None,
     log_traffic: Path | None,
 ) -> None:
     """Declare where the arm stands.
 
-    WHERE: angles such as '0,-60,40', a via point such as P0, or a trajectory file for its start. Without
-    it: the home posture of the arm file. Nothing moves; afterwards motions may start. With --switches the
-    joints that have a switch of known angle move: to it, off it, and slowly to it again.
+    WHERE: angles such as '0,-60,40', a via point of the job such as P0, or a trajectory file for its start.
+    Without it: the home posture of the arm file. Nothing moves; afterwards motions may start. With --switches
+    the joints that have a switch of known angle move: to it, off it, and slowly to it again.
     """
-    if switches and where is not None:
-        raise click.UsageError("give either WHERE or --switches")
-    arm = options.load_arm(arm_path)
-    angles_deg = None if where is None else posture.parse(where, arm, job_path)
-    with options.board(port, log_traffic, arm) as board:
-        board.configure(arm, replace=arm_path is not None)
+    if switches and where != posture.HOME:
+        raise InputError(
+            "WHERE and --switches exclude each other",
+            "give WHERE where the arm stands, or --switches to drive to the limit switches",
+        )
+    wanted = posture.NamedPosture.of(where, arm_path, altered)
+    with chosen.board(port, log_traffic, wanted.arm) as board:
+        arm = chosen.arm_of_board(board, wanted.arm)
+        angles_deg = wanted.angles_deg(arm, job_path)
+        board.configure(arm, replace=replace_arm)
         if switches:
             board.home_to_switches(arm)
         else:
             board.home(arm, angles_deg)
-        click.echo(posture.where_it_is(board))
+        posture.say_where_it_is(board)

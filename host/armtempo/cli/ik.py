@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import chosen, options
 
 if TYPE_CHECKING:
     from armtempo.kinematics.listing import Listing
@@ -102,7 +102,7 @@ def command(
     from armtempo.kinematics.solver import PoseSolver
 
     wanted = [_within(pose, tolerance_mm, tolerance_deg) for pose in _poses(_Given(**given))]
-    solver = PoseSolver(options.load_arm(arm_path))
+    solver = PoseSolver(chosen.arm_or_paper(arm_path))
     found = listings(solver, wanted, _posture(previous, solver), numerical)
     show = _print_json if as_json else _print_text
     show(solver, found)
@@ -116,11 +116,14 @@ def _within(pose: Pose, tolerance_mm: float | None, tolerance_deg: float | None)
 
 
 def _poses(given: _Given) -> list[Pose]:
-    """The poses of the options; UsageError where they do not make exactly one of the three forms."""
+    """The poses of the options; InputError where they do not make exactly one of the three forms."""
+    from armtempo.errors import InputError
     from armtempo.kinematics import pose_file
 
     if sum(form is not None for form in (given.matrix, given.position, given.poses)) != 1:
-        raise click.UsageError("give one of --matrix, --position or --poses")
+        raise InputError(
+            "not one pose is asked for, or too many", "give one of --matrix, --position and --poses"
+        )
     angles = {
         name: getattr(given, name) for name in ("roll", "pitch", "yaw") if getattr(given, name) is not None
     }
@@ -128,9 +131,10 @@ def _poses(given: _Given) -> list[Pose]:
         angles
     )
     if orientations > (given.position is not None):
-        raise click.UsageError(
+        raise InputError(
+            "these options do not make a pose",
             "--position goes alone or with one of --rpy, --quaternion, --approach, or any of --roll, --pitch and "
-            "--yaw; and they go with it"
+            "--yaw; and they go with it",
         )
     if given.poses is not None:
         return pose_file.read(given.poses)
@@ -164,7 +168,10 @@ def _posture(previous: str | None, solver: PoseSolver) -> Sequence[float]:
         return solver.home_rad
     angles = numbers(previous, "--previous")
     if len(angles) != len(solver.home_rad):
-        raise InputError(f"--previous: {len(angles)} angles given, the arm has {len(solver.home_rad)} joints")
+        raise InputError(
+            f"--previous: {len(angles)} angles given, the arm has {len(solver.home_rad)} joints",
+            "give one angle for each joint, base first",
+        )
     return [math.radians(angle) for angle in angles]
 
 
@@ -199,6 +206,7 @@ def _fail(without: list[int]) -> None:
     if without:
         which = ", ".join(map(str, without))
         raise PlanError(
-            f"no solution for pose {which}; the reasons are listed with it; bring it nearer to the arm, ask for less "
-            "of its orientation, or allow more by --tolerance-mm and --tolerance-deg"
+            f"no solution for pose {which}; the reasons are listed with it",
+            "bring it nearer to the arm, ask for less of its orientation, or allow more by --tolerance-mm and "
+            "--tolerance-deg",
         )

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import chosen, options
 
 
 @click.command("import")
@@ -15,25 +15,50 @@ from armtempo.cli import options
 @click.option("--name", help="Name of the job; without it the table's file name.")
 @click.option("--radians", is_flag=True, help="The angles are in radians.")
 @click.option(
+    "--tolerance-deg",
+    type=float,
+    metavar="DEG",
+    help="Leave out lines that the path keeps to within DEG without them. A table with a column time_s is a sampled "
+    "motion, for which this is 0.1 unless given.",
+)
+@click.option(
     "-o",
     "--output",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="Job file to write; without it the job's name with .toml. An existing file is not overwritten.",
+    help="Job file to write; without it the job's name with .toml. An existing file of other content is kept.",
 )
-def command(table: Path, arm_path: Path | None, name: str | None, radians: bool, output: Path | None) -> None:
-    """Make a job file from the CSV file TABLE: a line a via point, a column a driven joint."""
-    from armtempo.errors import InputError
+@options.force("an existing FILE of other content")
+def command(
+    table: Path,
+    arm_path: Path | None,
+    name: str | None,
+    radians: bool,
+    tolerance_deg: float | None,
+    output: Path | None,
+    force: bool,
+) -> None:
+    """Make a job file from the CSV file TABLE: a line a via point, a column a driven joint.
+
+    Columns are separated by commas, semicolons or tabs. What 'armtempo export' wrote comes back as a job of few via
+    points along the same path.
+    """
     from armtempo.formats import toml_table
-    from armtempo.formats.atomic_file import replace_text
+    from armtempo.formats.atomic_file import check_not_input, check_replaceable, replace_text
     from armtempo.model import exchange, job_file
 
-    arm = options.load_arm(arm_path)
+    arm = chosen.load_arm(arm_path)
     title = name or table.stem
     target = output or Path(f"{title}.toml")
-    if target.exists():
-        raise InputError(f"{target} exists; choose another place with --output")
-    text = exchange.job_text(title, exchange.via_from_csv(table, arm, radians))
+    check_not_input(target, (table, arm.source))
+    found = exchange.via_from_csv(table, arm, radians, tolerance_deg)
+    text = exchange.job_text(title, found)
     job_file.of_table(toml_table.parse(text, str(table)), arm)
+    check_replaceable(target, text, force)
     replace_text(target, text)
+    if found.thinned_to_deg is not None:
+        click.echo(
+            f"{found.lines} lines thinned to {len(found.via_deg)} via points: a spline through them keeps to the table "
+            f"within {found.thinned_to_deg:g} deg; the times are planned anew"
+        )
     click.echo(f"written: {target}; plan it with: armtempo plan --job {target}")

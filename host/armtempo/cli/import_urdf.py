@@ -35,9 +35,9 @@ def command(urdf: Path, out: Path, base: str | None, tip: str | None, force: boo
     from armtempo.urdf import arm_text, fitting, reader
 
     if out.exists() and not force:
-        raise InputError(f"{out}: is there already; choose another name, or --force to replace it")
+        raise InputError(f"{out}: is there already", "choose another name, or --force to replace it")
     if out.exists() and urdf.exists() and out.samefile(urdf):
-        raise InputError(f"{out}: is the URDF itself; choose another name")
+        raise InputError(f"{out}: is the URDF itself", "choose another name")
     chain = reader.read(urdf, base, tip)
     fit = fitting.fit(chain)
     text = arm_text.arm_text(chain, fit, urdf.name)

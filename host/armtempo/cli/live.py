@@ -11,6 +11,7 @@ import numpy as np
 from armtempo_shared.limits import TICK_HZ
 
 from armtempo.arrays import Array
+from armtempo.cli import messages
 from armtempo.cli.progress import ProgressBar
 from armtempo.errors import ArmtempoError
 from armtempo.link.board_messages import Sample
@@ -23,8 +24,10 @@ from armtempo.runs.run_folder import Repetition, RunFolder
 class Live(Watcher):
     """Shows a run on the terminal; used as a context. Without a display it says so and opens no window."""
 
-    def __init__(self, window: bool) -> None:
+    def __init__(self, window: bool, where: str = "") -> None:
+        """``where``: on what the motion runs, if that needs saying."""
         self._window = window
+        self._where = f", on {where}" if where else ""
         self._plot: LivePlot | None = None
         self._progress = ProgressBar("moving")
 
@@ -33,7 +36,7 @@ class Live(Watcher):
         self._motion = motion
         self._started_s = time.monotonic()
         self._plot = self._open() if self._window else None
-        click.echo(f"{motion.name}: {motion.trajectory.duration_s:.3f} s, into {folder.path}")
+        click.echo(f"{motion.name}: {motion.trajectory.duration_s:.3f} s, into {folder.path}{self._where}")
 
     def sample(self, sample: Sample, duration_s: float) -> None:
         """Show one sample."""
@@ -54,7 +57,7 @@ class Live(Watcher):
         try:
             return LivePlot(self._motion.trajectory, [joint.name for joint in self._motion.arm.driven])
         except ArmtempoError as error:
-            click.echo(f"no live plot: {error}", err=True)
+            messages.show(error, "no live plot")
             return None
 
     def _angles_deg(self, sample: Sample) -> Array:

@@ -3,12 +3,27 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import chosen, messages, options
 from armtempo.cli.progress import ProgressBar
+from armtempo.errors import InputError
+
+if TYPE_CHECKING:
+    from armtempo.model.arm import Arm
+    from armtempo.model.job import Job
+    from armtempo.model.plan import Plan
+
+
+def _refine(ctx: click.Context, param: click.Parameter, value: str | None) -> int | str | None:
+    """A number of segments, or ``auto``."""
+    if value is None or value == "auto":
+        return value
+    if not value.isdecimal() or not 1 <= int(value) <= 64:
+        raise InputError(f"--refine: {value!r} is not allowed", "give auto or a whole number from 1 to 64")
+    return int(value)
 
 
 @click.command()
@@ -19,12 +34,28 @@ from armtempo.cli.progress import ProgressBar
     "--output",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="Trajectory file to write; without it the job's name with .json.",
+    help="Trajectory file to write; without it the job's name with .json. An existing FILE is only replaced where "
+    "it is an earlier plan of the same job for the same arm, by their names.",
+)
+@options.force("any other FILE too")
+@click.option(
+    "--path",
+    type=click.Choice(["through", "free"]),
+    help="Instead of the job's path: on the spline through the via points, or free between them.",
+)
+@click.option(
+    "--corridor-deg", type=click.FloatRange(0), metavar="DEG", help="How far a joint may leave the spline."
+)
+@click.option(
+    "--corridor-mm", type=click.FloatRange(0), metavar="MM", help="How far the tool may leave the spline."
 )
 @click.option("--timing", type=click.Choice(["per-joint", "shared"]), help="Instead of the job's timing.")
 @click.option("--degree", type=click.Choice(["3", "5"]), help="Instead of the job's spline degree.")
 @click.option(
-    "--refine", type=click.IntRange(1, 64), help="Instead of the job's time segments per path segment."
+    "--refine",
+    callback=_refine,
+    metavar="N|auto",
+    help="Instead of the job's segments between via points: 1 to 64, or as many as pay.",
 )
 @click.option(
     "--polish/--no-polish", default=None, help="Finish the search with a gradient solver, or do not."
@@ -32,29 +63,92 @@ from armtempo.cli.progress import ProgressBar
 @click.option("--optimiser", metavar="NAME", help="Instead of the job's search algorithm.")
 @click.option("--population", type=click.IntRange(4), help="Instead of the job's population.")
 @click.option("--iterations", type=click.IntRange(1), help="Instead of the job's iterations.")
+@click.option("--starts", type=click.IntRange(1), help="Instead of the job's starts of the gradient solver.")
 @click.option("--seed", type=click.IntRange(0), help="Instead of the job's seed.")
-def command(job_path: Path | None, arm_path: Path | None, output: Path | None, **changes: Any) -> None:
-    """Plan a job and write its trajectory file."""
+@click.option("--split", is_flag=True, help="Cut a motion that is too long for the board at its stops.")
+@click.option(
+    "--corridor-curve", is_flag=True, help="Instead of a plan: the motion time in ever wider corridors."
+)
+def command(
+    job_path: Path | None,
+    arm_path: Path | None,
+    output: Path | None,
+    force: bool,
+    split: bool,
+    corridor_curve: bool,
+    **changes: Any,
+) -> None:
+    """Plan a job and write its trajectory file.
+
+    Where neither an arm nor a job is named, this plans the demo's job for the arm that ships with armtempo.
+    """
+    from armtempo.formats.atomic_file import check_not_input
+
+    arm, job = chosen.arm_and_job(arm_path, job_path)
+    job = _changed(job, changes)
+    target = output or Path(f"{job.name}.json")
+    check_not_input(target, (job.source, arm.source))
+    if corridor_curve:
+        _write_curve(arm, job, target, force)
+        return
+    plans = _plans(arm, job, split)
+    for number, plan in enumerate(plans, 1):
+        _write(plan, target if len(plans) == 1 else target.with_stem(f"{target.stem}-{number}"), force)
+
+
+def _changed(job: Job, changes: dict[str, Any]) -> Job:
+    """The job with what options say instead."""
     from dataclasses import replace
 
-    from armtempo import pipeline
-    from armtempo.errors import PlanError
-    from armtempo.planning import checks
-
-    arm = options.load_arm(arm_path)
-    job = options.load_job(job_path, arm)
     given = {name: value for name, value in changes.items() if value is not None}
     if "degree" in given:
         given["degree"] = int(given["degree"])
-    job = replace(job, **given)
+    return replace(job, **given)
+
+
+def _plans(arm: Arm, job: Job, split: bool) -> list[Plan]:
+    """The plan of the job, or those of its parts; each one that the board can hold."""
+    from armtempo import pipeline
+    from armtempo.planning import checks
+
     with ProgressBar("planning") as progress:
-        plan = pipeline.plan(arm, job, progress)
-    target = output or Path(f"{job.name}.json")
-    plan.save(target)
+        plans = pipeline.split(arm, job, progress) if split else [pipeline.plan(arm, job, progress)]
+    for plan in plans:
+        checks.check_held(plan.trajectory, arm)
+    return plans
+
+
+def _write(plan: Plan, target: Path, force: bool) -> None:
+    from armtempo import pipeline
+
+    plan.save(target, force)
+    click.echo(f"arm: {chosen.words(plan.arm)}")
     for line in pipeline.summary(plan):
         click.echo(line)
     click.echo(f"written: {target}")
+
+
+def _write_curve(arm: Arm, job: Job, target: Path, force: bool) -> None:
+    """Table to the terminal and as CSV, and the figure where matplotlib is installed."""
+    from armtempo import pipeline
+    from armtempo.errors import MissingPackageError
+    from armtempo.formats.atomic_file import check_replaceable, replace_text
+    from armtempo.planning.corridor_curve import unit_of
+    from armtempo.report import corridor_plot, drawing
+
+    table, picture = (target.with_name(f"{target.stem}-corridor{suffix}") for suffix in (".csv", ".png"))
+    for file in (table, picture):
+        check_replaceable(file, "", force)  # before the work, which takes a while
+    with ProgressBar("planning") as progress:
+        points = pipeline.corridor_curve(arm, job, progress)
+    unit = unit_of(job)
+    for line in corridor_plot.lines(points, unit):
+        click.echo(line)
+    replace_text(table, corridor_plot.csv(points, unit))
     try:
-        checks.check_held(plan.trajectory, arm)
-    except PlanError as error:
-        click.echo(f"not for a board as it is: {error}", err=True)
+        drawing.save(corridor_plot.figure(points, unit, job.name), picture)
+    except MissingPackageError as error:
+        messages.show(error, "no plot")
+        click.echo(f"written: {table}")
+        return
+    click.echo(f"written: {table}, {picture}")

@@ -8,7 +8,8 @@ import click
 @click.command()
 def command() -> None:
     """List the serial ports, likely boards first."""
-    from armtempo.link.ports import SIM, find_ports
+    from armtempo.ports.listing import find_ports
+    from armtempo.ports.names import SIM
 
     found = find_ports()
     width = max([24, *(1 + len(port.device) for port in found)])

@@ -1,67 +1,106 @@
-"""Postures on the command line: angles, a via point of a job, or the start of a trajectory."""
+"""Postures on the command line: home, angles, a via point of a job, or the start of a trajectory."""
 
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
+import click
 
+from armtempo.cli import chosen, state
 from armtempo.errors import InputError
 
 if TYPE_CHECKING:
     from armtempo.arrays import Array
     from armtempo.model.arm import Arm
+    from armtempo.model.job import Job
+    from armtempo.model.plan import Plan
     from armtempo.robot.board import Board
 
+HOME = "home"
 _VIA = re.compile(r"[Pp]\d+")
 
 
 def is_named(text: str) -> bool:
-    """Whether the text means a via point or a trajectory file, and no angles."""
-    return bool(_VIA.fullmatch(text)) or text.endswith(".json")
+    """Whether the text means home, a via point or a trajectory file, and no angles."""
+    return text == HOME or is_via(text) or text.endswith(".json")
 
 
-def parse(text: str, arm: Arm, job_path: Path | None) -> Array:
-    """Angles in degrees (J,): of '0,-60,40', of 'P3' in the job, or of the start of 'file.json'.
+@dataclass(frozen=True)
+class NamedPosture:
+    """What a user calls a posture, before the arm is known for which it is meant."""
 
-    Raises InputError where the text is none of these, or does not fit the arm.
-    """
-    from armtempo.planning import point_to_point
+    text: str
+    arm: Arm | None
+    """The arm that is named, else the one of the trajectory file; None: whatever the board is set up for."""
+    plan: Plan | None
+    """Of the trajectory file."""
 
-    if _VIA.fullmatch(text):
-        return _via(int(text[1:]), arm, job_path)
-    if text.endswith(".json"):
-        from armtempo import pipeline
+    @classmethod
+    def of(cls, text: str, arm_path: Path | None, altered: bool) -> NamedPosture:
+        """The posture that ``text`` names; InputError where its trajectory file or the arm cannot be read."""
+        if text.endswith(".json"):
+            plan = chosen.load_plan(Path(text), arm_path, altered)
+            return cls(text, plan.arm, plan)
+        if not is_named(text):
+            _numbers(text)  # what is no posture is said before a port is opened
+        return cls(text, chosen.named_arm(arm_path), None)
 
-        return pipeline.load(text, arm).trajectory(0.0)
+    def angles_deg(self, arm: Arm, job_path: Path | None) -> Array:
+        """Angles in degrees (J,); InputError where the text is no posture, or does not fit the arm."""
+        from armtempo.planning import point_to_point
+
+        if self.plan is not None:
+            return self.plan.trajectory(0.0)
+        if self.text == HOME:
+            return point_to_point.posture(arm.home_deg, arm)
+        if is_via(self.text):
+            return via_deg(self.text, arm, chosen.load_job(job_path, arm))
+        return point_to_point.posture(_numbers(self.text), arm)
+
+
+def _numbers(text: str) -> list[float]:
     try:
-        angles_deg = [float(cell) for cell in text.split(",")]
+        return [float(cell) for cell in text.split(",")]
     except ValueError:
         raise InputError(
-            f"{text!r} is no posture: give angles in degrees ('0,-60,40'), a via point of the job ('P0') "
-            "or a trajectory file"
+            f"{text!r} is no posture",
+            "give angles in degrees ('0,-60,40'), 'home', a via point of the job ('P0') or a trajectory file",
         ) from None
-    return point_to_point.posture(angles_deg, arm)
 
 
-def where_it_is(board: Board) -> str:
-    """Where the arm is, as the commands that place it say in the end."""
-    return f"the arm stands at {words(board.posture_deg())}"
+def say_where_it_is(board: Board) -> None:
+    """Print where the arm is, as the commands that place it do in the end."""
+    click.echo("the arm stands at")
+    for line in state.joint_lines(board.state()):
+        click.echo(f"  {line}")
 
 
-def words(angles_deg: Array) -> str:
-    """A posture as text: the driven joints' angles in degrees."""
-    return ", ".join(f"{round(angle, 2) + 0.0:.2f}" for angle in angles_deg) + " degrees"
+def words(angles_deg: Array, arm: Arm) -> str:
+    """A posture in one line: each driven joint's name, its angle and its steps."""
+    return ", ".join(
+        f"{joint.name} {round(angle, 2) + 0.0:.2f}° ({round(angle * joint.steps_per_deg)} steps)"
+        for joint, angle in zip(arm.driven, angles_deg, strict=True)
+    )
 
 
-def _via(index: int, arm: Arm, job_path: Path | None) -> Array:
-    from armtempo.cli import options
+def is_via(text: str) -> bool:
+    """Whether the text means a via point of a job, such as P0."""
+    return bool(_VIA.fullmatch(text))
+
+
+def via_deg(text: str, arm: Arm, job: Job) -> Array:
+    """The angles of a via point of a job, degrees (J,); InputError where the job has no such point."""
+    import numpy as np
+
     from armtempo.planning import planner
 
-    job = options.load_job(job_path, arm)
-    via_deg, _ = planner.via_angles(arm, job)
-    if index >= len(via_deg):
-        raise InputError(f"job {job.name!r} has the via points P0 to P{len(via_deg) - 1}, not P{index}")
-    return np.asarray(via_deg[index])
+    points_deg, _ = planner.via_angles(arm, job)
+    index = int(text[1:])
+    if index >= len(points_deg):
+        raise InputError(
+            f"job {job.name!r} has no via point P{index}", f"give one of P0 to P{len(points_deg) - 1}"
+        )
+    return np.asarray(points_deg[index])

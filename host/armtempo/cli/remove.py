@@ -6,16 +6,16 @@ from pathlib import Path
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import chosen, options
 
 
 @click.command()
 @click.argument("names", nargs=-1, required=True)
 @options.port
 @options.log_traffic
-def command(names: tuple[str, ...], port: str, log_traffic: Path | None) -> None:
+def command(names: tuple[str, ...], port: str | None, log_traffic: Path | None) -> None:
     """Remove the stored motions NAMES from the board."""
-    with options.board(port, log_traffic) as board:
+    with chosen.board(port, log_traffic) as board:
         for name in names:
             board.remove(name)
             click.echo(f"{name}: removed")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import chosen, options
 
 
 @click.command()
@@ -14,8 +14,8 @@ from armtempo.cli import options
 @click.argument("new")
 @options.port
 @options.log_traffic
-def command(old: str, new: str, port: str, log_traffic: Path | None) -> None:
+def command(old: str, new: str, port: str | None, log_traffic: Path | None) -> None:
     """Rename the stored motion OLD to NEW."""
-    with options.board(port, log_traffic) as board:
+    with chosen.board(port, log_traffic) as board:
         board.rename(old, new)
     click.echo(f"{old} is now {new}")

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import chosen, options
 
 if TYPE_CHECKING:
     from armtempo.model.plan import Plan
+    from armtempo.records.encoded_motion import EncodedMotion
     from armtempo.robot.board import Board
     from armtempo.robot.run import Run
 
@@ -19,32 +20,51 @@ if TYPE_CHECKING:
 @click.argument("what")
 @click.option("--repeat", type=click.IntRange(1, 99), default=1, show_default=True, help="Repetitions.")
 @click.option("--live", is_flag=True, help="Open a window that follows the run (matplotlib and a display).")
+@options.force("another motion that the board keeps under this one's name")
 @options.out
 @options.arm_of_file
+@options.replace_arm
+@options.altered
 @options.port
 @options.log_traffic
 def command(
-    what: str, repeat: int, live: bool, out: Path, arm_path: Path | None, port: str, log_traffic: Path | None
+    what: str,
+    repeat: int,
+    live: bool,
+    force: bool,
+    out: Path | None,
+    arm_path: Path | None,
+    replace_arm: bool,
+    altered: bool,
+    port: str | None,
+    log_traffic: Path | None,
 ) -> None:
     """Replay a motion and record it.
 
     WHAT is a trajectory file or the name of a motion on the board; the samples go into a new run folder.
     The arm must be homed ('armtempo home') and stand where the motion begins ('armtempo goto'); a virtual
-    board sees to that itself. Between repetitions the arm returns along the same path. Ctrl-C brakes.
+    board sees to that itself. Between repetitions the arm returns along the same path. Ctrl-C brakes, and so
+    does 'armtempo stop' in another terminal.
     """
-    plan = options.load_plan(what, arm_path)
-    arm = plan.arm if plan else options.load_arm(arm_path)
-    with options.board(port, log_traffic, arm) as board:
-        board.configure(arm, replace=plan is not None or arm_path is not None)
-        run_and_tell(board, plan or what, repeat, out, live)
+    plan = chosen.load_plan(Path(what), arm_path, altered) if chosen.is_file(what) else None
+    named = plan.arm if plan else chosen.named_arm(arm_path)
+    with chosen.board(port, log_traffic, named) as board:
+        arm = chosen.arm_of_board(board, named)
+        board.configure(arm, replace=replace_arm)
+        click.echo(f"arm: {chosen.words(arm)}")
+        motion = board.upload(plan, replace=force) if plan else what
+        run_and_tell(board, motion, repeat, chosen.runs(out), live)
 
 
-def run_and_tell(board: Board, motion: Plan | str, repeat: int, out: Path, live: bool = False) -> Run:
-    """Run a plan, or the motion of that name, and print what happens and what became of each joint."""
+def run_and_tell(
+    board: Board, motion: Plan | EncodedMotion | str, repeat: int, out: Path, live: bool = False
+) -> Run:
+    """Run a motion, or the stored one of that name, and print what happens and what became of each joint."""
     from armtempo.cli.live import Live
     from armtempo.report import text_summary
 
-    with Live(window=live) as watcher:
+    virtual = chosen.virtual_words(board.port) if board.info.virtual else ""
+    with Live(window=live, where=virtual) as watcher:
         run = board.run(motion, repeat, out, watcher=watcher)
     for line in text_summary.result_lines(run.results):
         click.echo(line)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from armtempo.cli import options, posture
+from armtempo.cli import chosen, options, posture
 from armtempo.formats.text_table import aligned
 
 if TYPE_CHECKING:
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("name")
-@options.arm
+@options.arm_of_board
 @options.port
 @options.log_traffic
-def command(name: str, arm_path: Path | None, port: str, log_traffic: Path | None) -> None:
+def command(name: str, arm_path: Path | None, port: str | None, log_traffic: Path | None) -> None:
     """Show the stored motion NAME, read back."""
-    arm = options.load_arm(arm_path)
-    with options.board(port, log_traffic) as board:
-        motion = board.read(name, arm)
+    named = chosen.named_arm(arm_path)
+    with chosen.board(port, log_traffic) as board:
+        motion = board.read(name, chosen.arm_of_board(board, named))
     for line in _lines(motion):
         click.echo(line)
 
@@ -37,8 +37,8 @@ def _lines(motion: EncodedMotion) -> list[str]:
     found = [
         f"{motion.name}: {len(motion.data)} bytes, {trajectory.duration_s:.4f} s, "
         f"degree {trajectory.joints[0].degree}, {'shared' if trajectory.shared else 'per-joint'} timing",
-        f"from {posture.words(motion.start_deg)}",
-        f"to   {posture.words(trajectory(trajectory.duration_s))}",
+        f"from {posture.words(motion.start_deg, motion.arm)}",
+        f"to   {posture.words(trajectory(trajectory.duration_s), motion.arm)}",
     ]
     pairs = zip(motion.arm.driven, trajectory.joints, strict=True)
     lasting = aligned([(joint.name, f"{spline.duration_s:.4f}") for joint, spline in pairs], (12, 9))

@@ -2,54 +2,60 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import chosen, options, state
+from armtempo.errors import InputError
 
 if TYPE_CHECKING:
-    from armtempo.link.board_messages import Hello, Status
+    from armtempo.model.arm import Arm
+    from armtempo.robot.board_state import BoardState
 
 
 @click.command()
+@options.arm_of_board
 @options.port
 @options.log_traffic
-def command(port: str, log_traffic: Path | None) -> None:
-    """Show the board, its state, and where the joints stand."""
-    with options.board(port, log_traffic, any_program=True) as board:
-        for line in [*_identity(board.info), *lines(board.status())]:
-            click.echo(line)
+@options.as_json
+def command(arm_path: Path | None, port: str | None, log_traffic: Path | None, as_json: bool) -> None:
+    """Show the board, its state, and where the joints stand.
+
+    Also while another armtempo program has the port.
+    """
+    from armtempo.robot import shared_board
+
+    name = chosen.port(port, others=True)
+    shared = shared_board.find(name)
+    if shared is not None:
+        with shared:
+            chosen.tell(f"port {name}: through {shared.program}")
+            found = shared.state()
+    else:
+        with chosen.board(name, log_traffic, any_program=True) as board:
+            found = board.state()
+    found = _named(found, arm_path)
+    if as_json:
+        click.echo(json.dumps(found.to_json()))
+        return
+    for line in state.lines(found):
+        click.echo(line)
 
 
-def _identity(info: Hello) -> list[str]:
-    return [
-        f"board     {info.board_id}",
-        f"program   {info.program_crc:08x}, protocol {info.protocol}{_other(info)}",
-        f"arm       {f'{info.joints} joints, record {info.arm_crc:08x}' if info.joints else 'none yet'}",
-        f"free      {info.free_flash} bytes of flash, {info.free_heap} of heap",
-        f"fastest   {info.max_rate} steps/s one joint, {info.max_rate_sum} all together",
-    ]
+def _named(found: BoardState, arm_path: Path | None) -> BoardState:
+    """In degrees, where the arm that is named, or the one that ships, is what the board is set up for."""
+    from armtempo.model.arm import Arm
 
-
-def _other(info: Hello) -> str:
-    from armtempo.link.program_version import own_crc
-
-    return "" if info.program_crc == own_crc() else "; another than the one installed here: 'armtempo deploy'"
-
-
-def lines(status: Status) -> list[str]:
-    """State, fault and stand of each joint."""
-    from armtempo.robot.stored_motion import fault_name
-
-    found = [f"state     {status.state}"]
-    if status.fault:
-        found.append(f"fault     {fault_name(status.fault)}; see 'armtempo clear'")
-    for joint, (steps, counts) in enumerate(
-        zip(status.positions.commanded_steps, status.positions.counts, strict=True)
-    ):
-        known = "" if status.joint_known(joint) else ", position unknown"
-        found.append(f"joint {joint + 1}   {steps} steps, {counts} counts{known}")
-    found.append(f"link      {status.frames_bad} damaged stretches, {status.samples_lost} samples lost")
-    return found
+    named: Arm | None = None
+    try:
+        named = chosen.named_arm(arm_path)
+    except InputError as error:  # the board is worth looking at all the same
+        chosen.tell(f"armtempo: {error}")
+    if named is not None and found.arm_crc and not found.arm and not found.named(named).arm:
+        chosen.tell(
+            f"the board is set up for another arm than {chosen.words(named)}; see 'armtempo configure'"
+        )
+    return found.named(named).named(Arm.paper())

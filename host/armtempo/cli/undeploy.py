@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import chosen, options
 
 
 @click.command()
 @options.port
-def command(port: str) -> None:
+def command(port: str | None) -> None:
     """Take the board program off a board.
 
     Stored motions stay; a boot.py or main.py from before comes back.
     """
     from armtempo.deploy import undeploy
 
-    undeploy(port, click.echo)
+    undeploy(chosen.port(port), click.echo)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import chosen, options
 from armtempo.errors import LinkError
 
 _LOOK_S = 0.5
@@ -47,7 +47,7 @@ _LOOK_S = 0.5
     help="Folder that is an SD card in the board.",
 )
 @options.arm
-@click.option("--ideal", is_flag=True, help="Ideal motors, instead of those that the arm file describes.")
+@click.option("--ideal", is_flag=True, help="Ideal motors, as without an arm.")
 @click.option("--seed", default=0, show_default=True, help="Tells one board from another, and its scatter.")
 def command(
     flash: Path | None,
@@ -63,7 +63,8 @@ def command(
 ) -> None:
     """Start a virtual board, print its port, and run it until Ctrl-C.
 
-    The port can be opened like a serial device, by armtempo (--port) and by any other program.
+    The port can be opened like a serial device, by armtempo (--port) and by any other program. Its motors are as
+    the arm file describes them; without one they are ideal, for whatever arm the board is set up for.
     """
     from armtempo.simulator import LaunchOptions, launch
 
@@ -72,7 +73,7 @@ def command(
         virtual_time=not real_time,
         edge_log=edge_log,
         interpreter=interpreter,
-        arm=None if ideal else options.load_arm(arm_path),
+        arm=None if ideal else chosen.named_arm(arm_path),
         seed=seed,
         deployed=deployed,
         button_s=hold_button,
@@ -83,4 +84,7 @@ def command(
         while board.running():
             time.sleep(_LOOK_S)
         tail = board.log().strip().splitlines()[-1:]
-        raise LinkError(f"the virtual board ended: {' '.join(tail) or 'it says nothing'}")
+        raise LinkError(
+            f"the virtual board ended: {' '.join(tail) or 'it says nothing'}",
+            "start it again; with the same --flash its files are kept",
+        )

@@ -7,7 +7,7 @@
     changes.py    how the two differ, and whether the board is suitable
     install.py    the steps from one to the other
     package.py    the same files as a folder for ``mpremote mip install``
-    firmware.py   the library as a folder for MicroPython's build, to be a part of the firmware
+    firmware/     MicroPython firmwares that have the program in them
 """
 
 from armtempo.deploy.install import deploy, undeploy

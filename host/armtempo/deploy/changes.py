@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from armtempo.deploy import firmware, program_files
+from armtempo.deploy import program_files
 from armtempo.deploy.remote import Survey
 from armtempo.errors import LinkError
+from armtempo.link.program_version import own_crc
 
 LEAST_RELEASE = (1, 20)
 LEAST_HEAP = 83_500
@@ -17,6 +19,14 @@ _SOURCES_HEAP = 160_000
 """The same for sources, which the board compiles."""
 _RESERVE_BLOCKS = 8
 """For folders, the arm's record and a motion."""
+
+NO_PINS = (
+    "its chip has 64 pins, and none of the ports D and E, on which the program has DIR, ENABLE, E-stop, limit "
+    "switches and an encoder (board/docs/hardware.md)"
+)
+MORE_PINS = "use a board whose chip has 100 pins or more"
+_64_PINS = re.compile("F40[57]R")
+"""In the chip's name (data sheet, ordering information)."""
 
 Tell = Callable[[str], None]
 """Called with messages for the user."""
@@ -32,22 +42,42 @@ class Change:
 
 def check_suitable(found: Survey) -> None:
     """LinkError, with the reason, where the program cannot run on this firmware."""
-    firmware.check_version(found.firmware_crc)
+    check_version(found.firmware_crc)
     if "STM32F4" not in found.machine:
         raise LinkError(
-            f"the board is a {found.machine}; armtempo needs an STM32F405 or F407 with MicroPython"
+            f"the board is a {found.machine}",
+            "connect an STM32F405 or F407 with MicroPython",
         )
+    if lacks_pins(found.machine):
+        raise LinkError(f"the board is a {found.machine}: {NO_PINS}", MORE_PINS)
     if found.version < LEAST_RELEASE:
         least = ".".join(map(str, LEAST_RELEASE))
-        raise LinkError(f"the board runs MicroPython {found.release}; install {least} or newer")
+        raise LinkError(f"the board runs MicroPython {found.release}", f"install {least} or newer")
     if found.sd_card:
         raise LinkError(
-            "an SD card is in the board, and the board starts from it; take it out, press reset, deploy again"
+            "an SD card is in the board, and the board starts from it",
+            "take it out, press reset, deploy again",
         )
     if found.free_heap < LEAST_HEAP:
         raise LinkError(
-            f"the board has {found.free_heap} bytes of free memory; {LEAST_HEAP} are needed: "
-            "is there a boot.py that loads something?"
+            f"the board has {found.free_heap} bytes of free memory; {LEAST_HEAP} are needed",
+            "look for a boot.py that loads something, remove it, press reset, deploy again",
+        )
+
+
+def lacks_pins(machine: str) -> bool:
+    """Whether a board, by what its firmware says that it runs on, has not all pins that the program uses."""
+    return _64_PINS.search(machine) is not None
+
+
+def check_version(firmware_crc: int | None) -> None:
+    """LinkError where a board's firmware has another version of the program; None: it has none."""
+    if firmware_crc not in (None, own_crc()):
+        raise LinkError(
+            f"a new firmware is due: the board's has another version of the program in it ({firmware_crc:08x}, "
+            f"here {own_crc():08x}), and files in the flash do not replace it",
+            "build and flash it ('armtempo firmware', board/docs/firmware.md), or flash MicroPython's own, then "
+            "deploy again",
         )
 
 
@@ -66,8 +96,11 @@ def choose(found: Survey, mpy: bool, tell: Tell) -> dict[str, bytes]:
         library = program_files.library(found.mpy)
     if not _fits(found, library):
         raise LinkError(
-            f"the program needs {_needed(found, library)} blocks of flash, the board has room for "
-            f"{_room(found)}; remove motions ('armtempo remove') or other files"
+            (
+                f"the program needs {_needed(found, library)} blocks of flash, the board has room for "
+                f"{_room(found)}; remove motions ('armtempo remove') or other files"
+            ),
+            "remove motions ('armtempo remove') or other files",
         )
     return library
 

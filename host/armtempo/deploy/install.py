@@ -18,7 +18,7 @@ from armtempo.deploy.changes import Tell, check_suitable, choose, difference, is
 from armtempo.deploy.remote import RECOVERY, Remote, Survey, each, rename
 from armtempo.errors import InputError, LinkError, NoProgramError, PortError
 from armtempo.link import open_board
-from armtempo.link.ports import is_sim
+from armtempo.ports.names import is_sim
 from armtempo.progress import Progress
 
 KEPT_ASIDE = ".before-armtempo"
@@ -79,6 +79,7 @@ def undeploy(port: str, tell: Tell = LOG.info) -> None:
         tell(f"{path.removesuffix(KEPT_ASIDE)} is the one from before again")
     remote.run(each("os.rmdir", _folders(files)))
     remote.run(["reset"])
+    _await_port(port)
     tell(f"{len(files)} files of the library removed; stored motions are kept")
     if found.firmware_crc is not None:
         tell("the program stays a part of the board's firmware, but does not start")
@@ -88,8 +89,11 @@ def end_program(port: str, tell: Tell) -> None:
     """Ask a program that runs for the REPL; LinkError where it is moving or the port is in use."""
     if is_sim(port):
         raise InputError(
-            "a virtual board of --port sim needs no deployment; for one that does: "
-            "'armtempo virtual-board --deployed --flash FOLDER', then --port with what that prints"
+            "a virtual board of --port sim needs no deployment",
+            (
+                "for one that does: 'armtempo virtual-board --deployed --flash FOLDER', then --port with what "
+                "that prints"
+            ),
         )
     with ExitStack() as stack:
         try:
@@ -103,7 +107,10 @@ def end_program(port: str, tell: Tell) -> None:
             return
         board.session.tell = tell
         if board.status().moving:
-            raise LinkError("the board is moving; wait for the end of the motion, or 'armtempo stop'")
+            raise LinkError(
+                "the board is moving",
+                "wait for the end of the motion, or 'armtempo stop'",
+            )
         board.leave()
 
 
@@ -154,7 +161,22 @@ def _verify(remote: Remote, library: Mapping[str, bytes]) -> None:
     """LinkError where a file that is read back differs from what was written."""
     wrong = difference(remote.survey(), library)
     if wrong.write:
-        raise LinkError(f"{', '.join(wrong.write)}: reads back otherwise than written; deploy again")
+        raise LinkError(f"{', '.join(wrong.write)}: reads back otherwise than written", "deploy again")
+
+
+def _await_port(port: str) -> None:
+    """Wait until a board that was reset has its port again, so that what is done next finds it."""
+    begin = time.monotonic()
+    while True:
+        time.sleep(_LOOK_S)
+        try:
+            with open_board(port, any_program=True):
+                return
+        except (PortError, InputError):
+            if time.monotonic() - begin > _START_S:
+                raise
+        except LinkError:
+            return  # it is there; whatever runs on it now
 
 
 def _confirm(port: str) -> None:
@@ -167,6 +189,7 @@ def _confirm(port: str) -> None:
         except (LinkError, InputError) as error:
             if time.monotonic() - begin > (_SETTLE_S if isinstance(error, NoProgramError) else _START_S):
                 raise LinkError(
-                    f"the files are on the board, but the program does not start: {error}; {RECOVERY}"
+                    f"the files are on the board, but the program does not start: {error.problem}",
+                    f"{error.hint}; else {RECOVERY}",
                 ) from None
             time.sleep(_LOOK_S)

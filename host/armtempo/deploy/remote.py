@@ -19,6 +19,8 @@ SILENCE_S = 30.0
 """Longest time without output of a step other than copying a file; mpremote itself would wait for ever."""
 SLOWEST_BYTES_S = 2000.0
 """Lowest speed at which a file is copied."""
+_NOT_ENTERED = "could not enter raw repl"
+"""mpremote's words for a board with which it has done nothing yet."""
 RECOVERY = "see host/docs/recovery.md"
 _SURVEY = Path(__file__).with_name("survey.txt")
 
@@ -56,7 +58,15 @@ class Remote:
         self.port = port
 
     def run(self, *commands: Sequence[str]) -> str:
-        """Run mpremote's commands one after the other in one session; gives what they print."""
+        """Run mpremote's commands one after the other in one session; gives what they print.
+
+        A board that is just being reset takes no prompt's keys: where mpremote has not got in, it tries once more.
+        """
+        try:
+            return "".join(self.lines(*commands))
+        except LinkError as error:
+            if _NOT_ENTERED not in str(error):
+                raise
         return "".join(self.lines(*commands))
 
     def lines(self, *commands: Sequence[str]) -> Iterator[str]:
@@ -78,8 +88,11 @@ class Remote:
                     (text.strip() for text in reversed(said) if text.strip()), "the board fell silent"
                 )
                 raise LinkError(
-                    f"mpremote failed on {self.port}: {last}; what was begun is repaired by doing it again; "
-                    f"where that fails too: {RECOVERY}"
+                    (
+                        f"mpremote failed on {self.port}: {last}; what was begun is repaired by doing it again; "
+                        f"where that fails too: {RECOVERY}"
+                    ),
+                    f"what was begun is repaired by doing it again; where that fails too: {RECOVERY}",
                 )
 
     def survey(self) -> Survey:
@@ -91,7 +104,8 @@ class Remote:
             return Survey(**found | {"files": files, "version": tuple(found["version"])})
         except (ValueError, IndexError, KeyError, TypeError) as error:
             raise LinkError(
-                f"{self.port}: the board answers mpremote, but not as MicroPython should"
+                f"{self.port}: the board answers mpremote, but not as MicroPython should",
+                f"press the board's reset button and try again; where that fails too: {RECOVERY}",
             ) from error
 
 

@@ -1,8 +1,10 @@
-"""Writing a file whole or not at all."""
+"""Writing a file whole or not at all, and nothing over what should be kept."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 
 from armtempo.errors import InputError
@@ -20,7 +22,38 @@ def replace_text(path: Path, text: str) -> None:
         else:
             _replace(path.resolve(), text)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {why(error)}; choose another place") from None
+        raise InputError(f"{path}: cannot be written: {why(error)}", "choose another place") from None
+
+
+def check_not_input(target: Path, inputs: Iterable[Path | str]) -> None:
+    """Raise InputError where ``target`` is a file that is read here: inputs are never written."""
+    for file in inputs:
+        with suppress(OSError):
+            if file and target.exists() and os.path.samefile(target, file):
+                raise InputError(
+                    f"{target} is what this is made from and is not written over", "choose another name"
+                )
+
+
+def check_replaceable(target: Path, text: str, force: bool, rule: str = "") -> None:
+    """Raise InputError where ``target`` is there with other content than ``text``, unless ``force``.
+
+    ``rule``: when it is replaced without, in words.
+    """
+    if force or not target.is_file() or _holds(target, text):
+        return
+    kept = f" ({rule})" if rule else ""
+    raise InputError(
+        f"{target} exists and has other content, so it is kept{kept}",
+        "choose another name, or replace it with --force",
+    )
+
+
+def _holds(path: Path, text: str) -> bool:
+    try:
+        return path.read_text(encoding="utf-8") == text
+    except (OSError, UnicodeDecodeError):
+        return False
 
 
 def why(error: Exception) -> str:

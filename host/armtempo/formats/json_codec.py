@@ -16,7 +16,10 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from armtempo.errors import InputError
+from armtempo.formats.plain_text import visible
+from armtempo.formats.spelling import did_you_mean
 
+_AGAIN = "restore the file from a copy, or make it again with the command that wrote it"
 ADDED = {"added": True}
 """Metadata of a dataclass field that older files do not have; its default is what they meant."""
 
@@ -58,9 +61,11 @@ def _plain(kind: Any, value: Any, where: str) -> Any:
     if kind is float and type(value) is int and abs(value) <= sys.float_info.max:
         return float(value)
     if type(value) is not (types.NoneType if kind is None else kind):
-        raise InputError(f"{where}: {_short(value)} should be {_name(kind)}")
+        raise InputError(f"{where}: {_short(value)} should be {_name(kind)}", _AGAIN)
     if type(value) is float and not math.isfinite(value):
-        raise InputError(f"{where}: {value} is not a finite number")
+        raise InputError(f"{where}: {value} is not a finite number", _AGAIN)
+    if type(value) is str and visible(value) != value:
+        raise InputError(f"{where}: {_short(value)} has control characters", _AGAIN)
     return value
 
 
@@ -70,23 +75,23 @@ def _union(kind: Any, value: Any, where: str) -> Any:
             return decode(option, value, where)
         except InputError:
             continue
-    raise InputError(f"{where}: {_short(value)} should be {_name(kind)}")
+    raise InputError(f"{where}: {_short(value)} should be {_name(kind)}", _AGAIN)
 
 
 def _tuple(kind: Any, value: Any, where: str) -> tuple[Any, ...]:
     kinds = get_args(kind)
     if not isinstance(value, list):
-        raise InputError(f"{where}: {_short(value)} should be a list")
+        raise InputError(f"{where}: {_short(value)} should be a list", _AGAIN)
     if kinds[-1] is Ellipsis:
         kinds = (kinds[0],) * len(value)
     if len(kinds) != len(value):
-        raise InputError(f"{where}: has {len(value)} entries, should have {len(kinds)}")
+        raise InputError(f"{where}: has {len(value)} entries, should have {len(kinds)}", _AGAIN)
     return tuple(decode(k, v, f"{where}[{i}]") for i, (k, v) in enumerate(zip(kinds, value, strict=True)))
 
 
 def _mapping(kind: Any, value: Any, where: str) -> dict[str, Any]:
     if not isinstance(value, dict):
-        raise InputError(f"{where}: {_short(value)} should be a table")
+        raise InputError(f"{where}: {_short(value)} should be a table", _AGAIN)
     return {key: decode(get_args(kind)[1], entry, f"{where}.{key}") for key, entry in value.items()}
 
 
@@ -94,20 +99,21 @@ def _array(value: Any, where: str) -> Any:
     try:
         array = np.array(value)
     except ValueError:
-        raise InputError(f"{where}: the rows differ in length") from None
+        raise InputError(f"{where}: the rows differ in length", _AGAIN) from None
     if array.dtype.kind not in "if" or not np.all(np.isfinite(array)):
-        raise InputError(f"{where}: should be a list of finite numbers")
+        raise InputError(f"{where}: should be a list of finite numbers", _AGAIN)
     return array.astype(float)
 
 
 def _dataclass(kind: Any, value: Any, where: str) -> Any:
     if not isinstance(value, dict):
-        raise InputError(f"{where}: {_short(value)} should be a table")
+        raise InputError(f"{where}: {_short(value)} should be a table", _AGAIN)
     fields = {field.name: field.metadata.get("added", False) for field in dataclasses.fields(kind)}
     missing = {name for name, added in fields.items() if name not in value and not added}
     for what, keys in (("unknown", value.keys() - fields.keys()), ("missing", missing)):
         if keys:
-            raise InputError(f"{where}: {what} key {', '.join(sorted(keys))}")
+            meant = did_you_mean(min(keys), fields) if what == "unknown" else ""
+            raise InputError(f"{where}: {what} key {', '.join(sorted(keys))}{meant}", _AGAIN)
     hints = _hints(kind)
     return kind(
         **{name: decode(hints[name], value[name], f"{where}.{name}") for name in fields if name in value}

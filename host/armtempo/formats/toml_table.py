@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import reprlib
 import sys
@@ -13,6 +12,8 @@ from typing import Any
 
 from armtempo.errors import InputError
 from armtempo.formats.atomic_file import why
+from armtempo.formats.plain_text import is_plain
+from armtempo.formats.spelling import did_you_mean, misspelt
 
 _REQUIRED: Any = object()
 
@@ -25,9 +26,12 @@ def read(path: Path | str) -> Table:
     try:
         text = Path(path).read_text(encoding="utf-8-sig")  # some editors begin a file with a mark
     except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file") from None
+        raise InputError(f"{path}: there is no such file", "check the path") from None
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {why(error)}") from None
+        raise InputError(
+            f"{path}: cannot be read: {why(error)}",
+            "check that it is a text file in UTF-8 that you may read",
+        ) from None
     return parse(text, str(path))
 
 
@@ -36,7 +40,10 @@ def parse(text: str, file: str) -> Table:
     try:
         return Table(tomllib.loads(text), file)
     except (ValueError, RecursionError) as error:  # not all of tomllib's are its own: numbers of 5000 digits
-        raise InputError(f"{file}: not valid TOML: {error}") from None
+        raise InputError(
+            f"{file}: not valid TOML: {error}",
+            "correct that place; strings stand in quotes, tables in [brackets]",
+        ) from None
 
 
 class Table:
@@ -52,13 +59,24 @@ class Table:
         """The error for a key: say what is there and what is allowed."""
         name = f"{self._place}{key}"
         if key not in self._values:
-            return InputError(f"{self.file}: {name} is missing; it must be {allowed}")
+            return InputError(
+                f"{self.file}: {name} is missing", f"write {name} = {allowed}{self._misspelt(key)}"
+            )
         value = reprlib.repr(self._values[key])
-        return InputError(f"{self.file}: {name} = {value} is not allowed; it must be {allowed}")
+        return InputError(f"{self.file}: {name} = {value} is not allowed", f"give {allowed}")
+
+    def _misspelt(self, key: str) -> str:
+        """A note on a key that is there and may be meant."""
+        near = misspelt(key, [other for other in self._values if other not in self._asked])
+        return f"; {self._place}{near} is there: is it misspelt?" if near else ""
 
     def has(self, key: str) -> bool:
         """Whether the key is given."""
         return key in self._values
+
+    def known(self, *keys: str) -> None:
+        """These keys may be there, whether a getter asks for them or not."""
+        self._asked.extend(keys)
 
     def _get(self, key: str, default: Any, allowed: str) -> Any:
         self._asked.append(key)
@@ -91,9 +109,11 @@ class Table:
             raise self.fail(key, allowed)
         return value
 
-    def choice(self, key: str, choices: Sequence[Any], default: Any = _REQUIRED) -> Any:
-        """One of ``choices``."""
-        allowed = "one of " + ", ".join(repr(choice) for choice in choices)
+    def choice(
+        self, key: str, choices: Sequence[Any], default: Any = _REQUIRED, allowed: str | None = None
+    ) -> Any:
+        """One of ``choices``; ``allowed`` says in words what they are, where there are many."""
+        allowed = allowed or "one of " + ", ".join(repr(choice) for choice in choices)
         value = self._get(key, default, allowed)
         if not any(type(value) is type(choice) and value == choice for choice in choices):
             raise self.fail(key, allowed)
@@ -104,10 +124,12 @@ class Table:
         return bool(self.choice(key, (True, False), default))
 
     def text(self, key: str, default: str = _REQUIRED) -> str:
-        """A text that is not empty."""
+        """A text that is not empty and has no control characters."""
         value = self._get(key, default, "a text")
         if not isinstance(value, str) or not value.strip():
             raise self.fail(key, "a text that is not empty")
+        if not is_plain(value):
+            raise self.fail(key, "a text on one line, without control characters")
         return value
 
     def numbers(self, key: str, count: int, default: Any = _REQUIRED) -> tuple[float, ...]:
@@ -151,10 +173,11 @@ class Table:
         for key in self._values:
             if key in self._asked:
                 continue
-            near = difflib.get_close_matches(key, self._asked, 1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            known = ", ".join(sorted(set(self._asked)))
-            raise InputError(f"{self.file}: {self._place}{key}: unknown key{hint} Known here: {known}")
+            meant = did_you_mean(key, self._asked).removeprefix("; ")
+            known = f"known here: {', '.join(sorted(set(self._asked)))}"
+            raise InputError(
+                f"{self.file}: {self._place}{key}: unknown key", f"{meant} {known}" if meant else known
+            )
 
 
 def _is_number(value: Any) -> bool:

@@ -57,9 +57,9 @@ def lines(answer: Answer) -> Iterator[str]:
 
 def _closed_form_lines(choice: Choice) -> Iterator[str]:
     yield (
-        f"region {choice.region} of Fig. 3: "
-        + ("any angle of joint 1, and " if choice.on_axis else "")
-        + f"{choice.postures} arm posture{'' if choice.postures == 1 else 's'}"
+        f"{choice.postures} of 4 arm postures reach the wrist centre"
+        + (", with any angle of joint 1" if choice.on_axis else "")
+        + f" (the paper's region {choice.region})"
     )
     yield f"  no  {'branch':<19}{_heads(6)}"
     for candidate in choice.candidates:

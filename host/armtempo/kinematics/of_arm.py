@@ -74,7 +74,7 @@ def _posture(arm: Arm, near_deg: ArrayLike) -> Array:
     """All joints, (joints,), in rad."""
     near = np.asarray(near_deg, dtype=float)
     if near.ndim != 1:
-        raise InputError("near_deg must be one posture: an angle for each joint")
+        raise InputError("near_deg must be one posture", "give an angle for each joint")
     return np.radians(spread_deg(arm, near, "near_deg: "))
 
 

@@ -28,14 +28,17 @@ def read(path: Path | str) -> list[Pose]:
     try:
         text = Path(path).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as text ({why(error)})") from error
+        raise InputError(
+            f"{path}: cannot be read as text ({why(error)})",
+            "check the path, and that it is plain text in UTF-8",
+        ) from error
     poses = []
     for number, line in enumerate(text.splitlines(), 1):
         content = line.split("#")[0]
         if content.strip():
             poses.append(parse(content, f"{path}, line {number}"))
     if not poses:
-        raise InputError(f"{path}: no pose in it; write one a line, for instance: x y z roll pitch yaw")
+        raise InputError(f"{path}: no pose in it", "write one a line, for instance: x y z roll pitch yaw")
     return poses
 
 
@@ -44,7 +47,7 @@ def parse(text: str, what: str, counts: tuple[int, ...] = tuple(FORMS)) -> Pose:
     words = text.replace(",", " ").split()
     if len(words) not in counts:
         allowed = ", ".join(f"{count} ({FORMS[count]})" for count in counts)
-        raise InputError(f"{what}: {len(words)} numbers are no pose; give {allowed}")
+        raise InputError(f"{what}: {len(words)} numbers are no pose", f"give {allowed}")
     if len(words) in (3, 6):
         position = numbers(" ".join(words[:3]), what)
         fixed = {name: word for name, word in zip(WHOLE, words[3:], strict=False) if word != FREE}
@@ -63,7 +66,10 @@ def numbers(text: str, what: str) -> list[float]:
         try:
             found.append(float(word))
         except ValueError:
-            raise InputError(f"{what}: {word!r} is not a number") from None
+            raise InputError(f"{what}: {word!r} is not a number", "write it like 12.5 or 1e-3") from None
         if not abs(found[-1]) <= LARGEST:
-            raise InputError(f"{what}: {word!r} is not a finite number of at most {LARGEST:g}")
+            raise InputError(
+                f"{what}: {word!r} is not a finite number of at most {LARGEST:g}",
+                "mend it, mm and degrees are meant",
+            )
     return found

@@ -103,7 +103,7 @@ class Shape:
         reasons = refusals(geometry)
         if reasons:
             raise InputError(
-                "no closed-form inverse for this arm: " + "; ".join(reasons) + ". Use the numerical solver"
+                "no closed-form inverse for this arm: " + "; ".join(reasons), "use the numerical solver"
             )
         cosines, sines = zip(*map(twist, geometry.alpha), strict=True)
         sign2 = cosines[1]

@@ -164,7 +164,10 @@ class PoseSolver:
         """The angles of all joints; InputError for another number of them."""
         angles = [float(angle) for angle in angles_rad]
         if len(angles) != len(self.arm.joints):
-            raise InputError(f"{len(angles)} angles given, the arm has {len(self.arm.joints)} joints")
+            raise InputError(
+                f"{len(angles)} angles given, the arm has {len(self.arm.joints)} joints",
+                "give one angle for each joint, base first",
+            )
         return angles
 
     def _nearest_of_eight(self, target: Pose, start: list[float]) -> list[float] | None:

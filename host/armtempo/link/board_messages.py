@@ -9,6 +9,9 @@ from typing import Any
 from armtempo_shared import wire
 from armtempo_shared.limits import TICK_HZ
 
+from armtempo.formats.plain_text import visible
+from armtempo.virtual_id import is_virtual
+
 
 @dataclass(frozen=True)
 class Hello:
@@ -26,7 +29,19 @@ class Hello:
     arm_crc: int
     program_crc: int
     boot: int
+    engine_room: int
+    """Bytes of memory that the engine for an arm can have (``armtempo_shared.engine_memory``)."""
+    engine_joints: int
+    """Joints that an engine can have."""
+    arm_problem: int
+    """Code of what is wrong with the stored arm record; 0 where it is in force or there is none."""
+    arm_value: int
     board_id: str
+
+    @property
+    def virtual(self) -> bool:
+        """Whether it is a virtual board."""
+        return is_virtual(self.board_id)
 
 
 @dataclass(frozen=True)
@@ -141,8 +156,13 @@ def event(number: int, payload: bytes) -> Event:
     entry = wire.EVENT_BY_ID.get(number)
     if entry is None:
         raise wire.WireError("not an event")
+    return _event(entry[0], *decode(entry, payload))
+
+
+def decode(entry: tuple[Any, ...], payload: bytes) -> tuple[tuple[Any, ...], Any]:
+    """Values and tail of a payload, control characters spelt out; WireError where it does not fit."""
     values, tail = wire.decode(entry, payload)
-    return _event(entry[0], values, tail)
+    return values, visible(tail) if isinstance(tail, str) else tail
 
 
 def _event(name: str, values: tuple[Any, ...], tail: Any) -> Event:

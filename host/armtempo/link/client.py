@@ -76,7 +76,7 @@ class Client:
     def info(self) -> board_messages.Hello:
         """The board's answer to ``hello``; LinkError before it."""
         if self._info is None:
-            raise LinkError("the board has not been greeted yet")
+            raise LinkError("the board has not been greeted yet", "call hello() first")
         return self._info
 
     def hello(self) -> board_messages.Hello:
@@ -101,10 +101,12 @@ class Client:
         where = self.session.transport.name
         if now.board_id != before.board_id:
             raise OtherBoardError(
-                f"another board is on {where} now ({now.board_id}, before {before.board_id})"
+                f"another board is on {where} now ({now.board_id}, before {before.board_id})",
+                "plug the right board in, or run the command again for this one",
             )
         raise OtherBoardError(
-            f"the board on {where} has started anew: positions are unknown, 'armtempo home'"
+            f"the board on {where} has started anew: positions are unknown",
+            "bring the arm to its home posture and run 'armtempo home'",
         )
 
     def status(self) -> board_messages.Status:

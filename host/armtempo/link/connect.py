@@ -7,13 +7,17 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
-from armtempo.errors import BoardError, DisturbedError, LinkError, NoAnswerError
-from armtempo.link import diagnose, ports, traffic
+from armtempo.errors import BoardError, DisturbedError, LinkError, NoAnswerError, PortError
+from armtempo.link import diagnose, traffic
 from armtempo.link.client import Client
 from armtempo.link.program_version import own_crc
 from armtempo.link.session import Session
 from armtempo.link.transport import SerialTransport, Transport
 from armtempo.model.arm import Arm
+from armtempo.ports import names
+from armtempo.share import claim as claims
+from armtempo.share.caller import Ownership, ownership
+from armtempo.share.claim import PortClaim
 
 _NOISY_TRIES = 10
 """Attempts at ``hello`` where pieces of frames arrive."""
@@ -26,22 +30,27 @@ def open_board(
     sink: traffic.Sink | None = None,
     arm: Arm | None = None,
     any_program: bool = False,
+    tell: Callable[[str], object] = lambda text: None,
 ) -> Iterator[Client]:
     """The board on ``port``, greeted; a sim port starts a virtual one that lives as long as the context.
 
     ``log_traffic``: file for the traffic log; ``sink`` takes the traffic as well; ``arm``: what a virtual
-    board's motors move; ``any_program``: also talk to a board whose program is not the one installed here.
-    Raises InputError where there is no such port, LinkError where it is in use, silent or runs something
-    else.
+    board's motors move; ``any_program``: also talk to a board whose program is not the one installed here;
+    ``tell`` hears what became of a program that had the port. Raises InputError where there is no such port,
+    LinkError where it is in use, silent or runs something else. A program that has the port and hangs loses it.
     """
+    hanging = _check_owner(port, tell)
     with ExitStack() as stack:
-        device = stack.enter_context(_virtual_port(port, arm)) if ports.is_sim(port) else port
+        if hanging is not None:
+            device = hanging.device
+        else:
+            device = stack.enter_context(_virtual_port(port, arm)) if names.is_sim(port) else port
         sinks = [] if sink is None else [sink]
         if log_traffic is not None:
             sinks.append(stack.enter_context(traffic.LogFile(log_traffic)))
 
         def open_transport() -> Transport:
-            transport: Transport = SerialTransport(device)
+            transport: Transport = SerialTransport(device, exclusive=hanging is None)
             for taken_by in sinks:
                 transport = traffic.LoggedTransport(transport, taken_by)
             return transport
@@ -49,9 +58,33 @@ def open_board(
         board = _greeted(stack, open_transport())
         if not any_program:
             _check_program(board)
-        if not ports.is_sim(port):  # a virtual board does not come back
+        if not names.is_sim(port):  # a virtual board does not come back
             board.session.reopen = open_transport
         yield board
+
+
+def _check_owner(port: str, tell: Callable[[str], object]) -> PortClaim | None:
+    """The claim of a program that has the port and hangs; PortError where it lives and goes on."""
+    name = names.same_for_all(port)
+    claim = claims.find(name, port) if name else None
+    if claim is None:
+        return None
+    state = ownership(claim)
+    if state is Ownership.LIVES:
+        raise PortError(
+            f"port {port} is in use by {claim.who}",
+            "wait for its end, or end it with 'armtempo stop'; 'armtempo status' and 'watch' look on meanwhile",
+        )
+    if state is Ownership.DIED:
+        tell(f"{claim.who} has ended without giving up {port}; what it had started may still move")
+        claim.remove()
+        return None
+    if not claims.LOCAL_SOCKETS:  # the operating system opens a port once only
+        raise PortError(
+            f"{claim.who} has port {port} and does not answer", "end that process, then try again"
+        )
+    tell(f"{claim.who} has port {port} and does not answer; taking the port over")
+    return claim
 
 
 def _greeted(stack: ExitStack, transport: Transport) -> Client:
@@ -65,8 +98,11 @@ def _greeted(stack: ExitStack, transport: Transport) -> Client:
 def _check_program(board: Client) -> None:
     if board.info.program_crc != own_crc():
         raise LinkError(
-            f"the board on {board.session.transport.name} runs another version of the board program than the "
-            "one installed here; bring it up to date with 'armtempo deploy'"
+            (
+                f"the board on {board.session.transport.name} runs another version of the board program than the "
+                "one installed here"
+            ),
+            "bring it up to date with 'armtempo deploy'",
         )
 
 
@@ -91,11 +127,13 @@ def _virtual_port(port: str, arm: Arm | None) -> Iterator[str]:
     """A virtual board's port; where its program fails, link errors end with the last line of its log."""
     from armtempo import simulator
 
-    with simulator.launch(simulator.LaunchOptions(ports.sim_flash(port), arm=arm)) as board:
+    with simulator.launch(simulator.LaunchOptions(names.sim_flash(port), arm=arm)) as board:
         try:
             yield board.port
         except LinkError as error:
             words = board.log().strip().splitlines()[-1:]
             if isinstance(error, BoardError) or not words:
                 raise
-            raise LinkError(f"{error}; the virtual board says: {words[0]}") from error
+            raise LinkError(
+                f"{error.problem}; the virtual board says: {words[0]}", f"{error.hint}"
+            ) from error

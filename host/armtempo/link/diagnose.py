@@ -16,6 +16,10 @@ _FRAME_SIGNS = (bytes((SYNC,)), bytes((wire.EVENT["ok"][1], wire.COMMAND["hello"
 _NUDGE = b"\r\x02\r"
 """Ends a line, leaves a raw REPL, asks for a prompt; the board program ignores it."""
 
+_ASK = b"print('armtempo','is','here')if'armtempo'in open('/flash/main.py').read()else 0\r"
+_HERE = b"armtempo is here"
+"""Asks the prompt whether the program is in the flash; the echo of the question is not the answer."""
+
 
 def explain(transport: Transport, heard: bytes) -> LinkError:
     """The error to raise, by what the port sends: nothing, a REPL, pieces of frames, or else; ``heard`` so far."""
@@ -23,22 +27,33 @@ def explain(transport: Transport, heard: bytes) -> LinkError:
     heard += _listen(transport)
     where = f"the board on {transport.name}"
     if any(sign in heard for sign in _REPL_SIGNS):
+        transport.write(_ASK)
+        if _HERE in _listen(transport):
+            return NoProgramError(
+                f"{where} runs MicroPython but not the armtempo program, which is on it: mpremote or an IDE ended it",
+                f"press the board's reset button, or: mpremote connect {transport.name} reset; if it does "
+                "not start then: armtempo deploy",
+            )
         return NoProgramError(
-            f"{where} runs MicroPython but not the armtempo program; install it with 'armtempo deploy'"
+            f"{where} runs MicroPython but not the armtempo program",
+            "install it with 'armtempo deploy'",
         )
     if any(sign in heard for sign in _FRAME_SIGNS):
         return DisturbedError(
-            f"{where} is mostly unreadable: pieces of armtempo's messages arrive, too few of them "
-            "whole; check cable and plugs"
+            f"{where} is mostly unreadable: pieces of armtempo's messages arrive, too few of them whole",
+            "check cable and plugs",
         )
     if heard:
         return LinkError(
-            f"something else than armtempo answers on {transport.name} (it says {_excerpt(heard)}); "
-            "'armtempo ports' lists the other ports"
+            f"something else than armtempo answers on {transport.name} (it says {_excerpt(heard)})",
+            "choose another port: 'armtempo ports' lists them",
         )
     return LinkError(
-        f"{where} does not answer within 2 s: check the cable, that the board is powered, and that this is "
-        "its port ('armtempo ports'); a board that hangs starts afresh with its reset button"
+        f"{where} does not answer within 2 s",
+        (
+            "check the cable, that the board is powered, and that this is its port ('armtempo ports'); a board "
+            "that hangs starts afresh with its reset button"
+        ),
     )
 
 

@@ -84,7 +84,7 @@ class Follower:
     def end(self) -> RunEnd:
         """How the run ended; LinkError before it has."""
         if self._end is None:
-            raise LinkError("the run has not ended yet")
+            raise LinkError("the run has not ended yet", "take the samples to their end first")
         return self._end
 
     def samples(self, between: Callable[[], None] = lambda: None) -> Iterator[Sample]:
@@ -97,6 +97,7 @@ class Follower:
             between()
             event = self._client.session.poll(CHECK_S)
             if event is None:
+                between()  # a stop request ends the wait
                 self._ask_status()
             else:
                 self._take(event)
@@ -173,7 +174,10 @@ class Follower:
             else:
                 self._last = Done(status.run, status.ticks, 0, status.samples_lost, status.positions)
         elif self._stuck(status.ticks):
-            raise LinkError("the board says that it moves, but its motion clock stands still; reset it")
+            raise LinkError(
+                "the board says that it moves, but its motion clock stands still",
+                "press its reset button, then 'armtempo home'",
+            )
 
     def _stuck(self, value: int) -> bool:
         """Whether ``value``, which should increase, has been the same MOST_REPEATS times."""

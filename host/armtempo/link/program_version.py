@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -18,6 +19,7 @@ def package_folder(name: str) -> Path:
     return Path(spec.origin).parent
 
 
+@cache
 def own_crc() -> int:
     """The hash of the program that this armtempo would deploy."""
     board, shared = (str(package_folder(name)) for name in PACKAGES)

@@ -8,6 +8,9 @@ from armtempo_shared.meanings import VALUES
 
 from armtempo.errors import BoardError
 
+_FASTER_JOINT = "the motion is faster than the joint's speed limit in the arm file that the board has"
+_FASTER_TOGETHER = "the joints together need more steps per second than the board can make"
+
 
 def refusal(what: str, code: int, joint: int = 255, value: int = 0) -> BoardError:
     """A BoardError with the sentence for an error or fault code; ``joint`` from 0, 255 where it is about none."""
@@ -15,15 +18,15 @@ def refusal(what: str, code: int, joint: int = 255, value: int = 0) -> BoardErro
         code, ("", f"error {code}, unknown to this version", "update armtempo")
     )
     where = f" (joint {joint + 1})" if joint < MAX_JOINTS else ""
+    if name == "too_fast":
+        meaning = _FASTER_JOINT if where else _FASTER_TOGETHER
     detail = f" [{_words(name, where, value)}]" if value else ""
-    return BoardError(f"{what}: {meaning}{where}{detail}; {cure}", code)
+    return BoardError(f"{what}: {meaning}{where}{detail}", cure, code)
 
 
 def _words(name: str, where: str, value: int) -> str:
     if name == "too_long" and where:
         return f"its numbers reach {value}"
-    if name == "too_long" and value < MAX_MOTION_BYTES:
-        return f"{value} bytes, for which it has no memory free in one piece"
     if name == "too_long":
         return f"it takes {MAX_MOTION_BYTES} bytes at most"
     return f"{VALUES[name]}: {value}" if name in VALUES else str(value)

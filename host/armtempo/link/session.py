@@ -1,15 +1,16 @@
 """Commands and events over a transport: sequence numbers, time-outs, repeats.
 
-One command is under way at a time. Its frame is sent again, under the same sequence number, until the
-board answers; the board acts once on a number and repeats its answer. Events that arrive meanwhile wait
-in ``events``.
+One command is under way at a time, whichever thread it comes from. Its frame is sent again, under the same
+sequence number, until the board answers; the board acts once on a number and repeats its answer. Events that
+arrive meanwhile wait in ``events``.
 """
 
 from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from armtempo_shared import wire
@@ -18,6 +19,7 @@ from armtempo.errors import ArmtempoError, LinkError, NoAnswerError, OtherBoardE
 from armtempo.link import board_messages
 from armtempo.link.refusal import refusal
 from armtempo.link.transport import Transport
+from armtempo.link.turns import Turns
 
 _CTRL_C = 3
 REPEAT_INTERVAL_S = 0.2
@@ -61,12 +63,18 @@ class Session:
         """Called with messages for the user while other calls wait."""
         self.stopping: Callable[[], bool] = lambda: False
         """Whether a stop was asked for: then a broken port is tried again for STOPPING_RECONNECT_S only."""
+        self.check: Callable[[], None] = lambda: None
+        """Called before the port is used; raises PortError where it is no longer this program's."""
+        self.heard: Callable[[board_messages.Event], None] = lambda event: None
+        """Called with each event when it arrives."""
+        self.turns = Turns()
         self.events: deque[board_messages.Event] = deque()
         self.recent = bytearray()
         self.repeats = 0
         self.sleep = time.sleep
         self._parser = wire.Parser()
         self._sequence = 0
+        self._woken = False
         self._heard_s = clock()
 
     @property
@@ -88,9 +96,17 @@ class Session:
         Raises BoardError where the board refuses, NoAnswerError after ``silence_timeout_s`` without a byte or
         ``answer_timeout_s`` without an answer, LinkError where the port breaks.
         """
+        with self.turns:
+            return self._command(
+                name, wire.encode(wire.COMMAND[name], values, tail), silence_timeout_s, answer_timeout_s
+            )
+
+    def _command(
+        self, name: str, payload: bytes, silence_timeout_s: float, answer_timeout_s: float
+    ) -> Answer:
         number = wire.COMMAND[name][1]
         sequence = self._next_sequence()
-        data = wire.frame(sequence, number, wire.encode(wire.COMMAND[name], values, tail))
+        data = wire.frame(sequence, number, payload)
         begin_s = self._heard_s = self.clock()
         while True:
             self._write(data)
@@ -102,26 +118,41 @@ class Session:
                 now_s - self._heard_s >= silence_timeout_s and not self.frames_bad
             )  # on a disturbed line all may be lost
             if silent or now_s - begin_s >= answer_timeout_s:
-                raise NoAnswerError(self._no_answer(name, now_s - begin_s))
+                raise self._no_answer(name, now_s - begin_s)
             self.repeats += 1
 
     def poll(self, timeout_s: float) -> board_messages.Event | None:
-        """The oldest event; waits up to ``timeout_s`` for one."""
+        """The oldest event; waits up to ``timeout_s`` for one, or until ``wake``."""
         deadline_s = self.clock() + timeout_s
         while not self.events:
             left_s = deadline_s - self.clock()
-            frame = self._frame(max(0.0, left_s))
-            if frame is not None:
-                self._keep_event(frame)
-            elif left_s <= 0:
+            with self.turns:
+                frame = self._frame(max(0.0, left_s))
+                if frame is not None:
+                    self._keep_event(frame)
+            if frame is None and (left_s <= 0 or self._woken):
+                self._woken = False
                 return None
         return self.events.popleft()
 
-    def _no_answer(self, name: str, waited_s: float) -> str:
-        what = f"the board on {self.transport.name} did not answer '{name}' within {waited_s:.1f} s"
+    def wake(self) -> None:
+        """Let a ``poll`` that waits return at once; for other threads and signal handlers."""
+        self._woken = True
+        self.transport.wake()
+
+    @contextmanager
+    def in_a_hurry(self, timeout_s: float) -> Iterator[bool]:
+        """The next turn to talk to the board, for a request from outside; see ``Turns.in_a_hurry``."""
+        self.transport.wake()
+        with self.turns.in_a_hurry(timeout_s) as mine:
+            yield mine
+
+    def _no_answer(self, name: str, waited_s: float) -> NoAnswerError:
+        problem = f"the board on {self.transport.name} did not answer '{name}' within {waited_s:.1f} s"
         if self.frames_bad:
-            return f"{what}; {self.frames_bad} damaged stretches received: check the cable"
-        return f"{what}; check the cable and that the board is powered"
+            problem += f", and messages arrived damaged ({self.frames_bad} times)"
+            return NoAnswerError(problem, "check cable and plugs, or try another cable")
+        return NoAnswerError(problem, "check the cable and that the board is powered")
 
     def _next_sequence(self) -> int:
         """The next of 255: a board that is just starting would take a 3 for Ctrl-C."""
@@ -154,12 +185,14 @@ class Session:
         return self._next_frame()
 
     def _write(self, data: bytes) -> None:
+        self.check()
         try:
             self.transport.write(data)
         except LinkError as error:
             self.reconnect(error)
 
     def _read(self, timeout_s: float) -> bytes:
+        self.check()
         try:
             return self.transport.read(timeout_s)
         except LinkError as error:
@@ -173,10 +206,11 @@ class Session:
         """
         if self.reopen is None:
             raise reason
-        self.tell(f"{reason}; waiting for it to come back")
+        self.tell(f"{reason.problem}; waiting for it to come back")
         self.transport.close()
         limit_s = self.clock() + RECONNECT_S
         while not self._found_again(self.reopen):
+            self.check()
             if self.stopping():
                 limit_s = min(limit_s, self.clock() + STOPPING_RECONNECT_S)
             if self.clock() >= limit_s:
@@ -189,8 +223,8 @@ class Session:
         if not self.stopping():
             return reason
         return LinkError(
-            f"{reason}; it could not be told to stop: what was moving may move on, see 'armtempo status' once it is "
-            "back"
+            f"{reason.problem}; it could not be told to stop: what was moving may move on",
+            "see 'armtempo status' once it is back",
         )
 
     def _found_again(self, reopen: Callable[[], Transport]) -> bool:
@@ -215,9 +249,11 @@ class Session:
 
     def _keep_event(self, frame: wire.Frame) -> None:
         try:
-            self.events.append(board_messages.event(frame.number, frame.payload))
+            event = board_messages.event(frame.number, frame.payload)
         except wire.WireError:
             return  # a reply to an older command, or a message of a newer protocol
+        self.events.append(event)
+        self.heard(event)
 
 
 _REPLY_IDS = tuple(wire.EVENT[name][1] for name in ("ok", "error"))
@@ -228,10 +264,10 @@ def _answer(name: str, reply: wire.Frame) -> Answer:
         values, tail = wire.decode(wire.EVENT_BY_ID[reply.number], reply.payload)
         if wire.EVENT_BY_ID[reply.number][0] == "error":
             raise refusal(f"the board refused '{name}'", *values[1:])
-        answer: Answer = wire.decode(wire.ANSWER[name], tail)
+        answer: Answer = board_messages.decode(wire.ANSWER[name], tail)
     except wire.WireError as error:
         raise LinkError(
-            f"the board's answer to '{name}' does not fit protocol {wire.PROTOCOL_VERSION} ({error}); "
-            "run 'armtempo deploy'"
+            f"the board's answer to '{name}' does not fit protocol {wire.PROTOCOL_VERSION} ({error})",
+            "run 'armtempo deploy'",
         ) from error
     return answer

@@ -105,6 +105,10 @@ class LoggedTransport:
         self._log(TO_BOARD, data)
         self._inner.write(data)
 
+    def wake(self) -> None:
+        """See Transport."""
+        self._inner.wake()
+
     def close(self) -> None:
         """See Transport."""
         self._inner.close()
@@ -127,7 +131,10 @@ class LogFile:
         try:
             self._file = path.open("w", encoding="utf-8")
         except OSError as error:
-            raise InputError(f"{path}: the traffic log cannot be written: {error.strerror}") from error
+            raise InputError(
+                f"{path}: the traffic log cannot be written: {error.strerror}",
+                "choose another place",
+            ) from error
         self._line(HEADER)
 
     def __call__(self, chunk: Chunk, words: list[str]) -> None:
@@ -150,7 +157,10 @@ class LogFile:
         with suppress(OSError):
             self._file.close()
         if self._failed is not None and value is None:
-            raise InputError(f"{self._path}: the traffic log is cut short: {self._failed.strerror}")
+            raise InputError(
+                f"{self._path}: the traffic log is cut short: {self._failed.strerror}",
+                "make room on the disk, or leave --log-traffic out",
+            )
 
 
 def read_log(path: Path) -> Iterator[Chunk]:
@@ -158,9 +168,15 @@ def read_log(path: Path) -> Iterator[Chunk]:
     try:
         lines = path.read_text(encoding="utf-8").split("\n")
     except (OSError, UnicodeError) as error:
-        raise InputError(f"{path}: the traffic log cannot be read: {why(error)}") from error
+        raise InputError(
+            f"{path}: the traffic log cannot be read: {why(error)}",
+            "check the path and its permissions",
+        ) from error
     if lines[0] != HEADER:
-        raise InputError(f"{path}: not a traffic log of armtempo (its first line should be {HEADER!r})")
+        raise InputError(
+            f"{path}: not a traffic log of armtempo (its first line should be {HEADER!r})",
+            "give a file that --log-traffic wrote",
+        )
     for number, line in enumerate(lines[1:-1], start=2):
         fields = line.split("\t")
         try:
@@ -168,4 +184,7 @@ def read_log(path: Path) -> Iterator[Chunk]:
                 raise ValueError("four columns expected, the second > or <")
             yield Chunk(float(fields[0]), fields[1], bytes.fromhex(fields[2]))
         except ValueError as error:
-            raise InputError(f"{path}, line {number}: not a line of a traffic log: {error}") from error
+            raise InputError(
+                f"{path}, line {number}: not a line of a traffic log: {error}",
+                "give a file as --log-traffic wrote it, not altered",
+            ) from error

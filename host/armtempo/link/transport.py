@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+from contextlib import suppress
 from typing import Protocol
 
 import serial
@@ -26,6 +27,9 @@ class Transport(Protocol):
     def write(self, data: bytes) -> None:
         """Send all of it."""
 
+    def wake(self) -> None:
+        """End a read that waits, or the next one; for other threads and signal handlers. It may do nothing."""
+
     def close(self) -> None:
         """Free the port; may be called twice."""
 
@@ -36,9 +40,10 @@ class SerialTransport:
     Raises InputError where there is no such port, PortError where it is in use, LinkError where it breaks.
     """
 
-    def __init__(self, port: str) -> None:
+    def __init__(self, port: str, exclusive: bool = True) -> None:
+        """``exclusive``: not while another program has the port open, where the operating system can tell."""
         self.name = port
-        self._serial = _open(port)
+        self._serial = _open(port, exclusive)
 
     def read(self, timeout_s: float) -> bytes:
         """See Transport."""
@@ -46,47 +51,62 @@ class SerialTransport:
             self._serial.timeout = timeout_s
             return bytes(self._serial.read(max(1, self._serial.in_waiting)))
         except (serial.SerialException, OSError, TypeError) as error:  # TypeError: pyserial, closed meanwhile
-            raise LinkError(f"the connection to {self.name} broke: {error}") from error
+            raise _broken(self.name, error) from error
 
     def write(self, data: bytes) -> None:
         """See Transport."""
         try:
             self._serial.write(data)
         except (serial.SerialException, OSError) as error:
-            raise LinkError(f"the connection to {self.name} broke: {error}") from error
+            raise _broken(self.name, error) from error
+
+    def wake(self) -> None:
+        """See Transport."""
+        with suppress(serial.SerialException, OSError, AttributeError, TypeError):  # URLs need not have it
+            self._serial.cancel_read()
 
     def close(self) -> None:
         """See Transport."""
         self._serial.close()
 
 
-def _open(port: str) -> serial.Serial:
+def _open(port: str, exclusive: bool) -> serial.Serial:
     try:
         device = serial.serial_for_url(port, do_not_open=True)
         device.baudrate = BAUD_RATE
         device.write_timeout = 2.0
-        if "://" not in port:
+        if exclusive and "://" not in port:
             device.exclusive = True
         device.open()
     except ValueError as error:
-        raise InputError(f"{port}: not a port or URL: {error}; {_ADVICE}") from error
+        raise InputError(f"{port}: not a port or URL: {error}", f"{_ADVICE}") from error
     except (serial.SerialException, OSError) as error:
         raise _open_error(port, error) from error
     return device
+
+
+def _broken(port: str, error: Exception) -> LinkError:
+    """A port that was open and is gone; pyserial's own words for it ("reports readiness to read") help nobody."""
+    unplugged = not os.path.exists(port) or "returned no data" in str(error)
+    reason = "its cable was unplugged, or the board was reset" if unplugged else str(error)
+    return LinkError(
+        f"the connection to {port} broke: {reason}",
+        "plug it in again and close other programs on this port; then 'armtempo status' says where the arm stands",
+    )
 
 
 def _open_error(port: str, error: Exception) -> PortError | InputError:
     number = getattr(error, "errno", None)
     text = str(error)
     if number == errno.ENOENT or "FileNotFoundError" in text:
-        return InputError(f"there is no port {port or chr(39) * 2}; {_ADVICE}")
+        return InputError(f"there is no port {port or chr(39) * 2}", f"{_ADVICE}")
     if number in (errno.EISDIR, errno.ENOTTY) or os.strerror(errno.ENOTTY) in text:
-        return InputError(f"{port} is not a serial port; {_ADVICE}")
+        return InputError(f"{port} is not a serial port", f"{_ADVICE}")
     if number in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in text:
-        return PortError(f"port {port} is in use by another program; close it and try again")
+        return PortError(f"port {port} is in use by another program", "close it and try again")
     if number == errno.EACCES or "PermissionError" in text:
         return PortError(
-            f"no permission to open {port}: another program holds it, or your user may not use serial ports "
-            "(on Debian: 'sudo adduser $USER dialout', then log in again)"
+            f"no permission to open {port}: another program holds it, or your user may not use serial ports",
+            "close the other program, or on Debian: 'sudo adduser $USER dialout', then log in again",
         )
-    return PortError(f"port {port} cannot be opened: {text}; {_ADVICE}")
+    return PortError(f"port {port} cannot be opened: {text}", f"{_ADVICE}")

@@ -227,7 +227,7 @@ class Arm:
 
 def _driven(arm: str, joint: Joint, motor: Motor) -> DrivenJoint:
     if joint.limits is None:
-        raise InputError(f"arm {arm!r}: {joint.name} has a motor but no limits; add a limits table")
+        raise InputError(f"arm {arm!r}: {joint.name} has a motor but no limits", "add a limits table")
     return DrivenJoint(
         joint.name,
         joint.range_deg,

@@ -226,8 +226,8 @@ def shared_channels(arm: Arm) -> list[SharedChannel]:
 
 def _check_channels(arm: Arm, path: Path | str) -> None:
     if not arm.driven:
-        raise InputError(f"{path}: no joint has a motor; at least one [joint.motor] is needed")
+        raise InputError(f"{path}: no joint has a motor", "add at least one [joint.motor]")
     for key, channel, joints in shared_channels(arm):
         raise InputError(
-            f"{path}: {key}.channel = {channel} is used by {' and '.join(joints)}; each needs its own"
+            f"{path}: {key}.channel = {channel} is used by {' and '.join(joints)}", "give each joint its own"
         )

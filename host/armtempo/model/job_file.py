@@ -13,9 +13,24 @@ from armtempo.formats import toml_table
 from armtempo.formats.toml_table import Table
 from armtempo.model import pose_table
 from armtempo.model.arm import Arm
-from armtempo.model.job import ITERATIONS, POPULATION, REFINE, Job
+from armtempo.model.job import (
+    AUTO,
+    GRADIENT,
+    ITERATIONS,
+    PATHS,
+    POPULATION,
+    REFINE,
+    STARTS,
+    TIMINGS,
+    Job,
+    Stop,
+)
 from armtempo.model.tool_pose import Pose
 from armtempo.optimise import ALGORITHMS
+
+MOST_DWELL_S = 600.0
+OPTIMISERS = (*ALGORITHMS, GRADIENT)
+"""Names that a job may give as its optimiser."""
 
 
 def default_path() -> Path:
@@ -33,27 +48,52 @@ def load(path: Path | str, arm: Arm) -> Job:
 
 def of_table(top: Table, arm: Arm) -> Job:
     """The job described by the top table of a TOML file; errors as in ``load``."""
-    low, high = top.numbers("bounds_s", 2, Job.bounds_s)
-    if not 0.0 < low < high:
-        raise top.fail("bounds_s", "two times in seconds above 0, the shorter first")
     parameters = top.table("parameters")
+    vias, stops = _vias(top, arm)
     job = Job(
         name=_name(top),
-        via=_vias(top, arm),
+        via=vias,
+        stops=stops,
+        path=top.choice("path", PATHS, Job.path),
+        corridor_deg=_corridor(top, "corridor_deg"),
+        corridor_mm=_corridor(top, "corridor_mm"),
         degree=top.choice("degree", (3, 5), Job.degree),
-        timing=top.choice("timing", ("per-joint", "shared"), Job.timing),
-        refine=top.integer("refine", Job.refine, least=REFINE[0], most=REFINE[1]),
-        optimiser=top.choice("optimiser", tuple(ALGORITHMS), Job.optimiser),
+        timing=top.choice("timing", TIMINGS, Job.timing),
+        refine=_refine(top),
+        optimiser=top.choice("optimiser", OPTIMISERS, Job.optimiser),
         population=top.integer("population", Job.population, least=POPULATION[0], most=POPULATION[1]),
         iterations=top.integer("iterations", Job.iterations, least=ITERATIONS[0], most=ITERATIONS[1]),
         parameters=parameters.rest() if parameters else {},
+        starts=top.integer("starts", Job.starts, least=STARTS[0], most=STARTS[1]),
         seed=top.integer("seed", Job.seed, least=0, most=2**63 - 1),
-        bounds_s=(low, high),
+        bounds_s=_bounds(top),
         polish=top.boolean("polish", Job.polish),
         source=top.file,
     )
     top.done()
     return job
+
+
+def _corridor(top: Table, key: str) -> float | None:
+    return top.number(key, least=0.0) if top.has(key) else None
+
+
+def _refine(top: Table) -> int | str:
+    if not top.has("refine"):
+        return Job.refine
+    least, most = REFINE
+    choices = (AUTO, *range(least, most + 1))
+    chosen: int | str = top.choice("refine", choices, allowed=f"{AUTO!r} or {least} to {most}")
+    return chosen
+
+
+def _bounds(top: Table) -> tuple[float, float] | None:
+    if not top.has("bounds_s"):
+        return None
+    low, high = top.numbers("bounds_s", 2)
+    if not 0.0 < low < high:
+        raise top.fail("bounds_s", "two times in seconds above 0, the shorter first")
+    return low, high
 
 
 def _name(top: Table) -> str:
@@ -64,10 +104,11 @@ def _name(top: Table) -> str:
     return name
 
 
-def _vias(top: Table, arm: Arm) -> tuple[tuple[float, ...] | Pose, ...]:
-    """``via_deg``: lists of angles; or ``via``: tables with ``angles_deg`` or a pose."""
+def _vias(top: Table, arm: Arm) -> tuple[tuple[tuple[float, ...] | Pose, ...], tuple[Stop, ...]]:
+    """``via_deg``: lists of angles; or ``via``: tables with ``angles_deg`` or a pose, and stops among them."""
     if top.has("via_deg") == top.has("via"):
         raise top.fail("via_deg", "given, or else [[via]] tables, but not both")
+    stops: list[Stop] = []
     if top.has("via_deg"):
         rows = top.array("via_deg", "a list of at least 2 lists of angles")
         named = Table({f"via_deg[{n}]": row for n, row in enumerate(rows, 1)}, top.file)
@@ -75,19 +116,40 @@ def _vias(top: Table, arm: Arm) -> tuple[tuple[float, ...] | Pose, ...]:
             _angles(named, f"via_deg[{n}]", arm) for n in range(1, len(rows) + 1)
         ]
     else:
-        tables = enumerate(top.tables("via"), 1)
-        vias = [_via(table, f"{top.file}: via[{n}]", arm) for n, table in tables]
+        tables = top.tables("via")
+        stops = [_stop(table, n, len(tables)) for n, table in enumerate(tables) if _stops(table)]
+        vias = [_via(table, f"{top.file}: via[{n}]", arm) for n, table in enumerate(tables, 1)]
     if len(vias) < 2:
-        raise InputError(f"{top.file}: {len(vias)} via point is not a motion; at least 2 are needed")
+        raise InputError(f"{top.file}: {len(vias)} via point is not a motion", "at least 2 are needed")
     if len(vias) - 1 > MAX_SEGMENTS:
-        raise InputError(f"{top.file}: {len(vias)} via points; the board holds at most {MAX_SEGMENTS + 1}")
-    return tuple(vias)
+        raise InputError(f"{top.file}: {len(vias)} via points", f"the board holds at most {MAX_SEGMENTS + 1}")
+    return tuple(vias), tuple(stops)
+
+
+def _stops(table: Table) -> bool:
+    """Whether the motion is to rest at this via point."""
+    stops = table.boolean("stop", False)
+    if table.has("dwell_s") and not stops:
+        raise table.fail("dwell_s", "given with stop = true only")
+    return stops
+
+
+def _stop(table: Table, via: int, count: int) -> Stop:
+    dwell_s = table.number("dwell_s", 0.0, least=0.0, most=MOST_DWELL_S)
+    if via in (0, count - 1):
+        raise table.fail(
+            "stop", "left out at the first and the last via point: the motion rests there anyway"
+        )
+    return Stop(via, dwell_s)
 
 
 def _via(table: Table, where: str, arm: Arm) -> tuple[float, ...] | Pose:
     forms = [key for key in ("angles_deg", "matrix", "position_mm") if table.has(key)]
     if len(forms) != 1:
-        raise InputError(f"{where}: exactly one of angles_deg, matrix and position_mm is needed")
+        raise InputError(
+            f"{where}: exactly one of angles_deg, matrix and position_mm is needed",
+            "leave all but one of them out",
+        )
     if forms == ["angles_deg"]:
         angles = _angles(table, "angles_deg", arm)
         table.done()

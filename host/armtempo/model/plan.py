@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from armtempo.arrays import Array
+from armtempo.formats import json_codec
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.splines.extremes import Extremes
@@ -28,13 +31,17 @@ class Search:
     evaluations: int
     """Fitness evaluations of the search."""
     history_s: Array
-    """Best fitness of the first population and after each iteration, (iterations + 1,)."""
+    """Best fitness of the first population and after each iteration, (iterations + 1,); of a gradient search the best
+    motion time after each start."""
     optimum_s: float
     """Where polished: lower bound of the local optimum with as many intervals; else 0."""
     floor_s: float
-    """Lower bound of the motion time of every time law along this path (kind "path": to about 1 ms)."""
+    """Proven lower bound of the motion time, whatever the time law along this path; for a free path, whatever the path
+    through the via points."""
     floor_kind: str
-    """How the lower bound was found, see ``lower_bounds.floor``."""
+    """How the lower bound was found, see ``lower_bounds.Floor``."""
+    starts_s: Array = field(default_factory=lambda: np.empty(0), metadata=json_codec.ADDED)
+    """Of a gradient search, the motion time that each start led to on few segments; else empty."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,11 +70,15 @@ class Plan:
         """The motion time: when the last joint arrives, seconds."""
         return self.trajectory.duration_s
 
-    def save(self, path: Path | str) -> None:
-        """Write the trajectory file, whole or not at all; InputError where it cannot be written."""
+    def save(self, path: Path | str, force: bool = False) -> None:
+        """Write the trajectory file, whole or not at all.
+
+        ``force``: also over a file that is no earlier plan of the same job for the same arm, by their names.
+        Raises InputError where such a file is there, or the file cannot be written.
+        """
         from armtempo.model import trajectory_file
 
-        trajectory_file.save(self, path)
+        trajectory_file.save(self, path, force)
 
     def to_csv(self, rate_hz: float = 100.0) -> str:
         """Angle, speed, acceleration and jerk of each driven joint as CSV, ``rate_hz`` lines a second."""
@@ -82,8 +93,11 @@ class Plan:
         return exchange.to_ros(self, rate_hz, frame_id)
 
     @classmethod
-    def load(cls, path: Path | str) -> Plan:
-        """The plan of a trajectory file; InputError where the file is none, is damaged or does not fit."""
+    def load(cls, path: Path | str, altered: bool = False) -> Plan:
+        """The plan of a trajectory file; ``altered``: also of one that was altered after it had been written.
+
+        InputError where the file is none, is damaged, altered or does not fit.
+        """
         from armtempo.model import trajectory_file
 
-        return trajectory_file.load(path)
+        return trajectory_file.load(path, altered)

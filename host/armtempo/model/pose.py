@@ -45,12 +45,19 @@ def checked(matrix: ArrayLike, what: str = "the pose") -> Array:
     if pose.shape == (3, 4):
         pose = np.vstack((pose, (0.0, 0.0, 0.0, 1.0)))
     if pose.shape != (4, 4):
-        raise InputError(f"{what}: a pose is a matrix of 4 rows of 4 numbers, or its first 3 rows")
+        raise InputError(
+            f"{what}: a matrix of shape {pose.shape} is no pose",
+            "give 4 rows of 4 numbers, or the first 3 of them",
+        )
     if not np.all(np.abs(pose) <= LARGEST):
-        raise InputError(f"{what}: every number of a pose must be finite, and at most {LARGEST:g}")
+        raise InputError(
+            f"{what}: one of its numbers is too large or no number",
+            f"every number of a pose must be finite, and at most {LARGEST:g}",
+        )
     if np.abs(pose[3] - (0.0, 0.0, 0.0, 1.0)).max() > 1e-9:
         raise InputError(
-            f"{what}: the last row of a pose is 0 0 0 1, not {' '.join(f'{v:g}' for v in pose[3])}"
+            f"{what}: the last row of a pose is 0 0 0 1, not {' '.join(f'{v:g}' for v in pose[3])}",
+            "write it so, with the position in the last column",
         )
     pose[:3, :3] = _nearest_rotation(pose[:3, :3], what)
     pose[3] = (0.0, 0.0, 0.0, 1.0)
@@ -62,12 +69,12 @@ def _nearest_rotation(part: Array, what: str) -> Array:
     off = float(np.abs(stretch - 1.0).max())
     if off > ROUNDED:
         raise InputError(
-            f"{what}: the 3 x 3 part is not a rotation: its columns must have length 1 and be square to each "
-            f"other (off by {off:.3g}, {ROUNDED:g} allowed)"
+            f"{what}: the 3 x 3 part is not a rotation (off by {off:.3g}, {ROUNDED:g} allowed)",
+            "its columns must have length 1 and be square to each other: give more digits, or roll, pitch and yaw",
         )
     rotation: Array = left @ right
     if np.linalg.det(rotation) < 0.0:
-        raise InputError(f"{what}: the 3 x 3 part is a mirror image (left-handed); swap or negate a column")
+        raise InputError(f"{what}: the 3 x 3 part is a mirror image (left-handed)", "swap or negate a column")
     # An exact matrix stays as it is, to the last bit.
     return part if np.abs(rotation - part).max() < 1e-14 else rotation
 
@@ -89,7 +96,8 @@ def from_quaternion(position: Sequence[float], wxyz: Sequence[float], what: str 
     length = math.hypot(*wxyz)
     if not abs(length - 1.0) <= ROUNDED:
         raise InputError(
-            f"{what}: a quaternion w x y z of length 1 is needed; this one has length {length:.6g}"
+            f"{what}: this quaternion has length {length:.6g}",
+            "give w x y z of length 1, w (the real part) first",
         )
     w, x, y, z = (value / length for value in wxyz)
     rotation = (

@@ -40,8 +40,9 @@ def _positioned(table: Table, where: str) -> Pose:
     given = [key for key in ORIENTATIONS if table.has(key)]
     if len(given) + bool(angles) > 1:
         raise InputError(
-            f"{where}: position_mm goes alone or with one of rpy_deg, quaternion and approach, or with any of "
-            "roll_deg, pitch_deg and yaw_deg"
+            f"{where}: {', '.join((*given, *(f'{name}_deg' for name in angles)))} cannot be given together",
+            "give position_mm alone, with one of rpy_deg, quaternion and approach, or with any of roll_deg, "
+            "pitch_deg and yaw_deg",
         )
     if given == ["quaternion"]:
         matrix = pose.from_quaternion(position, table.numbers("quaternion", 4), f"{where}.quaternion")

@@ -56,13 +56,15 @@ class Pose:
         """InputError for what makes no pose."""
         if self.fixed not in CONSTRAINTS:
             allowed = ", ".join("+".join(fixed) or "nothing" for fixed in CONSTRAINTS)
-            raise InputError(f"a pose may fix {allowed} of its orientation, not {'+'.join(self.fixed)}")
+            raise InputError(
+                f"a pose cannot fix {'+'.join(self.fixed)} of its orientation", f"it may fix {allowed}"
+            )
         if not (
             SMALLEST <= self.tolerance_mm <= LARGEST_MM and SMALLEST <= self.tolerance_deg <= LARGEST_DEG
         ):
             raise InputError(
-                f"tolerances of {self.tolerance_mm:g} mm and {self.tolerance_deg:g} deg are not allowed; give "
-                f"{SMALLEST:g} to {LARGEST_MM:g} mm and {SMALLEST:g} to {LARGEST_DEG:g} deg"
+                f"tolerances of {self.tolerance_mm:g} mm and {self.tolerance_deg:g} deg are not allowed",
+                f"give {SMALLEST:g} to {LARGEST_MM:g} mm and {SMALLEST:g} to {LARGEST_DEG:g} deg",
             )
 
     @property
@@ -94,7 +96,7 @@ class Pose:
         fixed = tuple(name for name in WHOLE if name in angles_deg)
         if fixed not in CONSTRAINTS:
             raise InputError(
-                f"{what}: roll and yaw without pitch leave too much open; give pitch too, or leave one out"
+                f"{what}: roll and yaw without pitch leave too much open", "give pitch too, or leave one out"
             )
         rpy = [angles_deg.get(name, 0.0) for name in WHOLE]
         return cls.of_matrix(pose.from_rpy(position, rpy, what), fixed)
@@ -107,7 +109,8 @@ class Pose:
         length = math.hypot(*direction)
         if not 1e-9 <= length <= pose.LARGEST:
             raise InputError(
-                f"{what}: the approach is a direction such as 0 0 -1 (straight down), not of length {length:g}"
+                f"{what}: the approach has length {length:g}",
+                "give a direction such as 0 0 -1 (straight down)",
             )
         z = np.array(direction) / length
         x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)

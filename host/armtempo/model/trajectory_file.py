@@ -1,8 +1,13 @@
-"""The trajectory file: a plan as JSON, whole enough to run it and to plan it again."""
+"""The trajectory file: a plan as JSON, whole enough to run it and to plan it again.
+
+It carries a sha256 over the plan, which does not depend on blanks and line breaks; files of version 1 have none.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
+import logging
 from pathlib import Path
 from typing import Any
 
@@ -11,57 +16,110 @@ from armtempo_shared.basis import BASIS
 
 from armtempo.errors import InputError
 from armtempo.formats import json_codec
-from armtempo.formats.atomic_file import replace_text, why
-from armtempo.model.arm import Joint
+from armtempo.formats.atomic_file import check_replaceable, replace_text, why
+from armtempo.model import arm_json
+from armtempo.model.job import AUTO
 from armtempo.model.plan import Plan
 from armtempo.splines.trajectory import JointSpline
 
 FORMAT = "armtempo trajectory"
-VERSION = 1
+VERSION = 2
+_RUN = "run.json"
+"""A run folder has this beside its trajectory file."""
+RULE = "a trajectory file is replaced by one of the same job, by its name, for an arm of the same name"
+LOG = logging.getLogger("armtempo")
 
 
-def save(plan: Plan, path: Path | str) -> None:
+def save(plan: Plan, path: Path | str, force: bool = False) -> None:
     """Write the plan, whole or not at all.
 
-    Raises InputError where the file cannot be written.
+    ``force``: also over a file that is not of the same job for the same arm, by their names, or was altered.
+    Raises InputError where such a file is there, or the file cannot be written.
     """
-    content = {"format": FORMAT, "version": VERSION, "plan": json_codec.encode(plan)}
-    text = json.dumps(content, indent=1, allow_nan=False)
-    replace_text(Path(path), text + "\n")
+    content = json_codec.encode(plan)
+    whole = {"format": FORMAT, "version": VERSION, "sha256": _checksum(content), "plan": content}
+    text = json.dumps(whole, indent=1, allow_nan=False) + "\n"
+    target = Path(path)
+    check_replaceable(target, text, force or _is_earlier(target, plan), RULE)
+    replace_text(target, text)
 
 
-def load(path: Path | str) -> Plan:
+def load(path: Path | str, altered: bool = False) -> Plan:
     """The plan of a trajectory file.
 
-    Raises InputError for a file that is missing, cut, of another format or version, or holds a key, value or
-    shape that this program does not understand.
+    ``altered``: also of one that was altered after it had been written. Raises InputError for a file that is
+    missing, cut, altered, of another format or version, or holds a key, value or shape that this program does
+    not understand.
     """
     content = _read(path)
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise InputError(f"{path}: is not a trajectory file; make one with: armtempo plan")
-    if content.get("version") != VERSION:
+        raise InputError(f"{path}: is not a trajectory file", "make one with: armtempo plan")
+    version = content.get("version")
+    if version not in (1, VERSION):
         raise InputError(
-            f"{path}: has version {content.get('version')!r}, this program reads version {VERSION}; "
-            "plan it again"
+            f"{path}: has version {version!r}, this program reads versions 1 and {VERSION}", "plan it again"
         )
-    if content.keys() != {"format", "version", "plan"}:
-        raise InputError(f"{path}: unknown or missing key beside format, version and plan")
+    expected = {"format", "version", "plan"} | ({"sha256"} if version == VERSION else set())
+    if content.keys() != expected:
+        raise InputError(
+            f"{path}: unknown or missing key beside {', '.join(sorted(expected))}", "plan it again"
+        )
+    _check_unaltered(content, path, altered)
     plan: Plan = json_codec.decode(Plan, content["plan"], f"{path}: plan")
     _check(plan, path)
     return plan
+
+
+def _checksum(content: Any) -> str:
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _check_unaltered(content: dict[str, Any], path: Path | str, altered: bool) -> None:
+    if content["version"] == 1:
+        LOG.warning(
+            f"{path} was written before trajectory files had a checksum: whether it was altered is not known"
+        )
+    elif content["sha256"] != _checksum(content["plan"]):
+        if not altered:
+            raise InputError(
+                f"{path} was altered after it had been written: its checksum does not fit", _cure(path)
+            )
+        LOG.warning(f"{path} was altered after it had been written, and is taken all the same")
+
+
+def _cure(path: Path | str) -> str:
+    if (Path(path).parent / _RUN).exists():
+        return "it no longer says what was run: bring the original back, or move it out of the run folder"
+    return "plan it again; or, if you know what was altered, take it with --altered"
+
+
+def _is_earlier(path: Path, plan: Plan) -> bool:
+    """Whether the file holds an earlier plan of the same job and arm, by their names, as it was written."""
+    try:
+        content = _read(path)
+        before = content["plan"]
+        names = before["job"]["name"], before["arm"]["name"]
+        unaltered = content["version"] == 1 or content["sha256"] == _checksum(before)
+    except (InputError, LookupError, TypeError):
+        return False
+    return bool(names == (plan.job.name, plan.arm.name) and unaltered and content.get("format") == FORMAT)
 
 
 def _read(path: Path | str) -> Any:
     try:
         text = Path(path).read_text(encoding="utf-8")
     except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
+        raise InputError(
+            f"{path}: no such file",
+            f"check the path, or make it with: armtempo plan -o {path}",
+        ) from None
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {why(error)}") from None
+        raise InputError(f"{path}: cannot be read: {why(error)}", "check its permissions") from None
     try:
         return json.loads(text, parse_constant=_refuse)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: damaged or cut: {error}; plan it again or copy it again") from None
+        raise InputError(f"{path}: damaged or cut: {error}", "plan it again or copy it again") from None
 
 
 def _refuse(name: str) -> None:
@@ -70,44 +128,58 @@ def _refuse(name: str) -> None:
 
 def _check(plan: Plan, path: Path | str) -> None:
     """Check what types cannot express: shapes, increasing times, one spline for each driven joint."""
-    for joint in plan.arm.joints:
-        _check_drive(joint, f"{path}: arm: {joint.name}")
+    arm_json.check(plan.arm, f"{path}: arm", "plan it again")
     joints, driven = plan.trajectory.joints, plan.arm.driven
     if not joints or len(joints) != len(driven):
-        raise InputError(f"{path}: {len(joints)} joints in the trajectory, the arm drives {len(driven)}")
+        raise InputError(
+            f"{path}: {len(joints)} joints in the trajectory, the arm drives {len(driven)}",
+            "plan it again",
+        )
     if plan.via_deg.shape[1:] != (len(driven),) or len(plan.extremes) != len(driven):
-        raise InputError(f"{path}: via_deg and extremes must have an entry for each of {len(driven)} joints")
+        raise InputError(
+            f"{path}: via_deg and extremes must have an entry for each of {len(driven)} joints",
+            "plan it again",
+        )
     for number, spline in enumerate(joints, 1):
         _check_spline(spline, len(plan.via_deg) - 1, f"{path}: trajectory joint {number}")
     if plan.trajectory.shared and any(
         not np.array_equal(spline.time_points_s, joints[0].time_points_s) for spline in joints
     ):
-        raise InputError(f"{path}: shared timing, but the joints' time control points differ")
+        raise InputError(
+            f"{path}: shared timing, but the joints' time control points differ",
+            "plan it again",
+        )
+    if isinstance(plan.job.refine, str) and plan.job.refine != AUTO:
+        raise InputError(
+            f"{path}: plan.job.refine {plan.job.refine!r} should be a number or {AUTO!r}", "plan it again"
+        )
     if any(not 0 <= index < len(joints) for search in plan.searches for index in search.joints):
-        raise InputError(f"{path}: searches name a joint that there is not")
+        raise InputError(f"{path}: searches name a joint that there is not", "plan it again")
 
 
-def _check_drive(joint: Joint, where: str) -> None:
-    """A joint with a motor can be driven, and its figures can be divided by."""
-    motor, encoder = joint.motor, joint.encoder
-    if motor is None:
-        return
-    if joint.limits is None or min(joint.limits.values) <= 0:
-        raise InputError(f"{where}: has no limits above 0")
-    if min(motor.steps_per_rev, motor.microsteps, motor.gear_ratio) <= 0:
-        raise InputError(f"{where}: its motor's figures must be above 0")
-    if encoder is not None and encoder.counts_per_rev <= 0:
-        raise InputError(f"{where}: its encoder's counts_per_rev must be above 0")
-
-
-def _check_spline(spline: JointSpline, segments: int, where: str) -> None:
+def _check_spline(spline: JointSpline, stretches: int, where: str) -> None:
+    segments = stretches
+    if spline.via_segments is not None:
+        if len(spline.via_segments) != stretches + 1 or spline.via_segments[0] != 0:
+            raise InputError(
+                f"{where}: via_segments must name {stretches + 1} via points, the first at 0", "plan it again"
+            )
+        if np.any(np.diff(spline.via_segments) < 1):
+            raise InputError(f"{where}: its via_segments do not increase", "plan it again")
+        segments = spline.via_segments[-1]
     if spline.degree not in BASIS or spline.refine < 1:
-        raise InputError(f"{where}: degree {spline.degree} with refine {spline.refine} is not known")
+        raise InputError(
+            f"{where}: degree {spline.degree} with refine {spline.refine} is not known",
+            "plan it again",
+        )
     for what, points, pieces in (
         ("angle", spline.angle_points_deg, segments),
         ("time", spline.time_points_s, segments * spline.refine),
     ):
         if points.shape != (pieces + spline.degree,):
-            raise InputError(f"{where}: {points.size} {what} control points do not fit {pieces} segments")
+            raise InputError(
+                f"{where}: {points.size} {what} control points do not fit {pieces} segments",
+                "plan it again",
+            )
     if not np.all(np.diff(spline.time_points_s) > 0):
-        raise InputError(f"{where}: its time control points do not increase")
+        raise InputError(f"{where}: its time control points do not increase", "plan it again")

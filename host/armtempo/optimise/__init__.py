@@ -73,7 +73,8 @@ def minimise(
     box = _checked_bounds(bounds)
     if wanted.population < 4 or wanted.iterations < 1:
         raise InputError(
-            f"optimiser: population {wanted.population} must be at least 4, iterations {wanted.iterations} at least 1"
+            f"optimiser: population {wanted.population}, iterations {wanted.iterations} are too few",
+            "give a population of at least 4 and at least 1 iteration",
         )
     values = {name: parameter.default for name, parameter in known.items()}
     values |= _checked(wanted.algorithm, known, wanted.parameters)
@@ -84,14 +85,20 @@ def minimise(
 
 def _module(algorithm: str) -> ModuleType:
     if algorithm not in ALGORITHMS:
-        raise InputError(f"optimiser {algorithm!r} is not known; there are {', '.join(sorted(ALGORITHMS))}")
+        raise InputError(
+            f"optimiser {algorithm!r} is not known",
+            f"choose one of {', '.join(sorted(ALGORITHMS))}",
+        )
     return import_module(ALGORITHMS[algorithm])
 
 
 def _checked_bounds(bounds: ArrayLike) -> Array:
     box = np.array(bounds, dtype=float)
     if box.ndim != 2 or box.shape[1] != 2 or not np.all(np.isfinite(box)) or np.any(box[:, 0] > box[:, 1]):
-        raise InputError("optimiser: bounds must be finite pairs (lowest, highest), one for each variable")
+        raise InputError(
+            "optimiser: the bounds are not finite pairs, lowest before highest",
+            "give (lowest, highest) for each variable",
+        )
     return box
 
 
@@ -102,8 +109,12 @@ def _checked(
     for name, value in given.items():
         if name not in known:
             raise InputError(
-                f"optimiser {algorithm!r} has no parameter {name!r}; it has {', '.join(sorted(known))}"
+                f"optimiser {algorithm!r} has no parameter {name!r}",
+                f"it has {', '.join(sorted(known))}",
             )
         if not known[name].admits(value):
-            raise InputError(f"optimiser {algorithm!r}: {name} = {value!r} must be {known[name].allowed}")
+            raise InputError(
+                f"optimiser {algorithm!r}: {name} = {value!r} is not allowed",
+                f"give {known[name].allowed}",
+            )
     return given

@@ -35,7 +35,8 @@ def brake_time_s(trajectory: Trajectory, limits: Sequence[Limits]) -> float:
     allowed = np.array([limit.values for limit in limits])
     if any(np.any(np.abs(motion[n]) > EXCESS * allowed[:, n]) for n in (1, 2)):
         raise InputError(
-            f"the motion {trajectory.name!r} goes beyond the arm's acceleration or jerk limits; plan it again"
+            f"the motion {trajectory.name!r} goes beyond the arm's acceleration or jerk limits",
+            "plan it again",
         )
     high = 0.01
     while _excess(time, motion, allowed, high) > EXCESS:

@@ -19,11 +19,22 @@ from armtempo_shared.limits import (
 )
 
 from armtempo import optimise
+from armtempo.arrays import Array
 from armtempo.errors import InputError, PlanError
 from armtempo.model.arm import Arm, DrivenJoint, Limits
-from armtempo.model.job import ITERATIONS, POPULATION, REFINE, Job
+from armtempo.model.job import (
+    AUTO,
+    GRADIENT,
+    ITERATIONS,
+    PATHS,
+    POPULATION,
+    REFINE,
+    STARTS,
+    TIMINGS,
+    Job,
+)
+from armtempo.model.tool_pose import TOLERANCE_DEG, TOLERANCE_MM, WHOLE, Pose
 from armtempo.splines import bspline, extremes
-from armtempo.splines.bspline import Array
 from armtempo.splines.extremes import Extremes
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
@@ -45,12 +56,16 @@ def limits_of(arm: Arm) -> list[Limits]:
         values = joint.limits.values
         if not all(math.isfinite(value) and value > 0 for value in values):
             raise InputError(
-                f"arm {arm.name!r}: the limits of {joint.name} must be positive numbers, not {values}"
+                f"arm {arm.name!r}: the limits of {joint.name} must be positive numbers, not {values}",
+                "set speed_deg_s, acceleration_deg_s2 and jerk_deg_s3 in the arm file",
             )
         _check_step_rate(arm, joint, joint.limits.speed_deg_s)
         limits.append(joint.limits)
     if not limits:
-        raise InputError(f"arm {arm.name!r}: no joint has a motor, so there is nothing to plan")
+        raise InputError(
+            f"arm {arm.name!r}: no joint has a motor, so there is nothing to plan",
+            "give at least one joint a motor in the arm file",
+        )
     return limits
 
 
@@ -59,36 +74,127 @@ def _check_step_rate(arm: Arm, joint: DrivenJoint, speed_deg_s: float) -> None:
     if rate > MAX_STEP_RATE:
         raise InputError(
             f"arm {arm.name!r}: {joint.name} at its speed limit of {speed_deg_s:g} deg/s needs {rate:.0f} "
-            f"steps/s, the board does {MAX_STEP_RATE} at most; check the unit, lower the limit, or use "
-            "fewer microsteps"
+            f"steps/s, the board does {MAX_STEP_RATE} at most",
+            "check the unit, lower the limit, or use fewer microsteps",
         )
 
 
 def check_job(arm: Arm, job: Job) -> None:
     """Raises InputError for settings that the planner does not know or the board cannot hold."""
-    if job.timing not in ("per-joint", "shared"):
-        raise InputError(f"job {job.name!r}: timing {job.timing!r} must be 'per-joint' or 'shared'")
-    for name, (least, most) in (("refine", REFINE), ("population", POPULATION), ("iterations", ITERATIONS)):
-        if not least <= getattr(job, name) <= most:
-            raise InputError(
-                f"job {job.name!r}: {name} {getattr(job, name)} must be a whole number from {least} to {most}"
-            )
-    segments = len(job.via) - 1
-    if segments * job.refine > MAX_SEGMENTS:
+    if job.timing not in TIMINGS:
         raise InputError(
-            f"job {job.name!r}: {segments} segments with refine {job.refine} make more than the board's "
-            f"{MAX_SEGMENTS}; lower refine or use fewer via points"
+            f"job {job.name!r}: timing {job.timing!r} must be 'per-joint' or 'shared'", "choose one of them"
         )
-    size = motion.size(job.degree, len(arm.driven), job.timing == "shared", segments, job.refine)
+    whole = {"population": POPULATION, "iterations": ITERATIONS, "starts": STARTS}
+    if job.refine != AUTO:
+        whole["refine"] = REFINE
+    for name, (least, most) in whole.items():
+        value = getattr(job, name)
+        if not isinstance(value, int) or not least <= value <= most:
+            raise InputError(
+                f"job {job.name!r}: {name} {value} must be a whole number from {least} to {most}",
+                f"give {name} such a number, or leave it out",
+            )
+    refine = 1 if isinstance(job.refine, str) else job.refine
+    _check_path(job)
+    kind = job.parameters.get("fitness", FITNESS[0])
+    if kind not in FITNESS:
+        raise InputError(
+            f"job {job.name!r}: fitness {kind!r} must be one of {', '.join(FITNESS)}",
+            "choose one of them, or leave fitness out",
+        )
+    if job.optimiser != GRADIENT:
+        optimise.parameters(job.optimiser)
+    if is_free(job):
+        return
+    segments = len(job.via) - 1
+    if segments * refine > MAX_SEGMENTS:
+        raise InputError(
+            f"job {job.name!r}: {segments} segments with refine {refine} make more than the board's "
+            f"{MAX_SEGMENTS}",
+            "lower refine or use fewer via points",
+        )
+    size = motion.size(job.degree, len(arm.driven), job.timing == "shared", segments, refine)
     if size > MAX_MOTION_BYTES:
         raise InputError(
             f"job {job.name!r}: its motion record would have {size} bytes, the board takes "
-            f"{MAX_MOTION_BYTES}; lower refine, use shared timing or fewer via points"
+            f"{MAX_MOTION_BYTES}",
+            "lower refine, use shared timing or fewer via points",
         )
-    kind = job.parameters.get("fitness", FITNESS[0])
-    if kind not in FITNESS:
-        raise InputError(f"job {job.name!r}: fitness {kind!r} must be one of {', '.join(FITNESS)}")
-    optimise.parameters(job.optimiser)
+
+
+def is_free(job: Job) -> bool:
+    """Whether the path may leave the spline through the via points; a corridor of 0 leaves it no room."""
+    return job.path == "free" and 0.0 not in (job.corridor_deg, job.corridor_mm)
+
+
+def _check_path(job: Job) -> None:
+    where = f"job {job.name!r}"
+    if job.path not in PATHS:
+        raise InputError(
+            f"{where}: path {job.path!r} must be one of {', '.join(map(repr, PATHS))}",
+            "choose one of them, or leave path out",
+        )
+    corridors = [name for name in ("corridor_deg", "corridor_mm") if getattr(job, name) is not None]
+    if corridors and job.path != "free":
+        raise InputError(f"{where}: {corridors[0]} bounds a free path", 'add path = "free" or leave it out')
+    if len(corridors) > 1:
+        raise InputError(
+            f"{where}: give one of corridor_deg and corridor_mm, not both", "leave one of them out"
+        )
+    if corridors and not 0.0 <= getattr(job, corridors[0]) < math.inf:
+        raise InputError(
+            f"{where}: {corridors[0]} must be 0 or more", f"give {corridors[0]} a width, or leave it out"
+        )
+    if job.stops and not is_free(job):
+        raise InputError(
+            f"{where}: the spline through the via points rests at its ends only",
+            'a stop needs path = "free", or plan the stretches between the stops one by one with --split',
+        )
+    if is_free(job):
+        _check_free(job, where)
+
+
+def is_wide(via: tuple[float, ...] | Pose) -> bool:
+    """Whether a free path may pass beside it: a pose with more tolerance than counts as reached anyway.
+
+    Only where nothing or all is asked of the orientation; other poses are passed where the inverse puts them.
+    """
+    return (
+        isinstance(via, Pose)
+        and via.fixed in ((), WHOLE)
+        and (via.tolerance_mm > TOLERANCE_MM or via.tolerance_deg > TOLERANCE_DEG)
+    )
+
+
+def _check_free(job: Job, where: str) -> None:
+    if job.degree != 5:
+        raise InputError(
+            f"{where}: a free path has degree 5, not {job.degree}",
+            'leave degree out, or take path = "through"',
+        )
+    together = {
+        "a stop": bool(job.stops),
+        "a corridor": job.corridor_deg is not None or job.corridor_mm is not None,
+        "a tolerance at a via point": any(is_wide(via) for via in job.via),
+    }
+    for what, asked in together.items():
+        if asked and job.timing != "shared":
+            raise InputError(
+                f'{where}: {what} needs timing = "shared", where the joints pass via points together',
+                "leave timing out or leave that out",
+            )
+    inner = range(1, len(job.via) - 1)
+    for stop in job.stops:
+        if stop.via not in inner or not 0.0 <= stop.dwell_s < math.inf:
+            raise InputError(
+                f"{where}: a stop must be at a via point between the ends, for 0 s or more",
+                "leave it out or move it to another via point",
+            )
+    if len({stop.via for stop in job.stops}) < len(job.stops):
+        raise InputError(f"{where}: two stops at one via point", "leave one of them out")
+    if together["a corridor"] and any(stop.dwell_s > 0.0 for stop in job.stops):
+        raise InputError(f"{where}: a corridor and a dwell do not go together", "give stops without dwell_s")
 
 
 def check_via(arm: Arm, job: Job, via_deg: Array) -> None:
@@ -96,13 +202,16 @@ def check_via(arm: Arm, job: Job, via_deg: Array) -> None:
     if via_deg.ndim != 2 or len(via_deg) < 2 or via_deg.shape[1] != len(arm.driven):
         raise InputError(
             f"job {job.name!r}: needs at least 2 via points with {len(arm.driven)} angles each, "
-            "one for each driven joint"
+            "one for each driven joint",
+            "give each via point all of these angles",
         )
     if not np.all(np.isfinite(via_deg)):
-        raise InputError(f"job {job.name!r}: a via angle is not a finite number")
+        raise InputError(
+            f"job {job.name!r}: a via angle is not a finite number", "give every angle as a number of degrees"
+        )
     if np.all(np.ptp(via_deg, axis=0) <= TOLERANCE):
         raise PlanError(
-            f"job {job.name!r}: all via points are the same, so nothing moves; change at least one angle"
+            f"job {job.name!r}: all via points are the same, so nothing moves", "change at least one angle"
         )
 
 
@@ -115,8 +224,8 @@ def check_ranges(arm: Arm, angle_points_deg: Array, degree: int) -> None:
         if lowest < least - room or highest > most + room:
             raise PlanError(
                 f"{joint.name}: the path reaches {lowest:.7g} to {highest:.7g} degrees, its range is "
-                f"{least:g} to {most:g}; move the via points away from the end of the range, or add one "
-                "where it swings out"
+                f"{least:g} to {most:g}",
+                "move the via points away from the end of the range, or add one where it swings out",
             )
 
 
@@ -127,14 +236,25 @@ def check_reached(arm: Arm, reached: tuple[Extremes, ...]) -> None:
         if not np.all(extreme.values <= np.array(joint.limits.values) * (1 + TOLERANCE)):
             raise PlanError(
                 f"{joint.name}: no plan was found that keeps its limits {joint.limits.values}, the best one "
-                f"reaches {extreme.values}; angles and limits are too far apart in size to compute with"
+                f"reaches {extreme.values}",
+                "angles and limits are too far apart in size to compute with",
             )
         rates += extreme.speed_deg_s * joint.steps_per_deg
     if rates > MAX_STEP_RATE_SUM:
         raise PlanError(
-            f"the joints together could need {rates:.0f} steps/s, the board does {MAX_STEP_RATE_SUM} at "
-            "most; lower the speed limits or use fewer microsteps"
+            f"the joints together could need {rates:.0f} steps/s, the board does {MAX_STEP_RATE_SUM} at most",
+            "lower the speed limits or use fewer microsteps",
         )
+
+
+def check_time(trajectory: Trajectory) -> None:
+    """Raises PlanError unless time increases everywhere: as all differences of its control points do."""
+    for spline in trajectory.joints:
+        if not np.all(np.diff(spline.time_points_s) > 0.0):
+            raise PlanError(
+                f"trajectory {trajectory.name!r}: no time axis was found that increases everywhere",
+                "via points, limits and dwells are too far apart in size to compute with; bring them closer",
+            )
 
 
 def check_held(trajectory: Trajectory, arm: Arm) -> None:
@@ -144,22 +264,24 @@ def check_held(trajectory: Trajectory, arm: Arm) -> None:
         _check_times(where, joint_spline)
         steps = joint_spline.angle_points_deg * joint.steps_per_deg
         if np.max(np.abs(steps)) >= MOST_STEPS or _span(steps, joint_spline.degree) >= MOST_SPAN_STEPS:
-            raise PlanError(f"{where}: more steps than the board can count; use fewer microsteps")
+            raise PlanError(f"{where}: more steps than the board can count", "use fewer microsteps")
 
 
 def _check_times(where: str, joint_spline: JointSpline) -> None:
     ticks = joint_spline.time_points_s * TICK_HZ
     if np.max(np.abs(ticks)) >= LONGEST_TICKS:
+        longest_s, reached_s = LONGEST_TICKS / TICK_HZ, ticks.max() / TICK_HZ
         raise PlanError(
-            f"{where}: lasts {joint_spline.duration_s:.0f} s, the board counts to "
-            f"{LONGEST_TICKS / TICK_HZ:.0f} s; split it"
+            f"{where}: lasts {joint_spline.duration_s:.0f} s, its time control points reach {reached_s:.0f} s, "
+            f"the board counts to {longest_s:.0f} s",
+            "mark via points with stop = true and plan with --split, or raise refine",
         )
     span = _span(ticks, joint_spline.degree)
     if span >= LONGEST_SPAN_TICKS:
         raise PlanError(
             f"{where}: its time segments are so long that {joint_spline.degree} of them span "
-            f"{span / TICK_HZ:.0f} s, the board holds {LONGEST_SPAN_TICKS / TICK_HZ:.0f} s; raise refine or add "
-            "via points"
+            f"{span / TICK_HZ:.0f} s, the board holds {LONGEST_SPAN_TICKS / TICK_HZ:.0f} s",
+            "raise refine or add via points",
         )
 
 

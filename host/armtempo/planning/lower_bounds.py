@@ -1,35 +1,74 @@
-"""Lower bounds of the motion time of every time law along a path, to compare a plan with."""
+"""Motion times that no motion can beat, proven, to hold a plan against."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
+from armtempo.arrays import Array
 from armtempo.model.arm import Limits
-from armtempo.planning import rest_to_rest, topp
+from armtempo.planning import dual_bound, dual_value, rest_to_rest
+from armtempo.planning.dual_bound import Cells
 from armtempo.splines import bspline
-from armtempo.splines.bspline import Array
 
 _WIGGLE = 1e-9
-"""Turns smaller than this fraction of the joint's travel are rounding errors."""
+"""Turns smaller than this part of the joint's way are rounding."""
+_ROUNDED = 1.0 - 1e-9
+"""Floors are this part of what comes out, for the rounding of angles and sums."""
+_MOST_CELLS, _LEAST_CELLS = 16, 4
+"""Cells in a segment of the path."""
+_WORK = 10_000
+"""Fewer cells where segments times the square of the joints' number would be more than this."""
 
 
-def floor(angle_points_deg: Array, degree: int, limits: Sequence[Limits]) -> tuple[float, str]:
-    """The highest known lower bound for joints moving together, in seconds, and its name.
+@dataclass(frozen=True)
+class Floor:
+    """A proven lower bound of a motion time, and how it was found.
 
-    ``angle_points_deg``: (n + degree, J). ``"rests"``: from turn to turn of one joint under its three limits;
-    ``"path"``: along the common path under speed and acceleration limits.
+    ``kind``: ``"rests"``: from turn to turn of one joint; ``"path"``: along the common path; ``"vias"``: through the
+    via points, whatever the path; each under speed, acceleration and jerk limits.
     """
-    joints = range(len(limits))
-    found = [
-        (rest_to_rest.floor_s(turns(angle_points_deg[:, j], degree), limits[j], at_rest=degree == 5), "rests")
-        for j in joints
-    ]
+
+    time_s: float
+    kind: str
+
+
+def of_path(angle_points_deg: Array, degree: int, limits: Sequence[Limits], about_s: float) -> Floor:
+    """The highest floor known for joints that move together on a path, ``about_s`` of it.
+
+    ``angle_points_deg``: (n + degree, J). Each joint stands still wherever it turns; and with several, no time law
+    along the path keeps the limits of all in less.
+    """
+    found = []
+    for joint, limit in enumerate(limits):
+        reached = turns(angle_points_deg[:, joint], degree)
+        found.append(Floor(_ROUNDED * rest_to_rest.floor_s(reached, limit, from_rest=degree == 5), "rests"))
     if len(limits) > 1:
-        values = np.array([limit.values for limit in limits])
-        found.append((topp.floor_s(angle_points_deg, degree, values[:, 0], values[:, 1]), "path"))
-    return max(found)
+        found.append(Floor(_path_s(angle_points_deg, degree, limits, about_s), "path"))
+    return max(found, key=lambda floor: floor.time_s)
+
+
+def _path_s(angle_points_deg: Array, degree: int, limits: Sequence[Limits], about_s: float) -> float:
+    """By duality, on more cells where few prove nothing; 0 where that does not help."""
+    segments = len(angle_points_deg) - degree
+    parts = min(max(_WORK // (segments * len(limits) ** 2), _LEAST_CELLS), _MOST_CELLS)
+    found = _by_cells(angle_points_deg, degree, limits, about_s, parts)
+    while found <= 0.0 and parts < _MOST_CELLS:
+        parts *= 2
+        found = _by_cells(angle_points_deg, degree, limits, about_s, parts)
+    return found
+
+
+def _by_cells(points_deg: Array, degree: int, limits: Sequence[Limits], about_s: float, parts: int) -> float:
+    """By duality, with so many cells in a segment of the path."""
+    pieces = bspline.subdivide(bspline.polynomials(points_deg, degree), parts)
+    cell_s = about_s / len(pieces)
+    values = np.array([limit.values for limit in limits]) * cell_s ** np.arange(1, 4)
+    cells = Cells(pieces, values, degree == 5)
+    return dual_value.value(cells, dual_bound.best_multipliers(cells)) * cell_s
 
 
 def turns(angle_points_deg: Array, degree: int) -> Array:
@@ -54,3 +93,42 @@ def _stationary(piece: Array) -> Array:
     roots = np.roots(slope) if np.any(slope) else np.empty(0)
     u = np.sort(roots.real[(np.abs(roots.imag) < 1e-7) & (roots.real > 0) & (roots.real < 1)])
     return np.polyval(piece[::-1], np.concatenate([[0.0], u]))
+
+
+def of_vias(
+    via_deg: Array, limits: Sequence[Limits], stops: Mapping[int, float], loose: Collection[int] = ()
+) -> Floor:
+    """No motion through via angles (n + 1, J) takes less, whatever its path.
+
+    From stop to stop (dwells in seconds by via point) the largest over joints of the least time through its turning
+    via angles under its three limits: where a joint's via angles turn it stands still there or beyond. ``loose`` via
+    points, which may be passed at other angles, do not count.
+    """
+    last = len(via_deg) - 1
+    ends = [0, *sorted(set(stops) - set(loose)), last]
+    total = sum(stops.values())
+    for first, end in pairwise(ends):
+        exact = [via for via in range(first, end + 1) if via not in loose]
+        rests = end not in loose
+        times = [
+            rest_to_rest.floor_s(_turning(via_deg[exact, joint], rests), limit, to_rest=rests)
+            for joint, limit in enumerate(limits)
+        ]
+        total += _ROUNDED * max(times)
+    return Floor(total, "vias")
+
+
+def _turning(angles: Array, rests: bool) -> Array:
+    """First and last of the angles and those between where their direction changes.
+
+    Where the joint does not rest at the last, that is left out.
+    """
+    kept = [float(angles[0])]
+    for angle in angles[1:]:
+        if angle == kept[-1]:
+            continue
+        if len(kept) > 1 and (angle - kept[-1]) * (kept[-1] - kept[-2]) > 0:
+            kept[-1] = float(angle)
+        else:
+            kept.append(float(angle))
+    return np.array(kept if rests or len(kept) == 1 else kept[:-1])

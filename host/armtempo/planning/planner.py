@@ -11,15 +11,13 @@ import numpy as np
 
 import armtempo
 from armtempo.arrays import Array
-from armtempo.model.arm import Arm, Limits
+from armtempo.model.arm import Arm
 from armtempo.model.job import Job
-from armtempo.model.plan import Plan, Search
+from armtempo.model.plan import Plan
 from armtempo.model.tool_pose import Pose
-from armtempo.planning import checks, lower_bounds, time_parameterization
-from armtempo.planning.time_parameterization import Timed
+from armtempo.planning import checks, free_plan, through_plan
 from armtempo.progress import Progress
-from armtempo.splines import bspline, extremes
-from armtempo.splines.trajectory import JointSpline, Trajectory
+from armtempo.splines import extremes
 
 
 @np.errstate(all="ignore")  # what overflows ends as not a number, which no check passes
@@ -29,24 +27,20 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     The same arm, job and seed give the same plan on the same machine and versions. Raises InputError where
     job and arm do not fit each other, PlanError where there is no motion under these limits and ranges.
     """
-    limits = checks.limits_of(arm)
+    checks.limits_of(arm)
     checks.check_job(arm, job)
     via, notes = via_angles(arm, job)
-    points = bspline.fit(via, job.degree)
-    checks.check_ranges(arm, points, job.degree)
-    moving = [int(joint) for joint in np.flatnonzero(np.ptp(via, axis=0) > checks.TOLERANCE)]
-    groups = [moving] if job.timing == "shared" else [[joint] for joint in moving]
-    timed = []
-    for number, joints in enumerate(groups):
-        part = None if progress is None else _part(progress, number, len(groups))
-        timed.append(_time(points, joints, limits, job, part))
-    trajectory = _trajectory(job, points, groups, timed)
+    way = free_plan.motion if checks.is_free(job) else through_plan.motion
+    planned = way(arm, job, via, progress or _silent)
+    trajectory = planned.trajectory
+    checks.check_time(trajectory)
     reached = extremes.of_joints(trajectory.joints)
     checks.check_reached(arm, reached)
-    searches = tuple(
-        _search(points, joints, limits, job, axis) for joints, axis in zip(groups, timed, strict=True)
-    )
-    return Plan(arm, job, via, notes, trajectory, searches, reached, versions())
+    return Plan(arm, job, via, (*notes, *planned.notes), trajectory, planned.searches, reached, versions())
+
+
+def _silent(_done: float, _whole: float) -> None:
+    """Progress that nobody watches."""
 
 
 @cache
@@ -72,50 +66,3 @@ def via_angles(arm: Arm, job: Job) -> tuple[Array, tuple[str, ...]]:
         angles, notes = np.array(job.via, dtype=float), ()
     checks.check_via(arm, job, angles)
     return angles, notes
-
-
-def _part(progress: Progress, number: int, parts: int) -> Progress:
-    return lambda done, whole: progress(number + done / whole, parts)
-
-
-def _time(
-    points: Array, joints: list[int], limits: list[Limits], job: Job, progress: Progress | None
-) -> Timed:
-    """The time axis of these joints; its random numbers depend on the seed and the first joint only."""
-    rng = np.random.default_rng([job.seed, joints[0]])
-    return time_parameterization.axis(
-        points[:, joints], [limits[joint] for joint in joints], job, rng, progress
-    )
-
-
-def _trajectory(job: Job, points: Array, groups: list[list[int]], timed: list[Timed]) -> Trajectory:
-    """All joints on their time axes; one that does not move takes the longest axis."""
-    longest = max(timed, key=lambda axis: axis.total_s)
-    axes = {joint: axis for joints, axis in zip(groups, timed, strict=True) for joint in joints}
-    joints = tuple(
-        JointSpline(
-            job.degree,
-            job.refine,
-            np.ascontiguousarray(points[:, joint]),
-            axes.get(joint, longest).time_points_s,
-        )
-        for joint in range(points.shape[1])
-    )
-    return Trajectory(job.name, joints, job.timing == "shared")
-
-
-def _search(points: Array, joints: list[int], limits: list[Limits], job: Job, timed: Timed) -> Search:
-    floor_s, floor_kind = lower_bounds.floor(
-        points[:, joints], job.degree, [limits[joint] for joint in joints]
-    )
-    return Search(
-        joints=tuple(joints),
-        intervals_s=timed.intervals_s,
-        total_s=timed.total_s,
-        searched_s=timed.searched_s,
-        evaluations=timed.found.evaluations,
-        history_s=timed.found.history,
-        optimum_s=timed.optimum_s,
-        floor_s=floor_s,
-        floor_kind=floor_kind,
-    )

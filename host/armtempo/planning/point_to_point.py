@@ -47,20 +47,28 @@ def posture(angles_deg: ArrayLike, arm: Arm) -> Array:
     """The angles as an array (J,); InputError where their number or a range does not fit the arm."""
     found = np.asarray(angles_deg, dtype=float)
     if found.shape != (len(arm.driven),):
-        raise InputError(f"a posture of arm {arm.name!r} has {len(arm.driven)} angles, not {found.size}")
+        raise InputError(
+            f"a posture of arm {arm.name!r} has {len(arm.driven)} angles, not {found.size}",
+            "give one angle for each joint with a motor",
+        )
     for joint, angle in zip(arm.driven, found, strict=True):
         low, high = joint.range_deg
         if not low <= angle <= high:
-            raise InputError(f"{joint.name}: {angle:g} degrees is outside of its range {low:g} to {high:g}")
+            raise InputError(
+                f"{joint.name}: {angle:g} degrees is outside of its range {low:g} to {high:g}",
+                "give an angle within it",
+            )
     return found
 
 
 def _backwards(joint: JointSpline) -> JointSpline:
+    segments = len(joint.angle_points_deg) - joint.degree
     return JointSpline(
         joint.degree,
         joint.refine,
         joint.angle_points_deg[::-1].copy(),
         joint.duration_s - joint.time_points_s[::-1],
+        None if joint.via_segments is None else tuple(segments - via for via in reversed(joint.via_segments)),
     )
 
 

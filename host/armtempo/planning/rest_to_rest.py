@@ -10,20 +10,24 @@ import math
 
 import numpy as np
 
+from armtempo.arrays import Array
 from armtempo.model.arm import Limits
-from armtempo.splines.bspline import Array
+
+_LEAST_SHARE = 0.05
+"""A way on which the joints hardly move counts as one that takes this part of the mean."""
 
 
-def floor_s(angles_deg: Array, limits: Limits, at_rest: bool = True) -> float:
+def floor_s(angles_deg: Array, limits: Limits, from_rest: bool = True, to_rest: bool | None = None) -> float:
     """Least time to pass ``angles_deg`` (turning points with both ends) in order.
 
-    At the first and the last the acceleration is zero too if ``at_rest``; at the others it is free, since a
-    joint may turn under full acceleration.
+    At the first the acceleration is zero too if ``from_rest``, at the last if ``to_rest`` (None: as at the first);
+    at the others it is free, since a joint may turn under full acceleration.
     """
+    to_rest = from_rest if to_rest is None else to_rest
     distances = np.abs(np.diff(angles_deg))
     last = len(distances) - 1
     return sum(
-        _stretch_s(float(distance), limits, at_rest and number == 0, at_rest and number == last)
+        _stretch_s(float(distance), limits, from_rest and number == 0, to_rest and number == last)
         for number, distance in enumerate(distances)
     )
 
@@ -58,3 +62,17 @@ def _ramp(speed: float, limits: Limits, from_rest: bool) -> tuple[float, float]:
         return time, speed * time / 2.0
     before = held * peak
     return time, before * held / 2.0 + before * phase + peak * phase**2 / 3.0
+
+
+def needed_s(via_deg: Array, limits: Array) -> Array:
+    """About what J joints take between neighbouring via points (n + 1, J), from rest to rest: (n,).
+
+    ``limits``: (J, 3). Where the joints hardly move, at least a part of the mean.
+    """
+    ways = np.abs(np.diff(via_deg, axis=0))
+    speed, acceleration, jerk = limits.T
+    needs = np.maximum(
+        ways / speed, np.maximum(np.sqrt(4.0 * ways / acceleration), np.cbrt(32.0 * ways / jerk))
+    )
+    needed = needs.max(axis=1)
+    return np.asarray(np.maximum(needed, _LEAST_SHARE * needed.mean()))

@@ -1,114 +1,177 @@
-"""From a path to its time axis: search, stretch to the limits, polish, refine."""
+"""From paths to time axes: search, polish, refine."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import accumulate
-from operator import mul
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
+from armtempo_shared import motion
+from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS
 
-from armtempo import optimise
 from armtempo.arrays import Array
 from armtempo.model.arm import Limits
-from armtempo.model.job import Job
-from armtempo.planning import checks, local_search
-from armtempo.planning.constraints import Path
-from armtempo.planning.fitness import Fitness
+from armtempo.model.job import REFINE, Job
+from armtempo.optimise.tracker import Result
+from armtempo.planning import interval_search
+from armtempo.planning.fixed_path import FixedPath, Optimum
+from armtempo.planning.variables import time_points
 from armtempo.progress import Progress
 from armtempo.splines import time_axis
 
 MIN_DURATION_S = 0.01
 """No motion is planned shorter: a tenth of the time between two samples."""
 
-_REFINED_GAP = 5e-5
-"""How near to its local optimum a refined axis must come; more would take most of the time for nothing."""
+_POLISHED_GAP = 1e-8
+_REFINED_GAP = 1e-4
+"""How near to its local optimum an axis should come."""
+_FINER = 4
+_PAYS = 1e-3
+"""With ``refine = "auto"`` each axis gets so many times more segments while that saves this part of its time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Joints that share a time axis: control points (n + degree, J) and one of ``limits`` each."""
+
+    joints: tuple[int, ...]
+    """Indices among the driven joints."""
+    angle_points_deg: Array
+    limits: Sequence[Limits]
 
 
 @dataclass(frozen=True, eq=False)
 class Timed:
-    """A time axis, (m + degree,) control points, that keeps all limits, and how it was found."""
+    """A time axis, (n * refine + degree,) control points, that keeps all limits, and how it was found."""
 
     time_points_s: Array
     intervals_s: Array
     """What was varied: the intervals X (n,), or with refinement the differences of all control points."""
+    refine: int
     total_s: float
     searched_s: float
     """Motion time by the search alone."""
     optimum_s: float
-    """Bound on the local optimum from below, where polished; else 0."""
-    found: optimise.Result
+    """No axis nearby with as many variables takes less, where gradients were used; else 0."""
+    found: Result
+    starts_s: Array
+    """Motion time that each start of a gradient search led to; else empty."""
+    notes: tuple[str, ...]
 
 
-def axis(
-    angle_points_deg: Array,
-    limits: Sequence[Limits],
-    job: Job,
-    rng: np.random.Generator,
-    progress: Progress | None = None,
-) -> Timed:
-    """The time axis of the joints whose control points are given, (n + degree, J), one of ``limits`` each."""
-    stages = _Stages(progress, job)
-    found = _search(Fitness(angle_points_deg, job.degree, limits), job, rng, stages.within)
+def most_refine(job: Job, segments: int, joints: int) -> int:
+    """The most segments of the time axis for one of the path that the board's record can hold."""
+    most = min(REFINE[1], MAX_SEGMENTS // segments)
+    shared = job.timing == "shared"
+    while most > 1 and motion.size(job.degree, joints, shared, segments, most) > MAX_MOTION_BYTES:
+        most -= 1
+    return most
+
+
+def axes(groups: Sequence[Group], job: Job, most: int, progress: Progress | None = None) -> list[Timed]:
+    """The time axis of each group, all with the same refinement, which is at most ``most`` if it is not given.
+
+    The random numbers of a group depend on the seed and its first joint only.
+    """
+    levels = _levels(job, most)
+    stages = _Stages(progress, len(groups), levels)
+    timed = [_searched(group, job, stages) for group in groups]
+    for before, refine in pairwise([1, *levels]):
+        finer = []
+        for group, axis in zip(groups, timed, strict=True):
+            finer.append(_refined(group, job, axis, before, refine))
+            stages.done()
+        pays = any(new.total_s < old.total_s * (1 - _PAYS) for new, old in zip(finer, timed, strict=True))
+        timed = finer
+        if job.refine == "auto" and not pays:
+            break
+    stages.end()
+    return [_long_enough(axis) for axis in timed]
+
+
+def _levels(job: Job, most: int) -> list[int]:
+    """The refinements to go through."""
+    if isinstance(job.refine, int):
+        return [job.refine] if job.refine > 1 else []
+    levels, refine = [], 1
+    while refine < most:
+        refine = min(refine * _FINER, most)
+        levels.append(refine)
+    return levels
+
+
+def _searched(group: Group, job: Job, stages: _Stages) -> Timed:
+    rng = np.random.default_rng([job.seed, group.joints[0]])
+    found = interval_search.search(group.angle_points_deg, group.limits, job, rng, stages.within)
     stages.done()
-    count = len(angle_points_deg) - job.degree
-    path = Path(angle_points_deg, job.degree, limits, time_axis.step_map(count, job.degree))
-    y = path.stretched(found.x)
-    searched, optimum = path.duration_s(y), 0.0
-    if job.polish or job.refine > 1:
-        polished = local_search.polish(path, y)
-        y, optimum = polished.y, polished.bound_s
-        stages.done()
-    if job.refine > 1:
-        path, polished = _refined(angle_points_deg, limits, job, y, stages)
-        y, optimum = polished.y, polished.bound_s
-    y = y * max(1.0, MIN_DURATION_S / path.duration_s(y))
-    bound = max(optimum, MIN_DURATION_S) if optimum else 0.0
-    return Timed(y @ path.axis, y, path.duration_s(y), searched, bound, found)
-
-
-def _search(fitness: Fitness, job: Job, rng: np.random.Generator, progress: Progress) -> optimise.Result:
-    parameters = dict(job.parameters)
-    function = getattr(fitness, str(parameters.pop("fitness", checks.FITNESS[0])))
-    return optimise.minimise(
-        function,
-        [job.bounds_s] * fitness.intervals,
-        rng,
-        optimise.Settings(job.optimiser, job.population, job.iterations, parameters),
-        progress,
+    path = FixedPath(group.angle_points_deg, job.degree, group.limits, mirrored=True)
+    differences = path.stretched(path.of_intervals(found.result.x))
+    searched = path.duration_s(differences)
+    optimum = Optimum(differences, searched, 0.0)
+    if job.polish and job.refine == 1:
+        optimum = path.optimum(differences, _POLISHED_GAP)
+    stages.done()
+    intervals = path.intervals(optimum.differences_s)
+    return Timed(
+        intervals @ time_axis.step_map(len(intervals), job.degree),
+        intervals,
+        1,
+        optimum.total_s,
+        searched,
+        optimum.bound_s,
+        found.result,
+        found.starts_s,
+        found.notes,
     )
 
 
-def _refined(
-    angle_points_deg: Array, limits: Sequence[Limits], job: Job, intervals_s: Array, stages: _Stages
-) -> tuple[Path, local_search.Polished]:
-    """The best axis of job.refine times as many segments, through ever finer ones.
+def _refined(group: Group, job: Job, axis: Timed, before: int, refine: int) -> Timed:
+    """The same axis cut finer, then improved, so that it is never slower."""
+    differences = np.diff(axis.time_points_s)
+    start = _cut(differences, before, refine, job.degree)
+    path = FixedPath(group.angle_points_deg, job.degree, group.limits, refine)
+    optimum = path.optimum(start, _REFINED_GAP)
+    return replace(
+        axis,
+        time_points_s=time_points(optimum.differences_s, job.degree),
+        intervals_s=optimum.differences_s,
+        refine=refine,
+        total_s=optimum.total_s,
+        optimum_s=optimum.bound_s,
+    )
 
-    Each starts from the same time law as the one before it, cut finer, so that none is slower.
-    """
-    edge, count = (job.degree - 1) // 2, len(intervals_s)
-    y = intervals_s[time_axis.mirrored(count, edge)]
-    for factor in _factors(job.refine):
-        y, count = time_axis.refined(y, factor, job.degree), count * factor
-        path = Path(angle_points_deg, job.degree, limits, time_axis.free_map(count, job.degree))
-        y = local_search.improve(path, y).y
-        stages.done()
-    found = local_search.polish(path, y, _REFINED_GAP)
-    stages.done()
-    return path, found
+
+def _cut(differences_s: Array, before: int, refine: int, degree: int) -> Array:
+    """The axis with ``refine`` instead of ``before`` segments; the same where that is a multiple, else much like it."""
+    if refine % before == 0:
+        return time_axis.refined(differences_s, refine // before, degree)
+    fine = time_axis.refined(differences_s, refine, degree)
+    count = (len(differences_s) - degree + 1) // before * refine + degree - 1
+    return np.asarray(np.interp(np.linspace(0, 1, count), np.linspace(0, 1, len(fine)), fine) * before)
+
+
+def _long_enough(axis: Timed) -> Timed:
+    stretch = max(1.0, MIN_DURATION_S / axis.total_s)
+    if stretch == 1.0:
+        return axis
+    return replace(
+        axis,
+        time_points_s=axis.time_points_s * stretch,
+        intervals_s=axis.intervals_s * stretch,
+        total_s=axis.total_s * stretch,
+        optimum_s=MIN_DURATION_S if axis.optimum_s else 0.0,
+    )
 
 
 class _Stages:
-    """Progress through search, polish and refinement, each weighted by what it takes."""
+    """Progress through search, polish and refinement of every group, each weighted by what it takes."""
 
-    def __init__(self, progress: Progress | None, job: Job) -> None:
+    def __init__(self, progress: Progress | None, groups: int, levels: Sequence[int]) -> None:
         self._progress = progress
-        self._weights = [1.0]
-        if job.polish or job.refine > 1:
-            self._weights.append(1.0)
-        parts = list(accumulate(_factors(job.refine), mul))
-        self._weights.extend(part**1.5 for part in [*parts, *parts[-1:]])
+        self._weights = [1.0, 1.0] * groups
+        for refine in levels:
+            self._weights.extend([1.0 + refine / 4] * groups)
         self._stage = 0
 
     def within(self, done: float, whole: float) -> None:
@@ -123,13 +186,7 @@ class _Stages:
         self._stage += 1
         self.within(0.0, 1.0)
 
-
-def _factors(number: int) -> list[int]:
-    """Prime factors, smallest first."""
-    factors, divisor = [], 2
-    while number > 1:
-        while number % divisor == 0:
-            factors.append(divisor)
-            number //= divisor
-        divisor += 1
-    return factors
+    def end(self) -> None:
+        """All is done."""
+        self._stage = len(self._weights)
+        self.within(0.0, 1.0)

@@ -127,7 +127,10 @@ def resolve(arm: Arm, job: Job) -> Resolved:
 def _spread(setup: _Setup, via: tuple[float, ...], where: str) -> Array:
     """All joints, the driven ones at the angles of a via point."""
     if len(via) != setup.driven.sum():
-        raise InputError(f"{where}: {len(via)} angles, but {setup.driven.sum()} joints have a motor")
+        raise InputError(
+            f"{where}: {len(via)} angles, but {setup.driven.sum()} joints have a motor",
+            "give one angle for each of them",
+        )
     posture = setup.home.copy()
     posture[setup.driven] = np.radians(via)
     return posture
@@ -157,12 +160,18 @@ def _searched(
     if answer.success:
         return np.array(answer.angles_rad)
     reasons = table(candidate.rejections for candidate in choice.candidates) if choice else ""
-    raise PlanError(f"{where}: {answer.reason}{reasons}")
+    raise PlanError(
+        f"{where}: {answer.reason}{reasons}",
+        "move the pose, widen its tolerance, or ask for less of its orientation",
+    )
 
 
 def _preferred(setup: _Setup, posture_deg: tuple[float, ...], where: str) -> Array:
     if len(posture_deg) != len(setup.home):
-        raise InputError(f"{where}: posture_deg has {len(posture_deg)} angles, not {len(setup.home)}")
+        raise InputError(
+            f"{where}: posture_deg has {len(posture_deg)} angles, not {len(setup.home)}",
+            "give one angle for each joint of the arm",
+        )
     return np.radians(posture_deg)
 
 

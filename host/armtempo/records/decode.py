@@ -31,9 +31,12 @@ def trajectory(data: bytes, joints: Sequence[StepScale], name: str, arm: str = "
     try:
         motion = Motion(data)
     except MotionError as error:
-        raise InputError(f"motion {name!r}: not a motion record ({error}); upload it again") from error
+        raise InputError(f"motion {name!r}: not a motion record ({error})", "upload it again") from error
     if motion.joints != len(joints):
-        raise InputError(f"motion {name!r} has {motion.joints} joints, {arm} drives {len(joints)}")
+        raise InputError(
+            f"motion {name!r} has {motion.joints} joints, {arm} drives {len(joints)}",
+            "connect the board that it was made for, or upload it again",
+        )
     splines = []
     for index, joint in enumerate(joints):
         angles = _points(data, motion.angle_offset(index), motion.segments + motion.degree)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from binascii import crc32
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -14,6 +17,8 @@ from armtempo.model.arm import Arm, DrivenJoint
 from armtempo.planning import checks
 from armtempo.splines.trajectory import Trajectory
 
+_NOT_IDENTITY = ("name", "range_deg", "home_deg", "limits", "model")
+"""Of a joint: what may change while it stays where it is. (Driver and safety have fields of their own.)"""
 _TICKS_PER_US = limits.TICK_HZ / 1e6
 
 
@@ -25,6 +30,11 @@ def arm_record(arm: Arm) -> bytes:
     return armrecord.pack(_head(arm), [_joint(joint) for joint in arm.driven])
 
 
+def step_rates(arm: Arm) -> list[int]:
+    """The highest step rates of the joints in the arm record, steps/s."""
+    return [_max_rate(joint) for joint in arm.driven]
+
+
 def motion_record(trajectory: Trajectory, arm: Arm, brake_s: float = 0.0) -> bytes:
     """The motion record (layout: ``armtempo_shared.motion``), tied to the arm by the checksum of its record.
 
@@ -34,8 +44,11 @@ def motion_record(trajectory: Trajectory, arm: Arm, brake_s: float = 0.0) -> byt
     """
     if len(trajectory.joints) != len(arm.driven):
         raise InputError(
-            f"trajectory {trajectory.name!r} has {len(trajectory.joints)} joints, "
-            f"arm {arm.name!r} drives {len(arm.driven)}; plan it for this arm"
+            (
+                f"trajectory {trajectory.name!r} has {len(trajectory.joints)} joints, arm {arm.name!r} drives "
+                f"{len(arm.driven)}"
+            ),
+            "plan it for this arm",
         )
     angles = [
         _fixed(spline.angle_points_deg * joint.steps_per_deg, limits.STEP_FRACTION_BITS)
@@ -54,7 +67,10 @@ def _fixed(points: NDArray[np.float64], bits: int) -> list[int]:
     """Control points as integers with ``bits`` fraction bits."""
     scaled = np.rint(points * 2.0**bits)
     if not np.all(np.abs(scaled) < 2.0**62):
-        raise InputError("a control point is too large for the board; check limits and via points")
+        raise InputError(
+            "a control point is too large for the board",
+            "check the limits and the via points",
+        )
     return [int(value) for value in scaled]
 
 
@@ -73,18 +89,48 @@ def _head(arm: Arm) -> dict[str, Any]:
         f"{name}_ticks": round(getattr(driver, f"{name}_us") * _TICKS_PER_US)
         for name in ("pulse", "low", "dir_setup", "dir_hold")
     }
-    return {"flags": flags, "link_timeout_ms": safety.link_timeout_ms, **ticks}
+    return {
+        "flags": flags,
+        "link_timeout_ms": safety.link_timeout_ms,
+        "identity": _identity(arm),
+        **ticks,
+    }
+
+
+def _identity(arm: Arm) -> int:
+    """A hash of what makes an angle of a joint mean a place of the arm: all but names, limits and models."""
+    joints = [{k: v for k, v in asdict(joint).items() if k not in _NOT_IDENTITY} for joint in arm.joints]
+    for joint in joints:
+        if joint["encoder"]:
+            del joint["encoder"]["following_error_deg"]
+    text = json.dumps(_as_floats(joints), sort_keys=True)
+    return crc32(text.encode())
+
+
+def _as_floats(value: Any) -> Any:
+    """The same with every number a float: 20 and 20.0 are one gear ratio."""
+    if isinstance(value, dict):
+        return {key: _as_floats(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_as_floats(entry) for entry in value]
+    return float(value) if isinstance(value, int | float) else value
 
 
 def _joint(joint: DrivenJoint) -> dict[str, Any]:
     motor, encoder, switches = joint.motor, joint.encoder, joint.switches
     per_step = joint.counts_per_step
     if max(abs(per_step.numerator), per_step.denominator) >= 2**31:
-        raise InputError(f"{joint.name}: the ratio of encoder counts to steps is too odd for the board")
+        raise InputError(
+            f"{joint.name}: the ratio of encoder counts to steps is too odd for the board",
+            "check gear_ratio, microsteps and counts_per_rev in the arm file",
+        )
     following = encoder.following_error_deg * joint.counts_per_deg if encoder else 0.0
     low, high = (round(angle * joint.steps_per_deg) for angle in joint.range_deg)
     if max(abs(low), abs(high)) >= 2**30:
-        raise InputError(f"{joint.name}: its range is {high - low} steps, more than the board can count")
+        raise InputError(
+            f"{joint.name}: its range is {high - low} steps, more than the board can count",
+            "make range_deg narrower, or use fewer microsteps",
+        )
     return {
         "channel": motor.channel - 1,
         "dir_inverted": int(motor.direction < 0),
@@ -111,7 +157,10 @@ def _max_rate(joint: DrivenJoint) -> int:
     rate = joint.limits.speed_deg_s * joint.steps_per_deg
     if rate > limits.MAX_STEP_RATE:
         raise InputError(
-            f"{joint.name}: speed_deg_s = {joint.limits.speed_deg_s:g} means {rate:.0f} steps/s; "
-            f"the board makes at most {limits.MAX_STEP_RATE}. Check the unit, microsteps and gear ratio"
+            (
+                f"{joint.name}: speed_deg_s = {joint.limits.speed_deg_s:g} means {rate:.0f} steps/s; the board "
+                f"makes at most {limits.MAX_STEP_RATE}"
+            ),
+            "check the unit, microsteps and gear_ratio",
         )
     return int(rate * 1.01) + 1

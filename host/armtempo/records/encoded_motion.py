@@ -64,7 +64,10 @@ def of_plan(plan: Plan, name: str | None = None) -> EncodedMotion:
     Raises InputError for a name that the board does not take, and as ``of_trajectory``.
     """
     if name is not None and not re.fullmatch(f"[A-Za-z0-9_-]{{1,{MAX_NAME}}}", name):
-        raise InputError(f"{name!r} is no name for the board: 1 to {MAX_NAME} characters of a-z A-Z 0-9 - _")
+        raise InputError(
+            f"{name!r} is no name for the board",
+            f"take 1 to {MAX_NAME} characters of a-z A-Z 0-9 - _",
+        )
     board_name = name or re.sub(r"[^A-Za-z0-9_-]", "-", plan.job.name)[:MAX_NAME]
     encoded = of_trajectory(plan.trajectory, plan.arm)
     return EncodedMotion(board_name, plan.arm, plan.trajectory, encoded.data, plan)

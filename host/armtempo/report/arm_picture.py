@@ -71,7 +71,7 @@ def _joint(axis: Axes, arm: Arm, index: int, size: float) -> None:
     axis.plot(*(view @ before[:3, 3]), "o", markersize=11, markerfacecolor="none", color=HOME)
     if abs(before[2, 2]) < 1e-6:
         axis.axhline(0.0, color=GROUND, linewidth=0.8, zorder=0)
-    _frame(axis, f"{_plain(joint.name)}: {low:g}° to {high:g}°, home {joint.home_deg:g}°")
+    _frame(axis, f"{joint.name}: {low:g}° to {high:g}°, home {joint.home_deg:g}°")
 
 
 def _view(direction: Array) -> Array:
@@ -114,9 +114,4 @@ def _explain(figure: Figure, arm: Arm) -> None:
         Line2D([], [], color=HOME, linestyle="", marker="o", markerfacecolor="none", label="its axis")
     )
     figure.legend(handles=lines, loc="outside lower center", ncols=5, frameon=False)
-    figure.suptitle(f"{_plain(arm.name)}: each joint seen along its axis, the others at home; lengths in mm")
-
-
-def _plain(text: str) -> str:
-    """Text in which nothing is taken for a formula."""
-    return text.replace("$", r"\$")
+    figure.suptitle(f"{arm.name}: each joint seen along its axis, the others at home; lengths in mm")

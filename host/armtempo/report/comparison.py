@@ -11,10 +11,23 @@ import numpy as np
 from armtempo.arrays import Array
 from armtempo.errors import RunFolderError
 from armtempo.formats.atomic_file import replace_text
-from armtempo.report import html_page, plots, run_report
+from armtempo.report import drawing, html_page, plots
+from armtempo.report.evaluation import Evaluation, evaluate
 from armtempo.runs import analysis
 
 PAGE = "comparison.html"
+_COLUMNS = {
+    "run": "",
+    "joint": "",
+    "degree": "of the joint's splines",
+    "time (s)": "motion time of the joint",
+    "angle RMS (°)": "root mean square, over the whole motion, of measured minus planned angle; without an encoder, of "
+    "commanded minus planned",
+    "speed RMS (°/s)": "the same of the speed, differentiated from the angles",
+    "acceleration RMS (°/s²)": "the same of the acceleration",
+    "lag at start (ms)": f"by how much the speed is late in the first {analysis.EDGE_S:g} s; negative: early",
+    "lag at end (ms)": f"the same in the last {analysis.EDGE_S:g} s of the joint's motion",
+}
 
 
 def write(folders: Sequence[Path], path: Path) -> Path:
@@ -24,16 +37,20 @@ def write(folders: Sequence[Path], path: Path) -> Path:
     """
     readable, complaints = _read(folders)
     if len(readable) < 2:
-        raise RunFolderError("fewer than two runs can be compared: " + "; ".join(complaints))
+        raise RunFolderError(
+            "fewer than two runs can be compared: " + "; ".join(complaints),
+            "name two runs or more that can be read",
+        )
     replace_text(path, render(readable, complaints))
     return path
 
 
-def render(found: dict[str, run_report.Evaluation], complaints: Sequence[str]) -> str:
+def render(found: dict[str, Evaluation], complaints: Sequence[str]) -> str:
     """The page, for evaluations by name."""
     sheet = html_page.Page("Runs compared", ", ".join(found))
-    if len({replace(evaluation.plan.arm, source="") for evaluation in found.values()}) > 1:
-        arms = ", ".join(f"{name} of {evaluation.plan.arm.name}" for name, evaluation in found.items())
+    known = {name: evaluation.arm for name, evaluation in found.items() if evaluation.arm}
+    if len({replace(arm, source="") for arm in known.values()}) > 1:
+        arms = ", ".join(f"{name} of {arm.name}" for name, arm in known.items())
         sheet.note(
             f"These runs are of different arms (name, geometry, limits or drives): {arms}.", html_page.BAD
         )
@@ -48,30 +65,30 @@ def render(found: dict[str, run_report.Evaluation], complaints: Sequence[str]) -
     for joint in range(joints):
         name, caption = f"joint-{joint + 1}", f"Joint {joint + 1}: mean angle, speed, acceleration and error."
         sheet.heading(f"Joint {joint + 1}")
-        sheet.figure(plots.inline_svg(plots.overlay(_of_joint(found, joint)), name, caption), caption)
+        sheet.figure(drawing.inline_svg(plots.overlay(_of_joint(found, joint)), name, caption), caption)
     return sheet.render()
 
 
-def _read(folders: Sequence[Path]) -> tuple[dict[str, run_report.Evaluation], list[str]]:
-    readable: dict[str, run_report.Evaluation] = {}
+def _read(folders: Sequence[Path]) -> tuple[dict[str, Evaluation], list[str]]:
+    readable: dict[str, Evaluation] = {}
     complaints = []
     for folder in folders:
         try:
-            evaluation = run_report.evaluate(folder)
+            evaluation = evaluate(folder)
         except RunFolderError as error:
-            complaints.append(str(error))
+            complaints.append(error.problem)
             continue
         name = folder.resolve().name
         readable[name if name not in readable else str(folder)] = evaluation
     return readable, complaints
 
 
-def _table(sheet: html_page.Page, found: dict[str, run_report.Evaluation]) -> None:
+def _table(sheet: html_page.Page, found: dict[str, Evaluation]) -> None:
     rows = []
     for name, evaluation in found.items():
         deviation = analysis.deviations(evaluation.curves)
-        lags = analysis.lags_s(evaluation.curves, evaluation.plan.trajectory)
-        for joint, spline in enumerate(evaluation.plan.trajectory.joints):
+        lags = analysis.lags_s(evaluation.curves, evaluation.trajectory)
+        for joint, spline in enumerate(evaluation.trajectory.joints):
             rows.append(
                 [
                     name,
@@ -82,19 +99,10 @@ def _table(sheet: html_page.Page, found: dict[str, run_report.Evaluation]) -> No
                     *(html_page.number(1000 * lags[end, joint], "+.0f") for end in (0, 1)),
                 ]
             )
-    header = (
-        "run",
-        "joint",
-        "degree",
-        "time (s)",
-        "angle RMS (°)",
-        "speed RMS (°/s)",
-        "acceleration RMS (°/s²)",
-    )
-    sheet.table((*header, "lag at start (ms)", "lag at end (ms)"), rows)
+    sheet.table(tuple(_COLUMNS), rows, "The mean of the repetitions against the plan", _COLUMNS)
 
 
-def _of_joint(found: dict[str, run_report.Evaluation], joint: int) -> dict[str, tuple[Array, Array, Array]]:
+def _of_joint(found: dict[str, Evaluation], joint: int) -> dict[str, tuple[Array, Array, Array]]:
     """By run: times (K,), mean (3, K) and error of the angle (K,)."""
     return {
         name: (

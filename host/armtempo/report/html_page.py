@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import html
 import math
-from collections.abc import Sequence
-from html import escape
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+
+from armtempo.formats.plain_text import visible
 
 _STYLE = Path(__file__).with_name("page.css")
 
-GOOD = "good"
-BAD = "bad"
+GOOD, BAD, OPEN = "good", "bad", "open"
+"""Kinds of text by what it says: as it should be, not so, cannot be told."""
+_MARKS = {GOOD: "✓", BAD: "✗", OPEN: "?"}
+_FEW_COLUMNS = 2
+"""A table of so many fits on a phone as it is; the rows of a wider one become blocks there."""
 
 
 class Page:
@@ -26,8 +31,18 @@ class Page:
         """A section begins."""
         self._parts.append(f"<h2>{escape(text)}</h2>")
 
+    def verdict(self, kind: str, summary: str, findings: Sequence[tuple[str, str]]) -> None:
+        """The verdict of the whole page with what it rests on: (kind, sentence) each."""
+        lines = "".join(
+            f'<li class="{of}"><span class="mark">{_MARKS[of]}</span> {escape(text)}</li>'
+            for of, text in findings
+        )
+        self._parts.append(
+            f'<section class="verdict {kind}"><p><strong>{escape(summary)}</strong></p><ul>{lines}</ul></section>'
+        )
+
     def note(self, text: str, kind: str = "") -> None:
-        """A paragraph; ``kind`` GOOD or BAD colours it."""
+        """A paragraph; ``kind`` GOOD, BAD or OPEN colours it."""
         mark = f' class="{kind}"' if kind else ""
         self._parts.append(f"<p{mark}>{escape(text)}</p>")
 
@@ -35,21 +50,35 @@ class Page:
         """Commands or data to copy."""
         self._parts.append(f"<pre>{escape(text)}</pre>")
 
-    def table(self, header: Sequence[str], rows: Sequence[Sequence[object]], caption: str = "") -> None:
-        """A table; columns of numbers are set flush right, a cell ``(text, kind)`` is coloured."""
+    def table(
+        self,
+        header: Sequence[str],
+        rows: Sequence[Sequence[object]],
+        caption: str = "",
+        explained: Mapping[str, str] | None = None,
+    ) -> None:
+        """A table; columns of numbers are set flush right, a cell ``(text, kind)`` is coloured.
+
+        ``explained``: what a column means, by its header, below the table; "" for one that needs no words.
+        """
         numeric = [bool(rows) and all(_is_number(row[index]) for row in rows) for index in range(len(header))]
         heads = "".join(
             f"<th{_class(number)}>{escape(name)}</th>" for name, number in zip(header, numeric, strict=True)
         )
-        body = "".join("<tr>" + "".join(map(_cell, row, numeric)) + "</tr>" for row in rows)
+        body = "".join("<tr>" + "".join(map(_cell, row, numeric, header)) + "</tr>" for row in rows)
         title = f"<caption>{escape(caption)}</caption>" if caption else ""
+        wide = "" if len(header) <= _FEW_COLUMNS else ' class="wide"'
         self._parts.append(
-            f'<div class="scroll"><table>{title}<thead><tr>{heads}</tr></thead>'
-            f"<tbody>{body}</tbody></table></div>"
+            f"<table{wide}>{title}<thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table>"
         )
+        if explained:
+            words = "".join(
+                f"<dt>{escape(name)}</dt><dd>{escape(text)}</dd>" for name, text in explained.items() if text
+            )
+            self._parts.append(f'<dl class="columns">{words}</dl>')
 
     def figure(self, svg: str, caption: str) -> None:
-        """A figure given as an ``<svg>`` element."""
+        """A figure given as ``<svg>`` elements."""
         self._parts.append(f"<figure>{svg}<figcaption>{escape(caption)}</figcaption></figure>")
 
     def render(self) -> str:
@@ -64,9 +93,17 @@ class Page:
         )
 
 
+def escape(text: str) -> str:
+    """Text for a page: nothing in it is markup, and characters that do not show are spelt out."""
+    return html.escape(visible(text))
+
+
 def number(value: float, form: str) -> str:
-    """A value as ``form`` has it; a dash where there is none (NaN)."""
-    return "–" if math.isnan(value) else f"{value:{form}}"
+    """A value as ``form`` has it; a dash where there is none (NaN), no sign where it rounds to 0."""
+    if math.isnan(value):
+        return "–"
+    text = f"{value:{form}}"
+    return text.lstrip("+-") if float(text) == 0.0 else text
 
 
 def _is_number(cell: object) -> bool:
@@ -74,9 +111,9 @@ def _is_number(cell: object) -> bool:
     return text == "–" or text[:1].isdigit() or (text[:1] in ("+", "-", "−", ".") and text[1:2].isdigit())
 
 
-def _cell(cell: object, number: bool) -> str:
+def _cell(cell: object, number: bool, header: str) -> str:
     text, kind = cell if isinstance(cell, tuple) else (cell, "")
-    return f"<td{_class(number, kind)}>{escape(str(text))}</td>"
+    return f'<td{_class(number, kind)} data-column="{escape(header)}">{escape(str(text))}</td>'
 
 
 def _class(number: bool, kind: str = "") -> str:

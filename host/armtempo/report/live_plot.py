@@ -27,7 +27,10 @@ class LivePlot:
         except ImportError:
             raise MissingPackageError("a live plot", "matplotlib", "plot") from None
         if plt.get_backend().lower() in _WITHOUT_WINDOW:
-            raise ArmtempoError("there is no display to open a window on")
+            raise ArmtempoError(
+                "there is no display to open a window on",
+                "leave --live out, or connect a display",
+            )
         self._plt: Any = plt
         self._figure, axes = plt.subplots(len(names), 1, squeeze=False, sharex=True, layout="constrained")
         times = np.linspace(0.0, trajectory.duration_s, 300)
@@ -38,7 +41,7 @@ class LivePlot:
         for joint, (axis, name) in enumerate(zip(axes[:, 0], names, strict=True)):
             axis.plot(times, planned[:, joint], ":", color="gray")
             self._lines += axis.plot([], [], color=COLOURS[joint % len(COLOURS)])
-            axis.set_ylabel(f"{name} (°)")
+            axis.set_ylabel(f"{name} (°)", parse_math=False)
         axes[-1][0].set_xlabel("time (s)")
         self._figure.show()
 

@@ -5,16 +5,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armtempo.model.plan import Plan
-from armtempo.planning import path_deviation
+from armtempo.planning import checks, path_deviation
 from armtempo.report import html_page
+
+_EXTREMES = {
+    "joint": "",
+    "motion time (s)": "when the joint arrives",
+    "floor (s)": "no motion of this joint along its path keeps the limits in less time",
+    "speed (°/s)": "the largest magnitude in the plan, exact, of what the arm file allows",
+    "acceleration (°/s²)": "the same",
+    "jerk (°/s³)": "the same",
+}
 
 
 def extremes(sheet: html_page.Page, plan: Plan) -> None:
     """Motion times with their lower bounds and exact extremes beside the limits; then the planner's notes."""
     rows = [_extremes_row(plan, joint) for joint in range(len(plan.extremes))]
-    header = ("joint", "motion time (s)", "floor (s)", "speed (°/s)", "acceleration (°/s²)", "jerk (°/s³)")
-    caption = "Motion time, the least that the limits allow, and exact extremes of the plan beside the limits"
-    sheet.table(header, rows, caption)
+    sheet.table(tuple(_EXTREMES), rows, "Motion time, and largest magnitudes beside the limits", _EXTREMES)
     for note in plan.notes:
         sheet.note(f"Note: {note}")
 
@@ -30,6 +37,8 @@ def timing(sheet: html_page.Page, plan: Plan) -> None:
         rows.append([f"P{via}", *(f"{joint[via]:.3f}" for joint in times), f"{spread:.3f}"])
     header = ("via point", *(f"{joint.name} (s)" for joint in plan.arm.driven), "apart by (s)")
     sheet.table(header, rows, "When each joint passes the via points")
+    if checks.is_free(plan.job):
+        return
     stray = path_deviation.tool_stray_mm(plan.arm, plan.trajectory)
     sheet.note(
         f"The joints do not pass a via point together, so the tool strays up to {stray:.1f} mm from the path "
@@ -41,6 +50,7 @@ def origin(sheet: html_page.Page, plan: Plan, others: Sequence[tuple[str, object
     """Settings and versions that made the plan, and ``others`` about the run."""
     job = plan.job
     rows: list[tuple[str, object]] = [
+        ("path", job.path),
         ("optimiser", f"{job.optimiser}, population {job.population}, {job.iterations} iterations"),
         ("seed", job.seed),
         ("degree, timing, refine", f"{job.degree}, {job.timing}, {job.refine}"),

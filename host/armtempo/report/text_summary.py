@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from armtempo_shared import motion
+from armtempo_shared.limits import MAX_MOTION_BYTES
+
 from armtempo.arm_check.resolution import findings as coarse_steps
 from armtempo.formats.text_table import aligned
+from armtempo.model.job import AUTO, GRADIENT
 from armtempo.model.plan import Plan, Search
-from armtempo.planning import path_deviation
+from armtempo.planning import checks, path_deviation
 from armtempo.runs.results import JointResult
 
 _HEAD = (
@@ -18,7 +22,8 @@ _WIDTHS = (12, 8, 8, 7, 16, 16, 17)
 _RESULT_WIDTHS = (11, 11, 12, 12)
 _FLOORS = {
     "rests": "from turn to turn of a joint under its speed, acceleration and jerk limits",
-    "path": "along the path under speed and acceleration limits alone",
+    "path": "along the path under the speed, acceleration and jerk limits of all its joints",
+    "vias": "through the via angles of a joint under its speed, acceleration and jerk limits, whatever the path",
 }
 """What ``Search.floor_kind`` means."""
 
@@ -29,15 +34,16 @@ def lines(plan: Plan) -> list[str]:
     Then what the user should know: notes on the poses, joints whose steps are coarse.
     """
     job = plan.job
-    made = f"{job.optimiser}, {job.population} x {job.iterations}, seed {job.seed}"
-    shape = f"degree {job.degree}, refine {job.refine}"
-    text = [f"{job.name}: {plan.trajectory.duration_s:.4f} s, {job.timing} timing, {shape}, {made}"]
+    text = [f"{job.name}: {plan.trajectory.duration_s:.4f} s, {', '.join(_settings(plan))}"]
     text.extend(aligned([*_HEAD, *(_row(plan, joint) for joint in range(len(plan.extremes)))], _WIDTHS))
     for kind in sorted({search.floor_kind for search in plan.searches}):
         text.append(f"floor: least time {_FLOORS[kind]}")
     text.extend(_polished(search) for search in plan.searches if search.optimum_s)
+    text.extend(_started(search) for search in plan.searches if len(search.starts_s))
     if job.timing == "per-joint" and len(plan.searches) > 1:
         text.extend(_separation(plan))
+    if job.refine == AUTO:
+        text.append(f"record: {record_bytes(plan)} bytes of the {MAX_MOTION_BYTES} that the board takes")
     text.extend(f"note: {note}" for note in plan.notes)
     text.extend(
         f"{each.level.value}: {each.where}: {each.what}; {each.next_step}" for each in coarse_steps(plan.arm)
@@ -53,6 +59,38 @@ def result_lines(results: Iterable[JointResult]) -> list[str]:
         for joint in results
     ]
     return aligned(rows, _RESULT_WIDTHS)
+
+
+def record_bytes(plan: Plan) -> int:
+    """Size of the plan's motion record."""
+    trajectory, first = plan.trajectory, plan.trajectory.joints[0]
+    segments = len(first.angle_points_deg) - first.degree
+    return motion.size(first.degree, len(trajectory.joints), trajectory.shared, segments, first.refine)
+
+
+def _settings(plan: Plan) -> list[str]:
+    """How the plan was made, a phrase each."""
+    job, first = plan.job, plan.trajectory.joints[0]
+    auto = " (auto)" if job.refine == AUTO else ""
+    timing = f"{job.timing} timing"
+    if checks.is_free(job):
+        pieces = len(first.angle_points_deg) - first.degree
+        return ["free path", timing, f"{pieces} pieces{auto}", f"{job.starts} starts", f"seed {job.seed}"]
+    search = f"{job.optimiser}, {job.population} x {job.iterations}"
+    if job.optimiser == GRADIENT:
+        search = f"{job.optimiser}, {job.starts} starts"
+    return [timing, f"degree {job.degree}", f"refine {first.refine}{auto}", search, f"seed {job.seed}"]
+
+
+def _started(search: Search) -> str:
+    """What the starts of a gradient search led to."""
+    joints = ", ".join(str(joint + 1) for joint in search.joints)
+    times = search.starts_s
+    spread = 100.0 * (times.max() / times.min() - 1.0)
+    return (
+        f"{len(times)} starts, driven joint {joints}: {times.min():.4f} to {times.max():.4f} s, spread {spread:.3f} %; "
+        f"the best went on to {search.total_s:.4f} s"
+    )
 
 
 def _row(plan: Plan, joint: int) -> tuple[str, ...]:
@@ -79,8 +117,11 @@ def _polished(search: Search) -> str:
 def _separation(plan: Plan) -> list[str]:
     """How far per-joint timing lets the joints pass the via points apart, and the tool leave the path."""
     spread = ", ".join(f"{value:.2f}" for value in path_deviation.via_spread_s(plan.trajectory))
+    apart = f"joints pass the via points apart by {spread} s"
+    if checks.is_free(plan.job):
+        return [apart]
     stray = path_deviation.tool_stray_mm(plan.arm, plan.trajectory)
     return [
-        f"joints pass the via points apart by {spread} s",
+        apart,
         f'so the tool strays up to {stray:.1f} mm from its path; timing = "shared" keeps it there',
     ]

@@ -12,24 +12,33 @@ from armtempo.link import Client
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
 from armtempo.records import encode
+from armtempo.robot import arm_difference, engine_room
 
 
 def configure(client: Client, arm: Arm, replace: bool) -> None:
-    """Make sure the board has this arm's record; a new one makes all positions unknown.
+    """Make sure the board has this arm's record; where it is new, positions are unknown.
 
-    Raises LinkError where the board is set up for another arm and ``replace`` is false, BoardError where
-    it is moving.
+    ``replace``: also in the place of another record; where that differs in limits alone, the board keeps the
+    positions. Raises LinkError where the board has another record and ``replace`` is false, InputError where
+    the arm does not fit the board, which keeps the one it has, BoardError where it is moving.
     """
     data = encode.arm_record(arm)
     if client.info.arm_crc == wire.record_crc(data):
         return
     if client.info.arm_crc and not replace:
-        raise LinkError(
-            f"the board is set up for another arm than {arm.name!r} ({arm.source}); "
-            "name its arm file with --arm"
-        )
+        raise _other_arm(arm, client.fetch(wire.ARM_RECORD_NAME), data)
+    engine_room.check(arm, client.info)
     client.upload(wire.ARM_RECORD_NAME, data)
     client.hello()
+
+
+def _other_arm(arm: Arm, old: bytes, new: bytes) -> LinkError:
+    return LinkError(
+        f"the board is set up for another arm than {arm.name!r} ({arm.source}): "
+        f"{arm_difference.describe(old, new)}",
+        f"name that arm's file with --arm; or, if this is the arm on the board "
+        f"now, 'armtempo configure' or --replace-arm sets the board up for it, {arm_difference.consequence(old, new)}",
+    )
 
 
 def home(client: Client, arm: Arm, angles_deg: ArrayLike | None = None) -> None:
@@ -58,8 +67,8 @@ def posture_deg(client: Client, arm: Arm) -> Array:
     unknown = [joint.name for index, joint in enumerate(arm.driven) if not status.joint_known(index)]
     if unknown:
         raise LinkError(
-            f"the position of {', '.join(unknown)} is unknown; bring the arm to its home posture and run "
-            "'armtempo home'"
+            f"the position of {', '.join(unknown)} is unknown",
+            "bring the arm to its home posture and run 'armtempo home'",
         )
     return np.array(status.positions.commanded_steps, dtype=float) / _steps_per_deg(arm)
 

@@ -2,62 +2,33 @@
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from numpy.typing import ArrayLike
 
-from armtempo import link
 from armtempo.arrays import Array
 from armtempo.errors import InputError, LinkError
 from armtempo.link import Client
 from armtempo.link.board_messages import Hello, Status, StoredMotion
-from armtempo.link.ports import is_sim
-from armtempo.link.traffic import Sink
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.planning import point_to_point
+from armtempo.ports.names import is_sim
 from armtempo.progress import Progress
 from armtempo.records import encoded_motion
 from armtempo.records.encoded_motion import EncodedMotion
-from armtempo.robot import arm_state, goto, homing, recording, stored_motion
+from armtempo.robot import arm_state, board_state, goto, homing, recording, stored_motion
+from armtempo.robot.board_state import BoardState
 from armtempo.robot.recording import Watcher
 from armtempo.robot.run import Run
 from armtempo.robot.stop_request import StopRequest, stoppable
 
 Where = Plan | EncodedMotion | ArrayLike
 """A posture: angles of the driven joints in degrees, (J,), or a motion for where it begins."""
-
-
-LOG = logging.getLogger("armtempo")
-
-
-def connect(
-    port: str = "sim",
-    arm: Arm | None = None,
-    *,
-    log_traffic: Path | None = None,
-    sink: Sink | None = None,
-    any_program: bool = False,
-    tell: Callable[[str], object] = LOG.warning,
-) -> Board:
-    """The board on ``port``, which has answered; use it as a context, or ``close`` it.
-
-    ``port``: a serial device or URL; ``"sim"`` starts a virtual board that lives until it is closed,
-    ``"sim:FOLDER"`` one that keeps its flash in FOLDER. ``arm``: what a virtual board's motors move; None:
-    ideal motors. ``log_traffic``: file that gets every byte both ways; ``sink`` takes the same. ``any_program``:
-    also talk to a board whose program is not the one installed here. ``tell`` hears what happens to the
-    connection while other calls wait; by default the logger "armtempo" does. Raises InputError where there is
-    no such port, LinkError where it is in use, silent or runs something else.
-    """
-    stack = ExitStack()
-    client = stack.enter_context(link.open_board(port, log_traffic, sink, arm, any_program))
-    client.session.tell = tell
-    return Board(client, port, stack)
 
 
 class Board:
@@ -74,6 +45,8 @@ class Board:
         self.port = port
         self.arm: Arm | None = None
         """The arm that the board was last set up for through this object."""
+        self.stops: list[StopRequest] = []
+        """The stop requests of what this object has under way."""
         self._stack = stack or ExitStack()
         self._moved = False
         self._last_folder: Path | None = None
@@ -99,11 +72,19 @@ class Board:
         """What the board is doing, its fault, and where the joints are in steps and counts."""
         return self.client.status()
 
-    def configure(self, arm: Arm, replace: bool = True) -> None:
-        """Make sure that the board has this arm's record; a new one makes all positions unknown.
+    def state(self, arm: Arm | None = None) -> BoardState:
+        """The same with what the board says of itself, in degrees and with the names of the joints.
 
-        Raises LinkError where the board is set up for another arm and ``replace`` is false, InputError where a
-        figure of the arm does not fit the board.
+        ``arm``: where the board is set up for it; None: the one that was named to this object.
+        """
+        return board_state.read(self.client, self.port).named(arm or self.arm)
+
+    def configure(self, arm: Arm, replace: bool = False) -> None:
+        """Make sure that the board has this arm's record.
+
+        ``replace``: put it in the place of another one. All positions are unknown then, unless the two differ
+        in limits alone; stored motions of the other record are refused. Raises LinkError where the board has
+        another record and ``replace`` is false, InputError where a figure of the arm does not fit the board.
         """
         arm_state.configure(self.client, arm, replace)
         self.arm = arm
@@ -116,14 +97,17 @@ class Board:
         name: str | None = None,
         default: bool = False,
         progress: Progress | None = None,
+        replace: bool = False,
     ) -> EncodedMotion:
         """Store a motion, unless the board has just this one already; ``progress`` counts bytes.
 
         ``name``: on the board, else made of the job's name. ``default``: let the board's button start it.
+        ``replace``: also in the place of another motion of this name, which the button then starts no longer.
+        Raises LinkError where there is such a motion, or the board is set up for another arm.
         """
         encoded = encoded_motion.of_plan(motion, name) if isinstance(motion, Plan) else motion
         self.configure(encoded.arm)
-        stored_motion.store(self.client, encoded.name, encoded.data, progress)
+        stored_motion.store(self.client, encoded.name, encoded.data, progress, replace)
         if default:
             self.client.set_default(encoded.name)
         return encoded
@@ -156,7 +140,7 @@ class Board:
     def home(self, arm: Arm, where: Where | None = None) -> None:
         """Declare that ``arm`` is at ``where``, or at its home posture; nothing moves.
 
-        Raises InputError for a posture that does not fit the arm.
+        Raises InputError for a posture that does not fit the arm, LinkError where the board is set up for another.
         """
         self.configure(arm)
         arm_state.home(self.client, arm, None if where is None else self._posture(where))
@@ -167,7 +151,7 @@ class Board:
         Raises InputError where no joint has one, LinkError where a switch does not trip.
         """
         self.configure(arm)
-        with stoppable(stop) as wanted:
+        with self._stoppable(stop) as wanted:
             self._moved = True
             homing.home_to_switches(self.client, arm, wanted)
 
@@ -183,7 +167,7 @@ class Board:
         Raises LinkError where the position is unknown, InputError for a posture that does not fit the arm.
         """
         arm, target_deg = self._known_arm(), self._posture(where)
-        with stoppable(stop) as wanted:
+        with self._stoppable(stop) as wanted:
             self._home_virtual_arm(arm)
             goto.go_to(self.client, arm, target_deg, wanted, progress)
 
@@ -199,13 +183,14 @@ class Board:
         """Replay a motion ``repeat`` times and record what comes back in a new run folder below ``out``.
 
         ``motion``: a plan, or the name of a motion on the board. The arm must be homed and be where the motion
-        begins, else LinkError; the arm of a virtual board is brought there. Between repetitions it returns along
+        begins, else LinkError, as where the board keeps another motion under its name (``upload`` can replace it)
+        or is set up for another arm. The arm of a virtual board is brought there. Between repetitions it returns along
         the same path. ``progress`` counts seconds of motion; ``watcher`` sees folder, samples and repetitions.
         Whatever ends the run early raises, and what was recorded until then is ``last_run``.
         """
         encoded = self._encoded(motion)
         seen = recording.ProgressWatcher(progress, repeat, watcher or Watcher())
-        with stoppable(stop) as wanted:
+        with self._stoppable(stop) as wanted:
             self._bring_to_start(encoded, wanted)
             folder = recording.new_run(Path(out), encoded, self.port, self.client)
             self._last_folder = folder.path
@@ -225,7 +210,7 @@ class Board:
         ``motion`` is what was run; None: the motion that the button starts. Such a run needs no host; one under
         way is followed to its end. Raises LinkError where the board keeps no samples.
         """
-        encoded = self._encoded(self._default() if motion is None else motion, replace=False)
+        encoded = self._encoded(self._default() if motion is None else motion)
         folder = recording.fetch(self.client, encoded, Path(out), self.port)
         self._last_folder = folder.path
         return Run.load(folder.path)
@@ -242,9 +227,19 @@ class Board:
         """Clear a fault; BoardError while its cause is still there."""
         self.client.clear()
 
+    @contextmanager
+    def _stoppable(self, given: StopRequest | None) -> Iterator[StopRequest]:
+        """As ``stoppable``; other programs can ask for this stop as well."""
+        with stoppable(given) as wanted:
+            self.stops.append(wanted)
+            try:
+                yield wanted
+            finally:
+                self.stops.remove(wanted)
+
     def _known_arm(self) -> Arm:
         if self.arm is None:
-            raise InputError("say first which arm the board moves: home(arm) or configure(arm)")
+            raise InputError("no arm is known to move", "say which with home(arm) or configure(arm)")
         return self.arm
 
     def _posture(self, where: Where) -> Array:
@@ -254,19 +249,22 @@ class Board:
             return where.start_deg
         return point_to_point.posture(where, self._known_arm())
 
-    def _encoded(self, motion: Plan | EncodedMotion | str, replace: bool = True) -> EncodedMotion:
+    def _encoded(self, motion: Plan | EncodedMotion | str) -> EncodedMotion:
         """The motion for a board that is set up for its arm."""
         if isinstance(motion, str):
             return self.read(motion)
         encoded = encoded_motion.of_plan(motion) if isinstance(motion, Plan) else motion
-        self.configure(encoded.arm, replace)
+        self.configure(encoded.arm)
         return encoded
 
     def _default(self) -> str:
         for entry in self.client.stored():
             if entry.default:
                 return entry.name
-        raise InputError("the board's button starts nothing: name the motion that was run")
+        raise InputError(
+            "no motion was named, and no stored motion is set as the one that the board's button starts",
+            "say which motion's samples these are: armtempo fetch NAME; 'armtempo list' shows the names",
+        )
 
     def _bring_to_start(self, motion: EncodedMotion, stop: StopRequest) -> None:
         """Store the motion; bring a virtual arm to its start, and refuse where a real one is elsewhere."""
@@ -276,7 +274,8 @@ class Board:
             goto.go_to(self.client, motion.arm, motion.start_deg, stop)
         elif not arm_state.is_at(self.client, motion.arm, motion.start_deg):
             raise LinkError(
-                f"the arm does not stand where {motion.name!r} begins; bring it there with 'armtempo goto'"
+                f"the arm does not stand where {motion.name!r} begins",
+                "bring it there with 'armtempo goto'",
             )
 
     def _home_virtual_arm(self, arm: Arm) -> None:

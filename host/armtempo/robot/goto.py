@@ -17,10 +17,7 @@ from armtempo.records import encoded_motion
 from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.robot import arm_state
 from armtempo.robot.stop_request import StopRequest
-from armtempo.robot.stored_motion import SampleSink, raise_fault, replay, store
-
-TEMPORARY = "tmp-"
-"""Names of motions that are removed after use begin so."""
+from armtempo.robot.stored_motion import TEMPORARY, SampleSink, raise_fault, replay, store
 
 
 def go_to(

@@ -16,9 +16,8 @@ from armtempo.link import Client
 from armtempo.model.arm import Arm, DrivenJoint, Limits
 from armtempo.planning import point_to_point
 from armtempo.records import encoded_motion
-from armtempo.robot.goto import TEMPORARY
 from armtempo.robot.stop_request import StopRequest
-from armtempo.robot.stored_motion import raise_fault, replay, store
+from armtempo.robot.stored_motion import TEMPORARY, raise_fault, replay, store
 
 FAST, SLOW = 0.2, 0.04
 """Fractions of the joint's limits in the first and in the second approach."""
@@ -51,8 +50,8 @@ def home_to_switches(client: Client, arm: Arm, stop: StopRequest) -> None:
     found = [(index, switch) for index, switch in switches if switch is not None]
     if not found:
         raise InputError(
-            f"arm {arm.name!r} has no limit switch whose angle is known; give low_deg or high_deg in a "
-            "joint's [switches], or home by hand"
+            f"arm {arm.name!r} has no limit switch whose angle is known",
+            "give low_deg or high_deg in a joint's [switches], or home by hand",
         )
     for index, switch in found:
         _JointHoming(client, arm, index, switch, stop).run()
@@ -85,15 +84,19 @@ class _JointHoming:
         edge_deg, back_deg = switch.edge_deg, -switch.side * BACK_DEG
         if abs(self._move(switch.far_deg, edge_deg, FAST) - edge_deg) <= _TOLERANCE_DEG:
             raise LinkError(
-                f"{joint.name}: its limit switch did not trip over the whole range; check its wiring"
+                f"{joint.name}: its limit switch did not trip over the whole range",
+                "check its wiring and its pin in the arm file",
             )
         self._move(edge_deg, edge_deg + back_deg, FAST)
         before_deg = edge_deg + 2 * back_deg
         way_deg = abs(self._move(before_deg, edge_deg, SLOW) - before_deg)
         if not 0.5 * BACK_DEG < way_deg < 1.5 * BACK_DEG:
             raise LinkError(
-                f"{joint.name}: its limit switch tripped {way_deg:.2f} degrees after it had been left by {BACK_DEG:g}; "
-                "check its wiring"
+                (
+                    f"{joint.name}: its limit switch tripped {way_deg:.2f} degrees after it had been left by "
+                    f"{BACK_DEG:g}"
+                ),
+                "check its wiring and that it sits firmly",
             )
         outside_deg = max(0.0, switch.side * (switch.trip_deg - edge_deg))
         away_deg = switch.side * (BACK_DEG + outside_deg)

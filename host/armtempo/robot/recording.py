@@ -11,7 +11,7 @@ from armtempo.errors import LinkError
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import Follower, RunEnd
-from armtempo.model import trajectory_file
+from armtempo.model import arm_json, trajectory_file
 from armtempo.progress import Progress
 from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.robot.goto import go_back
@@ -68,6 +68,7 @@ def new_run(parent: Path, motion: EncodedMotion, port: str, client: Client) -> R
     origin = {
         "arm": motion.arm.name,
         "port": port,
+        "virtual": client.info.virtual,
         "board": vars(client.info),
         "motion_crc": f"{motion.key.crc:08x}",
     }
@@ -77,6 +78,8 @@ def new_run(parent: Path, motion: EncodedMotion, port: str, client: Client) -> R
     folder.write_motion(motion.data)
     if motion.plan is not None:
         trajectory_file.save(motion.plan, folder.path / run_folder.TRAJECTORY)
+    else:
+        arm_json.save(motion.arm, folder.path / run_folder.ARM)
     folder.write()
     return folder
 
@@ -128,7 +131,10 @@ def fetch(client: Client, motion: EncodedMotion, folder_in: Path, port: str) -> 
     """
     status = client.status()
     if not status.run or not (status.moving or status.samples_kept):
-        raise LinkError("the board keeps no samples: nothing was run since it started, or they were fetched")
+        raise LinkError(
+            "the board keeps no samples: nothing was run since it started, or they were fetched",
+            "fetch before the next run and before a reset; a new run: 'armtempo run'",
+        )
     follower = Follower(client, status.run)
     folder = new_run(folder_in, motion, port, client)
     with folder.begin_repetition() as file:

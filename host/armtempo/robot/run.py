@@ -8,15 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from armtempo.errors import RunFolderError
-from armtempo.formats.atomic_file import why
-from armtempo.model import trajectory_file
 from armtempo.model.plan import Plan
-from armtempo.records import decode
 from armtempo.report import run_report
-from armtempo.runs import reader
+from armtempo.runs import reader, replayed
 from armtempo.runs.results import JointResult, results
-from armtempo.runs.run_folder import COMPLETE, MOTION, Repetition
+from armtempo.runs.run_folder import COMPLETE, Repetition
 from armtempo.splines.trajectory import Trajectory
 
 
@@ -68,8 +64,7 @@ class Run:
     @cached_property
     def plan(self) -> Plan | None:
         """The plan that was run; None where it is not known, as with a motion that only the board had."""
-        path = self._content.trajectory_path
-        return trajectory_file.load(path) if path else None
+        return replayed.plan_of(self._content)
 
     @cached_property
     def trajectory(self) -> Trajectory:
@@ -77,13 +72,7 @@ class Run:
 
         Raises RunFolderError where neither can be read.
         """
-        if self.plan is not None:
-            return self.plan.trajectory
-        try:
-            data = (self.path / MOTION).read_bytes()
-        except OSError as error:
-            raise RunFolderError(f"{self.path / MOTION}: cannot be read: {why(error)}") from error
-        return decode.trajectory(data, self._content.joints, self.name)
+        return self.plan.trajectory if self.plan is not None else replayed.trajectory_of(self._content)
 
     @property
     def samples(self) -> np.ndarray[Any, np.dtype[np.void]]:
@@ -122,7 +111,7 @@ class Run:
     def report(self) -> Path:
         """Write report.html and its figures into the run folder; gives the page.
 
-        Raises RunFolderError where the plan is not known or there is no sample, MissingPackageError without
+        Raises RunFolderError where it is not known what was to move or there is no sample, MissingPackageError without
         matplotlib.
         """
         return run_report.write(self.path)

@@ -1,9 +1,9 @@
-"""Ctrl-C and SIGTERM while something moves: the first asks for a stop, the second ends the program."""
+"""A stop that somebody asks for while something moves: by Ctrl-C or SIGTERM, from a thread, from another program."""
 
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import current_thread, main_thread
 from types import FrameType, TracebackType
@@ -25,7 +25,27 @@ class StopRequest:
     """
 
     def __init__(self) -> None:
-        self.wanted = False
+        self._wanted = False
+        self.by = ""
+        """Who asked for it, in words; "" for a signal or this program."""
+        self.wake: Callable[[], object] = lambda: None
+        """Called when the stop is asked for; ends the waiting of whoever looks at ``wanted``."""
+
+    @property
+    def wanted(self) -> bool:
+        """Whether the stop was asked for."""
+        return self._wanted
+
+    @wanted.setter
+    def wanted(self, wanted: bool) -> None:
+        self._wanted = wanted
+        if wanted:
+            self.wake()
+
+    def ask(self, by: str) -> None:
+        """Ask for the stop, as ``by`` in words."""
+        self.by = by
+        self.wanted = True
 
     def __enter__(self) -> Self:
         numbers = _SIGNALS if current_thread() is main_thread() else ()
@@ -43,7 +63,7 @@ class StopRequest:
     def check(self) -> None:
         """Raise Stopped where a stop was asked for."""
         if self.wanted:
-            raise Stopped
+            raise Stopped(*([f"{self.by} asked for a stop"] if self.by else []))
 
     def _note(self, number: int, frame: FrameType | None) -> None:
         if self.wanted:

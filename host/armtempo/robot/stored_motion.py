@@ -26,12 +26,29 @@ FREEZE_S = 2.0
 """Freezing takes no longer than this."""
 
 
-def store(client: Client, name: str, data: bytes, progress: Progress | None = None) -> MotionKey:
-    """Upload a motion record under ``name``, unless the board has just this one already."""
+TEMPORARY = "tmp-"
+"""Names of motions that are removed after use begin so."""
+
+
+def store(
+    client: Client, name: str, data: bytes, progress: Progress | None = None, replace: bool = False
+) -> MotionKey:
+    """Upload a motion record under ``name``, unless the board has just this one already.
+
+    Raises LinkError where the board keeps another motion under this name, unless ``replace``, or the name or what
+    stands there is worth nothing: temporary or damaged.
+    """
     key = MotionKey(name, wire.record_crc(data))
     found = client.find(name)
-    if found is None or found.crc != key.crc:
-        client.upload(name, data, progress)
+    if found is not None and found.crc == key.crc:
+        return key
+    if found is not None and found.joints and not replace and not name.startswith(TEMPORARY):
+        button = ", which its button starts" if found.default else ""
+        raise LinkError(
+            f"the board keeps another motion {name!r}{button} ({found.duration_s:.3f} s, checksum {found.crc:08x})",
+            "replace it with --force, or store this one under another name with 'armtempo upload --name'",
+        )
+    client.upload(name, data, progress)
     return key
 
 
@@ -48,6 +65,7 @@ def replay(
     cannot be reached any more, Stopped where the stop was asked for before the start.
     """
     client.session.stopping = lambda: stop.wanted
+    stop.wake = client.session.wake
     stop.check()
     started = client.start(motion.name, motion.crc, flags)
     follower = Follower(client, started.run)
@@ -56,7 +74,10 @@ def replay(
             client, follower, _Brake(client, stop), lambda sample: sink(sample, started.duration_s)
         )
     except OtherBoardError as error:
-        raise LinkError(f"{error}; what came after the last sample cannot be known") from error
+        raise LinkError(
+            f"{error.problem}; what came after the last sample cannot be known",
+            f"{error.hint}",
+        ) from error
 
 
 def _follow(client: Client, follower: Follower, brake: _Brake, take: Callable[[Sample], object]) -> RunEnd:
@@ -83,8 +104,11 @@ def _stop_after(client: Client, error: BaseException) -> None:
     """Stop what is moving because of ``error``, as far as the board can be reached."""
     if isinstance(error, BoardError) and error.code == wire.ERROR_CODES["no_session"]:
         raise LinkError(
-            "the board started anew during the motion: where the arm stands and what came after the last "
-            "sample cannot be known; find the cause, then 'armtempo home'"
+            (
+                "the board started anew during the motion: where the arm stands and what came after the last "
+                "sample cannot be known"
+            ),
+            "find the cause, then 'armtempo home'",
         ) from error
     client.session.reopen = None  # a cable that is out is not waited for
     with suppress(LinkError):  # the first error says more
@@ -98,7 +122,7 @@ class _Brake:
         self._client = client
         self._stop = stop
         brake_s = 0.0 if now else BRAKE_S
-        self._steps: list[tuple[float, Callable[[], None]]] = [
+        self._steps: list[tuple[float, Callable[[], object]]] = [
             (0.0, lambda: send_stop(client, now)),
             (brake_s, lambda: send_stop(client, now=True)),
             (brake_s + FREEZE_S, _does_not_stop),
@@ -115,16 +139,18 @@ class _Brake:
 
 
 def _does_not_stop() -> None:
-    raise LinkError("the board was told to stop and does not; switch off the motors' power")
+    raise LinkError("the board was told to stop and does not", "switch off the motors' power")
 
 
-def send_stop(client: Client, now: bool = False) -> None:
-    """Tell the board to brake along the path, or to freeze; nothing happens where nothing moves."""
+def send_stop(client: Client, now: bool = False) -> bool:
+    """Tell the board to brake along the path, or to freeze; False where nothing moves, and nothing happens."""
     try:
         client.stop(now)
+        return True
     except BoardError as error:
         if error.code != wire.ERROR_CODES["not_moving"]:
             raise
+        return False
 
 
 def stop(client: Client, now: bool) -> None:

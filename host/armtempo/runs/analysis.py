@@ -1,4 +1,4 @@
-"""What the samples of a run say: mean and scatter over repetitions, deviation from theory, limits, lag."""
+"""What the samples of a run say: mean and scatter over repetitions, deviation from theory, lag."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from armtempo_shared.limits import SAMPLE_TICKS, TICK_HZ
 from numpy.typing import NDArray
 
 from armtempo.arrays import Array
-from armtempo.model.arm import Limits
-from armtempo.runs.differentiation import WINDOW, derivative, noise, quantisation_sigma
+from armtempo.runs.differentiation import of_curves
 from armtempo.runs.reader import RepetitionData
 from armtempo.runs.run_folder import COMPLETE
 from armtempo.splines.trajectory import Trajectory
@@ -30,7 +29,8 @@ class Curves:
     ``times_s`` (K,); ``each`` (R, 3, K, J) for every repetition, NaN where samples are missing; ``mean``,
     ``sem`` (standard error of the mean; NaN with one repetition), ``theory``, and ``shown``, what the same
     differentiation shows of theory's angles, each (3, K, J). Deviations are taken from ``shown``, so that
-    they show the arm's errors and not those of the differentiation.
+    they show the arm's errors and not those of the differentiation. ``measured`` (J,): whether the joint has an
+    encoder; the curves of one without are those of the step pulses that the board made.
     """
 
     times_s: Array
@@ -39,6 +39,7 @@ class Curves:
     sem: Array
     theory: Array
     shown: Array
+    measured: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -47,27 +48,6 @@ class Deviation:
 
     rms: float
     largest: float
-
-
-@dataclass(frozen=True)
-class LimitCheck:
-    """A measured peak beside its limit; ``sigma`` is the peak's uncertainty from encoder rounding.
-
-    NaN for a joint without an encoder.
-    """
-
-    peak: float
-    limit: float
-    sigma: float
-
-    @property
-    def verdict(self) -> str:
-        """``"kept"``, ``"kept within uncertainty"`` (3 sigma), ``"exceeded"``, or ``"not measured"``."""
-        if np.isnan(self.peak):
-            return "not measured"
-        if self.peak <= self.limit:
-            return "kept"
-        return "kept within uncertainty" if self.peak <= self.limit + 3.0 * self.sigma else "exceeded"
 
 
 def curves(repetitions: Sequence[RepetitionData], trajectory: Trajectory) -> Curves:
@@ -79,15 +59,18 @@ def curves(repetitions: Sequence[RepetitionData], trajectory: Trajectory) -> Cur
     if count == 0:
         raise ValueError("no samples to analyse")
     times: Array = np.arange(count, dtype=np.float64) * SAMPLE_S
-    each = np.stack([_differentiated(_on_grid(one, count), one.state == COMPLETE) for one in repetitions])
+    measured = np.any([~np.isnan(one.angle_deg).all(axis=0) for one in repetitions], axis=0)
+    each = np.stack(
+        [of_curves(_on_grid(one, count, measured), SAMPLE_S, one.state == COMPLETE) for one in repetitions]
+    )
     theory: Array = np.stack([trajectory(times, order) for order in range(3)])
-    shown = _differentiated(theory[0], ended=True)
+    shown = of_curves(theory[0], SAMPLE_S, ended=True)
     present = np.sum(~np.isnan(each), axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         mean: Array = np.nansum(each, axis=0) / present
         spread = np.sqrt(np.nansum((each - mean) ** 2, axis=0) / (present - 1))
         sem: Array = np.where(present > 1, spread / np.sqrt(present), np.nan)
-    return Curves(times, each, mean, sem, theory, shown)
+    return Curves(times, each, mean, sem, theory, shown, measured)
 
 
 def deviations(found: Curves) -> list[list[Deviation]]:
@@ -100,32 +83,6 @@ def final_errors(repetition: RepetitionData, trajectory: Trajectory) -> Array:
     """Measured minus planned angle (J,) at the last sample, in degrees."""
     planned: Array = trajectory(repetition.time_s[-1], 0)
     return np.asarray(repetition.angle_deg[-1] - planned)
-
-
-def limit_checks(
-    found: Curves, limits: Sequence[Limits], resolutions_deg: Sequence[float]
-) -> list[list[LimitCheck]]:
-    """``[joint]``: speed and acceleration peaks of the mean curve beside the limits.
-
-    ``resolutions_deg``: degrees per encoder count; its rounding, averaged over the repetitions that are
-    there, gives the uncertainty.
-    """
-    runs = len(found.each)
-    checks = []
-    for joint, (limit, resolution) in enumerate(zip(limits, resolutions_deg, strict=True)):
-        sigma = quantisation_sigma(resolution) / np.sqrt(runs)
-        allowed = (limit.speed_deg_s, limit.acceleration_deg_s2)
-        checks.append(
-            [
-                LimitCheck(
-                    _peak(found.mean[order, :, joint]),
-                    allowed[order - 1],
-                    noise(order, SAMPLE_S, float(sigma)),
-                )
-                for order in (1, 2)
-            ]
-        )
-    return checks
 
 
 def lags_s(found: Curves, trajectory: Trajectory) -> Array:
@@ -143,12 +100,6 @@ def lags_s(found: Curves, trajectory: Trajectory) -> Array:
             if slope @ slope > 0.0:
                 lags[row, joint] = -(error @ slope) / (slope @ slope)
     return lags
-
-
-def _peak(values: Array) -> float:
-    """Largest magnitude of the measured values; NaN where there are none."""
-    known = np.abs(values[~np.isnan(values)])
-    return float(known.max()) if known.size else np.nan
 
 
 def _deviation(error: Array) -> Deviation:
@@ -169,29 +120,10 @@ def _grid_size(repetition: RepetitionData) -> int:
     return int(_indices(repetition).max(initial=-1)) + 1
 
 
-def _on_grid(repetition: RepetitionData, count: int) -> Array:
-    """Measured angles (count, J), NaN where a sample is missing."""
+def _on_grid(repetition: RepetitionData, count: int, measured: NDArray[np.bool_]) -> Array:
+    """Angles (count, J), measured or else as commanded; NaN where a sample is missing."""
     index = _indices(repetition)
-    grid = np.full((count, repetition.angle_deg.shape[1]), np.nan)
-    grid[index[index >= 0]] = repetition.angle_deg[index >= 0]
+    angles = np.where(measured, repetition.angle_deg, repetition.commanded_deg)
+    grid = np.full((count, angles.shape[1]), np.nan)
+    grid[index[index >= 0]] = angles[index >= 0]
     return grid
-
-
-def _differentiated(angles: Array, ended: bool) -> Array:
-    """(3, K, J): angle, speed, acceleration; each interval without a gap by itself.
-
-    The arm rests before a motion and after one that ``ended``, so there the window is filled with the angle at rest.
-    """
-    result = np.full((3, *angles.shape), np.nan)
-    result[0] = angles
-    for joint in range(angles.shape[1]):
-        known = ~np.isnan(angles[:, joint])
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], known, [False]))))
-        for start, stop in edges.reshape(-1, 2):
-            before = WINDOW // 2 if start == 0 else 0
-            after = WINDOW // 2 if stop == len(angles) and ended else 0
-            padded = np.pad(angles[start:stop, joint], (before, after), mode="edge")
-            for order in (1, 2):
-                found = derivative(padded, SAMPLE_S, order)
-                result[order, start:stop, joint] = found[before : len(found) - after]
-    return result

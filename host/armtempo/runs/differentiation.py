@@ -25,13 +25,13 @@ def weights(order: int, at: int, window: int = WINDOW, degree: int = DEGREE) -> 
     return fit
 
 
-def derivative(values: Array, step_s: float, order: int) -> Array:
-    """Derivative of the given order of values (M, ...) sampled every ``step_s``; same shape.
+def derivative(values: Array, step_s: float, order: int, window: int = WINDOW) -> Array:
+    """Derivative of the given order (0: the fit itself) of values (M, ...) sampled every ``step_s``; same shape.
 
-    With fewer than WINDOW samples, the window shrinks to what is there; NaN where even DEGREE does not fit.
+    With fewer than ``window`` samples, it shrinks to what is there; NaN where even DEGREE does not fit.
     """
     count = len(values)
-    window = min(WINDOW, count)
+    window = min(window, count)
     if window <= DEGREE:
         return np.full_like(np.asarray(values, float), np.nan)
     half = window // 2
@@ -48,9 +48,32 @@ def derivative(values: Array, step_s: float, order: int) -> Array:
     return result / step_s**order
 
 
-def noise(order: int, step_s: float, sigma: float) -> float:
+def of_curves(angles: Array, step_s: float, ended: bool, window: int = 0) -> Array:
+    """(3, K, J): angle, speed, acceleration of angles (K, J), each interval without a gap (NaN) by itself.
+
+    ``window`` 0: the angle as it is, its derivatives over WINDOW; else all three smoothed over that many samples.
+    The arm rests before a motion and after one that ``ended``, so there the window is filled with the angle at rest.
+    """
+    result = np.full((3, *angles.shape), np.nan)
+    if not window:
+        result[0] = angles
+    width = window or WINDOW
+    for joint in range(angles.shape[1]):
+        known = ~np.isnan(angles[:, joint])
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], known, [False]))))
+        for start, stop in edges.reshape(-1, 2):
+            before = width // 2 if start == 0 else 0
+            after = width // 2 if stop == len(angles) and ended else 0
+            padded = np.pad(angles[start:stop, joint], (before, after), mode="edge")
+            for order in range(0 if window else 1, 3):
+                found = derivative(padded, step_s, order, width)
+                result[order, start:stop, joint] = found[before : len(found) - after]
+    return result
+
+
+def noise(order: int, step_s: float, sigma: float, window: int = WINDOW) -> float:
     """Standard deviation of the derivative inside, for white noise ``sigma`` on the samples."""
-    return float(sigma * np.linalg.norm(weights(order, WINDOW // 2)) / step_s**order)
+    return float(sigma * np.linalg.norm(weights(order, window // 2, window)) / step_s**order)
 
 
 def quantisation_sigma(resolution: float) -> float:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from armtempo.arrays import Array
 from armtempo.errors import RunFolderError
+from armtempo.formats.plain_text import visible
 from armtempo.link.follow import Gap
 from armtempo.runs.run_folder import FORMAT, META, TRAJECTORY, VERSION, JointScale, Repetition
 
@@ -70,21 +71,24 @@ def load(path: Path) -> RunData:
     try:
         joints = tuple(_scale(**joint) for joint in meta["joints"])
         entries = tuple(_entry(entry) for entry in meta["repetitions"])
-        meta |= {key: str(meta[key]) for key in ("name", "started")}
+        meta |= {key: visible(str(meta[key])) for key in ("name", "started")}
     except (KeyError, TypeError, ValueError) as error:
-        raise RunFolderError(f"{path / META}: {error} is missing or wrong; the folder is damaged") from error
+        raise RunFolderError(
+            f"{path / META}: {error} is missing or wrong",
+            "restore the folder from a copy, or run again",
+        ) from error
     repetitions = tuple(_samples(path / entry.file, entry.state, joints) for entry in entries)
     return RunData(path, meta, joints, repetitions, entries)
 
 
 def _scale(name: str, steps_per_deg: float, counts_per_deg: float) -> JointScale:
-    return JointScale(str(name), float(steps_per_deg), float(counts_per_deg))
+    return JointScale(visible(str(name)), float(steps_per_deg), float(counts_per_deg))
 
 
 def _entry(values: dict[str, Any]) -> Repetition:
     """A repetition of run.json; keys that an older or newer program wrote otherwise are left out."""
     known = {key.name: values[key.name] for key in fields(Repetition) if key.name in values}
-    known |= {"file": str(values["file"]), "state": str(values["state"])}
+    known |= {key: visible(str(values[key])) for key in ("file", "state")}
     known["lost"] = tuple(Gap(int(first), int(number)) for first, number in known.get("lost", ()))
     known |= {key: tuple(map(int, known[key])) for key in ("commanded_steps", "counts") if key in known}
     return Repetition(**known)
@@ -94,13 +98,24 @@ def _meta(path: Path) -> dict[str, Any]:
     try:
         meta = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise RunFolderError(f"{path.parent} is not a run folder: {path.name}: {error.strerror}") from error
+        raise RunFolderError(
+            f"{path.parent} is not a run folder: {path.name}: {error.strerror}",
+            "give a folder that 'armtempo run' or 'armtempo fetch' wrote",
+        ) from error
     except ValueError as error:
-        raise RunFolderError(f"{path}: damaged: {error}") from error
+        raise RunFolderError(
+            f"{path}: damaged: {error}", "restore the folder from a copy, or run again"
+        ) from error
     if not isinstance(meta, dict) or meta.get("format") != FORMAT:
-        raise RunFolderError(f"{path}: not the description of an armtempo run")
+        raise RunFolderError(
+            f"{path}: not the description of an armtempo run",
+            "give a folder that 'armtempo run' or 'armtempo fetch' wrote",
+        )
     if meta.get("version") != VERSION:
-        raise RunFolderError(f"{path}: version {meta.get('version')}; this armtempo reads {VERSION}")
+        raise RunFolderError(
+            f"{path}: version {meta.get('version')}; this armtempo reads {VERSION}",
+            "update armtempo, or read it with the version that wrote it",
+        )
     return meta
 
 

@@ -4,6 +4,7 @@
 
     run.json          what ran, when, on which board; how each repetition ended; the columns' meaning
     trajectory.json   the plan, where it is known
+    arm.json          else the arm
     motion.bin        what the board replayed
     samples-01.csv    one file a repetition, one line a sample (columns: see ``columns``)
 
@@ -36,6 +37,7 @@ FORMAT = "armtempo run"
 VERSION = 1
 META = "run.json"
 TRAJECTORY = "trajectory.json"
+ARM = "arm.json"
 MOTION = "motion.bin"
 RUNNING, COMPLETE, INTERRUPTED, FAULT, BROKEN = "running", "complete", "interrupted", "fault", "broken"
 
@@ -198,8 +200,11 @@ def new_folder(parent: Path, name: str) -> Path:
                 path.mkdir(parents=True)
                 return path
     except OSError as error:
-        raise InputError(f"{parent}: the run folder cannot be made: {error.strerror}") from error
-    raise InputError(f"{parent} holds 9999 runs of {name!r}; move some away")
+        raise InputError(
+            f"{parent}: the run folder cannot be made: {error.strerror}",
+            "choose another place with --out",
+        ) from error
+    raise InputError(f"{parent} holds 9999 runs of {name!r}", "move some away")
 
 
 @contextmanager
@@ -208,7 +213,8 @@ def _writing(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise RunFolderError(
-            f"{path}: cannot be written: {error.strerror}; what came before is kept; make room, then run again"
+            f"{path}: cannot be written: {error.strerror}; what came before is kept",
+            "make room, then run again",
         ) from None
 
 

@@ -33,8 +33,8 @@ def _joint(joint: DrivenJoint) -> dict[str, Any]:
     model, motor = joint.model, joint.motor
     if model.holding_torque_nm and not (model.inertia_kg_m2 or model.rotor_inertia_kg_m2):
         raise InputError(
-            f"{joint.name}: model.holding_torque_nm without an inertia; "
-            "give model.inertia_kg_m2 or model.rotor_inertia_kg_m2 in the arm file"
+            f"{joint.name}: model.holding_torque_nm without an inertia",
+            "give model.inertia_kg_m2 or model.rotor_inertia_kg_m2 in the arm file",
         )
     return {
         "steps_per_deg": motor.steps_per_deg,

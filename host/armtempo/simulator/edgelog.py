@@ -47,7 +47,10 @@ class PowerCycle:
         A motion lasts until the next is started. Raises RunFolderError where there was none.
         """
         if not -len(self.starts) <= number < len(self.starts):
-            raise RunFolderError(f"the edge log has {len(self.starts)} motions, not one number {number}")
+            raise RunFolderError(
+                f"the edge log has {len(self.starts)} motions, not one number {number}",
+                f"give a number from 0 to {len(self.starts) - 1}",
+            )
         number %= len(self.starts)
         zero = self.starts[number]
         end = self.starts[number + 1] if number + 1 < len(self.starts) else np.iinfo(np.int64).max
@@ -65,7 +68,10 @@ def read(path: Path) -> list[PowerCycle]:
     """All power cycles of a log, oldest first. Raises RunFolderError where the file is none."""
     data = path.read_bytes()
     if data[:4] != b"ATE1":
-        raise RunFolderError(f"{path} is no edge log of a virtual board")
+        raise RunFolderError(
+            f"{path} is no edge log of a virtual board",
+            "give a file that --edge-log of a virtual board wrote",
+        )
     cycles: list[_Collector] = []
     at = 4
     while at + _RECORD.size <= len(data):

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from armtempo.model.arm import Arm
+from armtempo.virtual_id import PREFIX
 
 DEFAULT_MACHINE = "STM32F4DISC with STM32F407"
 
@@ -86,7 +87,7 @@ class ProcessOptions:
     speed: float = 0.0
     """Motions run at this multiple of real time; 0: as fast as they can."""
     edge_log: str | None = None
-    unique_id: str = "000000000000000000000000"
+    unique_id: str = PREFIX + "0000000000000000"
     """24 hex digits."""
     dma_preload: bool = True
     """DMA streams fetch one word ahead, as the chip's do in direct mode (RM0090 10.3.12)."""
@@ -111,5 +112,5 @@ class ProcessOptions:
 
 
 def unique_id(seed: int) -> str:
-    """A board's 24 hex digits, another for each seed."""
-    return hashlib.sha256(b"virtual board %d" % seed).hexdigest()[:24]
+    """A virtual board's 24 hex digits, another for each seed."""
+    return (PREFIX + hashlib.sha256(b"virtual board %d" % seed).hexdigest())[:24]

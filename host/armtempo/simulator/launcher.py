@@ -18,6 +18,9 @@ from armtempo.simulator.launch_options import LaunchOptions, ProcessOptions, uni
 from armtempo.simulator.temporary_folder import TemporaryFolder
 
 INTERPRETER_VARIABLE = "ARMTEMPO_MICROPYTHON"
+_CHOOSE_INTERPRETER = (
+    f"set {INTERPRETER_VARIABLE} to a MicroPython that runs here, or unset it to use this Python"
+)
 _MAIN = Path(__file__).with_name("main.py")
 _HEAP = "4M"
 _DEPLOYED_BLOCKS = 256
@@ -53,7 +56,10 @@ class VirtualBoard:
                 )
         except OSError as error:
             os.close(self._slave)
-            raise LinkError(f"the virtual board's interpreter {command[0]} does not start: {error}") from None
+            raise LinkError(
+                f"the virtual board's interpreter {command[0]} does not start: {error}",
+                _CHOOSE_INTERPRETER,
+            ) from None
         finally:
             os.close(master)
 
@@ -76,7 +82,10 @@ class VirtualBoard:
         while not (self._folder.path / "up").exists():
             if not self.running() or time.monotonic() > limit:
                 tail = self.log().strip().splitlines()[-1:] or ["it says nothing"]
-                raise LinkError(f"the virtual board did not start: {tail[0]}")
+                raise LinkError(
+                    f"the virtual board did not start: {tail[0]}",
+                    "start it again; where that fails too, report it with this line",
+                )
             time.sleep(0.005)
 
     def stop(self) -> None:
@@ -166,7 +175,8 @@ def _make(flash: Path) -> None:
         flash.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(
-            f"{flash}: the virtual board's flash cannot be made there: {error.strerror}"
+            f"{flash}: the virtual board's flash cannot be made there: {error.strerror}",
+            "choose another folder",
         ) from None
 
 
@@ -203,8 +213,14 @@ def is_micropython(interpreter: str) -> bool:
         command = [interpreter, "-c", question]
         answer = subprocess.run(command, capture_output=True, text=True, timeout=_START_S)
     except (OSError, subprocess.TimeoutExpired) as error:
-        raise LinkError(f"the virtual board's interpreter {interpreter} does not run: {error}") from None
+        raise LinkError(
+            f"the virtual board's interpreter {interpreter} does not run: {error}",
+            _CHOOSE_INTERPRETER,
+        ) from None
     if answer.returncode:
         reason = answer.stderr.strip()
-        raise LinkError(f"the virtual board's interpreter {interpreter} does not run: {reason}")
+        raise LinkError(
+            f"the virtual board's interpreter {interpreter} does not run: {reason}",
+            _CHOOSE_INTERPRETER,
+        )
     return answer.stdout.strip() == "micropython"

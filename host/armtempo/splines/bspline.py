@@ -27,7 +27,7 @@ def basis(degree: int) -> Array:
     Raises InputError for a degree other than 3 or 5.
     """
     if degree not in BASIS:
-        raise InputError(f"spline degree {degree}: there are 3 (cubic) and 5 (quintic)")
+        raise InputError(f"splines of degree {degree} are not known", "choose 3 (cubic) or 5 (quintic)")
     matrix = np.array(BASIS[degree], dtype=float) / FACTORIAL[degree]
     matrix.setflags(write=False)
     return matrix
@@ -45,7 +45,10 @@ def fit(points_deg: ArrayLike, degree: int) -> Array:
     points = np.asarray(points_deg, dtype=float)
     row = basis(degree)[0, :-1]
     if len(points) < 2 or not np.all(np.isfinite(points)):
-        raise InputError("a spline needs at least two points, all of them finite")
+        raise InputError(
+            "a spline through fewer than two points, or through a point that is not finite",
+            "give at least two points, all of them finite",
+        )
     edge = (degree - 1) // 2
     right = np.zeros((len(points) + degree - 1, *points.shape[1:]))
     right[edge : edge + len(points)] = points
@@ -79,6 +82,23 @@ def polynomials(control_points: Array, degree: int) -> Array:
     pieces = np.einsum("pc,s...c->sp...", basis(degree), windows - middle[..., None])
     pieces[:, 0] += middle  # apart, so that a small motion far from zero keeps its digits
     return np.asarray(pieces)
+
+
+def refined(control_points: Array, parts: int, degree: int) -> Array:
+    """Control points of the same spline with each segment cut into ``parts``.
+
+    ``control_points``: (n + degree, ...). Returns (n * parts + degree, ...). A finer knot row takes them over by
+    ``degree`` + 1 sums over ``parts`` neighbours.
+    """
+    mask = np.full(1, float(parts))
+    for _ in range(degree + 1):
+        mask = np.convolve(mask, np.full(parts, 1.0 / parts))
+    count = (len(control_points) - degree) * parts + degree
+    spread = np.zeros((len(control_points) * parts, *control_points.shape[1:]))
+    spread[::parts] = control_points
+    first = degree * (parts - 1)
+    full = np.apply_along_axis(np.convolve, 0, spread, mask)
+    return np.asarray(full[first : first + count])
 
 
 def subdivide(coefficients: Array, parts: int) -> Array:

@@ -45,7 +45,8 @@ class Spline:
         at = np.asarray(u, dtype=float)
         if not np.all((at >= 0.0) & (at <= self.segments)):
             raise InputError(
-                f"a spline of {self.segments} segments is defined for u from 0 to {self.segments}"
+                "u is outside of the spline",
+                f"a spline of {self.segments} segments is defined for u from 0 to {self.segments}",
             )
         segment = np.minimum(at.astype(np.intp), self.segments - 1)
         pieces = bspline.derivative(bspline.polynomials(self.control_points, self.degree), order)

@@ -52,17 +52,10 @@ def free_map(count: int, degree: int) -> Array:
 def refined(differences_s: Array, parts: int, degree: int) -> Array:
     """Differences of the control points of the same axis with each segment cut into ``parts``.
 
-    ``differences_s``: (m + degree - 1,). Returns (m * parts + degree - 1,). They are the coefficients of t',
-    a spline of degree - 1, which a finer knot row takes over by ``degree`` sums over ``parts`` neighbours.
+    ``differences_s``: (m + degree - 1,). Returns (m * parts + degree - 1,). They are the control points of t',
+    a spline of degree - 1.
     """
-    mask = np.ones(1)
-    for _ in range(degree):
-        mask = np.convolve(mask, np.full(parts, 1.0 / parts))
-    spread = np.zeros(len(differences_s) * parts)
-    spread[::parts] = differences_s
-    first = (degree - 1) * (parts - 1)
-    count = (len(differences_s) - degree + 1) * parts + degree - 1
-    return np.asarray(np.convolve(spread, mask)[first : first + count])
+    return bspline.refined(differences_s, parts, degree - 1) / parts
 
 
 @cache

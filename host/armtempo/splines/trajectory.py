@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armtempo.formats import json_codec
 from armtempo.splines import bspline, time_axis
 from armtempo.splines.bspline import Array
 
@@ -24,6 +25,8 @@ class JointSpline:
     refine: int
     angle_points_deg: Array
     time_points_s: Array
+    via_segments: tuple[int, ...] | None = field(default=None, metadata=json_codec.ADDED)
+    """Path segments before each via point; None: each path segment ends at one."""
 
     @cached_property
     def angle_polynomials(self) -> Array:
@@ -43,7 +46,8 @@ class JointSpline:
     @cached_property
     def via_times_s(self) -> Array:
         """When the joint passes each via point: (n + 1,)."""
-        return np.append(self.time_polynomials[:: self.refine, 0], self.duration_s)
+        knots = np.append(self.time_polynomials[:: self.refine, 0], self.duration_s)
+        return knots if self.via_segments is None else np.asarray(knots[list(self.via_segments)])
 
     def __call__(self, time_s: ArrayLike, order: int = 0) -> Array:
         """Angle (order 0), speed, acceleration or jerk (order 3) in deg, deg/s, deg/s², deg/s³.

@@ -40,7 +40,7 @@ def arm_text(chain: Chain, fit: Fit, source: str) -> str:
     """The arm file for ``chain`` with the rows of ``fit``; ``source`` names the URDF file."""
     head = _HEAD.format(
         source=_text(source),
-        robot=_text(chain.robot.strip() or "imported arm"),
+        robot=_text(_one_line(chain.robot) or "imported arm"),
         base=_text(chain.base),
         tip=_text(chain.tip),
         postures=fit.postures,
@@ -56,7 +56,7 @@ def _joint(row: DhRow, chain: Chain, first: bool) -> str:
         return _row_text(name, row, (-_STILL_DEG, _STILL_DEG), "a constant row: it never moves")
     joint = chain.joints[row.joint]
     note = "continuous in the URDF: widen it if the cables allow" if joint.continuous else ""
-    name = joint.name.strip() or f"joint {row.joint + 1}"
+    name = _one_line(joint.name) or f"joint {row.joint + 1}"
     return _row_text(name, row, _inside(joint.range_deg), note) + _placeholders(row.joint + 1, joint)
 
 
@@ -91,6 +91,11 @@ def _inside(range_deg: tuple[float, float]) -> tuple[float, float]:
     """The range with four decimals, never wider than it was (but for what rad and degrees lose)."""
     low, high = range_deg
     return math.ceil(low * 1e4 - 0.01) / 1e4 + 0.0, math.floor(high * 1e4 + 0.01) / 1e4 + 0.0
+
+
+def _one_line(name: str) -> str:
+    """A name as an arm file takes it: a blank for each character that does not show."""
+    return "".join(character if character.isprintable() else " " for character in name).strip()
 
 
 def _text(text: str) -> str:

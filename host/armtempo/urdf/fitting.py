@@ -60,7 +60,8 @@ def fit(chain: Chain) -> Fit:
     raise PlanError(
         f"no Denavit-Hartenberg table of {chain.robot!r} keeps to its URDF: the best one is off by "
         f"{best.position_mm:.3g} mm and {best.rotation_deg:.3g} deg at worst, which should not be; nothing was "
-        "written. Choose another chain, or write the rows by hand"
+        "written",
+        "choose another chain, or write the rows by hand",
     )
 
 

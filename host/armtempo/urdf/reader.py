@@ -80,16 +80,19 @@ def read(path: Path, base: str | None = None, tip: str | None = None) -> Chain:
         Exception
     ) as error:  # the reader raises whatever its parts do: KeyError, ValueError, AttributeError
         raise InputError(
-            f"{path}: is XML, but not a URDF that can be read ({type(error).__name__}: {error}); "
-            "try it with another URDF tool, such as check_urdf, which names the place"
+            f"{path}: is XML, but not a URDF that can be read ({type(error).__name__}: {error})",
+            "try it with another URDF tool, such as check_urdf, which names the place",
         ) from None
     if not model.robot.joints:
-        raise InputError(f"{path}: this robot has no joints, so there is no chain; give another file")
+        raise InputError(f"{path}: this robot has no joints, so there is no chain", "give another file")
     joints = _path(path, model, base, tip)
     _refuse(path, joints)
     moving = [joint for joint in joints if joint.type != "fixed"]
     if not moving:
-        raise InputError(f"{path}: no joint between {joints[0].parent!r} and {joints[-1].child!r} turns")
+        raise InputError(
+            f"{path}: no joint between {joints[0].parent!r} and {joints[-1].child!r} turns",
+            "choose another chain with --base and --tip",
+        )
     first, last = joints[0].parent, joints[-1].child
     model.update_cfg({joint.name: 0.0 for joint in moving})
     turning = tuple(_turning(model, first, joint) for joint in moving)
@@ -109,17 +112,19 @@ def _check_text(path: Path) -> None:
     try:
         root = ElementTree.fromstring(path.read_bytes())
     except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file") from None
+        raise InputError(f"{path}: there is no such file", "check the path") from None
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {why(error)}") from None
+        raise InputError(
+            f"{path}: cannot be read: {why(error)}", "make it readable, or give a copy"
+        ) from None
     except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise InputError(f"{path}: not valid XML: {error}; mend the file there") from None
+        raise InputError(f"{path}: not valid XML: {error}", "mend the file there") from None
     if root.tag != "robot":
-        raise InputError(f"{path}: its outermost element is <{root.tag}>, not <robot>; give a URDF file")
+        raise InputError(f"{path}: its outermost element is <{root.tag}>, not <robot>", "give a URDF file")
     if root.get("name") is None:
-        raise InputError(f'{path}: its <robot> element has no name; give it one: <robot name="my_arm">')
+        raise InputError(f"{path}: its <robot> element has no name", 'give it one: <robot name="my_arm">')
     if any("xacro" in element.tag for element in root.iter()):
-        raise InputError(f"{path}: is a xacro file; make a URDF of it first: xacro {path} > robot.urdf")
+        raise InputError(f"{path}: is a xacro file", f"make a URDF of it first: xacro {path} > robot.urdf")
 
 
 def _path(path: Path, model: Any, base: str | None, tip: str | None) -> list[Any]:
@@ -127,7 +132,9 @@ def _path(path: Path, model: Any, base: str | None, tip: str | None) -> list[Any
     links = [link.name for link in model.robot.links]
     for option, link in (("--base", base), ("--tip", tip)):
         if link is not None and link not in links:
-            raise InputError(f"{path}: has no link {link!r} for {option}; its links: {', '.join(links)}")
+            raise InputError(
+                f"{path}: has no link {link!r} for {option}", f"give one of its links: {', '.join(links)}"
+            )
     above = {joint.child: joint for joint in model.robot.joints}
     first = base or model.base_link
     last = tip or _only_end(path, above, first)
@@ -136,12 +143,12 @@ def _path(path: Path, model: Any, base: str | None, tip: str | None) -> list[Any
     while link != first:
         if link not in above or len(joints) > len(above):
             raise InputError(
-                f"{path}: no chain leads from link {first!r} to {last!r}; choose --base and --tip"
+                f"{path}: no chain leads from link {first!r} to {last!r}", "choose --base and --tip"
             )
         joints.insert(0, above[link])
         link = above[link].parent
     if not joints:
-        raise InputError(f"{path}: base and tip are the same link, {first!r}; choose --base and --tip")
+        raise InputError(f"{path}: base and tip are the same link, {first!r}", "choose --base and --tip")
     return joints
 
 
@@ -151,7 +158,9 @@ def _only_end(path: Path, above: dict[str, Any], first: str) -> str:
     ends = [link for link in above if link not in parents and _is_below(above, link, first)]
     if len(ends) != 1:
         found = ", ".join(ends) or "none"
-        raise InputError(f"{path}: which end of the robot is the tool? Choose with --tip: {found}")
+        raise InputError(
+            f"{path}: which end of the robot is the tool is not clear", f"choose with --tip: {found}"
+        )
     return ends[0]
 
 
@@ -168,8 +177,8 @@ def _refuse(path: Path, joints: list[Any]) -> None:
     reasons = [f"\n  joint {joint.name!r}: {reason}" for joint in joints if (reason := _reason(joint))]
     if reasons:
         raise InputError(
-            f"{path}: this chain does not fit an arm file:{''.join(reasons)}\n"
-            "choose another chain with --base and --tip, or change the URDF"
+            f"{path}: this chain does not fit an arm file:{''.join(reasons)}",
+            "choose another chain with --base and --tip, or change the URDF",
         )
 
 

@@ -53,10 +53,11 @@ def _mentions(function: ast.FunctionDef) -> Iterator[str]:
             yield f".{node.attr}"
 
 
-def in_full(traceback: str, known: Functions) -> str:
-    """The traceback with the sources' names behind those of the compact program.
+def in_full(traceback: str, known: Functions, paths: Mapping[str, str]) -> str:
+    """The traceback with the sources' files and functions in the place of the compact program's.
 
-    Of several that a name may stand for, those are left that the one before calls and that call the next.
+    ``paths``: of the source files, by the last part of the module's name. Of several functions that a name may
+    stand for, those are left that the one before calls and that call the next; more than one are all named.
     """
     frames = list(_FRAME.finditer(traceback))
     chain = [known.get((_stem(frame[2]), frame[3]), []) for frame in frames]
@@ -66,11 +67,14 @@ def in_full(traceback: str, known: Functions) -> str:
         chain[at] = [one for one in chain[at] if _calls([one], chain[at + 1])] or chain[at]
     parts = iter(chain)
 
-    def label(frame: re.Match[str]) -> str:
-        labels = " or ".join(one.label for one in next(parts))
-        return frame[0] + (f" ({labels})" if labels else "")
+    def place(frame: re.Match[str]) -> str:
+        labels = [one.label for one in next(parts)]
+        if len(labels) == 1:
+            module, _, name = labels[0].partition(".")
+            return f'File "{paths.get(module, module)}", in {name}'
+        return frame[0] + (f" ({' or '.join(labels)})" if labels else "")
 
-    return _FRAME.sub(label, traceback)
+    return _FRAME.sub(place, traceback)
 
 
 def _calls(callers: list[Function], called: list[Function]) -> bool:
@@ -87,5 +91,5 @@ def _functions(tree: ast.Module) -> Iterator[tuple[ast.FunctionDef, str]]:
 
 
 def _stem(file: str) -> str:
-    """``core`` of a compiled file, ``armtempo_board/core.py`` of one in the firmware."""
+    """``core`` of a compiled file."""
     return file.rsplit("/", 1)[-1].removesuffix(".py")

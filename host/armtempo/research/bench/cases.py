@@ -13,9 +13,10 @@ from armtempo import optimise
 from armtempo.arrays import Array
 from armtempo.errors import InputError
 from armtempo.model.arm import Arm, Limits
-from armtempo.model.job import Job
-from armtempo.planning import planner
+from armtempo.model.job import GRADIENT, Job
+from armtempo.planning import interval_search, planner
 from armtempo.planning.fitness import Fitness
+from armtempo.planning.fixed_path import FixedPath
 from armtempo.splines import bspline
 
 
@@ -32,10 +33,13 @@ class Problem:
     """A method of ``Fitness``: ``"stretched"`` or ``"penalised"``."""
     iterations: int
 
+    def points(self) -> Array:
+        """Control points of the path: (n + degree, 1)."""
+        return bspline.fit(np.array(self.via_deg)[:, None], self.degree)
+
     def function(self) -> optimise.Function:
         """Fitness (N,) of intervals (N, m)."""
-        points = bspline.fit(np.array(self.via_deg)[:, None], self.degree)
-        judge: optimise.Function = getattr(Fitness(points, self.degree, [self.limits]), self.fitness)
+        judge: optimise.Function = getattr(Fitness(self.points(), self.degree, [self.limits]), self.fitness)
         return judge
 
 
@@ -78,16 +82,24 @@ def problem_of(arm: Arm, job: Job, joint: int, fitness: str, iterations: int) ->
     Raises InputError where there is no such joint, or it does not move in this job.
     """
     if not 1 <= joint <= len(arm.driven):
-        raise InputError(f"joint {joint}: arm {arm.name!r} has the driven joints 1 to {len(arm.driven)}")
+        raise InputError(
+            f"joint {joint}: arm {arm.name!r} has no such driven joint",
+            f"give one of 1 to {len(arm.driven)}",
+        )
     driven = arm.driven[joint - 1]
     angles_deg, _ = planner.via_angles(arm, job)
     via = angles_deg[:, joint - 1]
     if np.ptp(via) == 0.0:
         raise InputError(
-            f"job {job.name!r}: {driven.name} does not move, so there is nothing to search; choose another"
+            f"job {job.name!r}: {driven.name} does not move, so there is nothing to search",
+            "choose another joint",
         )
     angles = tuple(float(angle) for angle in via)
-    return Problem(driven.name, angles, job.degree, driven.limits, job.bounds_s, fitness, iterations)
+    bounds = job.bounds_s
+    if bounds is None:
+        box = interval_search.bounds_s(bspline.fit(via[:, None], job.degree), job.degree, [driven.limits])
+        bounds = (float(box.min()), float(box.max()))
+    return Problem(driven.name, angles, job.degree, driven.limits, bounds, fitness, iterations)
 
 
 def cases(algorithms: Iterable[str], populations: Iterable[int], seeds: Iterable[int]) -> list[Case]:
@@ -99,12 +111,17 @@ def cases(algorithms: Iterable[str], populations: Iterable[int], seeds: Iterable
 
 def solve(problem: Problem, case: Case) -> Trial:
     """Run one case. The same case gives the same trial on every worker, except for its seconds."""
-    function = problem.function()
-    bounds = [problem.bounds_s] * (len(problem.via_deg) - 1)
+    bounds = np.array([problem.bounds_s] * (len(problem.via_deg) - 1))
     rng = np.random.default_rng(case.seed)
-    start = time.thread_time()
-    settings = optimise.Settings(case.algorithm, case.population, problem.iterations)
-    found = optimise.minimise(function, bounds, rng, settings)
+    if case.algorithm == GRADIENT:
+        path = FixedPath(problem.points(), problem.degree, [problem.limits], mirrored=True)
+        start = time.thread_time()
+        found = interval_search.gradient(path, bounds, rng, case.population).result
+    else:
+        function = problem.function()
+        settings = optimise.Settings(case.algorithm, case.population, problem.iterations)
+        start = time.thread_time()
+        found = optimise.minimise(function, bounds, rng, settings)
     seconds = time.thread_time() - start
     better = [0, *(np.flatnonzero(np.diff(found.history) < 0) + 1)]
     improvements = tuple((int(at), float(found.history[at])) for at in better)

@@ -36,7 +36,9 @@ class ResultStore:
             else:
                 self._append(head)
         except OSError as error:
-            raise InputError(f"{self.path}: cannot be used: {error.strerror}; choose another --out") from None
+            raise InputError(
+                f"{self.path}: cannot be used: {error.strerror}", "choose another --out"
+            ) from None
 
     def add(self, run: Trial) -> None:
         """Appends a finished run by one write."""
@@ -65,11 +67,11 @@ class ResultStore:
             differ = [name for name in head if found.get(name) != head[name]]
             runs = [_run(content) for content in rest]
         except (ValueError, KeyError, TypeError, AttributeError) as error:
-            raise InputError(f"{self.path}: not a file of runs ({error}); choose another --out") from None
+            raise InputError(f"{self.path}: not a file of runs ({error})", "choose another --out") from None
         if differ:
             raise InputError(
-                f"{self.path}: holds runs of another problem, it differs in {', '.join(differ)}; "
-                "choose another --out, or remove the file"
+                f"{self.path}: holds runs of another problem, it differs in {', '.join(differ)}",
+                "choose another --out, or remove the file",
             )
         self.runs = {run.case: run for run in runs}
 

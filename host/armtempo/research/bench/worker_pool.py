@@ -45,7 +45,7 @@ def cluster(address: str) -> Iterator[Executor]:
     or no scheduler answers, ArmtempoError where a worker has no armtempo or another version.
     """
     if not re.fullmatch(r"\w+://.+:\d+", address):  # distributed would hang on it, and complain at the end
-        raise InputError(f"--scheduler {address!r} is no address; it is written like tcp://127.0.0.1:8786")
+        raise InputError(f"--scheduler {address!r} is no address", "write it like tcp://127.0.0.1:8786")
     try:
         distributed: Any = import_module("distributed")
     except ImportError:
@@ -53,7 +53,10 @@ def cluster(address: str) -> Iterator[Executor]:
     try:
         client = distributed.Client(address, timeout=_CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:
-        raise InputError(f"--scheduler {address}: no Dask scheduler answers there ({error})") from None
+        raise InputError(
+            f"--scheduler {address}: no Dask scheduler answers there ({error})",
+            "check the address, or start one with: dask scheduler",
+        ) from None
     with client:
         _check_workers(address, client.run(importlib.metadata.version, "armtempo", on_error="return"))
         yield client.get_executor(pure=False)
@@ -63,14 +66,15 @@ def _check_workers(address: str, versions: dict[str, object]) -> None:
     """``versions``: of each worker its armtempo version, or the exception where it has none."""
     if not versions:
         raise InputError(
-            f"--scheduler {address}: the cluster has no workers; start some with: dask worker {address}"
+            f"--scheduler {address}: the cluster has no workers",
+            f"start some with: dask worker {address}",
         )
     for worker, found in versions.items():
         if found != armtempo.__version__:
             what = "no armtempo" if isinstance(found, Exception) else f"armtempo {found}"
             raise ArmtempoError(
-                f"worker {worker} has {what}, here is {armtempo.__version__}; "
-                "install this version on all workers"
+                f"worker {worker} has {what}, here is {armtempo.__version__}",
+                "install this version on all workers",
             )
 
 

@@ -10,15 +10,15 @@ from pathlib import Path
 
 import numpy as np
 
-from armtempo.link.ports import SIM
 from armtempo.model.plan import Plan
+from armtempo.ports.names import SIM
 from armtempo.progress import Progress
-from armtempo.report import run_report
+from armtempo.report.evaluation import Evaluation, evaluate
 from armtempo.research.paper import motions, printed
 from armtempo.research.paper.claims import DIFFERS, SAME, Claim
-from armtempo.robot.board import connect
+from armtempo.robot.connect import connect
 from armtempo.robot.stop_request import StopRequest
-from armtempo.runs import analysis
+from armtempo.runs import analysis, peaks
 from armtempo.splines import extremes
 from armtempo.splines.trajectory import Trajectory
 
@@ -34,7 +34,7 @@ class Series:
     """One motion, replayed and analysed."""
 
     name: str
-    found: run_report.Evaluation
+    found: Evaluation
 
 
 def run(made: motions.Plans, folder: Path, quick: bool, progress: Progress | None) -> list[Series]:
@@ -59,7 +59,7 @@ def run(made: motions.Plans, folder: Path, quick: bool, progress: Progress | Non
                     progress(sum(shares.values()), len(plans))
         for replay in filter(_failed, replays.values()):
             replay.result()
-    return [Series(name, run_report.evaluate(replay.result())) for name, replay in replays.items()]
+    return [Series(name, evaluate(replay.result())) for name, replay in replays.items()]
 
 
 def claims(series: list[Series]) -> list[Claim]:
@@ -95,7 +95,7 @@ def _failed(replay: Future[Path]) -> bool:
     return replay.done() and not isinstance(replay.exception(), KeyboardInterrupt | None)
 
 
-def _coincide(found: run_report.Evaluation) -> list[Claim]:
+def _coincide(found: Evaluation) -> list[Claim]:
     """ "The angle curves almost coincide": within the rounding of the encoder and the lag of the motor."""
     rows = analysis.deviations(found.curves)[0]
     return [
@@ -110,14 +110,11 @@ def _coincide(found: run_report.Evaluation) -> list[Claim]:
     ]
 
 
-def _limits_kept(found: run_report.Evaluation) -> list[Claim]:
-    resolutions = run_report.resolutions_deg(found.plan.arm)
+def _limits_kept(found: Evaluation) -> list[Claim]:
     claims = []
-    for name, checks in zip(
-        found.names, analysis.limit_checks(found.curves, found.limits, resolutions), strict=True
-    ):
+    for name, checks in zip(found.names, found.limit_checks, strict=True):
         for quantity, check in zip(("speed", "acceleration"), checks, strict=True):
-            kept = check.verdict != "exceeded"
+            kept = check.verdict != peaks.EXCEEDED
             claims.append(
                 Claim(
                     "Fig. 11",
@@ -131,9 +128,9 @@ def _limits_kept(found: run_report.Evaluation) -> list[Claim]:
     return claims
 
 
-def _unoptimised_peaks(found: run_report.Evaluation) -> list[Claim]:
+def _unoptimised_peaks(found: Evaluation) -> list[Claim]:
     """Joint 1 before optimisation: the peaks of section 2.3, as measured."""
-    checks = analysis.limit_checks(found.curves, found.limits, run_report.resolutions_deg(found.plan.arm))[0]
+    checks = found.limit_checks[0]
     claims = []
     for quantity, unit, value, check in zip(
         ("speed", "acceleration"), ("°/s", "°/s²"), printed.UNOPTIMISED_PEAKS, checks, strict=True
@@ -146,7 +143,7 @@ def _unoptimised_peaks(found: run_report.Evaluation) -> list[Claim]:
     return claims
 
 
-def _rougher_ends(quintic: run_report.Evaluation, cubic: run_report.Evaluation) -> list[Claim]:
+def _rougher_ends(quintic: Evaluation, cubic: Evaluation) -> list[Claim]:
     """Joint 1 at start and end: how much worse the cubic's speed and acceleration are than the quintic's."""
     claims = []
     for order, unit, said in (
@@ -160,12 +157,12 @@ def _rougher_ends(quintic: run_report.Evaluation, cubic: run_report.Evaluation) 
     return claims
 
 
-def _end_error(found: run_report.Evaluation, order: int) -> float:
+def _end_error(found: Evaluation, order: int) -> float:
     """RMS deviation of joint 1's mean curve from theory near start and end.
 
     From theory as the same differentiation shows it: so only what the motor and the arm add.
     """
-    end = found.plan.trajectory.joints[0].duration_s
+    end = found.trajectory.joints[0].duration_s
     times = found.curves.times_s
     near = (times <= _END_S) | ((times >= end - _END_S) & (times <= end + _END_S))
     error = (found.curves.mean - found.curves.shown)[order, near, 0]

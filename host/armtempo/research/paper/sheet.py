@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armtempo.kinematics import chain
-from armtempo.report import html_page, plan_section, plots, run_report
+from armtempo.report import arm_figure, drawing, html_page, plan_section, plots, run_report
 from armtempo.research.bench import result_plot
 from armtempo.research.bench.result_table import Row
 from armtempo.research.paper import motions
@@ -39,7 +39,7 @@ def render(
         )
     sheet.heading("Figures")
     for name, figure, caption in _figures(made, searched, series):
-        sheet.figure(plots.inline_svg(figure, name, caption), caption)
+        sheet.figure(drawing.inline_svg(figure, name, caption), caption)
     sheet.heading("How to repeat it")
     sheet.code("armtempo paper")
     plan_section.origin(sheet, made.quintic, _extent(searched, series))
@@ -91,4 +91,4 @@ def _postures(made: motions.Plans) -> Figure:
     plan = made.quintic
     times = np.linspace(0.0, plan.trajectory.duration_s, 300)
     path = chain.tool_path_mm(made.arm, plan.trajectory, times)
-    return plots.postures(chain.chains_mm(made.arm, plan.via_deg), path)
+    return arm_figure.postures(chain.chains_mm(made.arm, plan.via_deg), path)

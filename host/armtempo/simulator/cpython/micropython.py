@@ -16,7 +16,7 @@ from collections.abc import Callable
 from typing import Any, Literal, TypeVar
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-_REACH = 4096  # bytes that can be reached from an address
+_REACH = 8192  # bytes that can be reached from an address
 _MOST_KEPT = 4096
 
 

@@ -16,6 +16,7 @@ from micropython import mem_info
 FRAMES = "/flash/frames"
 TURNS = 20
 """Turns of the program's loop between two frames, and at the end."""
+_STAGE = 0x8000  # in the place of a frame's length, with the length of a stage's name, which follows
 
 
 class Beyond:
@@ -30,7 +31,10 @@ class Beyond:
 
 
 class Port:
-    """Hands over the frames of a file, each behind its length in two bytes, then ends the program."""
+    """Hands over the frames of a file, each behind its length in two bytes, then ends the program.
+
+    Between frames there may be names of stages, each behind its length + _STAGE: the heap is told of there.
+    """
 
     RTS = CTS = 0
 
@@ -64,6 +68,9 @@ class Port:
             tell("end")
             sys.exit()
         self._left = head[0] + 256 * head[1]
+        if self._left >= _STAGE:
+            tell(str(self._frames.read(self._left - _STAGE), "ascii"))
+            self._next()
 
     def write(self, buffer, start, count):
         """Tell the host that looks on."""
@@ -85,5 +92,5 @@ def nothing(*arguments):
 def replace():
     """Put the port, and what the emulator has not, into place."""
     sys.modules["pyb"] = Beyond(pyb, USB_VCP=Port)
-    sys.modules["os"] = Beyond(os, dupterm=nothing)
+    sys.modules["os"] = Beyond(os, dupterm=nothing, urandom=bytes)
     sys.modules["machine"] = Beyond(machine, unique_id=lambda: b"123456789012")

@@ -266,9 +266,7 @@ class Port:
         elif self._frames and self._turns > _BEFORE:
             self._feed()
             if len(self._frames) == self._session:
-                mem32[stm.TIM2 + _PSC] = mem32[stm.TIM5 + _PSC] = (
-                    0xFFFF  # as good as standing: see start_clock
-                )
+                hold_clock()
         elif self._turns > _BEHIND:
             print("@ end")
             sys.exit()
@@ -289,10 +287,15 @@ class Port:
         print()
 
 
+def hold_clock():
+    """From here on the counters as good as stand, also when they are started: see ``start_clock``."""
+    mem32[stm.TIM2 + _PSC] = mem32[stm.TIM5 + _PSC] = 0xFFFF
+
+
 def start_clock(us):
     """In the place of the short wait behind the start of the counters: from here on they run."""
     mem32[stm.TIM2 + _PSC] = mem32[stm.TIM5 + _PSC] = here["prescaler"]
-    here["core"].time, here["core"].stm = time, stm
+    here["engine"].time = time
     mem32[here["at_compare"]] = id(interrupt)
     mem32[here["at_feed"]] = id(feed)
     pause()
@@ -304,7 +307,20 @@ def nothing(*arguments):
     """In the place of what does not matter here."""
 
 
-def replace(settings):
+class Chip:
+    """The addresses that the program asks for while it moves are as quick to look up as those of the module."""
+
+    def __init__(self, **names):
+        for name in ("TIM2", "TIM5", "TIM6"):
+            setattr(self, name, getattr(stm, name))
+        for name in names:
+            setattr(self, name, names[name])
+
+    def __getattr__(self, name):
+        return getattr(stm, name)
+
+
+def replace(settings, port=Port):
     """Put the port, and what the emulator has not, into place."""
     here.update(settings)
     state[4] = mem32[here["allocated"]]
@@ -312,17 +328,16 @@ def replace(settings):
     mem32[here["looks_per_ms"]] = _LOOKS
     mem32[here["feed_ticks"]] = _FEED_TICKS
     still = uctypes.addressof(unmoved)
-    sys.modules["pyb"] = Beyond(pyb, USB_VCP=Port, Timer=Timer)
-    sys.modules["os"] = Beyond(os, dupterm=nothing)
+    sys.modules["pyb"] = Beyond(pyb, USB_VCP=port, Timer=Timer)
+    sys.modules["os"] = Beyond(os, dupterm=nothing, urandom=bytes)
     sys.modules["machine"] = Beyond(machine, unique_id=lambda: b"123456789012")
-    addresses = {"DMA1": uctypes.addressof(dma), "TIM1": still, "TIM3": still, "TIM4": still, "TIM8": still}
-    sys.modules["stm"] = Beyond(stm, **addresses)
+    sys.modules["stm"] = Chip(DMA1=uctypes.addressof(dma), TIM1=still, TIM3=still, TIM4=still, TIM8=still)
     sys.modules["time"] = Beyond(time, sleep_us=start_clock)
 
 
-def hook(core):
-    """Take the place of two of the program's functions; the settings say what it calls them."""
-    here["core"] = core
-    for name, function in (("matches", matches), ("set_interval", enter)):
-        programs.append(getattr(core, here[name]))
-        setattr(core, here[name], function)
+def hook():
+    """Take the place of two of the program's functions; the settings say where they and the engine are."""
+    here["engine"] = sys.modules[here["engine"]]
+    for (module, name), function in ((here["matches"], matches), (here["set_interval"], enter)):
+        programs.append(getattr(sys.modules[module], name))
+        setattr(sys.modules[module], name, function)

@@ -120,4 +120,8 @@ from armtempo_board import program  # noqa: E402
 
 tell("modules")
 builtins.__import__ = watch
-program.main(sys.argv[1])
+try:
+    program.main(sys.argv[1])
+finally:
+    builtins.__import__ = IMPORT
+    ANSWERS.close()

@@ -1,7 +1,11 @@
 """Faults and exceptions: what moves is frozen, the host is told, and nothing starts before it is cleared."""
 
 import cases
-from app_rig import connected, ends_of, start, state
+
+from app_rig import connected, ends_of, start, state  # isort: skip  it puts the stand-ins into place
+
+from armtempo_board.app import app as app_module
+from armtempo_shared import codes, wire
 
 
 def case_fault_stays_until_cleared():
@@ -36,11 +40,61 @@ def case_exception_becomes_a_fault():
     assert app.controller.engine.calls[-1] == "freeze"
 
 
-def case_exception_in_a_command_becomes_a_fault():
+def answers(host, sequence):
+    """What came for a command, as often as it came."""
+    found = []
+    for got, number, payload in host.turn():
+        if got == sequence and wire.EVENT_BY_ID[number][0] in ("ok", "error"):
+            found.append((number, bytes(payload)))
+    return found
+
+
+def failing_command(error):
+    """The answers to a command in which an exception comes, and to its repeat; how often it was carried out."""
     app, host = connected()
-    app.controller.store().names = None
-    assert host.ask("list", (0,)) is None
+    calls = []
+
+    def explode():
+        calls.append(1)
+        raise error
+
+    app.controller.store().names = explode
+    sequence = host.send("list", (0,))
+    first = answers(host, sequence)
+    host.send("list", (0,), sequence=sequence)
+    again = answers(host, sequence)
     assert state(host) == "fault"
+    return first, again, calls
+
+
+def case_exception_in_a_command_is_answered_once_and_becomes_a_fault():
+    for error, code in ((ValueError("deliberate"), codes.FAILED), (MemoryError(), codes.NO_MEMORY)):
+        first, again, calls = failing_command(error)
+        assert len(first) == 1 and first == again and len(calls) == 1, (first, again, calls)
+        number, payload = first[0]
+        assert wire.EVENT_BY_ID[number][0] == "error" and payload[1] == code, payload
+
+
+class Unprintable(Exception):
+    """Telling of it takes more memory than there is."""
+
+    def __str__(self):
+        raise MemoryError
+
+
+def case_a_failure_that_cannot_be_told_is_a_failure_all_the_same():
+    app, host = connected()
+    start(host)
+    app.controller.engine.explode = Unprintable()
+    tell = app_module._traceback
+    app_module._traceback = lambda error: str(error)
+    try:
+        host.turn()
+    finally:
+        app_module._traceback = tell
+    assert state(host) == "fault"
+    assert app.controller.engine.calls[-1] == "freeze"
+    assert "no memory" in next(rest for kind, _, rest in host.events if kind == "notice")
 
 
 def case_endless_exceptions_end_the_program():

@@ -1,8 +1,14 @@
 """How the program is left for MicroPython's prompt: by command or Ctrl-C, not by noise, not while moving."""
 
+import sys
+
 import cases
-from app_rig import connected, start
+
+from app_rig import connected, start  # isort: skip  it puts the stand-ins into place
+
+from armtempo_board import prompt
 from armtempo_shared import wire
+from stand_in import Clock, Port
 
 CTRL_C = b"\r\x03\r\x01"
 """What mpremote begins with."""
@@ -54,6 +60,48 @@ def case_leave_answers_first():
     app, host = connected()
     assert host.ask("leave") == ("ok", (), b"")
     assert app.left()
+
+
+class Here:
+    """In the place of ``os`` and ``time``."""
+
+    terminals = []
+
+    def dupterm(self, port, index):
+        self.terminals.append(port)
+
+    def ticks_ms(self):
+        Clock.now_ms += 1
+        return Clock.now_ms
+
+    def ticks_diff(self, end, start):
+        return end - start
+
+    def sleep_ms(self, wait_ms):
+        """Time goes on by itself."""
+
+
+def case_a_program_that_ended_by_itself_lets_no_frame_reach_the_prompt():
+    port = Port()
+    frames = b"".join([wire.frame(number, 4, bytes((3, 3, 13, 4))) for number in range(200)])
+    assert b"\x04" in frames and b"\x03" in frames
+    port.inbox.extend(frames + bytes(16))
+    sys.modules["pyb"].USB_VCP = lambda: port
+    prompt.os = prompt.time = Here()
+    asked = []
+    read = port.readinto
+
+    def readinto(buffer, count):
+        if not port.inbox and not asked:  # all frames are gone; now mpremote comes, after quiet
+            Clock.now_ms += 100
+            asked.append(1)
+            port.inbox.extend(CTRL_C)
+        return read(buffer, count)
+
+    port.readinto = readinto
+    prompt.wait()
+    assert asked and bytes(port.inbox) == b"\x01", port.inbox
+    assert Here.terminals == [None, port]
 
 
 def case_begun_again_it_waits_for_a_greeting():

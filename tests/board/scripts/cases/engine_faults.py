@@ -5,9 +5,10 @@ import random
 import cases
 from armtempo_shared import armrecord, codes
 from engine_rig import FEWER, HEAD, TICK_HZ, Evaluator, Motion, Rig, Steps, arm, row
+from virtual_board import machine_state
 from virtual_board.firmware import external_interrupts
 
-FREEZE_TICKS = 84 * 20
+FREEZE_TICKS = 84 * 10
 SEED = 20261
 MOTION = Motion(
     TICK_HZ // 40,
@@ -35,7 +36,7 @@ def stopped(rig, code=0, joint=255):
     rig.board.spend(TICK_HZ)
     assert [pulses.rises for pulses in rig.pulses] == before
     for pulses in rig.pulses:
-        pulses.check_end(frozen=True)
+        pulses.check_end()
     assert rig.commanded() == rig.stepped(), (rig.commanded(), rig.stepped())
     assert rig.samples[-1][2:5] == rig.stepped()[:3]
 
@@ -109,6 +110,61 @@ def case_estop_at_rest():
     assert rig.engine.clear()
     rig.turn()
     assert rig.engine.fault == 0
+
+
+def tap():
+    """Press the E-stop for a moment."""
+    external_interrupts.set_level("E15", 0)
+    machine_state.board.spend(84)
+    external_interrupts.set_level("E15", 1)
+    machine_state.board.spend(84)
+
+
+class Tapped:
+    """A motion that is looked at while somebody taps the E-stop."""
+
+    brake_ticks = 0
+    joints = MOTION.joints
+
+    @property
+    def duration(self):
+        """What the engine asks for behind its look at the E-stop."""
+        tap()
+        return MOTION.duration
+
+
+def case_estop_while_loading():
+    """A tap on the E-stop after the engine has looked at it, but before the start: nothing moves, and it is told."""
+    for motion in (MOTION, Tapped()):
+        rig = Rig(arm(3), flags=armrecord.FLAG_ESTOP_FITTED)
+        for pulses, steps in zip(rig.pulses, motion.joints):
+            pulses.expect(steps)
+        rig.engine.load(motion)
+        if motion is MOTION:
+            tap()
+        rig.engine.start()
+        rig.run_to(MOTION.duration)
+        assert rig.stepped() == [0, 0, 0] == rig.commanded()
+        assert (rig.engine.fault, rig.engine.known) == (codes.ESTOP, 7)
+
+
+def case_estop_behind_a_limit_switch():
+    """It releases the drivers whatever came before, so the position is unknown."""
+    rig = Rig(
+        [row(channel=0, limit_low=0, limit_active_high=1)],
+        flags=armrecord.FLAG_ESTOP_FITTED | armrecord.FLAG_ESTOP_RELEASES,
+    )
+    rig.start(Motion(TICK_HZ // 10, Steps((1000, 400, 2000, -1))))
+    rig.run_to(400_000)
+    external_interrupts.set_level("D8", 1)
+    rig.turn()
+    rig.turn()
+    stopped_one(rig, codes.LIMIT_SWITCH)
+    assert rig.engine.known == 1
+    tap()
+    assert rig.board.pins.line("E12").level == 1
+    rig.turn()
+    assert (rig.engine.fault, rig.engine.known) == (codes.LIMIT_SWITCH, 0)
 
 
 def case_underrun_anywhere():
@@ -292,7 +348,7 @@ def case_close_and_anew():
     first.run_to(1_000_000)
     first.engine.close()
     assert first.commanded() == first.stepped()
-    engine = type(first.engine)(dict(HEAD, flags=flags), arm(2))
+    engine = type(first.engine)(dict(HEAD, flags=flags), arm(2), first.workspace)
     first.engine = engine
     engine.home(3, [0, 0])
     for pulses in first.pulses:

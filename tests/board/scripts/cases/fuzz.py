@@ -17,7 +17,7 @@ stand_in.install()
 from armtempo_board import heap  # noqa: E402
 from armtempo_board.app.app import App  # noqa: E402
 from armtempo_board.link import frame_reader, serial_link  # noqa: E402
-from armtempo_board.storage import store  # noqa: E402
+from armtempo_board.storage import motion_file, store  # noqa: E402
 from armtempo_shared import wire  # noqa: E402
 from armtempo_shared.table import rows  # noqa: E402
 
@@ -119,7 +119,8 @@ def one():
 def board():
     """A configured and homed board with "feed" stored, on a flash in memory."""
     chip = flash.Flash()
-    store.os, store.open = chip, chip.open
+    store.os = chip
+    store.open = motion_file.open = chip.open
     heap.forget = lambda: None  # a store that is imported anew would be on the real flash
     port = stand_in.Port()
     app = App(port, "/flash")

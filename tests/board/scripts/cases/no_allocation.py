@@ -18,11 +18,13 @@ from arm_rows import HEAD, arm
 from armtempo_board.hardware import isr, registers  # noqa: F401  they are forgotten again: not counted
 from armtempo_board.motion import motion_check  # noqa: F401  they are forgotten again: not counted
 from armtempo_board.motion.engine import Engine
+from armtempo_board.motion.workspace import Workspace
 from armtempo_shared import armrecord  # noqa: F401
 from brake_motion import BRAKE_TICKS, record
 
 STEP_TICKS = 30_000
 BUFFER = array("i", [0] * 8)
+WORKSPACE = Workspace(12 * 1026, 6)
 
 
 def compare_of(ring):
@@ -49,7 +51,7 @@ class Streams:
         loads = (entries - dma[at]) % entries
         while (now - timer[compare_of(ring)]) & 0xFFFFFFFF < 1 << 31:
             loads += 1
-            timer[compare_of(ring)] = ring.words[(loads - 1) % entries + 1]
+            timer[compare_of(ring)] = ring.words[(loads - 1) % entries + 1] & 0xFFFFFFFF
             self.matched += 1
         dma[at] = (entries - loads) % entries or entries
 
@@ -88,7 +90,7 @@ def locked(function, argument=None):
 def run(joints, brake_at):
     """A whole motion, braked at a time (or not)."""
     stm.BLOCKS["TIM1"][isr.CNT] = 0
-    engine = Engine(HEAD, joints)
+    engine = Engine(HEAD, joints, WORKSPACE)
     engine.home(7, [0, 0, 0])
     motion = record(BRAKE_TICKS)
     engine.load(motion)
@@ -115,7 +117,7 @@ def heap(count):
     """Bytes that an engine with so many joints keeps."""
     gc.collect()
     before = gc.mem_alloc()
-    engine = Engine(HEAD, arm(count))
+    engine = Engine(HEAD, arm(count), WORKSPACE)
     gc.collect()
     return gc.mem_alloc() - before if engine else 0
 

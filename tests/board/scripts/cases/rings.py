@@ -5,9 +5,9 @@ from array import array
 import cases
 import uctypes
 import virtual_board.standalone  # noqa: F401
-from armtempo_board.hardware import isr
-from armtempo_board.hardware.ring import size
+from armtempo_board.hardware import isr, pins
 from armtempo_board.stepgen import step_queue
+from armtempo_shared.engine_memory import ring_words
 from engine_rig import Rig, arm
 
 BLOCK = isr.BLOCK_HEAD + 6 * isr.JOINT_WORDS
@@ -111,14 +111,14 @@ def case_written_and_wrapped():
 
 
 def case_sizes():
-    """A ring lasts at least 4 ms at a joint's highest rate, or is of the largest size."""
+    """A ring lasts at least 3 ms at a joint's highest rate, or is of the largest size."""
     previous = 64
     for rate in (0, 1, 1796, 1900, 3592, 4100, 8000, 20_000, 34_000, 333_000):
-        entries = size(rate)
+        entries = ring_words(rate) - 1
         assert entries in (64, 128, 256, 512, 1024) and entries >= previous
-        assert entries == 1024 or (entries - 8) * 1000 >= 2 * rate * 4, rate
+        assert entries == 1024 or (entries - 8) * 1000 >= 2 * rate * 3, rate
         previous = entries
-    assert (size(0), size(7_000), size(8_000), size(333_000)) == (64, 64, 128, 1024)
+    assert [ring_words(rate) for rate in (0, 9_300, 9_600, 333_000)] == [65, 65, 129, 1025]
 
 
 def case_times_across_the_wrap():
@@ -257,13 +257,97 @@ def case_counters_in_step():
         assert isr.counters_agree(first, second) == agree, (a, b)
 
 
+PORT_A, TIM5, PORT_B, PORT_E = 1024, 768, 1280, 2048  # words behind TIM2
+
+
+def of(line):
+    """The words of a line in the block."""
+    return isr.FIRST_LINE + isr.LINE_WORDS * (line - isr.SOFTWARE_LINE)
+
+
+def frozen(line, levels, high_a=0, high_b=0, runs=1, before=0):
+    """The block and the registers behind a freeze that a line calls for, with the levels of DIR and the STEP pins."""
+    block, registers = words(isr.BLOCK_WORDS), words(PORT_E + 8)
+    address = uctypes.addressof(registers)
+    block[isr.TIM2_AT], block[isr.TIM2_AT + 1] = address & 0x3FFFFFFF, address >> 30
+    block[isr.PORT_A_BEHIND] = 4 * PORT_A
+    for of_line, low, mask, release in (
+        (7, isr.ALWAYS, isr.ALWAYS, 0),
+        (8, 1 << 10, 1 << 7 | 1 << 10, 0),
+        (9, isr.ALWAYS, isr.ALWAYS | 1 << 7, 0),
+        (15, isr.ALWAYS, isr.ALWAYS, 1 << 28),
+    ):
+        at = of(of_line)
+        block[at + isr.LINE_LEVELS], block[at + isr.LINE_MASK], block[at + isr.LINE_RELEASE] = (
+            low,
+            mask,
+            release,
+        )
+    block[isr.FROZEN] = before
+    registers[isr.CR1] = registers[TIM5 + isr.CR1] = runs
+    registers[isr.DIER] = registers[TIM5 + isr.DIER] = 0xFF
+    registers[PORT_A + isr.IDR], registers[PORT_B + isr.IDR] = high_a, high_b
+    registers[PORT_E + isr.ODR] = levels
+    isr.freezer(block)(line)
+    return block, registers
+
+
 def case_towards_a_switch():
-    """Line, direction and movement all have to fit."""
-    pairs = array("I", [8, 7, 1, 0, 1, 8, 10, 0, 2, 1, 9, 7, 0, 0, 0])
-    port = words(8)
-    for line, levels, found in ((8, 1 << 7, 1), (8, 1 << 10, 0), (8, 0, 3), (9, 0, 0), (10, 1 << 7, 0)):
-        port[isr.ODR] = levels
-        assert isr.joint_towards(pairs, 3, line, isr.output_levels(port)) == found
+    """A limit switch freezes where a joint moves towards it, at one of its levels of DIR; E-stop and program always."""
+    for line, levels, freezes in (
+        (8, 1 << 7 | 1 << 10, 1),
+        (8, 1 << 10, 0),
+        (8, 0, 1),
+        (9, 0, 1),
+        (9, 1 << 7, 1),
+        (10, 0xFFFF, 0),
+        (7, 0xFFFF, 1),
+        (15, 0, 1),
+    ):
+        block, registers = frozen(line, levels)
+        assert (block[isr.FROZEN] != 0) == freezes, (line, levels)
+        assert registers[isr.DIER] == registers[TIM5 + isr.DIER] == (0 if freezes else 0xFF)
+        tripped = [other for other in range(7, 16) if block[of(other) + isr.LINE_TRIPPED]]
+        assert tripped == [line] * freezes
+        assert registers[PORT_E + isr.BSRR] == (1 << 28 if line == 15 else 0)
+
+
+def case_modes_of_a_freeze():
+    """STEP pins that are low are held low, those that are high keep their falling edge; other pins do not matter."""
+    both = 4 << 4 | 4 << 12
+    for pin, place, mode in (
+        ("A15", isr.CCMR1, 3 << 4 | 4 << 12),
+        ("A1", isr.CCMR1, 4 << 4 | 3 << 12),
+        ("B10", isr.CCMR1 + 1, 3 << 4),
+        ("A2", TIM5 + isr.CCMR1 + 1, 3 << 4 | 4 << 12),
+        ("A3", TIM5 + isr.CCMR1 + 1, 4 << 4 | 3 << 12),
+        ("A0", TIM5 + isr.CCMR1, 3 << 4 | 4 << 12),
+        ("A14", isr.CCMR1, both),
+        ("B9", isr.CCMR1, both),
+    ):
+        bit = 1 << pins.line(pin)
+        for others in (0, 0x7FF0):
+            high_a, high_b = others, others & ~0x400
+            if pin[0] == "A":
+                high_a |= bit
+            else:
+                high_b |= bit
+            block, registers = frozen(15, 0, high_a, high_b)
+            modes = {isr.CCMR1: both, isr.CCMR1 + 1: 64, TIM5 + isr.CCMR1: both, TIM5 + isr.CCMR1 + 1: both}
+            modes[place] = mode
+            assert {at: registers[at] for at in modes} == modes, (pin, others)
+            assert (block[isr.HIGH_A], block[isr.HIGH_B]) == (high_a, high_b)
+
+
+def case_freezing_again():
+    """What is frozen is left as it is, but an E-stop still releases the drivers; counters that stood stand."""
+    block, registers = frozen(15, 0, high_a=2, before=1)
+    assert block[isr.FROZEN] == 1
+    assert registers[isr.DIER] == 0xFF
+    assert registers[PORT_E + isr.BSRR] == 1 << 28
+    assert block[of(15) + isr.LINE_TRIPPED]
+    for runs in (0, 1):
+        assert frozen(15, 0, runs=runs)[1][isr.CR1] == runs
 
 
 def case_interrupts_wait_while_a_channel_is_armed_or_released():

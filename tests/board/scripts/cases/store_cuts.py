@@ -10,7 +10,7 @@ import stand_in
 stand_in.install()
 
 from armtempo_board.errors import Refused  # noqa: E402
-from armtempo_board.storage import store  # noqa: E402
+from armtempo_board.storage import motion_file, store  # noqa: E402
 from armtempo_shared import codes, wire  # noqa: E402
 
 ARM = stand_in.arm()
@@ -23,13 +23,14 @@ def put(place, file_name, data):
     place.begin(file_name, len(data))
     for at in range(0, len(data), 100):
         place.write(at, data[at : at + 100])
-    place.commit(wire.record_crc(data))
+    if place.commit(wire.record_crc(data)) == wire.ARM_RECORD_NAME:
+        place.take_arm(True)
 
 
 def fresh(undone=False):
     chip = flash.Flash(undone)
     store.os = chip
-    store.open = chip.open
+    store.open = motion_file.open = chip.open
     place = store.Store("/flash/armtempo")
     put(place, "feed", OLD)
     put(place, "spare", OLD)

@@ -5,8 +5,10 @@ Arguments: motion records. Prints how many parts were compared, and the deepest 
 
 import sys
 
+from armtempo_board.memory import Memory
 from armtempo_board.stepgen import subdivision
 from armtempo_board.stepgen.subintervals import Subintervals
+from armtempo_shared import engine_memory
 from armtempo_shared.motion import Motion
 
 DEEPEST = 14
@@ -49,7 +51,7 @@ def walk(motion, joint, parts, number):
 
 def main(*records):
     """All joints of all records with the same buffers, as the board reuses them."""
-    parts = Subintervals()
+    parts = Subintervals(Memory(list(engine_memory.GENERATOR_PARTS)))
     found = []
     for number, record in enumerate(records):
         with open(record, "rb") as file:

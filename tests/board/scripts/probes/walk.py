@@ -11,9 +11,11 @@ from array import array
 
 import micropython
 from armtempo_board.errors import Refused
+from armtempo_board.memory import Memory
 from armtempo_board.motion import motion_check as checking
 from armtempo_board.motion import rate_check
 from armtempo_board.stepgen.step_generator import StepGenerator
+from armtempo_shared import engine_memory
 from armtempo_shared.motion import Motion
 
 MASK = 1023
@@ -60,13 +62,13 @@ def first_position(motion, joint):
 
 def main(pulse, gap, room, start, length, *records):
     """Walk all with one generator, as the board reuses them."""
-    generator = StepGenerator()
+    generator = StepGenerator(Memory(list(engine_memory.GENERATOR_PARTS)))
     for record in records:
         with open(record, "rb") as file:
             motion = Motion(file.read())
         wrong = None
         try:
-            checking.check(motion, [FREE] * motion.joints, int(gap))
+            checking.check(motion, [FREE] * motion.joints, int(gap), generator.subintervals)
         except Refused as refused:
             wrong = (refused.code, refused.joint, refused.value)
         print(wrong)

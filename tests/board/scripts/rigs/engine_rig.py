@@ -57,13 +57,16 @@ class StepGenerator:
     latest_kiticks = step_generator.StepGenerator.latest_kiticks
     write = step_generator.StepGenerator.write
 
-    def __init__(self):
+    def __init__(self, memory):
         self.ended = True
         self.at_turn = False
         self.direction = 1
         self.queue = array("i", bytes(4 * step_queue.QUEUE_SIZE))
 
     subintervals = None
+
+    def close(self):
+        """There is no file."""
 
     def load(self, motion, joint, position, pulse, gap):
         """Stand before the first step."""
@@ -178,12 +181,12 @@ class Pulses:
         self.last_fall = now
         self.falls += 1
 
-    def check_end(self, frozen=False):
-        """All pulses are whole, and DIR kept its times. After a freeze the last pulse may be longer."""
+    def check_end(self):
+        """All pulses are whole and none is longer, also the last one before a freeze; and DIR kept its times."""
         pulse = self._rig.head["pulse_ticks"]
         assert self.rises == self.falls, (self.rises, self.falls)
         assert self.shortest_pulse >= pulse, self.shortest_pulse
-        assert frozen or self.longest_pulse <= pulse, self.longest_pulse
+        assert self.longest_pulse <= pulse, self.longest_pulse
         assert self.shortest_hold >= self._rig.head["dir_hold_ticks"], self.shortest_hold
         assert self.shortest_setup >= self._rig.head["dir_setup_ticks"], self.shortest_setup
 
@@ -245,8 +248,15 @@ class Rig:
             Pulses(self, joint, pins.STEP[joint["channel"]][0], pins.DIR[joint["channel"]])
             for joint in joints
         ]
-        self.engine = armtempo_board.motion.engine.Engine(self.head, joints)
+        self.workspace = self._workspace()
+        self.engine = armtempo_board.motion.engine.Engine(self.head, joints, self.workspace)
         self.engine.home((1 << len(joints)) - 1, [0] * len(joints))
+
+    @staticmethod
+    def _workspace():
+        from armtempo_board.motion.workspace import Workspace
+
+        return Workspace(12 * 1026, 6)
 
     # a world for the board
 

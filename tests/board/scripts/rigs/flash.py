@@ -121,6 +121,17 @@ class File:
         self.at += len(data)
         return data
 
+    def readinto(self, buffer):
+        data = self.read(len(buffer))
+        buffer[: len(data)] = data
+        return len(data)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.close()
+
     def seek(self, at):
         self.at = at
 

@@ -3,7 +3,7 @@
 import sys
 import time
 
-from armtempo_shared import armrecord, motion, wire
+from armtempo_shared import armrecord, engine_memory, motion, wire
 
 
 class Module:
@@ -47,6 +47,9 @@ def install():
     pyb.Pin = Pin
     engine = Module()
     engine.Engine = Engine
+    room = Module()
+    room.workspace = Workspace
+    room.sample_bytes = lambda: 4096
     ends = Module()
     ends.duration_ticks = lambda motion: 84000
     ends.start_offset = lambda motion, joint, position: 7 - position
@@ -56,16 +59,26 @@ def install():
     sys.modules["machine"] = machine
     sys.modules["pyb"] = pyb
     sys.modules["armtempo_board.motion.engine"] = engine
+    sys.modules["armtempo_board.app.room"] = room
     sys.modules["armtempo_board.motion.endpoints"] = ends
     sys.modules["time"] = _install_time()
     if not hasattr(sys, "print_exception"):
         sys.print_exception = lambda error, file: file.write(repr(error))
 
 
+class Workspace:
+    """Says only how large it is."""
+
+    class memory:
+        size = engine_memory.LARGEST_WORDS
+
+    joints = 6
+
+
 class Engine:
     """Moves when told, ends when told; remembers what was asked of it."""
 
-    def __init__(self, head, joints):
+    def __init__(self, head, joints, workspace):
         self.joints = len(joints)
         self.limits = joints
         self.known = 0
@@ -123,6 +136,9 @@ class Engine:
         for joint in range(self.joints):
             if mask >> joint & 1:
                 self.steps[joint] = steps[joint]
+
+    def commanded(self, joint):
+        return self.steps[joint]
 
     def snapshot(self, raw):
         low = self.ticks & 0xFFFFFFFF

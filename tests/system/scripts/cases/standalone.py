@@ -221,7 +221,7 @@ def case_a_run_by_button_needs_no_host(world):
     yield from ready(world)
     yield from world.wait(3000)
     yield from tap(world)
-    yield from world.wait(2 * world.arm[0]["link_timeout_ms"])
+    yield from world.wait(world.arm[0]["link_timeout_ms"] * 3 // 2)
     assert world.led() == "moving"
     yield from moved(world, 1)
 

@@ -264,6 +264,18 @@ def case_pins():
     assert len(found[4 * 16 + 7]) == 3 and len(found[3 * 16 + 8]) == 2
 
 
+def case_step_1_is_low_from_the_first_line_on():
+    """A reset pulls PA15 up, as it is one of JTAG's pins; boot.py drives it low before anything else."""
+    board = standalone.start()
+    line = board.pins.line("A15")
+    assert line.read() == 1
+    with open(__file__.rsplit("/tests/", 1)[0] + "/board/armtempo_board/boot.py") as file:
+        first = next(text for text in file.read().split("\n") if text.startswith("pyb."))
+    exec(first, {"pyb": pyb})
+    board.spend(1)
+    assert line.mode() == 1 and line.read() == 0
+
+
 def case_external_interrupt_within_20_us():
     board = standalone.start()
     seen = []

@@ -45,7 +45,7 @@ class Trap:
 
 
 NEVER = (
-    "fail", "freeze", "_freeze", "finish_pulses", "halt", "_stopped",  # what stops the outputs
+    "fail", "freeze", "_trip", "halt", "_stopped",  # what stops the outputs
     "turn", "run", "_serve_panel",  # what catches exceptions
     "arm_channel", "release_channel", "disable_irq", "enable_irq", "release",  # interrupts are off there
 )  # fmt: skip

@@ -103,11 +103,11 @@ class Channel:
             times.append(due)
             count += 1
             if not preload:
-                ahead = ring[place - 1]
+                ahead = ring[place - 1] & 0xFFFFFFFF
             gap = (ahead - ccr) & 0xFFFFFFFF
             ccr = ahead
             due += gap if gap > DMA_DELAY_TICKS else gap + 0x100000000
-            ahead = ring[place]
+            ahead = ring[place] & 0xFFFFFFFF
             place += 1
             if place == size:
                 place = 0

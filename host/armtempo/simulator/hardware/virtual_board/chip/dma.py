@@ -65,7 +65,7 @@ class Stream:
         self.ring = ring
         self.size = self.left
         self.place = 1 % self.size
-        self.ahead = ring[0]
+        self.ahead = ring[0] & 0xFFFFFFFF
 
     def target(self):
         """Word index of the register that the stream writes."""

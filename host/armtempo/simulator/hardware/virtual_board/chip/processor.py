@@ -62,6 +62,8 @@ class Chip:
         self.millisecond = None
         self.next_ms = TICKS_PER_MS
         memory.poke(memory.index("IWDG") + 2, 0xFFF)
+        for port, register, value in gpio.AT_RESET:
+            memory.poke(memory.index(port) + register, value)
         self.sync(True)
 
     # -- what the program wrote ------------------------------------------------------------------
@@ -90,7 +92,7 @@ class Chip:
     def _sync_pins(self, names):
         routed = False
         for port in self.pins.ports:
-            if memory.BLOCKS[memory.index("GPIOA") // memory.BLOCK_WORDS + port.index] in names:
+            if "GPIO" + gpio.PORTS[port.index] in names:
                 routed = port.sync(self.now) or routed
         if routed:
             self.pins.route((self.timers[2], self.timers[5]))

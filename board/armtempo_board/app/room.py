@@ -1,0 +1,52 @@
+"""How the heap is shared out when the program starts: to the engine, to samples, to the rest.
+
+The rest are link and commands, the modules that come and go (storage, commands about the store, the check of a motion),
+and what these need while they are at work: docs/memory.md.
+"""
+
+import gc
+
+from armtempo_shared import engine_memory
+from armtempo_shared.limits import MAX_JOINTS
+
+from armtempo_board.motion.workspace import Workspace
+
+_RESERVE = 14_400  # bytes of heap for the rest
+_USUAL_JOINTS = 3  # there is heap for their objects before there is memory for larger rings
+_MOST_SAMPLES = 4096  # bytes of the sample buffer at most,
+_LEAST_SAMPLES = 1024  # and at least;
+_SAMPLES_SHARE = 16  # between them, this part of the free heap
+_STEP_WORDS = 64
+
+
+def workspace() -> "Workspace":
+    """For the largest arm that fits."""
+    gc.collect()
+    free = _free()
+    if not free:
+        return Workspace(engine_memory.LARGEST_WORDS, MAX_JOINTS)
+    room = max(free - _RESERVE, 0)
+    words = max(room - engine_memory.object_bytes(_USUAL_JOINTS), 0) // 4
+    words = min(words, engine_memory.LARGEST_WORDS)
+    joints = 0
+    while joints < MAX_JOINTS and 4 * words + engine_memory.object_bytes(joints + 1) <= room:
+        joints += 1
+    while True:
+        try:
+            return Workspace(words, joints)
+        except MemoryError:  # the heap has no such blocks
+            words -= _STEP_WORDS
+            gc.collect()
+
+
+def sample_bytes() -> int:
+    """For the memory of samples."""
+    gc.collect()
+    free = _free()
+    return min(max(free // _SAMPLES_SHARE, _LEAST_SAMPLES), _MOST_SAMPLES) if free else _MOST_SAMPLES
+
+
+def _free() -> int:
+    """0 where it is not known."""
+    free = getattr(gc, "mem_free", None)
+    return int(free()) if free else 0

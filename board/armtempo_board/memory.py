@@ -1,0 +1,41 @@
+"""Memory that is taken once, in some blocks, and handed out in parts again and again."""
+
+from array import array
+
+from micropython import const
+
+_PIECE_WORDS = const(64)
+
+
+class Memory:
+    """``blocks``: so many words of 32 bits each. MemoryError where the heap has one of them not in one piece."""
+
+    def __init__(self, blocks: "list[int]") -> None:
+        self._blocks = [_zeros(words) for words in blocks]
+        self._taken = [0] * len(blocks)
+        self.size = sum(blocks)
+
+    def release(self) -> None:
+        """Take all parts back; who has one uses it no more."""
+        for number in range(len(self._taken)):
+            self._taken[number] = 0
+
+    def take(self, words: int) -> "memoryview[int]":
+        """A part of so many words, signed, all 0, from the first block that has them; MemoryError where none has."""
+        for number, block in enumerate(self._blocks):
+            begin = self._taken[number]
+            end = begin + words
+            if end <= len(block):
+                self._taken[number] = end
+                for word in range(begin, end):
+                    block[word] = 0
+                return memoryview(block)[begin:end]
+        raise MemoryError
+
+
+def _zeros(words: int) -> "array[int]":
+    """It grows in place: made of a buffer, it would need its size twice."""
+    block = array("i")
+    for begin in range(0, words, _PIECE_WORDS):
+        block.extend(array("i", bytes(4 * min(_PIECE_WORDS, words - begin))))
+    return block

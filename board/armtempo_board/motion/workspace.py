@@ -1,0 +1,35 @@
+"""What one engine after the other works in, made once: the heap is as it was when an arm gives way to another."""
+
+from armtempo_board.hardware.sampler import Sampler
+from armtempo_board.memory import Memory
+from armtempo_board.motion.ring_feeder import RingFeeder
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
+
+class Workspace:
+    """``words`` of memory for rings and step generators, ``joints`` at most: see ``armtempo_shared.engine_memory``.
+
+    The interrupts' callbacks belong to it, so they never hold what an engine had before.
+    """
+
+    def __init__(self, words: int, joints: int) -> None:
+        from armtempo_shared.engine_memory import blocks  # here, so that it can be forgotten
+
+        self.joints = joints
+        self.memory = Memory(blocks(words))
+        self.sampler = Sampler()
+        self.feeder = RingFeeder(self.sampler.block)
+
+    def rings(self, rates: "list[int]") -> "list[Any]":
+        """Take all memory back and out of it, the largest first, the words of a ring for each of these step rates."""
+        from armtempo_shared.engine_memory import ring_words  # here, so that it can be forgotten
+
+        self.memory.release()
+        sizes = [ring_words(rate) for rate in rates]
+        found: "dict[int, Any]" = {}
+        for joint in sorted(range(len(sizes)), key=lambda joint: -sizes[joint]):
+            found[joint] = self.memory.take(sizes[joint])
+        return [found[joint] for joint in range(len(sizes))]

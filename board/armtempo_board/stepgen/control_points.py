@@ -1,0 +1,61 @@
+"""The control points of one spline of a stored motion, read from its file in pieces as the walk comes to them.
+
+So a motion takes the same memory whatever its size. Reading allocates nothing; only the flash is read, never written.
+"""
+
+import micropython
+from micropython import const
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
+_KEPT = const(5)  # points of the piece before: as many as a quintic segment shares with the next
+_FRESH = const(5)  # points read at once
+WINDOW_WORDS = const(20)
+"""Words of a window: two a point."""
+_FRESH_AT = const(10)  # word
+
+
+@micropython.viper
+def _keep_last(words: ptr32) -> object:
+    """Move the last _KEPT points to the beginning."""
+    i = 0
+    while i < _FRESH_AT:
+        words[i] = words[i + WINDOW_WORDS - _FRESH_AT]
+        i += 1
+
+
+def _too_short() -> int:
+    raise OSError("the motion's file ends too early")
+
+
+class ControlPoints:
+    """``words``: memory of WINDOW_WORDS, in which points stand as in the record (int64, little endian)."""
+
+    def __init__(self, words: "memoryview") -> None:
+        self.words = words
+        self._fresh = memoryview(words)[_FRESH_AT:]
+        self._stream: "Any" = None
+        self._end = 0
+        self._degree = 0
+
+    def open(self, stream: "Any", degree: int) -> None:
+        """Stand before the first segment; ``stream`` is read from where it stands, and closed by ``close``."""
+        self.close()
+        self._stream = stream
+        self._end = 0  # points read so far
+        self._degree = degree
+
+    def close(self) -> None:
+        """Close the file."""
+        if self._stream:
+            self._stream.close()
+            self._stream = None
+
+    def seek(self, segment: int) -> int:
+        """Word at which the control points of a segment begin; segments are asked for in their order."""
+        while segment + self._degree >= self._end:
+            _keep_last(self.words)
+            self._end += _FRESH if self._stream.readinto(self._fresh) else _too_short()
+        return 2 * (segment - self._end + _KEPT + _FRESH)

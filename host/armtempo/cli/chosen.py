@@ -1,0 +1,183 @@
+"""What the shared options name: the board, the arm, the job, the plan, and the rules where an option is missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from armtempo.project.settings import ARM, JOB, RUNS, ProjectSettings, nothing_set
+
+if TYPE_CHECKING:
+    from armtempo.link.traffic import Sink
+    from armtempo.model.arm import Arm
+    from armtempo.model.job import Job
+    from armtempo.model.plan import Plan
+    from armtempo.robot.board import Board
+
+
+def tell(text: str) -> None:
+    """Say something beside the command's output."""
+    click.echo(text, err=True)
+
+
+# arm and job
+
+
+def named_arm(path: Path | None) -> Arm | None:
+    """The arm of ``--arm``, of the variable or of the project folder; None where none is named."""
+    setting = ProjectSettings().get(ARM, path)
+    if not setting:
+        return None
+    from armtempo.model.arm import Arm
+
+    return Arm.load(setting.path)
+
+
+def arm_file(path: Path | None) -> Path:
+    """The file of the same, or the paper's arm's, which is said aloud."""
+    from armtempo.model import shipped
+
+    setting = ProjectSettings().get(ARM, path)
+    if not setting:
+        tell(f"no arm is named; this is for the one that ships with armtempo, {shipped.PAPER!r}")
+    return shipped.find(setting.value or shipped.PAPER).path
+
+
+def load_arm(path: Path | None) -> Arm:
+    """The same; InputError where none is named."""
+    found = named_arm(path)
+    if found is None:
+        raise nothing_set(ARM, "which arm?")
+    return found
+
+
+def arm_or_paper(path: Path | None) -> Arm:
+    """The same, for commands that move nothing: without one the paper's arm, which is said aloud."""
+    found = named_arm(path)
+    if found is None:
+        from armtempo.model.arm import Arm
+
+        found = Arm.paper()
+        tell(f"no arm is named; this is for the one that ships with armtempo, {found.name!r}")
+    return found
+
+
+def load_job(path: Path | None, arm: Arm) -> Job:
+    """The job of ``--job``, of the variable or of the project folder; InputError where none is named."""
+    setting = ProjectSettings().get(JOB, path)
+    if not setting:
+        raise nothing_set(JOB, "which job?")
+    from armtempo.model.job import Job
+
+    return Job.load(setting.path, arm)
+
+
+def arm_and_job(arm_path: Path | None, job_path: Path | None) -> tuple[Arm, Job]:
+    """What to plan: both as they are named, or, where neither is, the demo's.
+
+    InputError where only one of them is named: a job is never planned for an arm that nobody has named.
+    """
+    settings = ProjectSettings()
+    arm, job = settings.get(ARM, arm_path), settings.get(JOB, job_path)
+    if arm or job:
+        if not arm:
+            raise nothing_set(ARM, f"job {job.value} ({job.source}) is for which arm?")
+        loaded = load_arm(arm_path)
+        return loaded, load_job(job_path, loaded)
+    from armtempo.model.arm import Arm
+    from armtempo.model.job import Job
+
+    tell("no arm and no job are named; these are the feeding job and the arm that ship with armtempo")
+    return Arm.paper(), Job.paper()
+
+
+def arm_of_board(board: Board, named: Arm | None) -> Arm:
+    """The arm that is named; else the one that ships with armtempo, if the board is set up for just that.
+
+    InputError where neither is.
+    """
+    if named is not None:
+        return named
+    from armtempo.model.arm import Arm
+    from armtempo.robot.board_state import record_crc
+
+    paper = Arm.paper()
+    if board.info.arm_crc == record_crc(paper):
+        tell(f"arm: {paper.name}, which the board is set up for")
+        return paper
+    has = "another than the one that ships with armtempo" if board.info.arm_crc else "none yet"
+    raise nothing_set(ARM, f"which arm does the board move? It is set up for {has}")
+
+
+def words(arm: Arm) -> str:
+    """An arm as commands name it."""
+    return source_words(arm.name, arm.source)
+
+
+def source_words(name: str, source: str) -> str:
+    """An arm's name and file; the one that ships with armtempo needs no path."""
+    ships = Path(source).is_relative_to(Path(__file__).parents[1]) if source else False
+    where = "as it ships with armtempo" if ships else source
+    return f"{name} ({where})" if where else name
+
+
+# plans
+
+
+def is_file(what: str) -> bool:
+    """Whether an argument names a trajectory file rather than a motion on the board."""
+    path = Path(what)
+    return path.suffix == ".json" or path.is_file()
+
+
+def load_plan(path: Path, arm_path: Path | None, altered: bool = False) -> Plan:
+    """The plan of a trajectory file, which must fit the arm that is named, if one is."""
+    from armtempo import pipeline
+
+    return pipeline.load(path, named_arm(arm_path), altered)
+
+
+# board
+
+
+def port(given: str | None, others: bool = False) -> str:
+    """The port of ``--port``, of the variable or of the project folder, else the one that can be meant, said aloud.
+
+    ``others``: one that another armtempo program has open will do too.
+    """
+    from armtempo.project import board_port
+
+    setting = board_port.choose(given, others)
+    if setting.source in board_port.UNASKED:
+        tell(f"port {setting.value}: {setting.source}")
+    return setting.value
+
+
+def runs(out: Path | None) -> Path:
+    """Where run folders go."""
+    return ProjectSettings().get(RUNS, out).path
+
+
+def board(
+    port: str | None,
+    log_traffic: Path | None = None,
+    arm: Arm | None = None,
+    any_program: bool = False,
+    sink: Sink | None = None,
+) -> Board:
+    """The board of ``--port``; a virtual one moves ``arm``, and is said to be one; ``sink`` takes the traffic."""
+    from armtempo.robot.connect import connect
+
+    found = connect(port, arm, log_traffic=log_traffic, sink=sink, any_program=any_program, tell=tell)
+    if found.info.virtual:
+        tell(f"port {found.port}: {virtual_words(found.port)}")
+    return found
+
+
+def virtual_words(port: str) -> str:
+    """What kind of virtual board is on a port."""
+    from armtempo.ports.names import SIM
+
+    return "a virtual board, which ends with this command" if port == SIM else "a virtual board"

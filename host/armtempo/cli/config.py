@@ -1,0 +1,57 @@
+"""``armtempo config``: what is set, and where it comes from."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from armtempo.cli import options
+from armtempo.errors import InputError
+from armtempo.project import settings
+from armtempo.project.settings import ProjectSettings, Setting
+
+
+@click.command()
+@options.arm
+@options.port
+@options.job
+@options.out
+@options.as_json
+def command(
+    arm_path: Path | None, port: str | None, job_path: Path | None, out: Path | None, as_json: bool
+) -> None:
+    """Show what a command in this folder, with these options, takes for arm, port, job and run folder, and why.
+
+    An option wins over a variable (ARMTEMPO_ARM, ARMTEMPO_PORT, ARMTEMPO_JOB, ARMTEMPO_RUNS), and that over
+    armtempo.toml in this folder or the nearest one above it.
+    """
+    project = ProjectSettings()
+    given = {settings.ARM: arm_path, settings.PORT: port, settings.JOB: job_path, settings.RUNS: out}
+    found = {name: project.get(name, value) for name, value in given.items()}
+    unset = {settings.PORT: _unset_port(found)}
+    if as_json:
+        values = {
+            name: {"value": one.value or None, "source": one.source or None} for name, one in found.items()
+        }
+        click.echo(json.dumps({"project": str(project.file) if project.file else None, "settings": values}))
+        return
+    click.echo(f"project   {project.file or 'none: no armtempo.toml here or above'}")
+    for name, one in found.items():
+        click.echo(
+            f"{name:<10}{one.value} ({one.source})" if one else f"{name:<10}{unset.get(name, 'not set')}"
+        )
+
+
+def _unset_port(found: dict[str, Setting]) -> str:
+    """What happens where no port is set."""
+    if found[settings.PORT]:
+        return ""
+    from armtempo.project import board_port
+
+    try:
+        one = board_port.choose()
+    except InputError:
+        return "not set, and not exactly one board is plugged in"
+    return f"{one.value} ({one.source})"

@@ -1,0 +1,123 @@
+"""``armtempo doctor``: one screen about machine, project and board, to paste into a question."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from armtempo.cli import chosen, options
+from armtempo.errors import ArmtempoError
+from armtempo.project import settings
+from armtempo.project.settings import ProjectSettings
+
+if TYPE_CHECKING:
+    from armtempo.doctor import Item
+    from armtempo.robot.board_state import BoardState
+
+
+@click.command()
+@options.arm
+@options.port
+@options.as_json
+def command(arm_path: Path | None, port: str | None, as_json: bool) -> None:
+    """Examine Python, packages, ports, permissions, project, arm file and board, and say what to do.
+
+    Nothing is changed and nothing moves. Without a port it looks at the one board that is plugged in, if there is one.
+    Exit code 1 where something is wrong.
+    """
+    from armtempo import doctor
+
+    parts = {
+        "machine": doctor.examine_machine(),
+        "packages": doctor.packages(),
+        "ports": doctor.ports(),
+        "project": _project(arm_path, port),
+        "arm": _arm(arm_path),
+        "board": _board(port, arm_path),
+    }
+    wrong = any(item.level is doctor.Condition.WRONG for items in parts.values() for item in items)
+    if as_json:
+        click.echo(json.dumps({part: [_values(item) for item in items] for part, items in parts.items()}))
+    else:
+        _print(parts)
+    if wrong:
+        raise SystemExit(1)
+
+
+def _project(arm_path: Path | None, port: str | None) -> list[Item]:
+    from armtempo.doctor import Condition, Item
+
+    project = ProjectSettings()
+    given = {settings.ARM: arm_path, settings.PORT: port}
+    try:
+        found = [project.get(name, given.get(name)) for name in settings.NAMES]
+    except ArmtempoError as error:
+        return [Item("armtempo.toml", str(error), Condition.WRONG, "correct that")]
+    return [Item(one.name, f"{one.value} ({one.source})" if one else "not set") for one in found]
+
+
+def _arm(arm_path: Path | None) -> list[Item]:
+    from armtempo import doctor
+    from armtempo.model import shipped
+
+    try:
+        setting = ProjectSettings().get(settings.ARM, arm_path)
+        return doctor.examine_arm(shipped.find(setting.value).path) if setting else []
+    except ArmtempoError as error:
+        return [doctor.Item("arm file", str(error), doctor.Condition.WRONG, "name an arm file that is there")]
+
+
+def _board(port: str | None, arm_path: Path | None) -> list[Item]:
+    from armtempo import doctor
+    from armtempo.project import board_port
+
+    try:
+        name = board_port.choose(port, others=True).value
+    except ArmtempoError:  # none was named and none can be meant: nothing is wrong with that
+        return [
+            doctor.Item("board", "not looked at", doctor.Condition.NOTE, "give --port PORT, or --port sim")
+        ]
+    try:
+        return doctor.examine_board(_named(_state(name), arm_path))
+    except ArmtempoError as error:
+        return doctor.examine_board(error)
+
+
+def _state(port: str) -> BoardState:
+    """Through another program where it has the port."""
+    from armtempo.robot import shared_board
+
+    shared = shared_board.find(port)
+    if shared is not None:
+        with shared:
+            return shared.state()
+    with chosen.board(port, any_program=True) as board:
+        return board.state()
+
+
+def _named(state: BoardState, arm_path: Path | None) -> BoardState:
+    """With the name of the arm that the board is set up for, where that is the one named here."""
+    try:
+        arm = chosen.named_arm(arm_path)
+    except ArmtempoError:  # told where the arm was examined
+        return state
+    return state if arm is None else state.named(arm)
+
+
+def _values(item: Item) -> dict[str, str]:
+    return {**asdict(item), "level": item.level.value}
+
+
+def _print(parts: dict[str, list[Item]]) -> None:
+    width = max(len(item.what) for items in parts.values() for item in items)
+    for part, items in parts.items():
+        if items:
+            click.echo(part)
+        for item in items:
+            click.echo(f"  {item.level.value:<6}{item.what:<{width}}  {item.found}")
+            if item.next_step:
+                click.echo(f"  {'':<6}{'':<{width}}  -> {item.next_step}")

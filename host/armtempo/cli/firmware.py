@@ -1,0 +1,89 @@
+"""``armtempo firmware``: build a MicroPython firmware with the board program in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from armtempo.cli import options
+from armtempo.cli.flash import put_on_board
+from armtempo.cli.progress import ProgressBar
+from armtempo.errors import InputError
+
+
+@click.command()
+@click.option(
+    "--board",
+    metavar="NAME",
+    help="STM32F4DISC, OLIMEX_H407, VCC_GND_F407ZG, PYBV11, another board of MicroPython with an STM32F405 or "
+    "F407, or a folder that defines one.",
+)
+@click.option(
+    "--micropython",
+    type=click.Path(file_okay=False, path_type=Path),
+    metavar="DIR",
+    help="A checkout of MicroPython with its submodules.",
+)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    metavar="FOLDER",
+    help="Where the firmware goes, a new folder; without it firmware-NAME here.",
+)
+@click.option(
+    "--flash",
+    "flash_too",
+    is_flag=True,
+    help="Then put it on the board of --port, as 'armtempo flash' does.",
+)
+@click.option(
+    "--program",
+    type=click.Path(file_okay=False, path_type=Path),
+    metavar="FOLDER",
+    help="Instead write FOLDER with the program and a manifest.py, for a build of your own.",
+)
+@options.flash_port
+@options.flash_tool
+def command(
+    board: str | None,
+    micropython: Path | None,
+    out: Path | None,
+    flash_too: bool,
+    program: Path | None,
+    port: str | None,
+    tool: str | None,
+) -> None:
+    """Build a MicroPython firmware with the board program in it.
+
+    There it takes a third of the heap that it takes as files. Needs make, gcc and arm-none-eabi-gcc; what is
+    missing is named with the command that brings it.
+    """
+    from armtempo.deploy.firmware import frozen
+
+    if program is not None:
+        frozen.write(program)
+        click.echo(
+            f"written: {program}; for MicroPython's make: FROZEN_MANIFEST={program.resolve() / frozen.MANIFEST}"
+        )
+        return
+    from armtempo.deploy import changes
+    from armtempo.deploy.firmware import build, checkout
+
+    if board is None or micropython is None:
+        raise InputError(
+            "--board and --micropython are needed",
+            f"give both; a checkout of MicroPython: {checkout.how_to_get(micropython or Path('micropython'))}",
+        )
+    folder = out or Path(f"firmware-{Path(board).name}")
+    with ProgressBar("building") as progress:
+        made = build.build(micropython, board, folder, progress)
+    click.echo(
+        f"{folder}: MicroPython {made.micropython} for {made.machine}, with the program {made.program_crc:08x}"
+    )
+    if changes.lacks_pins(made.machine):
+        click.echo(f"it cannot drive an arm: {changes.NO_PINS}; {changes.MORE_PINS}", err=True)
+    if flash_too:
+        put_on_board(folder, port, tool)
+    else:
+        click.echo(f"onto the board: armtempo flash {folder} --port PORT; then armtempo deploy --port PORT")

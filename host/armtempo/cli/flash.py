@@ -1,0 +1,34 @@
+"""``armtempo flash``: put a built firmware on a board."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from armtempo.cli import options
+from armtempo.cli.progress import ProgressBar
+from armtempo.project.settings import PORT, ProjectSettings
+
+
+@click.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@options.flash_port
+@options.flash_tool
+def command(folder: Path, port: str | None, tool: str | None) -> None:
+    """Put a firmware on a board: FOLDER as 'armtempo firmware' makes it, or a release brings it.
+
+    The board of --port is put in its bootloader first, which is refused while it moves; without --port one that
+    is there already, or has an ST-LINK, is flashed. Files in its flash are kept.
+    """
+    put_on_board(folder, port, tool)
+
+
+def put_on_board(folder: Path, port: str | None, tool: str | None) -> None:
+    """Put the firmware in ``folder`` on the board, and say what comes next."""
+    from armtempo.deploy.firmware.flash import flash
+
+    found = ProjectSettings().get(PORT, port).value or None
+    with ProgressBar("flashing") as progress:
+        flash(folder, found, tool, click.echo, progress)
+    click.echo(f"flashed; the start files are next: armtempo deploy --port {found or 'PORT'}")

@@ -1,0 +1,69 @@
+"""A board's state in lines, as ``status`` and ``stop`` print it."""
+
+from __future__ import annotations
+
+from armtempo.cli import chosen
+from armtempo.robot.board_state import BoardState, JointState
+
+
+def lines(state: BoardState) -> list[str]:
+    """Who the board is, what it is doing, where the joints are."""
+    virtual = f", {chosen.virtual_words(state.port)}" if state.virtual else ""
+    current = "" if state.program_current else "; another than the one installed here: 'armtempo deploy'"
+    return [
+        f"board     {state.board_id}{virtual}",
+        f"port      {state.port}",
+        f"program   {state.program_crc:08x}, protocol {state.protocol}{current}",
+        f"arm       {_arm(state)}",
+        f"free      {state.free_flash} bytes of flash, {state.free_heap} of heap",
+        f"fastest   {state.max_rate} steps/s one joint, {state.max_rate_sum} all together",
+        f"engine    {state.room}",
+        *motion_lines(state),
+    ]
+
+
+def motion_lines(state: BoardState) -> list[str]:
+    """What the board is doing, where the joints are."""
+    found = [f"state     {state.state}"]
+    if state.fault:
+        found.append(f"fault     {state.fault}; see 'armtempo clear'")
+    found += [f"          {line}" for line in joint_lines(state)]
+    found.append(f"link      {_link(state)}")
+    return found
+
+
+def joint_lines(state: BoardState) -> list[str]:
+    """A line a joint: its name, its angle with the steps, the encoder's angle with the counts."""
+    from armtempo.formats.text_table import aligned
+
+    rows = [_cells(joint) for joint in state.joints]
+    return [row.rstrip() for row in aligned(rows, (12, 10, 1, 1))] if rows else []
+
+
+def _link(state: BoardState) -> str:
+    if not state.frames_bad and not state.samples_lost:
+        return "sound: no message arrived damaged, no sample was lost"
+    return (
+        f"messages damaged {state.frames_bad} times, {state.samples_lost} samples lost: check cable and plugs"
+    )
+
+
+def _arm(state: BoardState) -> str:
+    if state.arm_problem:
+        return state.arm_problem
+    if not state.arm_crc:
+        return "none yet; 'armtempo configure' sets the board up for one"
+    record = f"{len(state.joints)} joints, record {state.arm_crc:08x}"
+    if state.arm:
+        return f"{chosen.source_words(state.arm, state.arm_source)}: {record}"
+    return f"{record}; name its file with --arm to see degrees"
+
+
+def _cells(joint: JointState) -> tuple[str, str, str, str]:
+    steps, counts = f"{joint.steps} steps", f"{joint.counts} counts"
+    if not joint.known:
+        return joint.name, "position unknown", f"({steps})", f"  ({counts})"
+    if joint.angle_deg is None:
+        return joint.name, steps, "", f"  {counts}"
+    encoder = "" if joint.encoder_deg is None else f"  encoder {joint.encoder_deg + 0.0:.2f}° ({counts})"
+    return joint.name, f"{round(joint.angle_deg, 2) + 0.0:.2f}°", f"({steps})", encoder

@@ -1,0 +1,138 @@
+"""One board's firmware with the program, built by MicroPython's own makefiles and put into a folder."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from armtempo.deploy import package
+from armtempo.deploy.firmware import checkout, frozen, image, toolchain
+from armtempo.deploy.firmware.checkout import BoardDefinition, Checkout
+from armtempo.errors import InputError, ToolError
+from armtempo.link.program_version import own_crc
+from armtempo.progress import Progress
+
+_SAID_LINES = 12
+"""Of a build that fails, the last ones are shown."""
+_SAID_COLUMNS = 200
+_FILES = 330
+"""That a build compiles, about; for its progress."""
+_WHOLE = ("firmware.dfu", "firmware.hex", "firmware.elf")
+"""The same firmware in one file, for other tools."""
+
+
+def build(micropython: Path, board: str, out: Path, progress: Progress) -> image.Image:
+    """Build the firmware of a board, by its name in MicroPython or a folder that defines it, into a new folder ``out``.
+
+    What the compiler makes stays in the checkout, in ``ports/stm32/build-BOARD-armtempo``, so the next build is short.
+    Raises InputError where checkout, submodules or board do not suit or ``out`` holds something, ToolError where a
+    compiler is missing or the build fails; ``out`` is then as it was.
+    """
+    found = checkout.look(micropython)
+    definition = checkout.board(found, board)
+    checkout.check_submodules(found, definition)
+    toolchain.check(with_mpy_cross=not toolchain.has_mpy_cross(found.folder))
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise InputError(f"{out} is there already", "name a new folder with --out")
+    built = _make(found, definition, progress)
+    made = image.Image(
+        definition.name,
+        definition.machine,
+        found.release,
+        toolchain.version(),
+        own_crc(),
+        _pieces(definition),
+    )
+    _check_room(built, made, definition)
+    _put(built, made, out)
+    return made
+
+
+def _pieces(definition: BoardDefinition) -> tuple[image.Piece, ...]:
+    """The files that MicroPython's build makes, one for each address."""
+    if len(definition.addresses) == 1:
+        return (image.Piece("firmware.bin", definition.addresses[0]),)
+    return tuple(
+        image.Piece(f"firmware{number}.bin", address) for number, address in enumerate(definition.addresses)
+    )
+
+
+def _make(found: Checkout, definition: BoardDefinition, progress: Progress) -> Path:
+    """Run make; the folder with what it built."""
+    built = found.port / f"build-{definition.name}-armtempo"
+    program = built / "armtempo"
+    shutil.rmtree(program, ignore_errors=True)
+    frozen.write(program, definition.manifest)
+    common = [f"-j{os.cpu_count() or 1}"]
+    if not toolchain.has_mpy_cross(found.folder):
+        _run(["make", "-C", str(found.folder / "mpy-cross"), *common], lambda: None)
+    count = 0
+
+    def step() -> None:
+        nonlocal count
+        count = min(count + 1, _FILES - 1)
+        progress(count, _FILES)
+
+    board = f"BOARD_DIR={definition.folder}"
+    _run(
+        [
+            "make",
+            "-C",
+            str(found.port),
+            *common,
+            board,
+            f"BUILD={built}",
+            f"FROZEN_MANIFEST={program / frozen.MANIFEST}",
+        ],
+        step,
+    )
+    progress(_FILES, _FILES)
+    return built
+
+
+def _run(command: list[str], step: Callable[[], None]) -> None:
+    """Run make, with a step for each line that it prints; ToolError with its last lines where it fails."""
+    said: list[str] = []
+    with subprocess.Popen(
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    ) as process:
+        assert process.stdout is not None
+        try:
+            for line in process.stdout:
+                said = [*said[1 - _SAID_LINES :], line.rstrip()[:_SAID_COLUMNS]]
+                step()
+        except BaseException:
+            process.terminate()
+            raise
+    if process.returncode:
+        raise ToolError(
+            "MicroPython's build failed:\n  " + "\n  ".join(said),
+            f"see the whole of it with {' '.join(command)}; with another version of MicroPython or of the compiler "
+            f"than {checkout.RELEASE} and gcc 12 to 14, try those",
+        )
+
+
+def _check_room(built: Path, made: image.Image, definition: BoardDefinition) -> None:
+    """ToolError where the firmware is larger than the chip's flash, which MicroPython's linker takes for 1 MB."""
+    last = made.pieces[-1]
+    end = last.address + (built / last.file).stat().st_size
+    if end > definition.flash_end:
+        raise ToolError(
+            f"the firmware is {end - definition.flash_end} bytes larger than the flash of {definition.machine}",
+            "use the program as files, with MicroPython's own firmware ('armtempo deploy')",
+        )
+
+
+def _put(built: Path, made: image.Image, out: Path) -> None:
+    """Copy the files aside and give them their place whole."""
+    files = {piece.file: (built / piece.file).read_bytes() for piece in made.pieces}
+    files |= {name: (built / name).read_bytes() for name in _WHOLE if name not in files}
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=out.parent, prefix=f".{out.name}.") as name:
+        whole = Path(name) / "whole"
+        package.fill(whole, {**files, image.ABOUT: image.about(made)})
+        os.replace(whole, out)

@@ -1,0 +1,48 @@
+"""The board program as a folder from which MicroPython's own build makes it a part of the firmware.
+
+The sources go in as they are. Machine code, byte code, names and line numbers then stay in the flash.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from armtempo.deploy import package, program_files
+from armtempo.link.program_version import PACKAGES, own_crc
+
+MANIFEST = "manifest.py"
+USUAL_MANIFEST = "$(PORT_DIR)/boards/manifest.py"
+"""What is frozen into most boards of MicroPython's stm32 port."""
+HASH = f"{PACKAGES[1]}/firmware.py"
+"""Module of the shared package that only a firmware has."""
+_HASH_MODULE = f'''"""The hash of the program in this firmware, by which host and board compare theirs."""
+
+
+def program_crc(board, shared):
+    """The hash; the arguments are for programs in files."""
+    from {PACKAGES[1]}.firmware import CRC
+
+    return CRC
+'''
+"""Replaces the shared package's module that computes the hash from files."""
+
+
+def write(folder: Path, board_manifest: str = USUAL_MANIFEST) -> None:
+    """Write the program's sources and a manifest for MicroPython's FROZEN_MANIFEST into a new or empty folder.
+
+    ``board_manifest``: what else is frozen. Raises InputError where the folder holds something already or
+    cannot be written.
+    """
+    package.fill(folder, files(board_manifest))
+
+
+def files(board_manifest: str = USUAL_MANIFEST) -> dict[str, bytes]:
+    """The folder's files by their path in it."""
+    sources = {name: path.read_bytes() for name, path in program_files.modules().items()}
+    manifest = Path(__file__).with_name(MANIFEST).read_text(encoding="utf-8")
+    made = {
+        f"{PACKAGES[1]}/program_hash.py": _HASH_MODULE,
+        HASH: f"CRC = 0x{own_crc():08X}\n",
+        MANIFEST: manifest.replace(USUAL_MANIFEST, board_manifest),
+    }
+    return sources | {name: text.encode() for name, text in made.items()}

@@ -1,0 +1,55 @@
+"""Python, the operating system, and the packages that armtempo uses."""
+
+from __future__ import annotations
+
+import platform
+import re
+import sys
+from importlib.metadata import PackageNotFoundError, requires, version
+
+from armtempo.doctor.item import Condition, Item
+
+LEAST_PYTHON = (3, 11)
+
+
+def examine_machine() -> list[Item]:
+    """Versions of armtempo, Python and the operating system."""
+    from armtempo import __version__
+
+    python = f"{platform.python_version()} ({platform.python_implementation()})"
+    fits = sys.version_info[:2] >= LEAST_PYTHON
+    least = ".".join(map(str, LEAST_PYTHON))
+    return [
+        Item("armtempo", __version__),
+        Item(
+            "Python",
+            python,
+            Condition.GOOD if fits else Condition.WRONG,
+            "" if fits else f"install Python {least} or newer",
+        ),
+        Item("system", f"{platform.system()} {platform.release()}, {platform.machine()}"),
+    ]
+
+
+def packages() -> list[Item]:
+    """Each package that armtempo needs or can use, with its version, or how to get it."""
+    found = []
+    for requirement in requires("armtempo") or []:
+        name = re.split(r"[^A-Za-z0-9._-]", requirement)[0]
+        extra = re.search(r"extra == ['\"](\w+)['\"]", requirement)
+        if extra is not None and extra[1] == "docs":  # for developers
+            continue
+        found.append(_package(name, extra[1] if extra else ""))
+    return found
+
+
+def _package(name: str, extra: str) -> Item:
+    """A package of the core (``extra`` = "") or of an extra."""
+    try:
+        return Item(name, version(name))
+    except PackageNotFoundError:
+        if extra:
+            return Item(
+                name, "not installed", Condition.NOTE, f"pip install 'armtempo[{extra}]' if you want it"
+            )
+        return Item(name, "missing", Condition.WRONG, "pip install --force-reinstall armtempo")

@@ -1,0 +1,58 @@
+"""An arm as JSON, for run folders of motions that the board had and whose plan nobody knows."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from armtempo.errors import InputError
+from armtempo.formats import json_codec
+from armtempo.formats.atomic_file import replace_text, why
+from armtempo.model.arm import Arm, Joint
+
+FORMAT = "armtempo arm"
+VERSION = 1
+_AGAIN = "restore it from a copy, or run again"
+
+
+def save(arm: Arm, path: Path) -> None:
+    """Write the arm, whole or not at all; InputError where the file cannot be written."""
+    content = {"format": FORMAT, "version": VERSION, "arm": json_codec.encode(arm)}
+    replace_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+
+
+def load(path: Path) -> Arm:
+    """The arm of such a file; InputError where it is none, damaged, or cannot be driven."""
+    try:
+        content: Any = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(f"{path}: cannot be read: {why(error)}", _AGAIN) from None
+    if not isinstance(content, dict) or (content.get("format"), content.get("version")) != (FORMAT, VERSION):
+        raise InputError(f"{path}: is not an arm of format {FORMAT!r}, version {VERSION}", _AGAIN)
+    arm: Arm = json_codec.decode(Arm, content.get("arm"), f"{path}: arm")
+    check(arm, f"{path}: arm", _AGAIN)
+    return arm
+
+
+def check(arm: Arm, where: str, hint: str) -> None:
+    """Check what types cannot express: the driven joints can be driven, and their figures divided by.
+
+    Raises InputError with that hint.
+    """
+    for joint in arm.joints:
+        if problem := _problem(joint):
+            raise InputError(f"{where}: {joint.name}: {problem}", hint)
+
+
+def _problem(joint: Joint) -> str:
+    motor, encoder = joint.motor, joint.encoder
+    if motor is None:
+        return ""
+    if joint.limits is None or min(joint.limits.values) <= 0:
+        return "has no limits above 0"
+    if min(motor.steps_per_rev, motor.microsteps, motor.gear_ratio) <= 0:
+        return "its motor's figures must be above 0"
+    if encoder is not None and encoder.counts_per_rev <= 0:
+        return "its encoder's counts_per_rev must be above 0"
+    return ""

@@ -1,0 +1,221 @@
+"""A feasible primal-dual interior-point method for smooth programs whose matrices have a narrow band.
+
+    minimise f(x)    with    A x = b,    g(x) > 0
+
+Every iterate keeps the inequalities; the barrier -mu sum(log g) holds it off them, and mu falls. The matrix of
+Newton's step is the Hessian of f plus J' diag(multipliers / g) J, which is never indefinite, and with the second
+derivatives of g where they help. Where the straight step runs into a curved boundary, a second one from the same
+matrix follows the curve. (Nocedal and Wright, Numerical Optimization, 2nd ed., chapters 18.3 and 19.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from armtempo.arrays import Array
+from armtempo.optimise.kkt import BandedKkt, Equalities, Factor
+
+
+class Linearised(Protocol):
+    """First and second derivatives of a program at one point."""
+
+    gradient: Array
+    """Of f: (n,)."""
+
+    def forward(self, step: Array) -> Array:
+        """Change of g by a step (n,), to first order: (M,)."""
+
+    def backward(self, weights: Array) -> Array:
+        """Sum of the gradients of g with ``weights`` (M,): (n,)."""
+
+    def hessian(self, weights: Array, multipliers: Array, exact: bool) -> Array:
+        """Entries, at the positions of the program's matrix, of the Hessian of f + J' diag(weights) J.
+
+        Minus the second derivatives of g times ``multipliers`` (M,) too, if ``exact``, else what of them is never
+        indefinite.
+        """
+
+
+class Program(Protocol):
+    """What is minimised."""
+
+    kkt: BandedKkt
+    equalities: Equalities
+
+    def objective(self, x: Array) -> float:
+        """f."""
+
+    def inequalities(self, x: Array) -> Array:
+        """g: (M,), scaled to about 1; entries not above 0, or no numbers, where x is not allowed."""
+
+    def linearise(self, x: Array) -> Linearised:
+        """Derivatives at an allowed x."""
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """How far to go. Barriers are sums over all inequalities: about the distance from the optimum."""
+
+    first_barrier: float = 1e-2
+    last_barrier: float = 1e-6
+    iterations: int = 200
+    curvature: bool = True
+    """Use second derivatives of g where they help."""
+
+
+@dataclass(frozen=True, eq=False)
+class Minimum:
+    """Where the method ended."""
+
+    x: Array
+    value: float
+    multipliers: Array
+    """Of the inequalities: (M,)."""
+    iterations: int
+    converged: bool
+    """The last barrier was reached and the step there had become small."""
+
+
+_SHRINK = 0.25
+_SUPERLINEAR = 1.3
+"""The barrier falls by the first, or to this power of it."""
+_TO_BOUNDARY = 0.99
+_KEEP = 1e-3
+"""Least part of an inequality that a step leaves."""
+_ARMIJO = 1e-4
+_CLOSE, _DONE = 5.0, 0.1
+"""The barrier falls, and the method ends, where Newton's decrement is below this many barriers times the root of
+their number."""
+_SPREAD = 1e4
+"""Multipliers stay within this factor of barrier / g."""
+_LEAST_STEP = 1e-10
+_BENT = 0.5
+"""Steps that must be shorter than this are tried along the curve of the inequalities too."""
+_FAR = -0.5
+"""How far beyond the inequalities their curve is still measured."""
+
+
+def minimise(program: Program, x: Array, settings: Schedule | None = None) -> Minimum:
+    """The local optimum near ``x``; none of the iterates breaks an inequality.
+
+    Where ``x`` itself breaks one it is given back as it is, not converged.
+    """
+    return _Solver(program, x, settings or Schedule()).run()
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """Where a step led: its length (0: nowhere), x, g there, and the decrement that Newton's model promised."""
+
+    length: float
+    x: Array
+    g: Array
+    decrement: float = 0.0
+
+
+class _Solver:
+    def __init__(self, program: Program, x: Array, settings: Schedule) -> None:
+        self.program, self.settings, self.x = program, settings, x
+        self.g = program.inequalities(x)
+        self.count = len(self.g)
+        self.barrier = settings.first_barrier / self.count
+        self.last = settings.last_barrier / self.count
+        with np.errstate(divide="ignore", invalid="ignore"):
+            self.multipliers = self.barrier / self.g
+        self.exact = settings.curvature
+        """Whether the next step tries the second derivatives of g first."""
+        self.whole = False
+        """Whether the last step was as long as Newton's method asked."""
+
+    def run(self) -> Minimum:
+        if not np.all(self.g > 0.0):
+            return self._solution(0, False)
+        for number in range(1, self.settings.iterations + 1):
+            step = self._step()
+            size = self.barrier * np.sqrt(self.count)
+            if self.barrier <= self.last and (step.length == 0.0 or step.decrement < _DONE * size):
+                return self._solution(number, True)
+            if step.length == 0.0 or step.decrement < _CLOSE * size or self.whole:
+                lower = min(self.barrier * _SHRINK, self.barrier**_SUPERLINEAR)
+                self.barrier = max(self.last, lower)
+        return self._solution(self.settings.iterations, False)
+
+    def _solution(self, iterations: int, converged: bool) -> Minimum:
+        return Minimum(self.x, self.program.objective(self.x), self.multipliers, iterations, converged)
+
+    def _step(self) -> _Step:
+        """One step of variables and multipliers."""
+        at = self.program.linearise(self.x)
+        gradient = at.gradient - at.backward(self.barrier / self.g)
+        for exact in (True, False) if self.exact else (False,):
+            entries = at.hessian(self.multipliers / self.g, self.multipliers, exact)
+            try:
+                factor = self.program.kkt.factor(entries)
+            except np.linalg.LinAlgError:
+                continue
+            step = factor.solve(gradient, self.program.equalities.residual(self.x))
+            found = self._along(at, factor, gradient, step)
+            if found.length > 0.0:
+                self.exact = self.settings.curvature and (found.length >= _BENT or not exact)
+                self._move(found, at.forward(step))
+                return found
+        self.exact = self.settings.curvature
+        return _Step(0.0, self.x, self.g)
+
+    def _along(self, at: Linearised, factor: Factor, gradient: Array, step: Array) -> _Step:
+        """The better of a straight and, where that is short, a bent step."""
+        slope = float(gradient @ step)
+        if not np.all(np.isfinite(step)) or slope >= 0.0:
+            return _Step(0.0, self.x, self.g)
+        change = at.forward(step)
+        most = min(1.0, 1.0 / max(float(np.max(-change / self.g)), 1e-300) * _TO_BOUNDARY)
+        straight = self._search(step, np.zeros_like(step), slope, most)
+        if straight.length >= _BENT:
+            return straight
+        bend = self._bend(step, change)
+        if bend is None:
+            return straight
+        weighted = at.backward(self.multipliers / self.g * bend)
+        other = factor.solve(gradient + weighted, self.program.equalities.residual(self.x))
+        bent = self._search(step, other - step, slope, 1.0)
+        return bent if bent.length > straight.length else straight
+
+    def _bend(self, step: Array, change: Array) -> Array | None:
+        """What the inequalities have left of their linear change by a whole step: (M,)."""
+        length = 1.0
+        while length > _KEEP:
+            g = self.program.inequalities(self.x + length * step)
+            if np.all(g > _FAR):
+                return np.asarray((g - self.g - length * change) / length**2)
+            length *= 0.5
+        return None
+
+    def _search(self, step: Array, bend: Array, slope: float, length: float) -> _Step:
+        """Backtracking on the barrier function along x + s step + s^2 bend, from s = ``length``."""
+        start = self._merit(self.x, self.g)
+        while length > _LEAST_STEP:
+            x = self.x + length * step + length**2 * bend
+            g = self.program.inequalities(x)
+            if np.all(g > _KEEP * self.g):
+                allowed = start + _ARMIJO * length * slope + 1e-14 * abs(start)
+                if self._merit(x, g) <= allowed:
+                    return _Step(length, x, g, -slope)
+            length *= 0.5
+        return _Step(0.0, self.x, self.g)
+
+    def _merit(self, x: Array, g: Array) -> float:
+        return self.program.objective(x) - self.barrier * float(np.log(g).sum())
+
+    def _move(self, found: _Step, change: Array) -> None:
+        """Take a step, and that of the multipliers that goes with it."""
+        old = self.multipliers
+        move = self.barrier / self.g - old - old / self.g * change
+        falling = move < 0
+        part = float(np.min(-_TO_BOUNDARY * old[falling] / move[falling], initial=1.0))
+        self.x, self.g = found.x, found.g
+        centre = self.barrier / self.g
+        self.multipliers = np.clip(old + part * move, centre / _SPREAD, centre * _SPREAD)
+        self.whole = found.length > 0.9 and part > 0.9

@@ -1,0 +1,237 @@
+"""A proven lower bound of the motion time along a path under speed, acceleration and jerk limits.
+
+With x = (du/dt)^2 as a function of the path's parameter u and ' = d/du, a motion takes the integral of x^(-1/2) and
+
+    speed          q'^2 x                                  <= V^2
+    acceleration   |q'' x + q' x' / 2|                     <= A
+    jerk           |q' x'' / 2 + 3 q'' x' / 2 + qd x|      <= J x^(-1/2),    qd the third derivative
+
+For any multipliers n >= 0, m = m+ - m-, l = l+ - l- of these, all x that keep them take at least
+
+    D = integral of  min over x > 0 of (w x^(-1/2) + c x)  -  n V^2 - (m+ + m-) A
+    w = 1 - sum of J (l+ + l-),    c = sum of n q'^2 + (m q'' - m' q') / 2 + (q' l'' - q'' l') / 2
+
+by weak duality and integration by parts (the ends give nothing where the path starts and ends at rest). The minimum is
+3 / 4^(1/3) w^(2/3) c^(1/3): D is concave in the multipliers, and the interior-point method finds about the best of
+those that are splines on cells of u: l quadratic, m linear, n constant. Whatever it finds, ``dual_value.value`` bounds
+D from below.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from armtempo.arrays import Array
+from armtempo.optimise import interior_point
+from armtempo.optimise.interior_point import Linearised, Schedule
+from armtempo.optimise.kkt import BandedKkt, Equalities
+from armtempo.planning.variables import Index
+from armtempo.splines import bspline
+
+SHARE = 3.0 / 4.0 ** (1.0 / 3.0)
+"""Of the minimum of w x^(-1/2) + c x."""
+_SCHEDULE = Schedule(first_barrier=100.0, last_barrier=1e-4, curvature=False)
+_NODES = 4
+"""Gauss points in a cell."""
+_JERK, _ACCELERATION, _SPEED = 0.2, 0.05, 0.5
+"""Coefficients to start from."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """A path cut into N cells of length 1, in units of time in which a cell takes about 1.
+
+    ``pieces``: power coefficients of the angles, (N, k + 1, J); ``limits``: (J, 3) in that unit of time. ``rests``:
+    whether also the second derivative of the angles is 0 at both ends.
+    """
+
+    pieces: Array
+    limits: Array
+    rests: bool
+
+    @property
+    def count(self) -> int:
+        """N."""
+        return len(self.pieces)
+
+    @property
+    def joints(self) -> int:
+        """J."""
+        return len(self.limits)
+
+
+@dataclass(frozen=True, eq=False)
+class Multipliers:
+    """Coefficients of the multipliers, each times its limit, none below 0.
+
+    ``jerk``: (2, N + 2, J), those of l+ and l-, quadratic B-splines; ``acceleration``: (2, N + 1, J), of m+ and m-
+    at the ends of cells; ``speed``: (N, J), n in each cell.
+    """
+
+    jerk: Array
+    acceleration: Array
+    speed: Array
+
+
+def best_multipliers(cells: Cells) -> Multipliers:
+    """Those that give about the highest bound."""
+    program = _Dual(cells)
+    return program.multipliers(interior_point.minimise(program, program.start(), _SCHEDULE).x)
+
+
+def quadratic(v: Array) -> Array:
+    """Values and first two derivatives of the three quadratic B-splines of a cell at v (P,): (3, 3, P)."""
+    one = np.ones_like(v)
+    return np.array(
+        [
+            [0.5 * (1.0 - v) ** 2, 0.5 + v - v**2, 0.5 * v**2],
+            [v - 1.0, 1.0 - 2.0 * v, v],
+            [one, -2.0 * one, one],
+        ]
+    )
+
+
+class _Dual:
+    """Minus D a cell, of coefficients above 0 that keep w and c above 0 at Gauss points of the cells."""
+
+    equalities = Equalities.none()
+
+    def __init__(self, cells: Cells) -> None:
+        from scipy.sparse import csr_array  # here, because loading it takes longer than most commands
+
+        self._cells = cells
+        count, joints = cells.count, cells.joints
+        sizes = [2 * joints * (count + 2), 2 * joints * (count + 1), joints * count]
+        jerk, acceleration, speed = np.split(np.arange(sum(sizes)), np.cumsum(sizes)[:-1])
+        self._jerk, self._acceleration = jerk.reshape(2, -1, joints), acceleration.reshape(2, -1, joints)
+        self._speed = speed.reshape(count, joints)
+        columns = self._local()
+        nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+        self._weights = np.tile(weights / 2 / count, count)
+        self._slopes = self._local_slopes((nodes + 1) / 2)
+        width, points = columns.shape[1], count * _NODES
+        each, starts = np.repeat(columns, _NODES, axis=0).ravel(), np.arange(0, points * width + 1, width)
+        self._w, self._c = (
+            csr_array((self._slopes[:, :, form].ravel(), each, starts), shape=(points, sum(sizes)))
+            for form in (0, 1)
+        )
+        self._cost = np.zeros(sum(sizes))
+        self._cost[self._speed] = 1.0 / count
+        self._cost[self._acceleration] = 1.0 / count
+        self._cost[self._acceleration[:, [0, -1]]] = 0.5 / count
+        if not cells.rests:
+            self._cost[self._jerk[:, [0, 1, -2, -1]]] = 1.0 / count  # so that they vanish
+        rows = np.concatenate([np.repeat(columns, width, axis=1).ravel(), np.arange(sum(sizes))])
+        others = np.concatenate([np.tile(columns, (1, width)).ravel(), np.arange(sum(sizes))])
+        self.kkt = BandedKkt(self._places(), rows, others, self.equalities)
+
+    def _local(self) -> Index:
+        """Variables that matter in each cell: (N, 11 J)."""
+        cell = np.arange(self._cells.count)
+        jerk = [self._jerk[sign, cell + offset] for sign in (0, 1) for offset in range(3)]
+        acceleration = [self._acceleration[sign, cell + offset] for sign in (0, 1) for offset in range(2)]
+        return np.concatenate([*jerk, *acceleration, self._speed], axis=1)
+
+    def _places(self) -> Array:
+        """Where each variable stands along the path."""
+        places = np.empty(self._jerk.size + self._acceleration.size + self._speed.size)
+        places[self._jerk] = (np.arange(self._jerk.shape[1]) - 1.0)[:, None]
+        places[self._acceleration] = (np.arange(self._acceleration.shape[1]) - 0.5)[:, None]
+        places[self._speed] = np.arange(self._cells.count, dtype=float)[:, None]
+        return places
+
+    def _local_slopes(self, v: Array) -> Array:
+        """Derivatives of w and c at v (G,) of each cell by its variables: (N, G, 2, 11 J)."""
+        cells = self._cells
+        q1, q2 = (_values(bspline.derivative(cells.pieces, order), v) for order in (1, 2))
+        speed, acceleration, jerk = cells.limits.T
+        b0, b1, b2 = quadratic(v)
+        linear = np.stack([1.0 - v, v])
+        slope = np.array([-1.0, 1.0])
+        none = np.zeros_like(q1)
+        w, c = [], []
+        for sign in (1.0, -1.0):
+            for value, first, second in zip(b0, b1, b2, strict=True):
+                w.append(none - value[None, :, None])
+                c.append(sign * 0.5 * (q1 * second[:, None] - q2 * first[:, None]) / jerk)
+        for sign in (1.0, -1.0):
+            for value, first in zip(linear, slope, strict=True):
+                w.append(none)
+                c.append(sign * 0.5 * (q2 * value[:, None] - q1 * first) / acceleration)
+        w.append(none)
+        c.append((q1 / speed) ** 2)
+        slopes = np.stack([np.concatenate(w, axis=2), np.concatenate(c, axis=2)], axis=2)
+        if not cells.rests:
+            by_jerk = slopes[..., : 6 * cells.joints].reshape(*slopes.shape[:3], 2, 3, cells.joints)
+            by_jerk[0, ..., :2, :] = by_jerk[1:2, ..., :1, :] = 0.0
+            by_jerk[-1, ..., 1:, :] = by_jerk[-2:-1, ..., 2:, :] = 0.0
+        return slopes
+
+    def start(self) -> Array:
+        """Multipliers that keep w and c above 0: those of speed alone do."""
+        x = np.empty(len(self._cost))
+        x[self._jerk] = _JERK / self._cells.joints
+        x[self._acceleration] = _ACCELERATION
+        x[self._speed] = _SPEED
+        return x
+
+    def multipliers(self, x: Array) -> Multipliers:
+        """Those of the variables x."""
+        jerk = x[self._jerk].copy()
+        if not self._cells.rests:
+            jerk[:, [0, 1, -2, -1]] = 0.0
+        return Multipliers(jerk, x[self._acceleration], x[self._speed])
+
+    def objective(self, x: Array) -> float:
+        w, c = self._forms(x)
+        return float(self._cost @ x - SHARE * self._weights @ (np.cbrt(w) ** 2 * np.cbrt(c)))
+
+    def inequalities(self, x: Array) -> Array:
+        return np.concatenate([x, *self._forms(x)])
+
+    def linearise(self, x: Array) -> Linearised:
+        return _Linearised(self, *self._forms(x))
+
+    def _forms(self, x: Array) -> tuple[Array, Array]:
+        return 1.0 + self._w @ x, self._c @ x
+
+
+class _Linearised:
+    def __init__(self, dual: _Dual, w: Array, c: Array) -> None:
+        self._dual = dual
+        with np.errstate(all="ignore"):
+            least = SHARE * dual._weights * np.cbrt(w) ** 2 * np.cbrt(c)
+            by_w, by_c = 2.0 / 3.0 * least / w, 1.0 / 3.0 * least / c
+        self.gradient = dual._cost - dual._w.T @ by_w - dual._c.T @ by_c
+        bend = 2.0 / 9.0 * least
+        self._curvature = np.array([[bend / w**2, -bend / (w * c)], [-bend / (w * c), bend / c**2]])
+
+    def forward(self, step: Array) -> Array:
+        return np.concatenate([step, self._dual._w @ step, self._dual._c @ step])
+
+    def backward(self, weights: Array) -> Array:
+        own, w, c = self._split(weights)
+        return np.asarray(own + self._dual._w.T @ w + self._dual._c.T @ c)
+
+    def hessian(self, weights: Array, _: Array, __: bool) -> Array:
+        own, w, c = self._split(weights)
+        both = self._curvature.copy()
+        both[0, 0] += w
+        both[1, 1] += c
+        slopes = self._dual._slopes
+        cells, nodes, _forms, width = slopes.shape
+        weighted = np.einsum("abng,ngbi->ngai", both.reshape(2, 2, cells, nodes), slopes)
+        blocks = slopes.reshape(cells, -1, width).swapaxes(1, 2) @ weighted.reshape(cells, -1, width)
+        return np.concatenate([blocks.ravel(), own])
+
+    def _split(self, weights: Array) -> list[Array]:
+        points = len(self._dual._weights)
+        return np.split(weights, [len(weights) - 2 * points, len(weights) - points])
+
+
+def _values(pieces: Array, v: Array) -> Array:
+    """Values of pieces (N, k + 1, J) at v (G,): (N, G, J)."""
+    powers = v[:, None] ** np.arange(pieces.shape[1])
+    return np.asarray(np.einsum("gp,npj->ngj", powers, pieces))

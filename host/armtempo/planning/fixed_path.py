@@ -1,0 +1,147 @@
+"""The best time axis of a path that stays as it is, with as many segments for each of the path as wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from armtempo.arrays import Array
+from armtempo.model.arm import Limits
+from armtempo.optimise import interior_point
+from armtempo.optimise.interior_point import Schedule
+from armtempo.optimise.kkt import Equalities
+from armtempo.planning import collocation
+from armtempo.planning.collocation import Curve, Points
+from armtempo.planning.limit_rows import LimitRows
+from armtempo.planning.motion_program import MotionProgram, time_weights
+from armtempo.planning.variables import MotionVariables, time_points
+from armtempo.splines import bspline, time_axis
+
+_ROUNDS = 12
+"""Solves, each at the peaks that the one before showed between its points."""
+_PARTS, _LEAST_PARTS, _POINTS = 64, 4, 2000
+"""Points of a path segment, shared by its time segments, but at least so many in each of those; fewer where there
+would be more than _POINTS."""
+_WATCHED = 0.95
+"""Peaks from this part of a limit on become points."""
+_FINER = 4
+"""Peaks are looked for on a grid so many times finer."""
+_AWAY = 1.003
+"""Time is stretched by this before each solve, so that it starts within the limits."""
+_COARSE = Schedule(first_barrier=1e-2, last_barrier=1e-5)
+_AGAIN = 3e-4
+"""First barrier of the solves after the first."""
+
+
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """A time axis that keeps all limits, and how near it is to the best one nearby."""
+
+    differences_s: Array
+    """Of the time control points, (m + degree - 1,)."""
+    total_s: float
+    bound_s: float
+    """No axis nearby with as many variables takes less; 0 where that was not found out."""
+
+
+class FixedPath:
+    """A path with limits, whose time axis has ``refine`` segments for each of the path.
+
+    ``angle_points_deg``: (n + degree, J), one of ``limits`` each. With ``mirrored`` ends the axis is one of
+    intervals (``time_axis.step_map``), else all differences of its control points are free.
+    """
+
+    def __init__(
+        self, angle_points_deg: Array, degree: int, limits: Sequence[Limits], refine: int = 1,
+        mirrored: bool = False,
+    ) -> None:  # fmt: skip
+        pieces = bspline.subdivide(bspline.polynomials(angle_points_deg, degree), refine)
+        self.degree, self.refine = degree, refine
+        self.variables = MotionVariables(len(pieces), degree, 0)
+        self.angle = np.ascontiguousarray(np.moveaxis(pieces, 2, 0))
+        self.limits = np.array([limit.values for limit in limits])
+        self._weights = time_weights(self.variables)
+        self._equalities = _mirror(self.variables) if mirrored else Equalities.none()
+
+    def curve(self, differences_s: Array) -> Curve:
+        """The motion on this time axis."""
+        times = bspline.polynomials(time_points(differences_s, self.degree), self.degree)
+        return Curve(self.angle, times, self.limits)
+
+    def of_intervals(self, intervals_s: Array) -> Array:
+        """Differences (n + degree - 1,) of the mirrored axis with these intervals (n,)."""
+        return np.asarray(intervals_s[time_axis.mirrored(len(intervals_s), (self.degree - 1) // 2)])
+
+    def intervals(self, differences_s: Array) -> Array:
+        """Intervals (n,) of a mirrored axis."""
+        edge = (self.degree - 1) // 2
+        return differences_s[edge : len(differences_s) - edge]
+
+    def duration_s(self, differences_s: Array) -> float:
+        """Its motion time."""
+        return float(self._weights @ differences_s)
+
+    def stretched(self, differences_s: Array) -> Array:
+        """The axis scaled until the motion just keeps every limit, proven."""
+        return np.asarray(differences_s * self.curve(differences_s).stretch())
+
+    def optimum(self, differences_s: Array, gap: float) -> Optimum:
+        """The best axis near one (m + degree - 1,), which is stretched first; never worse than that.
+
+        Ends when it is known to within ``gap`` of it, or further rounds do not help.
+        """
+        best = self.stretched(differences_s)
+        parts = max(_LEAST_PARTS, min(_PARTS // self.refine, _POINTS // self.variables.segments))
+        points = collocation.grid(self.variables.segments, parts, ends=self.degree == 3)
+        settings, bound, here = _COARSE, 0.0, best
+        for _ in range(_ROUNDS):
+            if not np.all(np.isfinite(here) & (here > 0.0)):
+                break
+            here, bound = self._solve(here, points, settings)
+            curve = self.curve(here)
+            stretch = curve.stretch()
+            if self.duration_s(here) * stretch < self.duration_s(best):
+                best = here * stretch
+            if bound and self.duration_s(best) <= bound * (1.0 + gap):
+                break
+            points += collocation.peaks(curve, _FINER * parts, _WATCHED)
+            here = here * stretch
+            settings = Schedule(_AGAIN, min(_AGAIN, 0.3 * gap))
+        return Optimum(best, self.duration_s(best), min(bound, self.duration_s(best)))
+
+    def _solve(self, differences_s: Array, points: Points, settings: Schedule) -> tuple[Array, float]:
+        """The best axis that keeps the limits at these points, and a bound from below on its motion time."""
+        unit_s = self.duration_s(differences_s) / self.variables.segments
+        limits = self.limits * unit_s ** np.arange(1, 4)
+        angle = np.stack([_at(self.angle, points, order) for order in (1, 2, 3)])
+        rows = LimitRows(self.variables, points, limits, angle)
+        program = MotionProgram(self.variables, [rows], self._equalities)
+        found = interior_point.minimise(program, differences_s / unit_s * _AWAY, settings)
+        here = found.x * unit_s
+        bound = self.duration_s(here) * (1.0 - 2.0 * settings.last_barrier) if found.converged else 0.0
+        return here, bound
+
+
+def _at(angle: Array, points: Points, order: int) -> Array:
+    """Derivatives of angles (J, S, k + 1) at points (P,): (P, J)."""
+    derived = bspline.derivative(np.moveaxis(angle, 0, 2), order)
+    powers = points.u[:, None] ** np.arange(derived.shape[1])
+    return np.asarray(np.einsum("pc,pcj->pj", powers, derived[points.segment]))
+
+
+def _mirror(variables: MotionVariables) -> Equalities:
+    """Differences at both ends are equal in pairs, as those of an axis of intervals are."""
+    edge = (variables.degree - 1) // 2
+    mirrored = time_axis.mirrored(variables.segments, edge) + edge
+    own = np.flatnonzero(mirrored != np.arange(len(mirrored)))
+    row = np.arange(len(own))
+    places = variables.places
+    return Equalities(
+        np.concatenate([row, row]),
+        np.concatenate([own, mirrored[own]]),
+        np.repeat([1.0, -1.0], len(own)),
+        np.zeros(len(own)),
+        0.5 * (places[own] + places[mirrored[own]]),
+    )

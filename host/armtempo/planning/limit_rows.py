@@ -1,0 +1,130 @@
+"""Inequalities of a motion program that keep speed, acceleration and jerk at points of u within limits."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armtempo.arrays import Array
+from armtempo.planning import limit_ratios
+from armtempo.planning.collocation import Points
+from armtempo.planning.variables import Index, MotionVariables, angle_basis, time_basis
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+
+class LimitRows:
+    """1 - ratio > 0 and 1 + ratio > 0 for speed, acceleration and jerk of each joint at each point.
+
+    ``points``: P of them, at least one in every segment; ``limits``: (J, 3); ``angle``: (3, P, J), derivatives of
+    the angles at the points where the path is fixed, else None.
+    """
+
+    def __init__(
+        self, variables: MotionVariables, points: Points, limits: Array, angle: Array | None
+    ) -> None:
+        self.limits, self._angle, self._variables = limits, angle, variables
+        self._starts = np.searchsorted(points.segment, np.arange(variables.segments))
+        self._bases = angle_basis(variables.degree, points.u)
+        self._time_bases = time_basis(variables.degree, points.u)
+        self.by_angle = _derivative_matrix(self._bases, points.segment, variables.angles)
+        self.by_time = _derivative_matrix(self._time_bases, points.segment, variables.differences)
+        self.rows, self.columns = self._pattern()
+
+    def _pattern(self) -> tuple[Index, Index]:
+        """Positions of the entries of ``_Linearised.hessian``."""
+        variables = self._variables
+        window = np.arange(variables.segments)[:, None]
+        times = variables.difference_index[window + np.arange(variables.degree)]
+        pairs = [(times, times)]
+        for joint in range(variables.joints):
+            own = variables.angle_index(joint)[window + np.arange(variables.degree + 1)]
+            pairs.extend([(own, own), (own, times), (times, own)])
+        rows, columns = [], []
+        for left, right in pairs:
+            full = (len(left), left.shape[1], right.shape[1])
+            rows.append(np.broadcast_to(left[:, :, None], full).ravel())
+            columns.append(np.broadcast_to(right[:, None, :], full).ravel())
+        return np.concatenate(rows), np.concatenate(columns)
+
+    def derivatives(self, x: Array) -> tuple[Array, Array]:
+        """q', q'', q''' (3, P, J) and t', t'', t''' (3, P) at the points, or their changes by a step."""
+        time = (self.by_time @ self._variables.time_differences(x)).reshape(3, -1)
+        if self._angle is not None:
+            return self._angle, time
+        return (self.by_angle @ self._variables.angle_points(x)).reshape(3, time.shape[1], -1), time
+
+    def gradient(self, local: Array) -> Array:
+        """Gradient (n,) of what has the derivatives ``local`` (6, P, J) by the six derivatives at each point."""
+        by_time = self.by_time.T @ local[3:].sum(axis=2).ravel()
+        if self._angle is not None:
+            return np.asarray(by_time)
+        by_angle = self.by_angle.T @ local[:3].reshape(-1, local.shape[2])
+        return self._variables.pack(by_angle, by_time)
+
+    def values(self, x: Array) -> Array:
+        """All 1 - ratio, then all 1 + ratio: (2 * 3 * P * J,)."""
+        ratios = limit_ratios.ratios(*self.derivatives(x), self.limits)
+        return np.concatenate([(1.0 - ratios).ravel(), (1.0 + ratios).ravel()])
+
+    def assemble(self, local: Array) -> Array:
+        """Entries of the matrix from those by the six derivatives at each point, (6, 6, P, J)."""
+        bases = self._time_bases
+        by_time = np.einsum("pak,abp,pbl->pkl", bases, local[3:, 3:].sum(axis=3), bases, optimize=True)
+        entries = [np.add.reduceat(by_time, self._starts).ravel()]
+        if self._angle is None:
+            half = np.einsum("pac,abpj->jpcb", self._bases, local[:3], optimize=True)
+            own = np.add.reduceat(half[..., :3] @ self._bases, self._starts, axis=1)
+            mixed = np.add.reduceat(half[..., 3:] @ bases, self._starts, axis=1)
+            for joint in range(local.shape[3]):
+                entries.extend([own[joint].ravel(), mixed[joint].ravel()])
+                entries.append(mixed[joint].swapaxes(1, 2).ravel())
+        return np.concatenate(entries)
+
+    def linearise(self, x: Array) -> LinearisedLimits:
+        """Their derivatives at x."""
+        return LinearisedLimits(self, *self.derivatives(x), self._angle is not None)
+
+
+class LinearisedLimits:
+    """Derivatives of the rows at one point; see ``optimise.interior_point.Linearised``."""
+
+    def __init__(self, rows: LimitRows, angle: Array, time: Array, fixed: bool) -> None:
+        self._rows, self._angle, self._time, self._fixed = rows, angle, time, fixed
+        self._gradient = limit_ratios.gradient(angle, time, rows.limits)
+
+    def forward(self, step: Array) -> Array:
+        """See there."""
+        angle, time = self._rows.derivatives(step)
+        change = np.einsum("kopj,op->kpj", self._gradient[:, 3:], time)
+        if not self._fixed:
+            change += np.einsum("kopj,opj->kpj", self._gradient[:, :3], angle)
+        return np.concatenate([-change.ravel(), change.ravel()])
+
+    def backward(self, weights: Array) -> Array:
+        """See there."""
+        upper, lower = weights.reshape(2, 3, *self._angle.shape[1:])
+        return self._rows.gradient(np.einsum("kopj,kpj->opj", self._gradient, lower - upper))
+
+    def hessian(self, weights: Array, multipliers: Array, exact: bool) -> Array:
+        """See there; the entries stand at ``LimitRows.rows`` and ``columns``."""
+        rows = self._rows
+        shape = (2, 3, *self._angle.shape[1:])
+        both = weights.reshape(shape).sum(axis=0)
+        local = np.einsum("kapj,kbpj->abpj", self._gradient * both[:, None], self._gradient, optimize=True)
+        if exact:
+            upper, lower = multipliers.reshape(shape)
+            local += limit_ratios.curvature(self._angle, self._time, rows.limits, upper - lower)
+        return rows.assemble(local)
+
+
+def _derivative_matrix(bases: Array, segment: Index, count: int) -> csr_array:
+    """First, second and third derivatives at all points, (3 P, count), from ``bases`` (P, 3, w) of their segments."""
+    from scipy.sparse import csr_array  # here, because loading it takes longer than most commands
+
+    points, _, width = bases.shape
+    columns = np.tile(segment[:, None] + np.arange(width), (3, 1)).ravel()
+    starts = np.arange(0, 3 * points * width + 1, width)
+    return csr_array((bases.swapaxes(0, 1).ravel(), columns, starts), shape=(3 * points, count))

@@ -1,0 +1,123 @@
+"""The motion time as a smooth program of control points: limits, bounds, and what must be met exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+
+from armtempo.arrays import Array
+from armtempo.optimise.interior_point import Linearised
+from armtempo.optimise.kkt import BandedKkt, Equalities
+from armtempo.planning.linear_rows import LinearRows
+from armtempo.planning.variables import Index, MotionVariables, time_basis
+
+
+class LinearisedBlock(Protocol):
+    """Derivatives of some of the inequalities; see ``optimise.interior_point.Linearised``."""
+
+    def forward(self, step: Array) -> Array: ...
+
+    def backward(self, weights: Array) -> Array: ...
+
+    def hessian(self, weights: Array, multipliers: Array, exact: bool) -> Array: ...
+
+
+class Block(Protocol):
+    """Some of the inequalities; ``rows`` and ``columns`` are the positions of their entries in the matrix."""
+
+    rows: Index
+    columns: Index
+
+    def values(self, x: Array) -> Array: ...
+
+    def linearise(self, x: Array) -> LinearisedBlock: ...
+
+
+class MotionProgram:
+    """Motion time a segment plus the squared steps between neighbouring time differences, weighted.
+
+    Angle and time may be traded against each other wherever the arm does not notice; the ``smoothing`` of each
+    step, (S + k - 2,), decides between such motions. ``blocks``: the inequalities besides time differences above
+    ``least``.
+    """
+
+    def __init__(
+        self,
+        variables: MotionVariables,
+        blocks: Sequence[Block],
+        equalities: Equalities,
+        smoothing: Array | None = None,
+        least: float = 0.0,
+    ) -> None:
+        self.variables, self.equalities = variables, equalities
+        index = variables.difference_index
+        above = np.full(len(index), least)
+        positive = LinearRows(
+            variables.size, index[:, None], np.ones((len(index), 1)), above, np.full(len(index), np.inf)
+        )
+        self.blocks: list[Block] = [*blocks, positive]
+        self._smoothing = np.zeros(len(index) - 1) if smoothing is None else smoothing
+        self._time = np.zeros(variables.size)
+        self._time[index] = time_weights(variables) / variables.segments
+        left, right = index[:-1], index[1:]
+        rows = [left, right, left, right, *(block.rows for block in self.blocks)]
+        columns = [left, right, right, left, *(block.columns for block in self.blocks)]
+        self.kkt = BandedKkt(variables.places, np.concatenate(rows), np.concatenate(columns), equalities)
+
+    def duration(self, x: Array) -> float:
+        """Motion time a segment, in the program's unit."""
+        return float(self._time @ x)
+
+    def objective(self, x: Array) -> float:
+        """See ``optimise.interior_point.Program``."""
+        steps = np.diff(self.variables.time_differences(x))
+        return self.duration(x) + float(self._smoothing @ steps**2)
+
+    def inequalities(self, x: Array) -> Array:
+        """See there."""
+        return np.concatenate([block.values(x) for block in self.blocks])
+
+    def linearise(self, x: Array) -> Linearised:
+        """See there."""
+        return _Linearised(self, x)
+
+
+class _Linearised:
+    def __init__(self, program: MotionProgram, x: Array) -> None:
+        self._smoothing = program._smoothing
+        self._blocks = [block.linearise(x) for block in program.blocks]
+        sizes = [len(block.values(x)) for block in program.blocks]
+        self._splits = np.cumsum(sizes)[:-1]
+        steps = 2.0 * self._smoothing * np.diff(program.variables.time_differences(x))
+        self.gradient = program._time.copy()
+        index = program.variables.difference_index
+        self.gradient[index[1:]] += steps
+        self.gradient[index[:-1]] -= steps
+
+    def forward(self, step: Array) -> Array:
+        return np.concatenate([block.forward(step) for block in self._blocks])
+
+    def backward(self, weights: Array) -> Array:
+        parts = np.split(weights, self._splits)
+        return np.asarray(sum(block.backward(part) for block, part in zip(self._blocks, parts, strict=True)))
+
+    def hessian(self, weights: Array, multipliers: Array, exact: bool) -> Array:
+        smooth = 2.0 * self._smoothing
+        entries = [smooth, smooth, -smooth, -smooth]
+        parts, others = np.split(weights, self._splits), np.split(multipliers, self._splits)
+        for block, part, other in zip(self._blocks, parts, others, strict=True):
+            entries.append(block.hessian(part, other, exact))
+        return np.concatenate(entries)
+
+
+def mean_slopes(degree: int) -> Array:
+    """Weights of a segment's k differences in the time that it takes: (k,)."""
+    nodes, weights = np.polynomial.legendre.leggauss(degree)
+    return np.asarray((weights / 2) @ time_basis(degree, (nodes + 1) / 2)[:, 0])
+
+
+def time_weights(variables: MotionVariables) -> Array:
+    """Weights of the differences in the motion time: (S + k - 1,)."""
+    return np.convolve(np.ones(variables.segments), mean_slopes(variables.degree))

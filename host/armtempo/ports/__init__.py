@@ -1,0 +1,1 @@
+"""Serial ports: their names, and which there are."""

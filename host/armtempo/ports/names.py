@@ -1,0 +1,45 @@
+"""What the name of a port means: a serial device, a URL, or a virtual board."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from armtempo.errors import InputError
+
+SIM = "sim"
+"""The port name that stands for a virtual board; ``sim:FOLDER`` for one whose flash is that folder."""
+
+
+def is_sim(port: str) -> bool:
+    """Whether the port stands for a virtual board."""
+    return port == SIM or port.startswith(SIM + ":")
+
+
+def sim_flash(port: str) -> Path | None:
+    """The folder that is the virtual board's flash; None: a new one that goes with the board.
+
+    Raises InputError where the folder is not named.
+    """
+    if port == SIM:
+        return None
+    if port == SIM + ":":
+        raise InputError(
+            f"port '{port}' names no folder",
+            "write sim:FOLDER to keep the flash there, or sim to keep it nowhere",
+        )
+    return Path(port[len(SIM) + 1 :])
+
+
+def same_for_all(port: str) -> str:
+    """A name of the port that is the same for every program: links followed, paths absolute.
+
+    "" for a virtual board that nobody else can reach.
+    """
+    if port == SIM:
+        return ""
+    if is_sim(port):
+        return f"{SIM}:{os.path.realpath(port[len(SIM) + 1 :])}"
+    if "://" in port:
+        return port
+    return port.upper() if os.name == "nt" else os.path.realpath(port)

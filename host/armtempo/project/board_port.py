@@ -1,0 +1,48 @@
+"""Which board is meant where no port is given."""
+
+from __future__ import annotations
+
+from armtempo.errors import InputError
+from armtempo.ports.listing import find_ports
+from armtempo.ports.names import SIM
+from armtempo.project.settings import PORT, ProjectSettings, Setting, nothing_set
+from armtempo.share import claim
+from armtempo.share.caller import Ownership, ownership
+
+ONLY_BOARD = "the only board plugged in"
+ONLY_OPEN = "the only port that an armtempo program has open"
+UNASKED = (ONLY_BOARD, ONLY_OPEN)
+"""Sources of a port that nobody has named; such a choice is said aloud."""
+
+
+def choose(given: str | None = None, others: bool = False) -> Setting:
+    """The port to use, and why it: ``given``, the variable, the project folder, else the one likely board.
+
+    ``others``: a port that another program of armtempo has open will do too, if it is the only one; for commands
+    that go through that program. Raises InputError where there is no such port, or more than one.
+    """
+    found = ProjectSettings().get(PORT, given)
+    if found:
+        return found
+    candidates = _open_ports() if others else []
+    why = ONLY_OPEN
+    if not candidates:
+        candidates = [port.device for port in find_ports() if port.board]
+        why = ONLY_BOARD
+    if len(candidates) == 1:
+        return Setting(PORT, candidates[0], why)
+    raise _unclear(candidates)
+
+
+def _open_ports() -> list[str]:
+    lives = [one for one in claim.claims() if ownership(one) is not Ownership.DIED]
+    return sorted({one.port for one in lives})
+
+
+def _unclear(candidates: list[str]) -> InputError:
+    seen = (
+        f"{len(candidates)} could be meant: {', '.join(candidates)}"
+        if candidates
+        else "none is plugged in ('armtempo ports' lists what is there)"
+    )
+    return nothing_set(PORT, f"which board? {seen}. '--port {SIM}' is a virtual one; for a real one")

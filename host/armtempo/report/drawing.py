@@ -1,0 +1,111 @@
+"""Figures as files and as parts of a page, where axes and text take the colour of the page's text."""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+from functools import lru_cache
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from armtempo.formats.plain_text import visible
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PAGE_COLOUR = "#010203"
+"""Stands for the page's text colour until ``inline_svg`` replaces it."""
+_HIDDEN = '<svg class="sheet" aria-hidden="true" '
+_LARGEST = 1.4
+"""How much larger than drawn a figure may become on a page."""
+_MARGIN_PT = 3.0
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write the figure as its suffix says: PNG on white, SVG without a background."""
+    _lay_out(figure)
+    if path.suffix == ".svg":
+        path.write_text(_svg(figure).replace(PAGE_COLOUR, "#222222"), encoding="utf-8")
+    else:
+        figure.savefig(path, dpi=150, facecolor="white")
+
+
+def inline_svg(figure: Figure, name: str, description: str) -> str:
+    """The figure as ``<svg>`` elements in the page's colour, with a description for screen readers.
+
+    One of several columns is cut into them, so that a page can set them side by side or below each other: the first
+    element has the drawing and is not shown, each other one shows a column of it.
+    """
+    text = _svg(figure)
+    text = text[text.index("<svg") :].replace(PAGE_COLOUR, "currentColor")
+    text = re.sub(r'(width|height)="[\d.]+pt" ', "", text, count=2)
+    text = re.sub(r'(\bid=")', rf"\g<1>{name}-", text)
+    text = re.sub(r'(xlink:href="#|url\(#)', rf"\g<1>{name}-", text)
+    columns = _columns(figure)
+    height = 72 * float(figure.get_figheight())
+    if len(columns) == 1:
+        shown = _shown(description, 72 * float(figure.get_figwidth()))
+        return text.replace("<svg ", f"<svg {shown} ", 1)
+    parts = [
+        f"<svg {_shown(f'{title}: {description}', right - left)} "
+        f'viewBox="{left:.1f} 0 {right - left:.1f} {height:.1f}"><use href="#{name}-figure_1"/></svg>'
+        for title, left, right in columns
+    ]
+    return f'<div class="slices">{text.replace("<svg ", _HIDDEN, 1)}{"".join(parts)}</div>'
+
+
+def _shown(description: str, width_pt: float) -> str:
+    """Attributes of an element that is shown, at most _LARGEST times as large as drawn."""
+    most = f"{_LARGEST * width_pt * 4 / 3:.0f}px"
+    return f'role="img" aria-label="{escape(visible(description))}" style="max-width: {most}"'
+
+
+def _columns(figure: Figure) -> list[tuple[str, float, float]]:
+    """Title, left and right end in points of each column of axes, without the gaps between them."""
+    _lay_out(figure)
+    ends: dict[int, tuple[str, float, float]] = {}
+    for axis in figure.axes:
+        place, box = axis.get_subplotspec(), axis.get_tightbbox()
+        if place is None or box is None:
+            continue
+        title, left, right = ends.get(place.colspan.start, ("", math.inf, -math.inf))
+        edges = [72 * edge / figure.dpi for edge in (box.x0, box.x1)]
+        left, right = min(left, edges[0]), max(right, edges[1])
+        ends[place.colspan.start] = (title or axis.get_title(), left, right)
+    return [
+        (title, left - _MARGIN_PT, right + _MARGIN_PT) for _, (title, left, right) in sorted(ends.items())
+    ]
+
+
+def _lay_out(figure: Figure) -> None:
+    """Fix the layout: with a layout engine left, each file would be drawn twice.
+
+    Before it, names of joints and runs become plain text: a ``$`` in one begins no formula, and what would steer a
+    terminal is spelt out.
+    """
+    from matplotlib.text import Text
+
+    if figure.get_layout_engine() is not None:
+        for text in figure.findobj(Text):
+            text.set_parse_math(False)
+            text.set_text(visible(text.get_text()))
+        figure.draw_without_rendering()
+        figure.set_layout_engine(None)
+
+
+@lru_cache(maxsize=8)
+def _svg(figure: Figure) -> str:
+    from matplotlib import rc_context
+
+    _lay_out(figure)
+    buffer = io.StringIO()
+    with rc_context({"svg.fonttype": "none", "svg.hashsalt": "armtempo"}):
+        figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
+    return re.sub(r' d="[^"]*"', _rounded, buffer.getvalue())
+
+
+def _rounded(path: re.Match[str]) -> str:
+    """Coordinates to a hundredth of a point: half the size, no visible difference."""
+    return re.sub(r"(\.\d\d)\d+", r"\1", path.group())

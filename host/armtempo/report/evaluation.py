@@ -1,0 +1,114 @@
+"""A run folder read and analysed: what was to move, what moved, and what is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from armtempo.errors import InputError, RunFolderError
+from armtempo.model.arm import Arm, Limits
+from armtempo.model.plan import Plan
+from armtempo.runs import analysis, peaks, reader, replayed
+from armtempo.runs.run_folder import COMPLETE
+from armtempo.splines import extremes
+from armtempo.splines.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """A run with its motion, its curves and what is wrong with its files.
+
+    ``plan`` is None for a motion that only the board had; ``arm`` too where the folder does not say.
+    """
+
+    run: reader.RunData
+    trajectory: Trajectory
+    arm: Arm | None
+    plan: Plan | None
+    curves: analysis.Curves
+    complaints: tuple[str, ...]
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the driven joints."""
+        return [joint.name for joint in self.run.joints]
+
+    @property
+    def limits(self) -> list[Limits]:
+        """Their limits; empty where the arm is not known."""
+        return [joint.limits for joint in self.arm.driven] if self.arm else []
+
+    @property
+    def extremes(self) -> Sequence[extremes.Extremes]:
+        """The planned motion's largest speed, acceleration and jerk of each joint."""
+        return self.plan.extremes if self.plan else extremes.of_joints(self.trajectory.joints)
+
+    @property
+    def limit_checks(self) -> list[list[peaks.LimitCheck]]:
+        """``[joint]``: speed and acceleration beside the limits; empty where the arm is not known."""
+        if not self.limits:
+            return []
+        counts = [joint.counts_per_deg for joint in self.run.joints]
+        resolutions = [1.0 / per_deg if per_deg else np.nan for per_deg in counts]
+        return peaks.limit_checks(self.curves, self.trajectory, self.limits, resolutions)
+
+    @property
+    def last(self) -> reader.RepetitionData:
+        """The last repetition that has samples."""
+        return [repetition for repetition in self.run.repetitions if len(repetition.time_s)][-1]
+
+
+def evaluate(folder: Path) -> Evaluation:
+    """Read and analyse a run folder; what is incomplete is listed in ``complaints``.
+
+    Raises RunFolderError where it is not known what was to move, or there is not one sample.
+    """
+    run = reader.load(folder)
+    plan = replayed.plan_of(run)
+    trajectory = plan.trajectory if plan else replayed.trajectory_of(run)
+    if len(run.joints) != len(trajectory.joints):
+        raise RunFolderError(
+            f"{folder}: run.json tells of {len(run.joints)} joints, trajectory.json of {len(trajectory.joints)}",
+            "put the trajectory.json of this run there, or run again",
+        )
+    usable = [repetition for repetition in run.repetitions if len(repetition.time_s)]
+    if not usable:
+        raise RunFolderError(f"{folder}: holds no sample", "run it again")
+    found = complaints(run)
+    arm = plan.arm if plan else _arm(run, found)
+    return Evaluation(run, trajectory, arm, plan, analysis.curves(usable, trajectory), tuple(found))
+
+
+def _arm(run: reader.RunData, complaints: list[str]) -> Arm | None:
+    """The arm of a motion without a plan, if it is there and fits; else one more complaint."""
+    try:
+        arm = replayed.arm_of(run)
+    except InputError as error:
+        complaints.append(error.problem)
+        return None
+    return arm if arm and len(arm.driven) == len(run.joints) else None
+
+
+def complaints(run: reader.RunData) -> list[str]:
+    """What is missing or broken in each repetition, one sentence each."""
+    found = []
+    for repetition, entry in zip(run.repetitions, run.entries, strict=True):
+        steps = np.diff(repetition.index)
+        if not len(repetition.time_s):
+            found.append(f"{repetition.file}: {repetition.problem or 'no samples'}")
+            continue
+        if repetition.index[0] > 0:
+            found.append(f"{repetition.file}: the first {repetition.index[0]} samples are missing")
+        for at in np.flatnonzero(steps > 1):
+            first, last = repetition.index[at] + 1, repetition.index[at + 1] - 1
+            found.append(f"{repetition.file}: samples {first} to {last} are missing")
+        if np.any(steps <= 0):
+            found.append(f"{repetition.file}: the sample count starts again in the middle (a reset?)")
+        if repetition.state != COMPLETE:
+            end = repetition.time_s[-1]
+            state = f"{entry.state} ({entry.fault})" if entry.fault else entry.state
+            found.append(f"{repetition.file}: cut short, ended as {state} after {end:.1f} s")
+    return found

@@ -1,0 +1,160 @@
+"""What a board says of itself, in words and units of the arm file: the answer to 'armtempo status'.
+
+It goes to other programs as JSON, so it holds plain values only. Nothing heavy is imported: what asks another
+program to stop a motion loads this.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from armtempo.errors import LinkError
+
+if TYPE_CHECKING:
+    from armtempo.link import Client
+    from armtempo.link.board_messages import Hello
+    from armtempo.model.arm import Arm
+
+
+@dataclass(frozen=True)
+class JointState:
+    """Where one joint is."""
+
+    name: str
+    """As the arm file has it; "joint N" where the arm is not known."""
+    known: bool
+    """Whether the position is known."""
+    steps: int
+    """Steps commanded."""
+    angle_deg: float | None
+    """The same in degrees; None where the arm is not known."""
+    counts: int
+    """Of the encoder, 0 without one."""
+    encoder_deg: float | None
+    """The same in degrees; None without an encoder, or where the arm is not known."""
+
+
+@dataclass(frozen=True)
+class BoardState:
+    """A board, the arm it is set up for, and where that is."""
+
+    port: str
+    virtual: bool
+    """Whether it is a virtual board."""
+    board_id: str
+    program_crc: int
+    program_current: bool
+    """Whether its program is the one installed here."""
+    protocol: int
+    arm_crc: int
+    """Checksum of its arm record; 0 where it has none."""
+    arm: str
+    """Name of the arm whose record that is; "" where it is not known."""
+    arm_source: str
+    """File of that arm."""
+    free_flash: int
+    free_heap: int
+    max_rate: int
+    """Steps/s of one joint."""
+    max_rate_sum: int
+    """Steps/s of all joints together."""
+    room: str
+    """What engines its memory has room for, in words."""
+    arm_problem: str
+    """Why a stored arm record is not used; "" where it is, or there is none."""
+    state: str
+    """One of ``armtempo_shared.messages.STATES``."""
+    moving: bool
+    """Whether steps may still come."""
+    fault: str
+    """Name of the pending fault, "" for none."""
+    frames_bad: int
+    """Byte sequences that reached the board and were no message."""
+    samples_lost: int
+    joints: tuple[JointState, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values."""
+        return asdict(self)
+
+    @classmethod
+    def of_json(cls, values: Mapping[str, Any]) -> BoardState:
+        """What ``to_json`` gave; LinkError where another version of armtempo gave it."""
+        try:
+            joints = tuple(JointState(**joint) for joint in values["joints"])
+            return cls(**{**values, "joints": joints})
+        except (TypeError, KeyError) as error:
+            raise LinkError(
+                "the program that has the port is of another version of armtempo", "end it and start it again"
+            ) from error
+
+    def named(self, arm: Arm | None) -> BoardState:
+        """The same in degrees and with the joints' names, where ``arm`` is the one that the board is set up for."""
+        if arm is None or self.arm or record_crc(arm) != self.arm_crc:
+            return self
+        joints = tuple(
+            replace(
+                joint,
+                name=driven.name,
+                angle_deg=joint.steps / driven.steps_per_deg,
+                encoder_deg=joint.counts / driven.counts_per_deg if driven.encoder else None,
+            )
+            for joint, driven in zip(self.joints, arm.driven, strict=True)
+        )
+        return replace(self, arm=arm.name, arm_source=arm.source, joints=joints)
+
+
+def read(client: Client, port: str) -> BoardState:
+    """What the board says now, in steps and counts."""
+    from armtempo.link.program_version import own_crc
+    from armtempo.robot import engine_room
+    from armtempo.robot.stored_motion import fault_name
+
+    info, status = client.info, client.status()
+    pairs = zip(status.positions.commanded_steps, status.positions.counts, strict=True)
+    return BoardState(
+        port=port,
+        virtual=info.virtual,
+        board_id=info.board_id,
+        program_crc=info.program_crc,
+        program_current=info.program_crc == own_crc(),
+        protocol=info.protocol,
+        arm_crc=info.arm_crc,
+        arm="",
+        arm_source="",
+        free_flash=info.free_flash,
+        free_heap=info.free_heap,
+        max_rate=info.max_rate,
+        max_rate_sum=info.max_rate_sum,
+        room=engine_room.words(info),
+        arm_problem=_arm_problem(info),
+        state=status.state,
+        moving=status.moving,
+        fault=fault_name(status.fault),
+        frames_bad=status.frames_bad,
+        samples_lost=status.samples_lost,
+        joints=tuple(
+            JointState(f"joint {number}", status.joint_known(number - 1), steps, None, counts, None)
+            for number, (steps, counts) in enumerate(pairs, 1)
+        ),
+    )
+
+
+def _arm_problem(info: Hello) -> str:
+    """Why the record in the board's flash is not used."""
+    if not info.arm_problem:
+        return ""
+    from armtempo.link.refusal import refusal
+
+    return str(refusal("the stored arm record is not used", info.arm_problem, value=info.arm_value))
+
+
+def record_crc(arm: Arm) -> int:
+    """The checksum by which a board knows an arm."""
+    from armtempo_shared import wire
+
+    from armtempo.records import encode
+
+    return int(wire.record_crc(encode.arm_record(arm)))

@@ -1,0 +1,68 @@
+"""From the name of a port to a board in use, which other programs on this machine can look into and stop."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+
+from armtempo import link
+from armtempo.link.traffic import Chunk, Sink
+from armtempo.model.arm import Arm
+from armtempo.project import board_port
+from armtempo.robot.board import Board
+from armtempo.robot.sharing import Sharing
+
+LOG = logging.getLogger("armtempo")
+
+
+def connect(
+    port: str | None = None,
+    arm: Arm | None = None,
+    *,
+    log_traffic: Path | None = None,
+    sink: Sink | None = None,
+    any_program: bool = False,
+    tell: Callable[[str], object] = LOG.warning,
+) -> Board:
+    """The board on ``port``, which has answered; use it as a context, or ``close`` it.
+
+    ``port``: a serial device or URL; ``"sim"`` starts a virtual board that lives until it is closed,
+    ``"sim:FOLDER"`` one that keeps its flash in FOLDER. None: what ARMTEMPO_PORT or the project folder's
+    ``armtempo.toml`` says, else the one board that is plugged in, which ``tell`` hears; a virtual one is never
+    taken unasked. ``arm``: what a virtual board's motors move; None: ideal motors. ``log_traffic``: file that
+    gets every byte both ways; ``sink`` takes the same. ``any_program``: also talk to a board whose program is
+    not the one installed here. ``tell`` hears what happens to the connection while other calls wait; by default
+    the logger "armtempo" does. Until the board is closed other programs on this machine can look in and stop it
+    (``attach``). Raises InputError where there is no such port, or none is named and not exactly one board is
+    there; LinkError where it is in use, silent or runs something else.
+    """
+    chosen = board_port.choose(port)
+    if chosen.source in board_port.UNASKED:
+        tell(f"port {chosen.value}: {chosen.source}")
+    stack = ExitStack()
+    taps = _Taps(sink)
+    client = stack.enter_context(link.open_board(chosen.value, log_traffic, taps, arm, any_program, tell))
+    client.session.tell = tell
+    board = Board(client, chosen.value, stack)
+    sharing = Sharing(client, board.state, board.stops, lambda: board.arm)
+    stack.callback(sharing.close)
+    try:
+        sharing.open(chosen.value)
+        taps.sinks.append(sharing.traffic)
+    except OSError as error:
+        tell(f"no other program can look in or stop this one: {error}")
+    return board
+
+
+class _Taps:
+    """Takes the traffic for several sinks."""
+
+    def __init__(self, *sinks: Sink | None) -> None:
+        self.sinks = [sink for sink in sinks if sink is not None]
+
+    def __call__(self, chunk: Chunk, words: list[str]) -> None:
+        """Hand a chunk on."""
+        for sink in self.sinks:
+            sink(chunk, words)

@@ -1,0 +1,165 @@
+"""What a program that has a board's port does for others: it answers, stops the board, and hands out samples.
+
+The requests come from threads of their own; they take turns with this program's commands (``Session.turns``),
+and a stop goes first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from threading import Event as Flag
+from threading import Thread
+from typing import Any
+
+from armtempo_shared.limits import TICK_HZ
+
+from armtempo.errors import ArmtempoError, NoAnswerError
+from armtempo.link import Client
+from armtempo.link.board_messages import Done, Event, Fault, Sample
+from armtempo.link.traffic import Chunk
+from armtempo.model.arm import Arm
+from armtempo.ports import names
+from armtempo.robot.board_state import BoardState
+from armtempo.robot.stop_request import StopRequest
+from armtempo.robot.stored_motion import fault_name, send_stop
+from armtempo.share import claim
+from armtempo.share.lines import Message
+from armtempo.share.server import TOPICS, Server
+
+TURN_S = 1.0
+"""A request waits so long for its turn to talk to the board."""
+EVERY_S = 0.5
+"""Interval of the states that are handed out."""
+
+
+class Sharing:
+    """Makes a board's port known to other programs, until ``close``.
+
+    ``state``: gives what the board says now; ``stops``: the stop requests of what this program has under way;
+    ``arm``: gives the arm that it moves, as far as that is known.
+    """
+
+    def __init__(
+        self,
+        client: Client,
+        state: Callable[[], BoardState],
+        stops: Sequence[StopRequest],
+        arm: Callable[[], Arm | None],
+    ) -> None:
+        self._client = client
+        self._state = state
+        self._stops = stops
+        self._arm = arm
+        self._server: Server | None = None
+        self._closed = Flag()
+
+    def open(self, port: str) -> None:
+        """Listen; OSError where that cannot be. A virtual board that only this program can reach is not shared."""
+        name = names.same_for_all(port)
+        if not name:
+            return
+        session = self._client.session
+        device = session.transport.name if names.is_sim(port) else port
+        handlers = {"status": self._status, "stop": self._stop}
+        self._server = Server(claim.new(name, port, device), handlers)
+        session.check = self._server.check
+        session.heard = self._heard
+        Thread(target=self._hand_out_states, name="armtempo states", daemon=True).start()
+
+    def close(self) -> None:
+        """Give up the port."""
+        self._closed.set()
+        if self._server is not None:
+            self._server.close()
+
+    def traffic(self, chunk: Chunk, words: list[str]) -> None:
+        """Hand out what goes over the port."""
+        if self._server is not None and self._server.wanted("traffic"):
+            content = {"time_s": chunk.time_s, "direction": chunk.direction, "data": chunk.data.hex()}
+            self._server.publish("traffic", {**content, "words": words})
+
+    # requests
+
+    def _status(self, request: Message) -> Message:
+        return {"status": self._read().to_json()}
+
+    def _stop(self, request: Message) -> Message:
+        now = request.get("now") is True
+        for stop in [*self._stops]:
+            stop.ask(str(request.get("by") or "another program"))
+        with self._client.session.in_a_hurry(TURN_S) as mine:
+            if not mine:
+                raise NoAnswerError(
+                    "the board does not answer the program that has its port",
+                    "it is told to stop as soon as it does; where that takes too long, switch off the motors' power",
+                )
+            moving = send_stop(self._client, now)
+        if self._server is not None:
+            self._server.publish("event", {"event": "stop", "now": now})
+        return {"moving": moving}
+
+    def _read(self) -> BoardState:
+        with self._client.session.in_a_hurry(TURN_S) as mine:
+            if not mine:
+                raise NoAnswerError("the program that has the port waits for the board's answer", "try again")
+            return self._state()
+
+    # what is handed out
+
+    def _hand_out_states(self) -> None:
+        while not self._closed.wait(EVERY_S):
+            server = self._server
+            if server is None or not any(map(server.wanted, TOPICS)):
+                continue
+            try:
+                server.publish("status", {"status": self._read().to_json()})
+            except ArmtempoError as error:
+                server.publish("event", {"event": "trouble", "text": str(error)})
+
+    def _heard(self, event: Event) -> None:
+        if self._server is None:
+            return
+        if isinstance(event, Sample):
+            if self._server.wanted("sample"):
+                self._server.publish("sample", sample_json(event, self._arm()))
+        elif self._server.wanted("event"):
+            self._server.publish("event", _event_json(event))
+
+
+def sample_json(sample: Sample, arm: Arm | None) -> dict[str, Any]:
+    """A sample as plain values; in degrees too where the arm is known."""
+    steps, counts = sample.positions.commanded_steps, sample.positions.counts
+    found: dict[str, Any] = {
+        "run": sample.run,
+        "index": sample.index,
+        "time_s": sample.ticks / TICK_HZ,
+        "commanded_steps": list(steps),
+        "counts": list(counts),
+    }
+    if arm is not None and len(arm.driven) == len(steps):
+        joints = arm.driven
+        found["joints"] = [joint.name for joint in joints]
+        found["commanded_deg"] = [
+            value / joint.steps_per_deg for value, joint in zip(steps, joints, strict=True)
+        ]
+        found["angle_deg"] = [
+            value / joint.counts_per_deg if joint.encoder else None
+            for value, joint in zip(counts, joints, strict=True)
+        ]
+    return found
+
+
+def _event_json(event: Event) -> dict[str, Any]:
+    if isinstance(event, Done):
+        return {"event": "done", "run": event.run, "time_s": event.ticks / TICK_HZ}
+    if isinstance(event, Fault):
+        time_s = event.ticks / TICK_HZ
+        joint = event.joint + 1 if event.joint < 255 else None
+        return {
+            "event": "fault",
+            "run": event.run,
+            "time_s": time_s,
+            "fault": fault_name(event.code),
+            "joint": joint,
+        }
+    return {"event": "notice", "text": getattr(event, "text", "")}

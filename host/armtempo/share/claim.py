@@ -1,0 +1,170 @@
+"""Who has a port: one file for each port, in a folder that only this user can read.
+
+The folder is ``armtempo`` below ``$XDG_RUNTIME_DIR``, else a private one for temporary files. A program that
+was killed leaves its file behind; nobody answers at its address then.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import secrets
+import stat
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+VERSION = 1
+LOCAL_SOCKETS = os.name == "posix"
+"""Whether sockets are files of the file system; else they are ports of localhost, and a token is asked for."""
+_LONGEST_SOCKET_PATH = 100
+"""Bytes; an operating system takes 104 to 108."""
+
+
+@dataclass(frozen=True)
+class PortClaim:
+    """One program's claim to one port."""
+
+    name: str
+    """The port, by a name that is the same for every program (``ports.names.same_for_all``)."""
+    port: str
+    """The same as its user called it."""
+    device: str
+    """What can be opened: for a virtual board the device that it was given."""
+    program: str
+    """What the program was called with, in short."""
+    pid: int
+    number: str
+    """Tells one claim from another."""
+    address: str
+    """Path of a socket, or a port of localhost."""
+    token: str
+    """What a caller must know; "" where the socket's permissions are enough."""
+    version: int = VERSION
+
+    @property
+    def who(self) -> str:
+        """The program as messages name it."""
+        return f"'{self.program}' (process {self.pid})"
+
+    def write(self) -> None:
+        """Put the claim in place of an earlier one. OSError where that fails."""
+        folder()
+        for path in self._files():
+            before = _read(path)
+            if before is not None and before.number != self.number:
+                self._write(before._marker(path))  # it may wake up after this program has ended
+            self._write(path)
+
+    def _write(self, path: Path) -> None:
+        aside = path.with_suffix(f".{self.number}")
+        with os.fdopen(os.open(aside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
+            json.dump(asdict(self), file)
+        os.replace(aside, path)
+
+    def _marker(self, path: Path) -> Path:
+        """Where it stands who has taken the port over from this program, also when that has given it up again."""
+        return path.with_name(f"{self.number}.taken")
+
+    def taken_by(self) -> PortClaim | None:
+        """The claim of another program that stands, or stood, in the place of this one."""
+        files = self._files()
+        found = [_read(path) for path in (*files, *(self._marker(file) for file in files))]
+        return next((claim for claim in found if claim is not None and claim.number != self.number), None)
+
+    def remove(self) -> None:
+        """Give the port up, unless another program has claimed it since."""
+        with suppress(OSError):
+            for path in self._files():
+                self._marker(path).unlink(missing_ok=True)
+                found = _read(path)
+                if found is not None and found.number == self.number:
+                    path.unlink()
+        with suppress(OSError):
+            if LOCAL_SOCKETS:
+                Path(self.address).unlink()
+
+    def _files(self) -> list[Path]:
+        """Where the claim to this port stands: in the folder for new ones, and wherever an earlier one does."""
+        name = f"{hashlib.sha256(self.name.encode()).hexdigest()[:16]}.json"
+        first, *others = [place / name for place in _folders()]
+        return [first, *(path for path in others if path.exists())]
+
+
+def new(name: str, port: str, device: str) -> PortClaim:
+    """This program's claim, not yet written. OSError where there is no private folder for it."""
+    number = secrets.token_hex(8)
+    address = str(folder() / f"{number}.socket") if LOCAL_SOCKETS else ""
+    token = "" if LOCAL_SOCKETS else secrets.token_hex(16)
+    return PortClaim(name, port, device, program(), os.getpid(), number, address, token)
+
+
+def find(name: str, port: str) -> PortClaim | None:
+    """Who has claimed the port, dead or alive; ``port`` as the user calls it, for a link whose device is gone."""
+    for claim in claims():
+        if claim.name == name or claim.port == port:
+            return claim
+    return None
+
+
+def claims() -> Iterator[PortClaim]:
+    """All claims of this user's programs."""
+    for place in _folders():
+        for path in sorted(place.glob("*.json")) if _is_private(place) else []:
+            found = _read(path)
+            if found is not None:
+                yield found
+
+
+def folder() -> Path:
+    """Where claims and sockets are, made where it is missing. OSError where it is not this user's alone."""
+    place = next(_folders())
+    place.mkdir(mode=0o700, parents=True, exist_ok=True)
+    if not _is_private(place):
+        raise OSError(None, "is not this user's alone", str(place))
+    return place
+
+
+def program() -> str:
+    """This program's command line, in short."""
+    words = sys.argv[:1] and [Path(sys.argv[0]).name, *sys.argv[1:]]
+    if words and words[0] in ("__main__.py", "-c"):
+        words[0] = "armtempo" if words[0] == "__main__.py" else "python"
+    text = " ".join(words) or "python"
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _folders() -> Iterator[Path]:
+    """The folder for new claims, then one where another program of this user may have put its own."""
+    user = str(os.getuid()) if hasattr(os, "getuid") else os.environ.get("USERNAME", "")
+    private = Path(tempfile.gettempdir()) / f"armtempo-{user}"
+    runtime = os.environ.get("XDG_RUNTIME_DIR") or (os.environ.get("LOCALAPPDATA") if os.name == "nt" else "")
+    if runtime and Path(runtime).is_dir():
+        wanted = Path(runtime) / "armtempo"
+        if len(os.fsencode(wanted)) + len("/0123456789abcdef.socket") <= _LONGEST_SOCKET_PATH:
+            yield wanted
+    yield private
+
+
+def _is_private(place: Path) -> bool:
+    """Whether the folder is there and this user's alone."""
+    try:
+        found = place.lstat()
+    except OSError:
+        return False
+    if not stat.S_ISDIR(found.st_mode):
+        return False
+    return not hasattr(os, "getuid") or (found.st_uid == os.getuid() and not found.st_mode & 0o077)
+
+
+def _read(path: Path) -> PortClaim | None:
+    """The claim in a file; None where it is gone, damaged or of another version."""
+    try:
+        found = PortClaim(**json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError):
+        return None
+    return found if found.version == VERSION else None

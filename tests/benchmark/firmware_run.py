@@ -1,0 +1,261 @@
+"""The shipped motion on MicroPython's own stm32 firmware, driven by this host: the figures of board/docs/firmware.md.
+
+    python -m tests.benchmark.firmware_run MICROPYTHON [FOLDER]
+
+MICROPYTHON: a checkout as ``armtempo firmware`` takes it. That command builds the firmware with the program; one
+without is built beside it, and gets the compiled files that ``armtempo deploy`` copies. QEMU (7.2 or newer) runs each;
+the host reaches it over TCP, sends the arm, homes it, uploads the motion and runs it, as with any board. What stands
+in for timers, DMA, USB and encoders (loop_board.c, firmware_loop.py and firmware_host.py of tests/board/scripts) is a
+part of both firmwares, so that it takes little of the heap. FOLDER keeps what was built.
+"""
+
+from __future__ import annotations
+
+import re
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from armtempo.arrays import Array
+from armtempo.deploy import program_files
+from armtempo.errors import ArmtempoError
+from armtempo.model.arm import Arm, LimitSwitches, Safety
+from armtempo.model.job import Job
+from armtempo.planning import planner
+from armtempo.robot.board import Board, connect
+
+from tests.benchmark import firmware, loop
+
+PROBES = ("firmware_loop.py", "firmware_host.py")
+MANIFEST = 'include("$(PORT_DIR)/boards/manifest.py")\n' + "".join(f'module("{name}")\n' for name in PROBES)
+CYCLES = 1.3
+PATIENCE_S = 300.0
+SIX_JOINTS = "ar4"
+USB = 'pyb.usb_mode("VCP")'
+START = """import gc
+
+gc.collect()
+before = gc.mem_alloc()
+import firmware_host
+
+firmware_host.replace(%r)
+gc.collect()
+print("@ own", gc.mem_alloc() - before)
+from armtempo_board import load_program
+
+program = load_program()
+firmware_host.loop.hook()
+program.main(firmware_host.ROOT)
+"""
+
+
+@dataclass(frozen=True)
+class Heap:
+    """Bytes: in use by firmware and program, and the largest free block."""
+
+    used: int
+    largest: int
+
+
+def in_files() -> dict[str, Any]:
+    """Where the stand-ins find in the compact program what they take the place of."""
+    known = program_files.compact_program().functions
+
+    def place(label: str) -> tuple[str, str]:
+        (short,) = {key for key, found in known.items() for one in found if one.label == label}
+        return f"armtempo_board.{short[0]}", short[1]
+
+    return {
+        "engine": "armtempo_board.core",
+        "matches": place("isr.matches"),
+        "set_interval": place("newton.set_interval"),
+    }
+
+
+def define_board(micropython: Path, folder: Path) -> Path:
+    """The definition of the emulated board, with the stand-ins as modules of its firmware."""
+    source = Path(__file__).with_name("loop_board.c").read_text()
+    probes = {name: (firmware.SCRIPTS / name).read_text() for name in PROBES}
+    return firmware.define_board(micropython, folder, source, {**probes, "manifest.py": MANIFEST})
+
+
+def build_with_program(micropython: Path, board: Path, out: Path) -> Path:
+    """By the command; the firmware's ELF file."""
+    if not out.exists():
+        command = [
+            sys.executable,
+            "-m",
+            "armtempo",
+            "firmware",
+            "--board",
+            board,
+            "--micropython",
+            micropython,
+            "--out",
+            out,
+        ]
+        subprocess.run(list(map(str, command)), check=True)
+    return out / "firmware.elf"
+
+
+def flash(folder: Path, elf: Path, with_library: bool) -> Path:
+    """The image of a flash whose main.py starts the program between the stand-ins."""
+    places = firmware.symbols(elf)
+    scale = round(2 * loop._INSTRUCTION_NS / CYCLES)
+    settings: dict[str, Any] = {
+        name: places[name] for name in ("allocated", "at_compare", "at_feed", "feed_ticks", "looks_per_ms")
+    }
+    settings |= in_files() if with_library else loop.IN_FIRMWARE
+    settings |= {
+        "prescaler": scale - 1,
+        "millisecond": round(loop.CORE_HZ / 1000 / CYCLES * loop._INSTRUCTION_NS * loop.CORE_HZ / 1e9),
+    }
+    tree = folder / ("files" if with_library else "no-files")
+    files = program_files.start_files()
+    if with_library:
+        files |= program_files.library(firmware.STM32F4) | {program_files.STAMP_PATH: program_files.stamp()}
+    for path, data in files.items():
+        local = tree / path.removeprefix(f"{program_files.ROOT}/")
+        local.parent.mkdir(parents=True, exist_ok=True)
+        local.write_bytes(data)
+    boot = (tree / "boot.py").read_text()
+    assert USB in boot
+    (tree / "boot.py").write_text(
+        boot.replace(USB, "pyb.usb_mode(None)")
+    )  # the emulator has none, and waits long
+    before, found, _ = (tree / "main.py").read_text().partition(firmware.START)
+    assert found
+    (tree / "main.py").write_text(before + START % settings)
+    return firmware.make_image(tree)
+
+
+@contextmanager
+def running(elf: Path, image: Path) -> Iterator[tuple[str, list[str]]]:
+    """A board that runs: its port for the host, and the lines that it has printed until now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        number = probe.getsockname()[1]
+    serial = f"tcp:127.0.0.1:{number},server=on,wait=off,nodelay=on"
+    with tempfile.NamedTemporaryFile() as cut:
+        cut.write(bytes(4))
+        cut.flush()
+        command = firmware.emulator(elf, image, Path(cut.name), "-icount", f"shift={loop._SHIFT}")
+        command += ["-serial", serial]
+        said: list[str] = []
+        with subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        ) as process:
+            threading.Thread(target=lambda: said.extend(process.stdout or ()), daemon=True).start()
+            try:
+                _wait(said, "@ started")
+                yield f"socket://127.0.0.1:{number}", said
+            finally:
+                process.kill()
+
+
+def _wait(said: list[str], words: str) -> None:
+    begin = time.monotonic()
+    while not any(words in line for line in said):
+        assert time.monotonic() - begin < PATIENCE_S, "".join(said)
+        time.sleep(0.2)
+
+
+def heaps(said: list[str]) -> dict[str, Heap]:
+    """By stage."""
+    text = "".join(said).replace("\r", "")
+    (own,) = re.findall(r"@ own (\d+)", text)
+    print(
+        f"    of the heap the stand-ins hold {own} bytes, which are not counted as in use, but are not free"
+    )
+    found = re.findall(r"@ (\w+)\nstack.*\nGC: total: \d+, used: (\d+).*\n.*max free sz: (\d+)", text)
+    return {name: Heap(int(used) - int(own), 16 * int(free)) for name, used, free in found}
+
+
+def unwatched(arm: Arm) -> Arm:
+    """The arm without what nothing stands in for: encoders are not watched, there are no switches."""
+    joints = tuple(
+        replace(
+            joint,
+            encoder=joint.encoder and replace(joint.encoder, following_error_deg=0.0),
+            switches=LimitSwitches(),
+        )
+        for joint in arm.joints
+    )
+    return replace(arm, joints=joints, safety=Safety())
+
+
+def run(elf: Path, image: Path) -> dict[str, Heap]:
+    """Drive a board through the shipped motion by the host's own link; AssertionError where it does not end well."""
+    arm = unwatched(Arm.paper())
+    plan = planner.plan(arm, replace(Job.paper(arm), population=5, iterations=20))
+    with running(elf, image) as (port, said), tempfile.TemporaryDirectory() as runs:
+        with connect(port) as board:
+            board.home(arm)
+            board.goto(plan)
+            done = board.run(plan, out=runs)
+            _check_steps(board, arm, plan.trajectory(plan.total_s))
+        print(f"    {plan.job.name}: {plan.total_s:.3f} s, {len(done.samples)} samples, ends where planned")
+        _wait(said, "@ ended")
+        return heaps(said)
+
+
+def move(elf: Path, image: Path, name: str) -> dict[str, Heap]:
+    """Move a shipped arm a little from its home posture; as ``run``."""
+    arm = unwatched(Arm.load(name))
+    target_deg = np.array(arm.home_deg) + np.resize([2.0, 1.0, -2.0], len(arm.driven))
+    with running(elf, image) as (port, said):
+        with connect(port) as board:
+            board.home(arm)
+            board.goto(target_deg)
+            _check_steps(board, arm, target_deg)
+        _wait(said, "@ ended")
+        return heaps(said)
+
+
+def _check_steps(board: Board, arm: Arm, angles_deg: Array) -> None:
+    wanted = [
+        round(float(angle) * joint.steps_per_deg) for angle, joint in zip(angles_deg, arm.driven, strict=True)
+    ]
+    sent = board.status().positions.commanded_steps
+    assert max(abs(one - two) for one, two in zip(sent, wanted, strict=True)) <= 1, (sent, wanted)
+
+
+def main(micropython: Path, folder: Path) -> None:
+    """Print the figures."""
+    board = define_board(micropython, folder)
+    kinds = (
+        ("in the firmware", build_with_program(micropython, board, folder / "with-program"), False),
+        ("files, compiled", firmware.build_at(micropython, board, folder / "stock"), True),
+    )
+    for title, elf, with_library in kinds:
+        print(title, flush=True)
+        image = flash(folder, elf, with_library)
+        tell(run(elf, image))
+        print(f"    {SIX_JOINTS}, six joints:", flush=True)
+        try:
+            tell(move(elf, image, SIX_JOINTS))
+        except ArmtempoError as error:
+            print(f"    {error}")
+
+
+def tell(found: dict[str, Heap]) -> None:
+    """Print a line for each stage."""
+    for stage, heap in found.items():
+        print(f"    {stage:<10}in use {heap.used:>7}, largest free block {heap.largest:>7}", flush=True)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 2:
+        main(Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve())
+    else:
+        with tempfile.TemporaryDirectory() as name:
+            main(Path(sys.argv[1]).resolve(), Path(name))

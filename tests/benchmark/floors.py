@@ -1,0 +1,62 @@
+"""Floors of random jobs with 2 to 500 via points against plans: none may be above; how near they are.
+
+    python -m tests.benchmark.floors [--first 0] [--count 1000]
+
+Shared timing, ``refine`` as high as 16 where the board's record has room, so that the plans are near what the path
+allows.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import time
+from dataclasses import replace
+
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(name, "1")
+
+import numpy as np  # noqa: E402
+from armtempo.planning import planner, time_parameterization  # noqa: E402
+
+from tests.host.test_floors import random_motion  # noqa: E402
+
+REFINE = 16
+
+
+def main() -> None:
+    """Plan, compare, and print what is above and how far below the others are."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--count", type=int, default=1000)
+    parser.add_argument("--minutes", type=float, default=np.inf, help="begin no further job after these")
+    options = parser.parse_args()
+    end = time.monotonic() + 60.0 * options.minutes
+    over, above, vias = [], 0, []
+    start = time.process_time()
+    for seed in range(options.first, options.first + options.count):
+        if time.monotonic() > end:
+            break
+        arm, job = random_motion(seed, most=500)
+        most = time_parameterization.most_refine(job, len(job.via) - 1, len(arm.driven))
+        plan = planner.plan(arm, replace(job, refine=min(REFINE, most), optimiser="gradient", starts=1))
+        search = plan.searches[0]
+        if not 0.0 < search.floor_s <= plan.total_s:
+            above += 1
+            print(f"seed {seed}: floor {search.floor_s:.9g} s, plan {plan.total_s:.9g} s", flush=True)
+        over.append(100.0 * (plan.total_s / search.floor_s - 1.0))
+        vias.append(len(job.via))
+    quantiles = np.quantile(over, (0.1, 0.5, 0.9))
+    print(f"{len(over)} plans, {min(vias)} to {max(vias)} via points: {above} floors above their plan")
+    print(
+        "over the floor: "
+        + ", ".join(
+            f"{name} {value:.2f} %" for name, value in zip(("10 %", "median", "90 %"), quantiles, strict=True)
+        )
+        + f"; within 2 %: {100.0 * np.mean(np.array(over) < 2.0):.0f} % of them"
+    )
+    print(f"CPU: {time.process_time() - start:.0f} s")
+
+
+if __name__ == "__main__":
+    main()

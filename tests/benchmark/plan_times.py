@@ -1,0 +1,70 @@
+"""Motion time, floor and CPU time of plans: the shipped motion in many ways, and growth with via points and refine.
+
+    python -m tests.benchmark.plan_times [--large]
+
+CPU seconds of one run on one core; compare them within the run only.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import time
+from dataclasses import replace
+
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(name, "1")
+
+import numpy as np  # noqa: E402
+from armtempo.model.arm import Arm  # noqa: E402
+from armtempo.model.job import Job  # noqa: E402
+from armtempo.planning import planner  # noqa: E402
+from armtempo.report import text_summary  # noqa: E402
+
+from tests.host import problems  # noqa: E402
+
+
+def main() -> None:
+    """Print a line for each plan."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--large", action="store_true", help="300 and 500 via points too")
+    options = parser.parse_args()
+    arm = Arm.paper()
+    paper = Job.paper(arm)
+    planner.plan(arm, replace(paper, iterations=5, polish=True))  # so that everything is loaded
+    planner.plan(arm, Job("first", paper.via, path="free", refine=4, starts=1))
+    print(f"{'job':<34}{'time s':>10}{'floor s':>10}{'over %':>8}{'CPU s':>8}{'segments':>10}{'record':>8}")
+    job = Job("feed", paper.via)
+    _print("paper: per-joint, refine 1, acs", arm, paper)
+    _print("shared, refine 1", arm, replace(job, refine=1))
+    for refine in (8, 64):
+        _print(f"shared, refine {refine}", arm, replace(job, refine=refine))
+    _print("the defaults (shared, auto)", arm, job)
+    _print("the defaults, gradient", arm, replace(job, optimiser="gradient"))
+    _print("free", arm, replace(job, path="free"))
+    _print("free, 1 start", arm, replace(job, path="free", starts=1))
+    _print("free, per-joint", arm, replace(job, path="free", timing="per-joint"))
+    equal = problems.make_arm([[50.0, 50.0, 150.0]] * 3)
+    for vias, refine in ((10, 4), (30, 4), (100, 4), *(((300, 1), (500, 1)) if options.large else ())):
+        via = np.random.default_rng(1).normal(0, 40, (vias, 3))
+        many = Job("many", tuple(map(tuple, via.tolist())), refine=refine, optimiser="gradient", starts=1)
+        _print(f"{vias} via points, refine {refine}, gradient", equal, many)
+
+
+def _print(label: str, arm: Arm, job: Job) -> None:
+    start = time.process_time()
+    plan = planner.plan(arm, job)
+    seconds = time.process_time() - start
+    floor = max(search.floor_s for search in plan.searches)
+    if not plan.trajectory.shared:
+        floor = max(plan.searches, key=lambda search: search.total_s).floor_s
+    segments = len(plan.trajectory.joints[0].time_points_s) - job.degree
+    print(
+        f"{label:<34}{plan.total_s:>10.4f}{floor:>10.4f}{100 * (plan.total_s / floor - 1):>8.2f}{seconds:>8.2f}"
+        f"{segments:>10}{text_summary.record_bytes(plan):>8}",
+        flush=True,
+    )
+
+
+if __name__ == "__main__":
+    main()

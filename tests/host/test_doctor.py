@@ -1,0 +1,122 @@
+"""``armtempo doctor``: what is wrong is named with a cure, and ends with code 1; nothing is changed."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from armtempo import doctor
+from armtempo.cli import main
+from armtempo.doctor import Condition, machine, robot
+from armtempo.errors import LinkError
+from armtempo.ports.listing import Port
+from armtempo.robot.board_state import BoardState
+from click.testing import CliRunner
+
+STATE = BoardState(
+    port="/dev/ttyACM0",
+    virtual=False,
+    board_id="1234 1.26",
+    program_crc=0xABCD,
+    program_current=True,
+    protocol=1,
+    arm_crc=5,
+    arm="mine",
+    arm_source="arm.toml",
+    free_flash=50_000,
+    free_heap=40_000,
+    max_rate=240_000,
+    max_rate_sum=240_000,
+    room="5820 bytes: 3 x 5000 steps/s",
+    arm_problem="",
+    state="idle",
+    moving=False,
+    fault="",
+    frames_bad=0,
+    samples_lost=0,
+    joints=(),
+)
+
+
+def test_a_sound_board_has_nothing_wrong() -> None:
+    assert {item.level for item in doctor.examine_board(STATE)} == {Condition.GOOD}
+
+
+@pytest.mark.parametrize(
+    ("change", "level", "words", "cure"),
+    [
+        ({"program_current": False}, Condition.WRONG, "another than", "armtempo deploy"),
+        ({"fault": "estop"}, Condition.WRONG, "estop", "armtempo clear"),
+        (
+            {"arm_problem": "not used: the record is damaged"},
+            Condition.WRONG,
+            "damaged",
+            "armtempo configure",
+        ),
+        ({"free_heap": 3_000}, Condition.NOTE, "3000 bytes of heap", "firmware"),
+        ({"frames_bad": 7}, Condition.NOTE, "7 damaged messages", "cable"),
+    ],
+)
+def test_what_is_wrong_with_a_board(
+    change: dict[str, object], level: Condition, words: str, cure: str
+) -> None:
+    found = [
+        item for item in doctor.examine_board(replace(STATE, **change)) if item.level is not Condition.GOOD
+    ]  # type: ignore[arg-type]
+    assert [item.level for item in found] == [level]
+    assert words in found[0].found
+    assert cure in found[0].next_step
+
+
+def test_a_board_that_does_not_answer() -> None:
+    (item,) = doctor.examine_board(LinkError("no answer within 2 s; check power and cable"))
+    assert item.level is Condition.WRONG
+    assert "no answer" in item.found
+
+
+def test_a_port_that_may_not_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(robot, "find_ports", lambda: [Port("/dev/ttyACM0", "board", True)])
+    monkeypatch.setattr(robot.os, "access", lambda *_: False)
+    monkeypatch.setattr(robot.sys, "platform", "linux")
+    (item,) = doctor.ports()
+    assert item.level is Condition.WRONG
+    assert "dialout" in item.next_step
+
+
+def test_packages_that_are_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def nothing(name: str) -> str:
+        raise machine.PackageNotFoundError(name)
+
+    monkeypatch.setattr(machine, "version", nothing)
+    levels = {item.what: item.level for item in doctor.packages()}
+    assert levels["numpy"] is Condition.WRONG
+    assert levels["matplotlib"] is Condition.NOTE
+    assert "sphinx" not in levels
+
+
+def test_the_command_examines_a_virtual_board(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(main, ["doctor", "--arm", "paper", "--port", f"sim:{tmp_path / 'b'}", "--json"])
+    assert done.exit_code == 0, done.output
+    found = json.loads(done.stdout)
+    assert {item["what"] for item in found["machine"]} == {"armtempo", "Python", "system"}
+    assert "(virtual)" in found["board"][0]["found"]
+    assert "as installed here" in found["board"][1]["found"]
+
+
+def test_a_broken_arm_file_is_named_and_ends_with_1(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("arm.toml").write_text("name = 3\n")
+    done = CliRunner().invoke(main, ["doctor", "--arm", "arm.toml"])
+    assert done.exit_code == 1, done.output
+    assert "armtempo check --arm arm.toml" in done.output
+
+
+def test_an_arm_that_is_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(main, ["doctor", "--arm", "nowhere.toml"])
+    assert done.exit_code == 1
+    assert "nowhere.toml" in done.output
+    assert "Traceback" not in done.output

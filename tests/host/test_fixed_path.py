@@ -1,0 +1,172 @@
+"""Time axes by gradients: derivatives, optimality, refinement, and the totals on the paper's motion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from armtempo.model.job import Job
+from armtempo.planning import interval_search, limit_ratios, planner
+from armtempo.planning.fixed_path import FixedPath
+from armtempo.splines import bspline
+
+from tests.host import problems
+from tests.host.feeding import FEEDING, LIMITS
+
+PROBLEMS = {problem.name: problem for problem in problems.load()}
+
+
+def point(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Derivatives of two joints and of time at three points of u, and limits."""
+    rng = np.random.default_rng(seed)
+    return rng.normal(0, 10, (3, 3, 2)), rng.uniform(0.5, 2, (3, 3)), rng.uniform(1, 9, (2, 3))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_derivatives_of_the_ratios_are_theirs(seed: int) -> None:
+    angle, time, limits = point(seed)
+    weights = np.random.default_rng(seed).normal(0, 1, (3, 3, 2))
+    gradient = limit_ratios.gradient(angle, time, limits)
+    curvature = limit_ratios.curvature(angle, time, limits, weights)
+    step = 1e-6
+    for number in range(6):
+        moved = []
+        for sign in (1, -1):
+            one, two = angle.copy(), time.copy()
+            (one if number < 3 else two)[number % 3] += sign * step
+            moved.append((limit_ratios.ratios(one, two, limits), limit_ratios.gradient(one, two, limits)))
+        slope = (moved[0][0] - moved[1][0]) / (2 * step)
+        assert gradient[:, number] == pytest.approx(slope, rel=1e-6, abs=1e-6 * np.abs(gradient).max())
+        bend = np.einsum("lpj,lvpj->vpj", weights, (moved[0][1] - moved[1][1]) / (2 * step))
+        assert curvature[number] == pytest.approx(bend, rel=1e-6, abs=1e-6 * np.abs(curvature).max())
+
+
+@pytest.mark.parametrize("name", ["feeding", "feeding-shared", "feeding-cubic"])
+def test_polished_plan_is_the_best_known_to_1e_6(name: str) -> None:
+    """From a short search on purpose, so that the solver has work to do."""
+    problem = PROBLEMS[name]
+    plan = planner.plan(problem.arm, replace(problem.job, polish=True, iterations=150))
+    for search, best in zip(plan.searches, problem.best_s, strict=True):
+        assert search.total_s <= search.searched_s
+        assert search.total_s == pytest.approx(best, rel=2e-6)
+        assert search.optimum_s <= search.total_s <= search.optimum_s * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_gradients_never_make_it_worse(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    points = bspline.fit(rng.normal(0, 40, (int(rng.integers(2, 9)), 2)), 5)
+    path = FixedPath(points, 5, LIMITS[:2], mirrored=True)
+    start = path.stretched(path.of_intervals(rng.uniform(0.3, 2, len(points) - 5)))
+    found = path.optimum(start, 1e-8)
+    assert found.total_s <= path.duration_s(start) * (1 + 1e-12)
+    assert path.duration_s(path.stretched(found.differences_s)) == pytest.approx(found.total_s, rel=1e-9)
+    assert found.bound_s <= found.total_s
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_every_polished_axis_has_a_bound_near_it(seed: int) -> None:
+    arm, job = problems.random_problem(seed)
+    if np.all(np.ptp(job.via, axis=0) == 0):
+        return
+    for search in planner.plan(arm, replace(job, polish=True, bounds_s=None)).searches:
+        assert 0.0 < search.optimum_s <= search.total_s, f"seed {seed}"
+        assert search.total_s <= 1.02 * search.optimum_s, f"seed {seed}"
+
+
+def test_equal_plans_have_equal_bounds() -> None:
+    plans = [
+        planner.plan(problem.arm, replace(problem.job, polish=True, seed=seed))
+        for problem in [PROBLEMS["feeding-shared"]]
+        for seed in (1, 2)
+    ]
+    bounds = [plan.searches[0].optimum_s for plan in plans]
+    assert bounds == pytest.approx([bounds[0]] * 2, rel=1e-6)
+
+
+def refined(joints: list[int], timing: str, refine: int | str) -> tuple[float, float]:
+    """Motion time and floor on the paper's motion."""
+    feeding = PROBLEMS["feeding"]
+    via = tuple(tuple(row) for row in FEEDING[:, joints].tolist())
+    arm = replace(feeding.arm, joints=tuple(feeding.arm.joints[joint] for joint in joints))
+    plan = planner.plan(arm, replace(feeding.job, via=via, timing=timing, refine=refine))
+    assert refine in ("auto", plan.trajectory.joints[0].refine)
+    assert plan.searches[0].total_s == pytest.approx(plan.trajectory.duration_s, rel=1e-12)
+    return plan.trajectory.duration_s, plan.searches[0].floor_s
+
+
+@pytest.mark.parametrize(("joint", "most_s"), [(0, 4.946), (1, 6.014), (2, 5.576)])
+def test_refined_joints_come_near_their_floor(joint: int, most_s: float) -> None:
+    total, floor = refined([joint], "per-joint", 8)
+    assert floor < total <= most_s
+    assert total <= 1.006 * floor
+
+
+@pytest.mark.parametrize(
+    ("refine", "most_s"), [(1, 8.19), (4, 7.2975), (8, 7.254), (64, 7.2272), ("auto", 7.228)]
+)
+def test_refined_shared_timing(refine: int | str, most_s: float) -> None:
+    total, floor = refined([0, 1, 2], "shared", refine)
+    assert total <= most_s
+    assert 7.15 <= floor <= total
+
+
+def test_more_refinement_is_never_slower() -> None:
+    """Also where it is no multiple of what came before."""
+    totals = [refined([0, 1, 2], "shared", refine)[0] for refine in (1, 2, 3, 8)]
+    assert np.all(np.diff(totals) < 0)
+
+
+def test_automatic_refinement_stays_within_the_record() -> None:
+    rng = np.random.default_rng(3)
+    via = tuple(map(tuple, np.cumsum(rng.normal(0, 10, (120, 3)), axis=0).tolist()))
+    arm = problems.make_arm([[50.0, 50.0, 150.0]] * 3)
+    plan = planner.plan(arm, Job("long", via, optimiser="gradient", starts=1))
+    refine = plan.trajectory.joints[0].refine
+    assert 1 < refine < 18
+    assert 119 * refine <= 2048
+
+
+@pytest.mark.parametrize("name", ["feeding", "feeding-shared"])
+def test_gradients_from_several_starts_find_the_best_known(name: str) -> None:
+    problem = PROBLEMS[name]
+    job = replace(problem.job, optimiser="gradient", polish=True, starts=4, bounds_s=None)
+    for search, best in zip(planner.plan(problem.arm, job).searches, problem.best_s, strict=True):
+        assert search.total_s == pytest.approx(best, rel=2e-6)
+        assert len(search.starts_s) == search.evaluations == 4
+        assert np.array_equal(search.history_s, np.minimum.accumulate(search.starts_s))
+
+
+def uneven() -> tuple[np.ndarray, list[object]]:
+    """One joint, ways of 0.01 and 1000 degrees: intervals more than 30 : 1."""
+    return np.array([[0.0], [1000.0], [1000.01], [1000.02], [2000.0]]), [LIMITS[0]]
+
+
+def test_bounds_follow_from_the_job() -> None:
+    via, limits = uneven()
+    box = interval_search.bounds_s(bspline.fit(via, 5), 5, limits)
+    assert box[0, 1] / box[1, 0] > 30.0
+
+
+def test_bounds_that_hold_the_search_back_are_widened_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    via, _ = uneven()
+    arm = problems.make_arm([[50.0, 50.0, 150.0]])
+    job = Job("uneven", tuple(map(tuple, via.tolist())), refine=1)
+    best = planner.plan(arm, job).total_s
+    given = planner.plan(arm, replace(job, bounds_s=(20.0, 21.0), polish=False))
+    assert any("ended at bounds_s" in note for note in given.notes)
+    assert given.total_s > 1.001 * best
+    monkeypatch.setattr(interval_search, "_REACH", 1.05)
+    held = planner.plan(arm, job)
+    assert any("they were widened 6 times" in note for note in held.notes)
+    assert held.total_s == pytest.approx(best, rel=1e-3)
+
+
+def test_gradients_start_within_bounds_and_are_not_held_by_them() -> None:
+    via, _ = uneven()
+    arm = problems.make_arm([[50.0, 50.0, 150.0]])
+    job = Job("uneven", tuple(map(tuple, via.tolist())), refine=1, optimiser="gradient")
+    plan = planner.plan(arm, replace(job, bounds_s=(20.0, 21.0)))
+    assert not plan.notes
+    assert plan.total_s == pytest.approx(planner.plan(arm, job).total_s, rel=1e-4)

@@ -1,0 +1,101 @@
+"""Names that other programs would take for something else: formulas, terminal control, directions of writing."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from armtempo.cli import main
+from armtempo.errors import InputError
+from armtempo.link import board_messages
+from armtempo.model import arm_file, shipped, trajectory_file
+from armtempo.model.plan import Plan
+from armtempo.report import comparison, run_report
+from armtempo_shared import wire
+from click.testing import CliRunner
+
+from tests.host import made_runs
+
+FORMULAS = ("$$", r"$\theta$", r"_a^{b}\frac")
+CONTROL = ("\x1b[31mred", "bell\x07", "two\nlines", "back\b", "\x9b31m", "\u202etxt.exe")
+
+
+def named(*names: str) -> Plan:
+    """The shipped plan with these names for its driven joints."""
+    left = iter(names)
+    whole = made_runs.shipped_plan()
+    joints = [replace(joint, name=next(left)) if joint.motor else joint for joint in whole.arm.joints]
+    return replace(whole, arm=replace(whole.arm, name=names[0], joints=tuple(joints)))
+
+
+def shown_safely(text: str) -> bool:
+    """Whether there is nothing in it that steers a terminal or changes the direction of writing."""
+    return all(char.isprintable() or char == "\n" for char in text)
+
+
+def test_a_formula_in_a_name_is_text_in_every_figure(tmp_path: Path) -> None:
+    path = made_runs.make(tmp_path / "run", repetitions=1, plan=named(*FORMULAS))
+    result = CliRunner().invoke(main, ["report", str(path)])
+    assert result.exit_code == 0, result.output
+    page = (path / run_report.PAGE).read_text()
+    for name in FORMULAS:
+        assert f">{name}</text>" in (path / "tracking.svg").read_text()
+        assert f">{name}</td>" in page
+    assert f"> {FORMULAS[2]}</text>" in (path / "convergence.svg").read_text()  # its line is in the legend
+    other = shutil.copytree(path, tmp_path / "_other")
+    comparison.write([path, other], tmp_path / "two.html")
+    text = (tmp_path / "two.html").read_text()
+    assert "> _other</text>" in text
+    assert "$$" in text
+
+
+@pytest.mark.parametrize("name", CONTROL)
+def test_an_arm_file_with_control_characters_in_a_name_is_refused(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "arm.toml"
+    text = shipped.files()[shipped.PAPER].read_text(encoding="utf-8")
+    path.write_text(text.replace('"joint 2"', json.dumps(name), 1), encoding="utf-8")
+    result = CliRunner().invoke(main, ["plan", "--arm", str(path), "-o", str(tmp_path / "x.json")])
+    assert result.exit_code == 2
+    assert "without control characters" in result.stderr
+    assert shown_safely(result.output)
+
+
+def test_other_alphabets_are_names(tmp_path: Path) -> None:
+    path = tmp_path / "arm.toml"
+    text = shipped.files()[shipped.PAPER].read_text(encoding="utf-8")
+    path.write_text(text.replace('"joint 2"', '"Schulter – плечо 肩"', 1), encoding="utf-8")
+    assert arm_file.load(path).driven[1].name == "Schulter – плечо 肩"
+
+
+@pytest.mark.parametrize("name", [name for name in CONTROL if "\n" not in name])
+def test_a_trajectory_file_with_them_is_refused(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "x.json"
+    trajectory_file.save(named(name, "b", "c"), path)
+    with pytest.raises(InputError, match="control characters") as caught:
+        trajectory_file.load(path)
+    assert shown_safely(str(caught.value))
+
+
+@pytest.mark.parametrize("name", [CONTROL[0], CONTROL[-1]])
+def test_they_are_spelt_out_in_a_run_folder(tmp_path: Path, name: str) -> None:
+    path = made_runs.make(tmp_path / "run", repetitions=1, on_board=True)
+    meta = json.loads((path / "run.json").read_text())
+    meta["joints"][0]["name"] = meta["name"] = meta["port"] = name
+    (path / "run.json").write_text(json.dumps(meta))
+    result = CliRunner().invoke(main, ["report", str(path)])
+    assert result.exit_code == 0, result.output
+    assert shown_safely(result.output)
+    files = [path / run_report.PAGE, *path.glob("*.svg")]
+    assert len(files) == 5
+    assert all(shown_safely(file.read_text()) for file in files)
+
+
+def test_what_a_board_says_cannot_steer_the_terminal() -> None:
+    entry = wire.EVENT["notice"]
+    payload = wire.encode(entry, (), "loud\x07 \x1b]0;title\x07")
+    heard = board_messages.event(entry[1], payload)
+    assert isinstance(heard, board_messages.Notice)
+    assert heard.text == r"loud\x07 \x1b]0;title\x07"
