@@ -8,7 +8,7 @@ import pytest
 
 from tests import interpreters
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("cortex_m4")]
 
 BENCHMARK = interpreters.ROOT / "tests" / "benchmark" / "cortex_m4.py"
 

@@ -26,7 +26,7 @@ from click.testing import CliRunner
 from tests import browser
 from tests.host import made_runs
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("report")]
 
 FIGURES = ("tracking", "errors", "motion", "convergence", "postures")
 PARTS = 11
