@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 @options.altered
 @options.port
 @options.log_traffic
+@options.as_json
 def command(
     what: str,
     repeat: int,
@@ -38,6 +40,7 @@ def command(
     altered: bool,
     port: str | None,
     log_traffic: Path | None,
+    as_json: bool,
 ) -> None:
     """Replay a motion and record it.
 
@@ -51,21 +54,33 @@ def command(
     with chosen.board(port, log_traffic, named) as board:
         arm = chosen.arm_of_board(board, named)
         board.configure(arm, replace=replace_arm)
-        click.echo(f"arm: {chosen.words(arm)}")
+        say = chosen.tell if as_json else click.echo
+        say(f"arm: {chosen.words(arm)}")
         motion = board.upload(plan, replace=force) if plan else what
-        run_and_tell(board, motion, repeat, chosen.runs(out), live)
+        run_and_tell(board, motion, repeat, chosen.runs(out), live, as_json)
 
 
 def run_and_tell(
-    board: Board, motion: Plan | EncodedMotion | str, repeat: int, out: Path, live: bool = False
+    board: Board,
+    motion: Plan | EncodedMotion | str,
+    repeat: int,
+    out: Path,
+    live: bool = False,
+    as_json: bool = False,
 ) -> Run:
-    """Run a motion, or the stored one of that name, and print what happens and what became of each joint."""
+    """Run a motion, or the stored one of that name, and print what happens and what became of each joint.
+
+    ``as_json``: the result as JSON, what happens on the other stream.
+    """
     from armtempo.cli.live import Live
     from armtempo.report import text_summary
 
     virtual = chosen.virtual_words(board.port) if board.info.virtual else ""
-    with Live(window=live, where=virtual) as watcher:
+    with Live(window=live, where=virtual, aside=as_json) as watcher:
         run = board.run(motion, repeat, out, watcher=watcher)
+    if as_json:
+        click.echo(json.dumps(run.to_json()))
+        return run
     for line in text_summary.result_lines(run.results):
         click.echo(line)
     return run
