@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -36,6 +37,20 @@ def test_plans_the_shipped_job_without_options() -> None:
     assert "joint 3" in result.output
     assert "written: feed.json" in result.output
     assert trajectory_file.load("feed.json").job.iterations == 20
+
+
+def test_json_is_one_document_and_quiet_leaves_it_alone() -> None:
+    result = CliRunner().invoke(main, ["--quiet", "plan", "--iterations", "5", "--json"])
+    assert result.exit_code == 0, result.output
+    assert result.stderr == ""
+    (found,) = json.loads(result.stdout)["plans"]
+    saved = trajectory_file.load("feed.json")
+    assert (found["file"], found["duration_s"]) == ("feed.json", saved.trajectory.duration_s)
+    assert [joint["name"] for joint in found["joints"]] == ["joint 1", "joint 2", "joint 3"]
+    for joint in found["joints"]:
+        assert joint["floor_s"] <= joint["duration_s"] <= found["duration_s"]
+        assert all(value <= joint["limits"][name] * (1 + 1e-9) for name, value in joint["extremes"].items())
+    assert "no arm and no job are named" in run("--iterations", "5").stderr
 
 
 COARSE_JOINT_2 = ("microsteps = 8, gear_ratio = 20.0", "microsteps = 1, gear_ratio = 0.5")
@@ -189,6 +204,16 @@ stop = true
 [[via]]
 angles_deg = [40, -60, 40]
 """
+
+
+def test_no_part_is_written_where_a_later_one_would_be_refused() -> None:
+    Path("rests.toml").write_text(RESTING)
+    Path("move-2.json").write_text("mine")
+    refused = run("--job", "rests.toml", "--split", "-o", "move.json")
+    assert refused.exit_code == 2
+    assert "move-2.json exists" in refused.output
+    assert not Path("move-1.json").exists()
+    assert Path("move-2.json").read_text() == "mine"
 
 
 def test_a_motion_too_long_for_the_board_ends_with_1_and_is_split_on_request() -> None:

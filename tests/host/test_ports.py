@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import os
 from pathlib import Path
 
 import pytest
 from armtempo import deploy
+from armtempo.cli import main
 from armtempo.deploy import program_files
 from armtempo.errors import InputError, LinkError
 from armtempo.link import diagnose
 from armtempo.link.transport import SerialTransport
 from armtempo.ports import listing, names
+from armtempo.ports.listing import find_ports
+from click.testing import CliRunner
 
 
 class Silent:
@@ -105,3 +109,10 @@ def test_what_is_no_serial_port_is_said_to_be_none(tmp_path: Path) -> None:
             SerialTransport(str(path))
     with pytest.raises(InputError, match="names no folder"):
         names.sim_flash("sim:")
+
+
+def test_ports_as_json() -> None:
+    found = CliRunner().invoke(main, ["ports", "--json"])
+    assert found.exit_code == 0
+    ports = json.loads(found.stdout)["ports"]
+    assert [one["port"] for one in ports] == [port.device for port in find_ports()]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -60,10 +61,12 @@ def test_board_set_up_for_another_arm(tmp_path: Path) -> None:
 
 def test_live_says_where_there_is_no_display(tmp_path: Path) -> None:
     file = small_plan(tmp_path / "small.json")
-    done = commandline.run("run", file, "--live", folder=tmp_path, MPLBACKEND="agg")
+    done = commandline.run("run", file, "--live", "--json", folder=tmp_path, MPLBACKEND="agg")
     assert done.exit_code == 0, done.errors
-    done.said("no live plot: there is no display")
-    assert "samples-01.csv: complete" in done.output
+    done.said("no live plot: there is no display", "samples-01.csv: complete")
+    found = json.loads(done.output)
+    assert (found["complete"], found["repetitions"]) == (True, ["complete"])
+    assert reader.load(tmp_path / found["folder"]).repetitions[0].state == "complete"
 
 
 def test_fault_is_named_in_terminal_run_folder_and_report(tmp_path: Path) -> None:

@@ -133,5 +133,6 @@ def _of_file(error: OSError) -> ArmtempoError:
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]}, epilog=_EXAMPLES)
 @click.version_option(__version__, prog_name="armtempo")
-def main() -> None:
+@click.option("-q", "--quiet", is_flag=True, help="No progress bars and no remarks: only results and errors.")
+def main(quiet: bool) -> None:
     """Time-optimal B-spline motions for stepper arms, replayed by an STM32F407 with MicroPython."""

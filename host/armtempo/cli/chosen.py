@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from armtempo.cli.verbosity import is_quiet
 from armtempo.errors import InputError
 from armtempo.project.settings import ARM, JOB, RUNS, ProjectSettings, nothing_set
 
@@ -20,8 +21,9 @@ if TYPE_CHECKING:
 
 
 def tell(text: str) -> None:
-    """Say something beside the command's output."""
-    click.echo(text, err=True)
+    """Say something beside the command's output, unless ``armtempo --quiet``."""
+    if not is_quiet():
+        click.echo(text, err=True)
 
 
 # arm and job

@@ -11,7 +11,7 @@ import numpy as np
 from armtempo_shared.limits import TICK_HZ
 
 from armtempo.arrays import Array
-from armtempo.cli import messages
+from armtempo.cli import chosen, messages
 from armtempo.cli.progress import ProgressBar
 from armtempo.errors import ArmtempoError
 from armtempo.link.board_messages import Sample
@@ -24,8 +24,9 @@ from armtempo.runs.run_folder import Repetition, RunFolder
 class Live(Watcher):
     """Shows a run on the terminal; used as a context. Without a display it says so and opens no window."""
 
-    def __init__(self, window: bool, where: str = "") -> None:
-        """``where``: on what the motion runs, if that needs saying."""
+    def __init__(self, window: bool, where: str = "", aside: bool = False) -> None:
+        """``where``: on what the motion runs, if that needs saying; ``aside``: say it on stderr."""
+        self._say = chosen.tell if aside else click.echo
         self._window = window
         self._where = f", on {where}" if where else ""
         self._plot: LivePlot | None = None
@@ -36,7 +37,7 @@ class Live(Watcher):
         self._motion = motion
         self._started_s = time.monotonic()
         self._plot = self._open() if self._window else None
-        click.echo(f"{motion.name}: {motion.trajectory.duration_s:.3f} s, into {folder.path}{self._where}")
+        self._say(f"{motion.name}: {motion.trajectory.duration_s:.3f} s, into {folder.path}{self._where}")
 
     def sample(self, sample: Sample, duration_s: float) -> None:
         """Show one sample."""
@@ -51,7 +52,7 @@ class Live(Watcher):
 
     def end(self, repetition: Repetition) -> None:
         """Say how it ended."""
-        click.echo(repetition_line(repetition))
+        self._say(repetition_line(repetition))
 
     def _open(self) -> LivePlot | None:
         try:

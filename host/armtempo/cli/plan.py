@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -70,6 +71,7 @@ def _refine(ctx: click.Context, param: click.Parameter, value: str | None) -> in
 @click.option(
     "--corridor-curve", is_flag=True, help="Instead of a plan: the motion time in ever wider corridors."
 )
+@options.as_json
 def command(
     file: Path | None,
     job_path: Path | None,
@@ -78,6 +80,7 @@ def command(
     force: bool,
     split: bool,
     corridor_curve: bool,
+    as_json: bool,
     **changes: Any,
 ) -> None:
     """Plan a job and write its trajectory file, or plan a sequence.
@@ -91,7 +94,7 @@ def command(
     if file is not None and job_path is not None:
         raise InputError("FILE and --job are both given", "name one of them")
     if file is not None and sequence_file.is_sequence(file):
-        sequences.refuse_job_options({"split": split, "corridor_curve": corridor_curve, **changes})
+        sequences.refuse_job_options({"split": split, "corridor_curve": corridor_curve, "json": as_json, **changes})
         sequences.plan(file, arm_path, output, force)
         return
     job_path = file or job_path
@@ -103,8 +106,14 @@ def command(
         _write_curve(arm, job, target, force)
         return
     plans = _plans(arm, job, split)
-    for number, plan in enumerate(plans, 1):
-        _write(plan, target if len(plans) == 1 else target.with_stem(f"{target.stem}-{number}"), force)
+    parts = [target] if len(plans) == 1 else [_part(target, number) for number in range(1, len(plans) + 1)]
+    made = dict(zip(parts, plans, strict=True))
+    _save(made, force)
+    if as_json:
+        click.echo(json.dumps({"plans": [_json(file, plan) for file, plan in made.items()]}))
+        return
+    for file, plan in made.items():
+        _show(file, plan)
 
 
 def _changed(job: Job, changes: dict[str, Any]) -> Job:
@@ -129,14 +138,36 @@ def _plans(arm: Arm, job: Job, split: bool) -> list[Plan]:
     return plans
 
 
-def _write(plan: Plan, target: Path, force: bool) -> None:
-    from armtempo import pipeline
+def _part(target: Path, number: int) -> Path:
+    """The file of one part of a motion that is split."""
+    return target.with_stem(f"{target.stem}-{number}")
 
-    plan.save(target, force)
+
+def _save(made: dict[Path, Plan], force: bool) -> None:
+    """All files, or none where one of them may not be replaced."""
+    from armtempo.model import trajectory_file
+
+    for file, plan in made.items():
+        trajectory_file.check(plan, file, force)
+    for file, plan in made.items():
+        plan.save(file, force)
+
+
+def _show(file: Path, plan: Plan) -> None:
+    from armtempo import pipeline
+    from armtempo.robot import engine_room
+
     click.echo(f"arm: {chosen.words(plan.arm)}")
     for line in pipeline.summary(plan):
         click.echo(line)
-    click.echo(f"written: {target}")
+    click.echo(engine_room.of_arm(plan.arm))
+    click.echo(f"written: {file}")
+
+
+def _json(file: Path, plan: Plan) -> dict[str, Any]:
+    from armtempo.report import json_summary
+
+    return {"file": str(file), **json_summary.of_plan(plan)}
 
 
 def _write_curve(arm: Arm, job: Job, target: Path, force: bool) -> None:

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+import json
+
 import click
+
+from armtempo.cli import options
 
 
 @click.command()
-def command() -> None:
+@options.as_json
+def command(as_json: bool) -> None:
     """List the serial ports, likely boards first."""
     from armtempo.ports.listing import find_ports
     from armtempo.ports.names import SIM
 
     found = find_ports()
+    if as_json:
+        entries = [
+            {"port": port.device, "description": port.description, "board": port.board} for port in found
+        ]
+        click.echo(json.dumps({"ports": entries}))
+        return
     width = max([24, *(1 + len(port.device) for port in found)])
     for port in found:
         mark = "a MicroPython board" if port.board else ""

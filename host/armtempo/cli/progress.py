@@ -11,6 +11,8 @@ from typing import Any, Self
 
 import click
 
+from armtempo.cli.verbosity import is_quiet
+
 _PATIENCE_S = 1.0
 _BAR_COLUMNS = 24
 """Width of frame, percentage and remaining time; the note is cut so that no line wraps."""
@@ -40,7 +42,7 @@ class ProgressBar:
             self._shown = now
 
     def _wanted(self) -> bool:
-        return sys.stderr.isatty() and time.monotonic() - self._start_s >= _PATIENCE_S
+        return not is_quiet() and sys.stderr.isatty() and time.monotonic() - self._start_s >= _PATIENCE_S
 
     def __enter__(self) -> Self:
         return self

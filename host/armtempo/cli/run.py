@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 @options.altered
 @options.port
 @options.log_traffic
+@options.as_json
 def command(
     what: str,
     repeat: int,
@@ -41,6 +43,7 @@ def command(
     altered: bool,
     port: str | None,
     log_traffic: Path | None,
+    as_json: bool,
 ) -> None:
     """Replay a motion and record it, or run a sequence.
 
@@ -53,7 +56,7 @@ def command(
     from armtempo.model.sequence_plan import is_sequence_plan
 
     if chosen.is_file(what) and is_sequence_plan(Path(what)):
-        only_for_motions(repeat, live, out)
+        only_for_motions(repeat, live, out, as_json)
         sequence = chosen.load_sequence_plan(Path(what), arm_path)
         with chosen.board(port, log_traffic, sequence.arm) as board:
             board.configure(sequence.arm, replace=replace_arm)
@@ -66,19 +69,26 @@ def command(
     with chosen.board(port, log_traffic, named) as board:
         arm = chosen.arm_of_board(board, named)
         board.configure(arm, replace=replace_arm)
-        click.echo(f"arm: {chosen.words(arm)}")
+        say = chosen.tell if as_json else click.echo
+        say(f"arm: {chosen.words(arm)}")
         motion = board.upload(plan, replace=force) if plan else what
         board.speed(percent / 100)
         if isinstance(motion, str) and _is_sequence(board, motion):
-            only_for_motions(repeat, live, out)
+            only_for_motions(repeat, live, out, as_json)
             sequences.run_and_tell(board, motion)
             return
-        run_and_tell(board, motion, repeat, chosen.runs(out), live)
+        run_and_tell(board, motion, repeat, chosen.runs(out), live, as_json)
 
 
-def only_for_motions(repeat: int, live: bool, out: Path | None) -> None:
-    """InputError for what a sequence has not: repetitions of its own, a plot, a run folder."""
-    for name, given in (("--repeat", repeat != 1), ("--live", live), ("--out", out is not None)):
+def only_for_motions(repeat: int, live: bool, out: Path | None, as_json: bool) -> None:
+    """InputError for what a sequence has not: repetitions of its own, a plot, a run folder and what is in it."""
+    given_options = (
+        ("--repeat", repeat != 1),
+        ("--live", live),
+        ("--out", out is not None),
+        ("--json", as_json),
+    )
+    for name, given in given_options:
         if given:
             raise InputError(
                 f"{name}: a sequence has no such thing", "leave it out; repeat is a step of the sequence"
@@ -91,15 +101,26 @@ def _is_sequence(board: Board, name: str) -> bool:
 
 
 def run_and_tell(
-    board: Board, motion: Plan | EncodedMotion | str, repeat: int, out: Path, live: bool = False
+    board: Board,
+    motion: Plan | EncodedMotion | str,
+    repeat: int,
+    out: Path,
+    live: bool = False,
+    as_json: bool = False,
 ) -> Run:
-    """Run a motion, or the stored one of that name, and print what happens and what became of each joint."""
+    """Run a motion, or the stored one of that name, and print what happens and what became of each joint.
+
+    ``as_json``: the result as JSON, what happens on the other stream.
+    """
     from armtempo.cli.live import Live
     from armtempo.report import text_summary
 
     virtual = chosen.virtual_words(board.port) if board.info.virtual else ""
-    with Live(window=live, where=virtual) as watcher:
+    with Live(window=live, where=virtual, aside=as_json) as watcher:
         run = board.run(motion, repeat, out, watcher=watcher)
+    if as_json:
+        click.echo(json.dumps(run.to_json()))
+        return run
     for line in text_summary.result_lines(run.results):
         click.echo(line)
     return run

@@ -36,12 +36,20 @@ def save(plan: Plan, path: Path | str, force: bool = False) -> None:
     ``force``: also over a file that is not of the same job for the same arm, by their names, or was altered.
     Raises InputError where such a file is there, or the file cannot be written.
     """
+    check(plan, path, force)
+    replace_text(Path(path), _text(plan))
+
+
+def check(plan: Plan, path: Path | str, force: bool = False) -> None:
+    """Raise InputError where ``save`` would not replace a file that is there; nothing is written."""
+    target = Path(path)
+    check_replaceable(target, _text(plan), force or _is_earlier(target, plan), RULE)
+
+
+def _text(plan: Plan) -> str:
     content = json_codec.encode(plan)
     whole = {"format": FORMAT, "version": VERSION, "sha256": _checksum(content), "plan": content}
-    text = json.dumps(whole, indent=1, allow_nan=False) + "\n"
-    target = Path(path)
-    check_replaceable(target, text, force or _is_earlier(target, plan), RULE)
-    replace_text(target, text)
+    return json.dumps(whole, indent=1, allow_nan=False) + "\n"
 
 
 def load(path: Path | str, altered: bool = False) -> Plan:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -55,6 +56,16 @@ class Run:
     def entries(self) -> tuple[Repetition, ...]:
         """What run.json says of each repetition: how it ended, fault, lost samples, last position."""
         return self._content.entries
+
+    def to_json(self) -> dict[str, Any]:
+        """The run folder, how each repetition ended, and where each joint came to rest in the last one."""
+        return {
+            "name": self.name,
+            "folder": str(self.path),
+            "complete": self.complete,
+            "repetitions": [entry.state for entry in self.entries],
+            "joints": [asdict(joint) for joint in self.results],
+        }
 
     @property
     def complete(self) -> bool:
