@@ -9,7 +9,6 @@ _NOT_ALWAYS = (
     "motion_check",
     "rate_check",
     "override",
-    "joint_law",
     "time_law",
     "interval_steps",
     "cubics",
@@ -26,6 +25,7 @@ _NOT_ALWAYS = (
     "table",
     "program_hash",
     "basis",
+    "set_up",  # of the compact form: constructors
 )
 
 

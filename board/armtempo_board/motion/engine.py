@@ -151,7 +151,7 @@ class Engine:
     def _take_override(self, rate: int, brake_ticks: int) -> None:
         heap.forget()
         gc.collect()
-        from armtempo_board.motion.override import Override  # here, so that it can be forgotten
+        from armtempo_board.stepgen.override import Override  # here, so that it can be forgotten
 
         override = Override()
         override.begin(rate, brake_ticks, self.duration_ticks)

@@ -26,6 +26,14 @@ STAMP_PATH = f"{LIBRARY}/{PACKAGES[0]}/{STAMP}"
 START_FILES = ("boot.py", "main.py")
 """Files of the board package that become files of the flash's root; main.py goes last."""
 _MAIN = f"{PACKAGES[0]}.app.program"
+_STEPGEN, _MOTION = f"{PACKAGES[0]}.stepgen", f"{PACKAGES[0]}.motion"
+_TOGETHER = {
+    f"{_STEPGEN}.override": [f"{_STEPGEN}.{name}" for name in ("time_law", "interval_steps", "cubics")],
+    f"{_MOTION}.motion_check": [f"{_MOTION}.rate_check"],
+    f"{PACKAGES[0]}.storage.motion_file": [f"{PACKAGES[1]}.motion"],
+    f"{_STEPGEN}.bezier_weights": [f"{PACKAGES[1]}.basis"],
+}
+"""Modules that are imported later, with those that come and go with them: each costs memory for names and a table."""
 _ARCHITECTURES = {1: "x86", 2: "x64", 3: "armv6", 4: "armv6m", 5: "armv7m", 6: "armv7em", 7: "armv7emsp"}
 """By the number in ``sys.implementation._mpy`` (MicroPython's py/persistentcode.h)."""
 
@@ -117,6 +125,7 @@ def compact_program(hash_module: str = "") -> Compact:
         _MAIN,
         entries & set(sources),
         {*_handlers(), *_hardware_names(), *(name for node in nodes for name in _named(node))},
+        _TOGETHER,
     )
 
 
