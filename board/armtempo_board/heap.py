@@ -3,30 +3,18 @@
 import gc
 import sys
 
-_NOT_ALWAYS = (
-    "pins",
-    "registers",
-    "motion_check",
-    "rate_check",
-    "override",
-    "time_law",
-    "interval_steps",
-    "cubics",
-    "endpoints",
-    "arm_check",
-    "motion_file",
-    "engine_memory",
-    "room",
-    "armtempo_shared.motion",
-    "bezier_weights",
-    "store",
-    "store_commands",
-    "armrecord",
-    "table",
-    "program_hash",
-    "basis",
-    "set_up",  # of the compact form: constructors
-)
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
+_HELD_BYTES = 5_800
+_held: "Any" = None
+_NOT_ALWAYS = """
+    pins registers motion_check rate_check override time_law interval_steps cubics endpoints arm_check motion_file
+    engine_memory room armtempo_shared.motion bezier_weights store store_commands command_rows armrecord table program_hash basis
+    start_up set_up
+"""
+"""Modules; the last two are those of the compact form that hold constructors."""
 
 
 def collect_often(often: bool = True) -> None:
@@ -39,15 +27,33 @@ def collect_often(often: bool = True) -> None:
         gc.threshold((gc.mem_free() + gc.mem_alloc()) // 64 if often else -1)
 
 
-def forget() -> None:
-    """Give up the modules that only set-up, the start of a motion or a motion needs; the next collection frees them.
+def hold() -> None:
+    """Keep a piece of the heap free of what stays, for the code that a motion needs: it comes in large pieces."""
+    global _held
+    _held = None
+    try:
+        _held = bytearray(_HELD_BYTES)
+    except MemoryError:  # then it has to do with smaller ones
+        pass
 
+
+def release() -> None:
+    """Give that piece up."""
+    global _held
+    _held = None
+
+
+def forget(*names: str) -> None:
+    """Give up the modules of these names, or all that only set-up, the start of a motion or a motion needs.
+
+    The next collection frees them.
     They are imported inside of functions, never at the head of a module that stays, and never while a motion runs.
     What a motion needs is held by its engine until it ends.
     """
+    given_up = names or _NOT_ALWAYS.split()
     for module in list(sys.modules):
         if module.startswith("armtempo_"):
             package, _, name = module.rpartition(".")
-            if name in _NOT_ALWAYS or module in _NOT_ALWAYS:
+            if name in given_up or module in given_up:
                 del sys.modules[module]
                 delattr(sys.modules[package], name)

@@ -127,6 +127,7 @@ class Controller:
     def store(self) -> "Any":
         """The store; an upload that is under way keeps it."""
         if self._store is None:
+            heap.forget()
             from armtempo_board.storage import store
 
             self._store = store.Store(self._root)
@@ -210,21 +211,25 @@ class Controller:
         return arm_check.checked(data, self._workspace.memory.size, self._workspace.joints)
 
     def _take_arm(self, record: "ArmRecord") -> None:
-        from armtempo_shared import armrecord  # here, so that it can be forgotten
+        from armtempo_shared.armrecord import FLAG_STOP_ON_LINK_LOSS  # here, so that its module can be forgotten
 
         head, joints, crc = record
         if crc == self.arm_crc:
             return
-        all_but_limits = armrecord.without_limits(head, joints)
+        all_but_limits = _all_but_limits(record)
         known, steps = 0, []
         if self.engine and all_but_limits == self._all_but_limits:  # the same arm: it stands where it stood
             known, steps = self.engine.known, [self.engine.commanded(joint) for joint in range(self.joints)]
         self._drop_engine()
-        self.engine = Engine(head, joints, self._workspace)
+        heap.hold()
+        try:
+            self.engine = Engine(head, joints, self._workspace)
+        finally:
+            heap.release()
         self._all_but_limits = all_but_limits
         if known:
             self.engine.home(known, steps)
-        stops = head["flags"] & armrecord.FLAG_STOP_ON_LINK_LOSS
+        stops = head["flags"] & FLAG_STOP_ON_LINK_LOSS
         self._silence_ms = head["link_timeout_ms"] if stops else _NEVER_MS
         self.joints = len(joints)
         self.arm_crc = crc
@@ -273,17 +278,22 @@ class Controller:
         if unknown and not homing:
             raise Refused(codes.UNHOMED, _lowest(unknown))
         rate, self._next_rate = self._next_rate, _PERMILLE
-        motion = self.load(name, crc)
-        self.forget_store()
         heap.forget()
         gc.collect()
-        if homing:
-            self._assume(motion, unknown)
+        heap.hold()
         try:
+            motion = self.load(name, crc)
+            self.forget_store()
+            heap.forget()
+            gc.collect()
+            if homing:
+                self._assume(motion, unknown)
             self.engine.load(motion, _PERMILLE if crc is None else rate)
         except Refused:
             self._withdraw_assumed()
             raise
+        finally:
+            heap.release()
         self.samples.clear()
         self.done = False
         self.duration_ticks = self.engine.duration_ticks
@@ -404,6 +414,13 @@ class Controller:
 
 def _board_id() -> bytes:
     return b"".join([b"%02x" % byte for byte in machine.unique_id()]) + b" " + sys.version.encode()
+
+
+def _all_but_limits(record: "ArmRecord") -> int:
+    from armtempo_shared import armrecord  # here, so that it can be forgotten
+
+    head, joints, _ = record
+    return armrecord.without_limits(head, joints)
 
 
 def _lowest(mask: int) -> int:

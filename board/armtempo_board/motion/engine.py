@@ -149,6 +149,7 @@ class Engine:
         self.finished = False
 
     def _take_override(self, rate: int, brake_ticks: int) -> None:
+        heap.release()
         heap.forget()
         gc.collect()
         from armtempo_board.stepgen.override import Override  # here, so that it can be forgotten

@@ -2,7 +2,7 @@
 
 MicroPython keeps every name that a file mentions, and 10 to 20 bytes for each place where a module holds one. So
 packages within packages go (``flatten``), constants are put in where they are used (``constants``), the modules that
-are always needed become one, as do others (``merge``), the program's own names become short (``shorten``), and those that are used
+are always needed become one (``merge``), as do others (``join``), the program's own names become short (``shorten``), and those that are used
 most come first (``order``). The behaviour of the program does not change.
 """
 
@@ -16,9 +16,10 @@ from types import MappingProxyType
 from armtempo.deploy.compact.constants import fold
 from armtempo.deploy.compact.flatten import flatten
 from armtempo.deploy.compact.frames import Function, Functions, functions, label
+from armtempo.deploy.compact.join import join
 from armtempo.deploy.compact.merge import CORE, merge, used_whole
 from armtempo.deploy.compact.order import often_used_first
-from armtempo.deploy.compact.set_up import SET_UP, move, set_up_methods
+from armtempo.deploy.compact.set_up import move, set_up_methods
 from armtempo.deploy.compact.shorten import short_names, shorten
 
 
@@ -36,30 +37,37 @@ def compact(
     entries: Collection[str],
     keep: Collection[str],
     together: Mapping[str, Collection[str]] = MappingProxyType({}),
-    at_rest: Collection[str] = (),
+    at_rest: Mapping[str, Collection[str]] = MappingProxyType({}),
 ) -> Compact:
     """A program of fewer modules and shorter names that does the same.
 
     ``sources``: text by dotted module name, packages by their own. ``main``: what it needs at once becomes the
     module ``core`` of its package. ``entries``: modules that are imported from outside, ``main`` among them.
     ``keep``: names that must stay, as they are used from outside or made at run time. ``together``: modules that
-    become part of another one (``merge``). ``at_rest``: methods, by module, class and name, that are called only
-    while nothing moves, as constructors are (``set_up``). Raises ValueError where a module asks another for a name that is not
-    there, or a package cannot be made flat.
+    become part of another one (``join``). ``at_rest``: methods, by module, class and name, that are called only
+    while nothing moves, under the name of the module that is to hold them (``set_up``). Raises ValueError where a
+    module asks another for a name that is not there, or a package cannot be made flat.
     """
     trees, flat = flatten({module: _at_run_time(ast.parse(text)) for module, text in sources.items()})
     whole = used_whole(trees)
     fold(trees, whole)
-    flat_together = {flat[home]: {flat[module] for module in modules} for home, modules in together.items()}
-    merged = merge(trees, flat[main], {flat[entry] for entry in entries}, flat_together)
+    join(trees, {flat[home]: [flat[module] for module in modules] for home, modules in together.items()})
+    merged = merge(trees, flat[main], {flat[entry] for entry in entries})
     core = f"{main.split('.', 1)[0]}.{CORE}"
-    methods = set_up_methods(merged[core], {_in_core(name) for name in at_rest})
+    apart = {
+        target: set_up_methods(merged[core], {_in_core(name) for name in names})
+        for target, names in at_rest.items()
+    }
     names = short_names(merged, keep, whole)
     known = functions(merged, names)
-    labels = [label(CORE, method.name, node.name) for node, method in methods]
+    labels = {
+        target: [label(CORE, method.name, node.name) for node, method in methods]
+        for target, methods in apart.items()
+    }
     shorten(merged, names)
-    for name, of in zip(move(merged, core, methods), labels, strict=True):
-        known[SET_UP, name] = [Function(of, name, frozenset(), named=True)]
+    for target, methods in apart.items():
+        for name, of in zip(move(merged, core, target, methods), labels[target], strict=True):
+            known[target, name] = [Function(of, name, frozenset(), named=True)]
     for tree in merged.values():
         often_used_first(tree)
     texts = {module: ast.unparse(ast.fix_missing_locations(tree)) for module, tree in merged.items()}

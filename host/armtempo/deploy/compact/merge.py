@@ -1,4 +1,4 @@
-"""The modules that a program needs at once become one, and so do others that are needed together."""
+"""The modules that a program needs at once become one; what is imported later stays apart."""
 
 from __future__ import annotations
 
@@ -18,56 +18,34 @@ from armtempo.deploy.compact.scopes import (
 CORE = "core"
 
 
-def merge(
-    trees: Mapping[str, ast.Module],
-    main: str,
-    entries: Collection[str],
-    together: Mapping[str, Collection[str]],
-) -> dict[str, ast.Module]:
+def merge(trees: Mapping[str, ast.Module], main: str, entries: Collection[str]) -> dict[str, ast.Module]:
     """The modules of the smaller program; ``trees`` is used up.
 
     What ``main`` imports at the head of a module, directly or through others, becomes the module ``core`` of
     its package, each name behind that of its module. Packages, ``entries``, modules that a function imports and
-    modules of which more than names is used stay as they are, but the modules of ``together`` become part of the
-    one under which they stand there. Raises ValueError where a name has no meaning, or one of these stays apart.
+    modules of which more than names is used stay as they are. Raises ValueError where a name has no meaning.
     """
-    in_order = _in_order(trees, main)
-    for tree in trees.values():
-        tree.body = _without_unused(tree).body
     apart = {*entries, *packages(trees), *_imported_later(trees), *used_whole(trees)}
+    inside = {module: top_names(trees[module]) for module in _in_order(trees, main) if module not in apart}
     core = f"{main.rsplit('.', 1)[0]}.{CORE}"
-    joined = {module: home for home, modules in together.items() for module in modules}
-    if stay := apart & set(joined):
-        raise ValueError(f"{min(stay)} is imported inside of a function or used as a whole: it stays apart")
-    homes = {module: core for module in in_order if module not in apart}
-    homes |= {module: home for home in together for module in _in_order(trees, home) if joined.get(module) == home}
-    inside = {module: top_names(trees[module]) for module in homes}
-    done = {module: _Merger(module, tree, inside, homes).run() for module, tree in trees.items()}
-    merged = {module: ast.Module(body, []) for module, body in done.items() if module not in homes}
-    for home in set(homes.values()):
-        parts = [node for module in homes if homes[module] == home for node in done[module]]
-        merged[home] = ast.Module(_once([*parts, *done.get(home, [])]), [])
-    while any([_drop_unused(merged, home) for home in set(homes.values())]):
+    done = {module: _Merger(module, tree, inside, core).run() for module, tree in trees.items()}
+    merged = {module: ast.Module(body, []) for module, body in done.items() if module not in inside}
+    merged[core] = ast.Module(_once([node for module in inside for node in done[module]]), [])
+    while _drop_unused(merged, core):
         pass
     for module in set(merged) - packages(trees):
         merged[module] = _without_unused(merged[module])
     return merged
 
 
-def _drop_unused(merged: Mapping[str, ast.Module], home: str) -> bool:
-    """Take out of ``home`` what nothing mentions; whether there was something."""
+def _drop_unused(merged: Mapping[str, ast.Module], core: str) -> bool:
+    """Take out of ``core`` what nothing mentions; whether there was something."""
     nodes = [node for tree in merged.values() for node in ast.walk(tree)]
     used = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
     used |= {node.attr for node in nodes if isinstance(node, ast.Attribute)}
-    body = merged[home].body
-    merged[home].body = [node for node in body if not _is_unused(node, used)]
-    return len(merged[home].body) < len(body)
-
-
-def _is_unused(node: ast.stmt, used: Collection[str]) -> bool:
-    """Whether it only defines what came from another module, its name behind that of its module, and is not used."""
-    made = _makes_only(node)
-    return bool(made) and all("__" in name and name not in used for name in made)
+    body = merged[core].body
+    merged[core].body = [node for node in body if not _makes_only(node) or _makes_only(node) & used]
+    return len(merged[core].body) < len(body)
 
 
 def _makes_only(node: ast.stmt) -> set[str]:
@@ -158,40 +136,36 @@ class _Pruner(Scoped):
 
 
 class _Merger(Scoped):
-    """Rewrites one module; ``inside``: names in the modules that become a part of others, ``homes``."""
+    """Rewrites one module; ``inside``: names in the modules that become ``core``."""
 
-    def __init__(
-        self, module: str, tree: ast.Module, inside: Mapping[str, set[str]], homes: Mapping[str, str]
-    ) -> None:
+    def __init__(self, module: str, tree: ast.Module, inside: Mapping[str, set[str]], core: str) -> None:
         super().__init__()
         self._module = module
         self._inside = inside
-        self._homes = homes
-        self._home = homes.get(module, module)
+        self._core = core
         self._body = tree.body
         self._top_nodes = set(tree.body)
         self._imported = imported(tree.body, inside)
         self._own = inside.get(module, set())
-        self._needed: set[str] = set()
+        self._needs_core = False
 
     def run(self) -> list[ast.stmt]:
         """The rewritten statements of the module."""
         body = visit_all(self, self._body)
-        for home in sorted(self._needed):
-            package, name = home.rsplit(".", 1)
+        if self._needs_core:
+            package, name = self._core.rsplit(".", 1)
             body.insert(0, ast.ImportFrom(package, [ast.alias(name)], 0))
         return body
 
-    def _at_home(self, target: Target, name: str, context: ast.expr_context) -> ast.AST:
+    def _in_core(self, target: Target, name: str, context: ast.expr_context) -> ast.AST:
         """The name of another module, from here."""
         if name not in self._inside[target.module]:
             raise ValueError(f"{self._module}: {target.module} defines no {name}")
         whole = _qualified(target.module, name)
-        home = self._homes[target.module]
-        if home == self._home:
+        if self._module in self._inside:
             return ast.Name(whole, context)
-        self._needed.add(home)
-        return ast.Attribute(ast.Name(home.rsplit(".", 1)[1], ast.Load()), whole, context)
+        self._needs_core = True
+        return ast.Attribute(ast.Name(CORE, ast.Load()), whole, context)
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
         """One of the module's own names, or of another's."""
@@ -199,7 +173,7 @@ class _Merger(Scoped):
             return node
         target = self._imported.get(node.id)
         if target and target.name:
-            return self._at_home(target, target.name, node.ctx)
+            return self._in_core(target, target.name, node.ctx)
         if node.id in self._own:
             node.id = _qualified(self._module, node.id)
         return node
@@ -209,7 +183,7 @@ class _Merger(Scoped):
         if isinstance(node.value, ast.Name) and not self.hides(node.value.id):
             target = self._imported.get(node.value.id)
             if target and target.name is None:
-                return self._at_home(target, node.attr, node.ctx)
+                return self._in_core(target, node.attr, node.ctx)
         return self.generic_visit(node)
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
@@ -233,7 +207,7 @@ class _Merger(Scoped):
         return node
 
     def visit_ImportFrom(self, node: ast.ImportFrom) -> ast.AST | None:
-        """What becomes a part of another is not imported any more."""
+        """What becomes core is not imported any more."""
         node.names = [alias for alias in node.names if not self._is_inside(node, alias)]
         return node if node.names else None
 

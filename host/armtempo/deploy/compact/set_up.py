@@ -1,4 +1,4 @@
-"""Constructors and methods that are called only while nothing moves become a module that is imported for a call."""
+"""Constructors and other methods that are called only while nothing moves go to modules that are imported for a call."""
 
 from __future__ import annotations
 
@@ -7,36 +7,30 @@ from collections.abc import Collection, Iterator
 
 from armtempo.deploy.compact.scopes import Scoped, top_names
 
-SET_UP = "set_up"
-_LEAST_NODES = 50
-"""Of a constructor's syntax tree: the call that takes the place of a smaller one needs as much."""
-
 Method = tuple[ast.ClassDef, ast.FunctionDef]
 
 
-def set_up_methods(tree: ast.Module, keep: Collection[str]) -> list[Method]:
-    """The methods of a module that can be apart: constructors of classes without a base, and those of ``keep``.
+def set_up_methods(tree: ast.Module, wanted: Collection[str]) -> list[Method]:
+    """The methods of a module's classes that are ``wanted``: class and method, with a dot between.
 
-    ``keep``: class and method, with a dot between.
+    Raises ValueError where one is not there.
     """
-    return [
-        (node, method)
+    found = {
+        f"{node.name}.{method.name}": (node, method)
         for node in tree.body
-        if isinstance(node, ast.ClassDef) and not node.bases
+        if isinstance(node, ast.ClassDef)
         for method in node.body
-        if isinstance(method, ast.FunctionDef) and not method.decorator_list
-        if f"{node.name}.{method.name}" in keep or (method.name == "__init__" and _is_large(method))
-    ]
+        if isinstance(method, ast.FunctionDef)
+    }
+    if missing := set(wanted) - set(found):
+        raise ValueError(f"there is no {min(missing)}")
+    return [found[name] for name in found if name in wanted]
 
 
-def _is_large(method: ast.FunctionDef) -> bool:
-    return sum(1 for _ in ast.walk(method)) > _LEAST_NODES
+def move(trees: dict[str, ast.Module], home: str, target: str, methods: Collection[Method]) -> list[str]:
+    """Move methods of the module ``home`` to the new module ``target`` of its package; returns their names there.
 
-
-def move(trees: dict[str, ast.Module], home: str, methods: Collection[Method]) -> dict[str, ast.FunctionDef]:
-    """Move methods of the module ``home`` to the module ``set_up`` of its package; returns them by their names there.
-
-    Each leaves a call of itself behind. Names in ``set_up`` are some that the module has already, which cost nothing.
+    Each leaves a call of itself behind. The names are some that the module has already, which cost nothing.
     """
     package, core = home.rsplit(".", 1)
     own = sorted(top_names(trees[home]))
@@ -48,13 +42,13 @@ def move(trees: dict[str, ast.Module], home: str, methods: Collection[Method]) -
         body = qualifier.visit(ast.FunctionDef("", method.args, method.body, [])).body
         moved[name] = ast.FunctionDef(name, nothing, body, [])
         given: list[ast.expr] = [ast.Name(argument.arg, ast.Load()) for argument in arguments]
-        call = ast.Call(ast.Attribute(ast.Name(SET_UP, ast.Load()), name, ast.Load()), given, [])
+        call = ast.Call(ast.Attribute(ast.Name(target, ast.Load()), name, ast.Load()), given, [])
         result = ast.Expr(call) if method.name == "__init__" else ast.Return(call)
-        method.body = [ast.ImportFrom(package, [ast.alias(SET_UP)], 0), result]
+        method.body = [ast.ImportFrom(package, [ast.alias(target)], 0), result]
     imports = _needed([*trees[home].body], moved.values())
     own_import = ast.ImportFrom(package, [ast.alias(core)], 0)
-    trees[f"{package}.{SET_UP}"] = ast.Module([own_import, *imports, *moved.values()], [])
-    return moved
+    trees[f"{package}.{target}"] = ast.Module([own_import, *imports, *moved.values()], [])
+    return list(moved)
 
 
 def _needed(nodes: Collection[ast.stmt], functions: Collection[ast.FunctionDef]) -> Iterator[ast.stmt]:
