@@ -3,16 +3,12 @@
 import gc
 import sys
 
-TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from typing import Any
-
-_HELD_BYTES = 5_800
-_held: "Any" = None
+_LEAST_HELD = 1_000
+_held: "list[bytearray]" = []
 _NOT_ALWAYS = """
     pins registers motion_check rate_check override time_law interval_steps cubics endpoints arm_check motion_file
-    engine_memory room armtempo_shared.motion bezier_weights store store_commands command_rows armrecord table program_hash basis
-    start_up set_up
+    engine_memory room armtempo_shared.motion bezier_weights store store_commands command_rows armrecord table
+    program_hash basis start_up set_up
 """
 """Modules; the last two are those of the compact form that hold constructors."""
 
@@ -27,20 +23,21 @@ def collect_often(often: bool = True) -> None:
         gc.threshold((gc.mem_free() + gc.mem_alloc()) // 64 if often else -1)
 
 
-def hold() -> None:
-    """Keep a piece of the heap free of what stays, for the code that a motion needs: it comes in large pieces."""
-    global _held
-    _held = None
-    try:
-        _held = bytearray(_HELD_BYTES)
-    except MemoryError:  # then it has to do with smaller ones
-        pass
+def hold(*sizes: int) -> None:
+    """Keep pieces of the heap free of what stays, for the code that a motion needs; as large as there are, at most."""
+    release()
+    for size in sizes:
+        while size >= _LEAST_HELD:
+            try:
+                _held.append(bytearray(size))
+                break
+            except MemoryError:
+                size -= _LEAST_HELD // 4
 
 
 def release() -> None:
-    """Give that piece up."""
-    global _held
-    _held = None
+    """Give them up."""
+    _held.clear()
 
 
 def forget(*names: str) -> None:

@@ -211,7 +211,9 @@ class Controller:
         return arm_check.checked(data, self._workspace.memory.size, self._workspace.joints)
 
     def _take_arm(self, record: "ArmRecord") -> None:
-        from armtempo_shared.armrecord import FLAG_STOP_ON_LINK_LOSS  # here, so that its module can be forgotten
+        from armtempo_shared.armrecord import (
+            FLAG_STOP_ON_LINK_LOSS,
+        )  # here, so that its module can be forgotten
 
         head, joints, crc = record
         if crc == self.arm_crc:
@@ -221,7 +223,7 @@ class Controller:
         if self.engine and all_but_limits == self._all_but_limits:  # the same arm: it stands where it stood
             known, steps = self.engine.known, [self.engine.commanded(joint) for joint in range(self.joints)]
         self._drop_engine()
-        heap.hold()
+        heap.hold(8_800)
         try:
             self.engine = Engine(head, joints, self._workspace)
         finally:
@@ -280,7 +282,7 @@ class Controller:
         rate, self._next_rate = self._next_rate, _PERMILLE
         heap.forget()
         gc.collect()
-        heap.hold()
+        heap.hold(9_200)
         try:
             motion = self.load(name, crc)
             self.forget_store()

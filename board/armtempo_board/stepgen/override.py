@@ -1,8 +1,8 @@
 """Feed override: the rate at which the motion's own time runs, and ramps from one rate to another; for each joint too.
 
 The same law serves a slower run, a change of speed, a pause and braking (stepgen/time_law.py). Rates are in
-thousandths. Numbers here may be large integers: ``Override`` is called when a motion is loaded or a rate is asked for. Imported before a
-motion, and forgotten after it.
+thousandths. Numbers of ``Override`` may be large integers: it is called when a motion is loaded or a rate is asked
+for. Imported before a motion, and forgotten after it.
 """
 
 from array import array

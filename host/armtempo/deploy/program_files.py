@@ -29,11 +29,8 @@ _MAIN = f"{PACKAGES[0]}.app.program"
 _STEPGEN, _MOTION = f"{PACKAGES[0]}.stepgen", f"{PACKAGES[0]}.motion"
 _TOGETHER = {
     f"{_STEPGEN}.override": [f"{_STEPGEN}.{name}" for name in ("time_law", "interval_steps", "cubics")],
-    f"{_MOTION}.motion_check": [
-        f"{_MOTION}.rate_check",
-        f"{_MOTION}.endpoints",
-    ],
-    f"{_STEPGEN}.bezier_weights": [f"{PACKAGES[1]}.basis"],
+    f"{_MOTION}.motion_check": [f"{_MOTION}.rate_check"],
+    f"{_MOTION}.endpoints": [f"{_STEPGEN}.bezier_weights", f"{PACKAGES[1]}.basis"],
     f"{_MOTION}.arm_check": [f"{PACKAGES[1]}.armrecord"],
     f"{PACKAGES[0]}.app.room": [f"{PACKAGES[1]}.engine_memory"],
     f"{PACKAGES[0]}.app.command_rows": [f"{PACKAGES[0]}.app.store_commands"],
@@ -45,11 +42,19 @@ _TOGETHER = {
 _AT_REST = {
     "start_up": (
         "app.commands.Commands.__init__",
+        "app.commands.Commands.home",
+        "app.controller.Controller._assume",
+        "app.controller.Controller.home",
         "app.events.Events.__init__",
         "hardware.sampler.Sampler.__init__",
+        "hardware.sampler.Sampler.plan",
         "link.frame_reader.FrameReader.__init__",
         "link.serial_link.SerialLink.__init__",
+        "motion.engine.Engine._check",
+        "motion.engine.Engine.home",
+        "motion.joint_drive.JointDrive.load",
         "motion.ring_feeder.RingFeeder.__init__",
+        "stepgen.step_generator.StepGenerator.load",
     ),
     "set_up": (
         "hardware.encoders.EncoderInput.__init__",

@@ -2,8 +2,9 @@
 
 MicroPython keeps every name that a file mentions, and 10 to 20 bytes for each place where a module holds one. So
 packages within packages go (``flatten``), constants are put in where they are used (``constants``), the modules that
-are always needed become one (``merge``), as do others (``join``), the program's own names become short (``shorten``), and those that are used
-most come first (``order``). The behaviour of the program does not change.
+are always needed become one (``merge``), as do others that come and go together (``join``), the program's own names
+become short (``shorten``), those that are used most come first (``order``), and what is called only while nothing
+moves is imported for the call (``set_up``). The behaviour of the program does not change.
 """
 
 from __future__ import annotations

@@ -37,7 +37,9 @@ def functions(trees: Mapping[str, ast.Module], names: Names) -> Functions:
         for node, around in _functions(tree):
             short = (names.attributes if around else names.own[module]).get(node.name, node.name)
             name = around if node.name == "__init__" else f".{node.name}" if around else node.name
-            called = Function(label(last, node.name, around), name, frozenset(_mentions(node)), short == node.name)
+            called = Function(
+                label(last, node.name, around), name, frozenset(_mentions(node)), short == node.name
+            )
             found.setdefault((last, short), []).append(called)
     return found
 

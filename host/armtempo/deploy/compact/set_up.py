@@ -1,4 +1,4 @@
-"""Constructors and other methods that are called only while nothing moves go to modules that are imported for a call."""
+"""Constructors and other methods that are called only while nothing moves: in modules that are imported for a call."""
 
 from __future__ import annotations
 

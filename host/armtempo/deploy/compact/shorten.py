@@ -50,9 +50,9 @@ Without those that MicroPython itself looks for in objects, and without ``const`
 declarations.
 """
 _OF_MODULES = """
-    e pi acos arg asin atan bin ceil clz cmp cos deinit done dump dumps erf exp fabs feed floor fmod freq frexp hard hex
-    imag inf isinf isnan load loads log match math micros millis mode modf nan peek phase polar poll pull push pwm radians
-    real rect rng scan search seed sin sqrt tan tau tell trunc uniform wfi
+    e pi acos arg asin atan bin ceil clz cmp cos deinit done dump dumps erf exp fabs feed floor fmod freq frexp hard
+    hex imag inf isinf isnan load loads log match math micros millis mode modf nan peek phase polar poll pull push pwm
+    radians real rect rng scan search seed sin sqrt tan tau tell trunc uniform wfi
 """
 """Names that the port's own modules have (``math``, ``pyb``, ...): they stand in the firmware and need no memory."""
 

@@ -86,8 +86,6 @@ def tell(name):
     gc.collect()
     print("@", name)
     mem_info()
-    import micropython
-    micropython.qstr_info(1)
 
 
 def wait(us):
