@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 _BYTES_PER_JOINT = const(8)  # in a sample on the wire
 _PERMILLE = const(1000)
 _BOOT_BYTES = const(4)
+_MOTION_CODE_BYTES = const(10_300)  # the large pieces of the code that only a motion needs,
+_LAST_PIECES_BYTES = const(1_300)  # and one of them
 _NEVER_MS = const((1 << 30) - 1)
 
 
@@ -165,9 +167,8 @@ class Controller:
         its own: what its frame leaves on the stack would keep its modules in memory.
         """
         self.arm_waits = False
-        data = self._new_arm()
         try:
-            record = self._judged(data)
+            record = self._judged(self._new_arm())
         except Refused:
             self._decide(False)
             raise
@@ -223,7 +224,7 @@ class Controller:
         if self.engine and all_but_limits == self._all_but_limits:  # the same arm: it stands where it stood
             known, steps = self.engine.known, [self.engine.commanded(joint) for joint in range(self.joints)]
         self._drop_engine()
-        heap.hold(8_800)
+        heap.hold(_MOTION_CODE_BYTES)
         try:
             self.engine = Engine(head, joints, self._workspace)
         finally:
@@ -282,7 +283,7 @@ class Controller:
         rate, self._next_rate = self._next_rate, _PERMILLE
         heap.forget()
         gc.collect()
-        heap.hold(9_200)
+        heap.hold(_MOTION_CODE_BYTES, _LAST_PIECES_BYTES, _LAST_PIECES_BYTES)
         try:
             motion = self.load(name, crc)
             self.forget_store()

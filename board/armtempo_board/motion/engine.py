@@ -84,6 +84,7 @@ class Engine:
         registers.apply(registers.CLOCKS)
         registers.apply(registers.TIMERS)
         rings = workspace.rings([row["max_rate"] for row in joints])
+        heap.forget("room", "engine_memory")
         arm = head, joints
         self._joints = [
             JointDrive(n, arm, self._sampler, ring, workspace.memory) for n, ring in enumerate(rings)

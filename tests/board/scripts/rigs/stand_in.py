@@ -55,7 +55,7 @@ def install():
     ends.start_offset = lambda motion, joint, position: 7 - position
     from armtempo_board import heap
 
-    heap.forget = lambda: None  # what stands in for a module stays
+    heap.forget = lambda *names: None  # what stands in for a module stays
     sys.modules["machine"] = machine
     sys.modules["pyb"] = pyb
     sys.modules["armtempo_board.motion.engine"] = engine
