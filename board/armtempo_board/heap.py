@@ -3,32 +3,15 @@
 import gc
 import sys
 
-_NOT_ALWAYS = (
-    "pins",
-    "registers",
-    "motion_check",
-    "rate_check",
-    "override",
-    "joint_law",
-    "time_law",
-    "interval_steps",
-    "cubics",
-    "endpoints",
-    "arm_check",
-    "motion_file",
-    "engine_memory",
-    "room",
-    "armtempo_shared.motion",
-    "bezier_weights",
-    "store",
-    "store_commands",
-    "armrecord",
-    "table",
-    "program_hash",
-    "basis",
-    "output_setup",
-)
 _SEQUENCE = "sequence"  # how the names of the modules begin that only sequences need
+_LEAST_HELD = 1_000
+_held: "list[bytearray]" = []
+_NOT_ALWAYS = """
+    pins registers motion_check rate_check override time_law interval_steps cubics endpoints arm_check motion_file
+    engine_memory room armtempo_shared.motion bezier_weights store store_commands command_rows armrecord table
+    program_hash basis output_setup start_up set_up
+"""
+"""Modules; the last two are those of the compact form that hold constructors."""
 
 
 def collect_often(often: bool = True) -> None:
@@ -41,17 +24,36 @@ def collect_often(often: bool = True) -> None:
         gc.threshold((gc.mem_free() + gc.mem_alloc()) // 64 if often else -1)
 
 
-def forget(names: "tuple[str, ...]" = _NOT_ALWAYS) -> None:
-    """Give up modules, those that only set-up, the start of a motion, a motion or a sequence needs.
+def hold(*sizes: int) -> None:
+    """Keep pieces of the heap free of what stays, for the code that a motion needs; as large as there are, at most."""
+    release()
+    for size in sizes:
+        while size >= _LEAST_HELD:
+            try:
+                _held.append(bytearray(size))
+                break
+            except MemoryError:
+                size -= _LEAST_HELD // 4
+
+
+def release() -> None:
+    """Give them up."""
+    _held.clear()
+
+
+def forget(*names: str) -> None:
+    """Give up the modules of these names, or all that only set-up, the start of a motion or a motion needs.
+
+    With them those of sequences.
 
     The next collection frees them.
-
     They are imported inside of functions, never at the head of a module that stays, and never while a motion runs.
     What a motion needs is held by its engine until it ends.
     """
+    given_up = names or _NOT_ALWAYS.split()
     for module in list(sys.modules):
         if module.startswith("armtempo_"):
             package, _, name = module.rpartition(".")
-            if name in names or module in names or name.startswith(_SEQUENCE):
+            if name in given_up or module in given_up or name.startswith(_SEQUENCE):
                 del sys.modules[module]
                 delattr(sys.modules[package], name)

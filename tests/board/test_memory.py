@@ -8,8 +8,8 @@ import pytest
 
 from tests.board import heap_use
 
-PEAK = 77_000
-MOTION = 74_000
+PEAK = 82_000
+MOTION = 65_000
 MACHINE_CODE = 27_500
 
 

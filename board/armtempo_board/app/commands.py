@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from armtempo_board.link.serial_link import SerialLink
 
 _WHILE_MOVING = ("hello", "status", "stop", "speed", "samples")
+_STORE = range(0x10, 0x20)  # numbers of the commands about the store
 _BYTES_PER_POSITION = const(4)
 _BYTES_OF_INDEX = const(4)  # of a sample
 _ANSWER_AT = const(6)  # in a reply: its payload begins with the command's number
@@ -45,31 +46,22 @@ class Commands:
     """Acts on the frame in ``link.reader`` and leaves the reply with the link."""
 
     def __init__(self, controller: "Controller", link: "SerialLink") -> None:
-        from armtempo_shared.table import offset, rows  # here, so that it can be forgotten
+        from armtempo_shared.table import offset, rows  # here, so that they can be forgotten
+
+        from armtempo_board.app.command_rows import ROWS
 
         self.controller = controller
         self.greeted = False  # a host has said hello
         self.leaving = False  # a host has asked for the REPL
         self.link = link
         self._session = 0
-        self._table: "dict[int, Any]" = {}
-        while_moving = bytearray()
-        kept: "dict[str, str]" = {}  # one string for all that are equal, to save heap
-        for command, answer in zip(rows("C"), rows("A")):
-            name, number, fields, _, tail = command
-            _, _, values, _, _ = answer
+        self._numbers = bytes(ROWS)
+        self._while_moving: "dict[int, Any]" = {}
+        for number, (name, fields, values, tail) in ROWS.items():
             if name in _WHILE_MOVING:
-                while_moving.append(number)
-            handler = getattr(type(self), "_" + name, name)
-            self._table[number] = (
-                handler,
-                kept.setdefault(fields, fields),
-                kept.setdefault(values, values),
-                tail,
-            )
+                self._while_moving[number] = getattr(type(self), name), fields, values, tail
             if name == "hello":
                 self._hello_number = number
-        self._while_moving = bytes(while_moving)
         self._ticks_at = _ANSWER_AT + offset("A", "status", "ticks")
         (_, self._ok, _, _, _), (_, self._error, self._error_fields, _, _) = rows("R")
 
@@ -88,18 +80,19 @@ class Commands:
             raise
 
     def _dispatch(self, number: int) -> None:
-        rows = self.controller.rows
-        row = self._table.get(number) or rows.get(number)
+        row = self._while_moving.get(number) or self.controller.rows.get(number)
         if row is None:
-            return self._refuse(number, codes.UNKNOWN_COMMAND)
+            if number not in self._numbers:
+                return self._refuse(number, codes.UNKNOWN_COMMAND)
+            if self.controller.moving():
+                return self._refuse(number, codes.BUSY if self.greeted else codes.NO_SESSION)
+            row = self._row(number)
         length = self.link.reader.length()
         fixed = calcsize(row[_FIELDS])
         if length < fixed or (length > fixed and not row[_TAIL]):
             return self._refuse(number, codes.MALFORMED)
         if not self.greeted and number != self._hello_number:
             return self._refuse(number, codes.NO_SESSION)
-        if self.controller.moving() and number not in self._while_moving and number not in rows:
-            return self._refuse(number, codes.BUSY)
         self.link.reply[PAYLOAD_AT] = number
         self.controller.refill()
         handler = row[_HANDLER]
@@ -110,6 +103,13 @@ class Commands:
             self.controller.take_new_arm()
         self.controller.refill()
         self.link.answer(self._ok, _ANSWER_AT - PAYLOAD_AT + (size or 0))
+
+    def _row(self, number: int) -> tuple:
+        """Of a command that is not taken while a motion runs."""
+        from armtempo_board.app.command_rows import ROWS  # here, so that it can be forgotten
+
+        name, fields, values, tail = ROWS[number]
+        return name if number in _STORE else getattr(type(self), name), fields, values, tail
 
     def _store(self, name: str, row: tuple, length: int) -> "int | None":
         from armtempo_board.app import store_commands  # here, so that it can be forgotten
@@ -147,9 +147,10 @@ class Commands:
         self.link.reply[_ANSWER_AT + size : _ANSWER_AT + size + len(tail)] = tail
         return size + len(tail)
 
-    # session
+    # commands by their names: the session
 
-    def _hello(self, row: tuple, length: int) -> int:
+    def hello(self, row: tuple, length: int) -> int:
+        """A host begins a session: what the board is."""
         protocol, session = self.fields(row)
         if protocol != PROTOCOL_VERSION:
             raise Refused(codes.PROTOCOL, value=PROTOCOL_VERSION)
@@ -186,7 +187,8 @@ class Commands:
         self.controller.forget_speed()
         self.controller.forget_store()
 
-    def _status(self, row: tuple, length: int) -> int:
+    def status(self, row: tuple, length: int) -> int:
+        """What it does, and where the joints stand."""
         controller = self.controller
         reply = self.link.reply
         samples = controller.samples
@@ -209,12 +211,14 @@ class Commands:
         size = calcsize(row[_ANSWER])
         return size + controller.put_snapshot(reply, self._ticks_at, _ANSWER_AT + size)
 
-    def _leave(self, row: tuple, length: int) -> None:
+    def leave(self, row: tuple, length: int) -> None:
+        """The REPL is wanted."""
         self.leaving = True
 
     # motion
 
-    def _home(self, row: tuple, length: int) -> None:
+    def home(self, row: tuple, length: int) -> None:
+        """Declare where joints stand."""
         (mask,) = self.fields(row)
         joints = self.controller.joints
         self.controller.check_ready()
@@ -224,28 +228,33 @@ class Commands:
         steps = unpack_from("<%di" % joints, self.link.reader.data, PAYLOAD_AT + fixed)
         self.controller.home(mask, steps)
 
-    def _start(self, row: tuple, length: int) -> int:
+    def start(self, row: tuple, length: int) -> int:
+        """Start a stored motion."""
         flags, crc = self.fields(row)
         name = self.text(row, length)
         self.controller.begin(name, flags, crc)
         return self.reply(row, self.controller.run_number, self.controller.duration_ticks)
 
-    def _stop(self, row: tuple, length: int) -> int:
+    def stop(self, row: tuple, length: int) -> int:
+        """Brake, or freeze."""
         if not self.controller.moving():
             raise Refused(codes.NOT_MOVING)
         self.controller.stop(self.link.reader.data[PAYLOAD_AT])
         return 0
 
-    def _speed(self, row: tuple, length: int) -> None:
+    def speed(self, row: tuple, length: int) -> None:
+        """Another speed: of what moves, or of the next run."""
         (rate,) = self.fields(row)
         if not (rate in (0, RESUME) or SLOWEST_PERMILLE <= rate <= PERMILLE):
             raise Refused(codes.MALFORMED)
         self.controller.change_speed(rate)
 
-    def _clear(self, row: tuple, length: int) -> None:
+    def clear(self, row: tuple, length: int) -> None:
+        """Clear the pending fault."""
         self.controller.clear()
 
-    def _samples(self, row: tuple, length: int) -> int:
+    def samples(self, row: tuple, length: int) -> int:
+        """Acknowledge samples, and ask for some again."""
         data = self.link.reader.data
         samples = self.controller.samples
         acknowledged = u32(data, PAYLOAD_AT)

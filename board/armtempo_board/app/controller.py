@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 _BYTES_PER_JOINT = const(8)  # in a sample on the wire
 _PERMILLE = const(1000)
 _BOOT_BYTES = const(4)
+_MOTION_CODE_BYTES = const(10_300)  # the large pieces of the code that only a motion needs,
+_LAST_PIECES_BYTES = const(1_300)  # and one of them
 _NEVER_MS = const((1 << 30) - 1)
 
 
@@ -144,6 +146,7 @@ class Controller:
     def store(self) -> "Any":
         """The store; an upload that is under way keeps it."""
         if self._store is None:
+            heap.forget()
             from armtempo_board.storage import store
 
             self._store = store.Store(self._root)
@@ -181,9 +184,8 @@ class Controller:
         its own: what its frame leaves on the stack would keep its modules in memory.
         """
         self.arm_waits = False
-        data = self._new_arm()
         try:
-            record = self._judged(data)
+            record = self._judged(self._new_arm())
         except Refused:
             self._decide(False)
             raise
@@ -227,22 +229,28 @@ class Controller:
         return arm_check.checked(data, self._workspace.words, self._workspace.joints)
 
     def _take_arm(self, record: "ArmRecord") -> None:
-        from armtempo_shared import armrecord  # here, so that it can be forgotten
+        from armtempo_shared.armrecord import (
+            FLAG_STOP_ON_LINK_LOSS,
+        )  # here, so that its module can be forgotten
 
         head, joints, crc, outputs, inputs = record
         if crc == self.arm_crc:
             return
-        all_but_limits = armrecord.without_limits(head, joints)
+        all_but_limits = _all_but_limits(record)
         known, steps = 0, []
         if self.engine and all_but_limits == self._all_but_limits:  # the same arm: it stands where it stood
             known, steps = self.engine.known, [self.engine.commanded(joint) for joint in range(self.joints)]
         self._drop_engine()
         self._share_room(len(outputs), len(inputs))
-        self.engine = Engine(head, joints, self._workspace)
+        heap.hold(_MOTION_CODE_BYTES)
+        try:
+            self.engine = Engine(head, joints, self._workspace)
+        finally:
+            heap.release()
         self._all_but_limits = all_but_limits
         if known:
             self.engine.home(known, steps)
-        stops = head["flags"] & armrecord.FLAG_STOP_ON_LINK_LOSS
+        stops = head["flags"] & FLAG_STOP_ON_LINK_LOSS
         self._silence_ms = head["link_timeout_ms"] if stops else _NEVER_MS
         self.joints = len(joints)
         self.arm_crc = crc
@@ -311,7 +319,7 @@ class Controller:
             self._new_sequence(name, crc, rate, homing)
             self.sequence.begin()
             return
-        self.begin_motion(self.load(name, crc), rate, homing, unknown)
+        self.begin_motion(name, crc, rate, homing, unknown)
 
     def _new_sequence(self, name: str, crc: "int | None", rate: int, homing: bool) -> None:
         self.forget_store()
@@ -324,18 +332,30 @@ class Controller:
         except MemoryError:
             raise Refused(codes.NO_SEQUENCE_ROOM)
 
-    def begin_motion(self, motion: "MotionFile", rate: int, homing: bool = False, unknown: int = 0) -> None:
-        """Start a motion at ``rate`` thousandths of its speed, or refuse; ``unknown``: joints of unknown position."""
+    def begin_motion(
+        self, name: str, crc: "int | None", rate: int, homing: bool = False, unknown: int = 0
+    ) -> None:
+        """Start a stored motion at ``rate`` thousandths of its speed, or refuse.
+
+        ``crc`` as for ``begin``; ``unknown``: joints of unknown position.
+        """
         self.forget_store()
         heap.forget()
         gc.collect()
-        if homing:
-            self._assume(motion, unknown)
+        heap.hold(_MOTION_CODE_BYTES, _LAST_PIECES_BYTES, _LAST_PIECES_BYTES)
         try:
+            motion = self.load(name, crc)
+            self.forget_store()
+            heap.forget()
+            gc.collect()
+            if homing:
+                self._assume(motion, unknown)
             self.engine.load(motion, rate)
         except Refused:
             self._withdraw_assumed()
             raise
+        finally:
+            heap.release()
         self.samples.clear()
         self.done = False
         self.duration_ticks = self.engine.duration_ticks
@@ -459,6 +479,13 @@ class Controller:
 
 def _board_id() -> bytes:
     return b"".join([b"%02x" % byte for byte in machine.unique_id()]) + b" " + sys.version.encode()
+
+
+def _all_but_limits(record: "ArmRecord") -> int:
+    from armtempo_shared import armrecord  # here, so that it can be forgotten
+
+    head, joints, _, _, _ = record
+    return armrecord.without_limits(head, joints)
 
 
 def _lowest(mask: int) -> int:

@@ -44,7 +44,7 @@ def attach(controller: "Controller", outputs: "Rows", inputs: "Rows") -> None:
         _, number, fields, _, tail = command
         _, _, values, _, _ = answer
         controller.rows[number] = (handler, fields, values, tail)
-    heap.forget(_MODULES)
+    heap.forget(*_MODULES)
 
 
 def detach(controller: "Controller") -> None:

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
         def forget_store(self) -> None: ...
 
-        def begin_motion(self, motion: MotionFile, rate: int) -> None: ...
+        def begin_motion(self, name: str, crc: "int | None", rate: int) -> None: ...
 
         def fault(self) -> int: ...
 
@@ -117,7 +117,7 @@ class Sequencer:
         op, number, value, _, _ = self._row
         if op == sequence.MOVE:
             name, crc = self._record.motion(number)
-            self._controller.begin_motion(self._controller.load(name, crc), self._rate)
+            self._controller.begin_motion(name, crc, self._rate)
         elif op == sequence.OUTPUT:
             self._controller.outputs.set(number, value)
         elif op == sequence.REPEAT:

@@ -84,6 +84,7 @@ class Engine:
         registers.apply(registers.CLOCKS)
         registers.apply(registers.TIMERS)
         rings = workspace.rings([row["max_rate"] for row in joints])
+        heap.forget("room", "engine_memory")
         arm = head, joints
         self._joints = [
             JointDrive(n, arm, self._sampler, ring, workspace.memory) for n, ring in enumerate(rings)
@@ -149,9 +150,10 @@ class Engine:
         self.finished = False
 
     def _take_override(self, rate: int, brake_ticks: int) -> None:
+        heap.release()
         heap.forget()
         gc.collect()
-        from armtempo_board.motion.override import Override  # here, so that it can be forgotten
+        from armtempo_board.stepgen.override import Override  # here, so that it can be forgotten
 
         override = Override()
         override.begin(rate, brake_ticks, self.duration_ticks)

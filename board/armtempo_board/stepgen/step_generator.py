@@ -51,6 +51,7 @@ _SEARCHES = const(4)  # and so many times a part of the motion looked at for eac
 _NODES = const(12)  # solved in one call
 _CLEARED = (STEPS, LATEST_KITICKS, REACHED, LAST_STEP, MODE, HELD_BACK, HALTED)
 _FIRST_CUBIC_STEPS = const(16)  # tried first in a motion
+_LAW_WORDS = const(18)  # as in time_law.py
 _FAR = const(1 << 16)  # in 4096 ticks: longer than any subinterval and gap, and a small integer in ticks
 
 
@@ -65,11 +66,9 @@ class StepGenerator:
 
     def __init__(self, memory: Memory) -> None:
         """``memory``: where its words are taken from (``armtempo_shared.engine_memory`` counts them)."""
-        from armtempo_board.stepgen.time_law import LAW_WORDS  # here, so that it can be forgotten
-
         self.queue = memory.take(step_queue.QUEUE_SIZE)
         self._solver = memory.take(newton.SOLVER_SIZE)
-        self._law_words = memory.take(LAW_WORDS)
+        self._law_words = memory.take(_LAW_WORDS)
         self._law: "Any" = None  # JointLaw, while a motion is loaded
         self.subintervals = Subintervals(memory)
         self.direction = self._heading = 1
@@ -94,7 +93,7 @@ class StepGenerator:
         ``pulse_ticks``: STEP high time; ``gap_ticks``: least time between steps in opposite directions. Two that
         would be closer are both left out.
         """
-        from armtempo_board.stepgen.joint_law import JointLaw  # here, so that it can be forgotten
+        from armtempo_board.stepgen.override import JointLaw  # here, so that it can be forgotten
 
         self._law = JointLaw(self._law_words)
         self.subintervals.load(motion, joint)

@@ -94,7 +94,9 @@ def command(
     if file is not None and job_path is not None:
         raise InputError("FILE and --job are both given", "name one of them")
     if file is not None and sequence_file.is_sequence(file):
-        sequences.refuse_job_options({"split": split, "corridor_curve": corridor_curve, "json": as_json, **changes})
+        sequences.refuse_job_options(
+            {"split": split, "corridor_curve": corridor_curve, "json": as_json, **changes}
+        )
         sequences.plan(file, arm_path, output, force)
         return
     job_path = file or job_path

@@ -26,6 +26,57 @@ STAMP_PATH = f"{LIBRARY}/{PACKAGES[0]}/{STAMP}"
 START_FILES = ("boot.py", "main.py")
 """Files of the board package that become files of the flash's root; main.py goes last."""
 _MAIN = f"{PACKAGES[0]}.app.program"
+_STEPGEN, _MOTION = f"{PACKAGES[0]}.stepgen", f"{PACKAGES[0]}.motion"
+_TOGETHER = {
+    f"{_STEPGEN}.override": [f"{_STEPGEN}.{name}" for name in ("time_law", "interval_steps", "cubics")],
+    f"{_MOTION}.motion_check": [f"{_MOTION}.rate_check"],
+    f"{_MOTION}.endpoints": [f"{_STEPGEN}.bezier_weights", f"{PACKAGES[1]}.basis"],
+    f"{_MOTION}.arm_check": [f"{PACKAGES[1]}.armrecord"],
+    f"{PACKAGES[0]}.app.room": [f"{PACKAGES[1]}.engine_memory"],
+    f"{PACKAGES[0]}.app.command_rows": [f"{PACKAGES[0]}.app.store_commands"],
+    f"{PACKAGES[1]}.table": [f"{PACKAGES[1]}.program_hash"],
+    f"{PACKAGES[0]}.hardware.registers": [f"{PACKAGES[0]}.hardware.pins"],
+    f"{PACKAGES[0]}.storage.motion_file": [f"{PACKAGES[1]}.motion"],
+}
+"""Modules that are imported later, with those that come and go with them: each costs memory for names and a table."""
+_AT_REST = {
+    "start_up": (
+        "app.commands.Commands.__init__",
+        "app.commands.Commands.home",
+        "app.controller.Controller._assume",
+        "app.controller.Controller.home",
+        "app.events.Events.__init__",
+        "hardware.sampler.Sampler.__init__",
+        "hardware.sampler.Sampler.plan",
+        "link.frame_reader.FrameReader.__init__",
+        "link.serial_link.SerialLink.__init__",
+        "motion.engine.Engine._check",
+        "motion.engine.Engine.home",
+        "motion.joint_drive.JointDrive.load",
+        "motion.ring_feeder.RingFeeder.__init__",
+        "stepgen.step_generator.StepGenerator.load",
+    ),
+    "set_up": (
+        "hardware.encoders.EncoderInput.__init__",
+        "hardware.inputs.Inputs.__init__",
+        "hardware.inputs.Inputs._add_limits",
+        "hardware.inputs.Inputs._make_freezer",
+        "hardware.ring.Ring.__init__",
+        "hardware.ring.Ring._describe",
+        "hardware.sampler.Sampler.configure",
+        "memory.Memory.take",
+        "motion.engine.Engine.__init__",
+        "motion.following_error.FollowingError.__init__",
+        "motion.joint_drive.JointDrive.__init__",
+        "motion.readings.Readings.__init__",
+        "motion.ring_feeder.RingFeeder.connect",
+        "motion.workspace.Workspace.rings",
+        "stepgen.step_generator.StepGenerator.__init__",
+        "stepgen.subintervals.Subintervals.__init__",
+    ),
+}
+"""Methods of the board package that are called only when the program starts, and only when it takes an arm; by the
+module that holds them in the compact form."""
 _ARCHITECTURES = {1: "x86", 2: "x64", 3: "armv6", 4: "armv6m", 5: "armv7m", 6: "armv7em", 7: "armv7emsp"}
 """By the number in ``sys.implementation._mpy`` (MicroPython's py/persistentcode.h)."""
 
@@ -117,6 +168,8 @@ def compact_program(hash_module: str = "") -> Compact:
         _MAIN,
         entries & set(sources),
         {*_handlers(), *_hardware_names(), *(name for node in nodes for name in _named(node))},
+        _TOGETHER,
+        {module: [f"{PACKAGES[0]}.{name}" for name in names] for module, names in _AT_REST.items()},
     )
 
 
@@ -132,8 +185,7 @@ def in_full(traceback: str) -> str:
 
 def _handlers() -> set[str]:
     """Methods and functions that the board finds by the names of the commands."""
-    names = {row[0] for row in rows("C")}
-    return names | {f"_{name}" for name in names}
+    return {row[0] for row in rows("C")}
 
 
 def _hardware_names() -> set[str]:

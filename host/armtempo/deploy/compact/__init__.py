@@ -2,8 +2,9 @@
 
 MicroPython keeps every name that a file mentions, and 10 to 20 bytes for each place where a module holds one. So
 packages within packages go (``flatten``), constants are put in where they are used (``constants``), the modules that
-are always needed become one (``merge``), the program's own names become short (``shorten``), and those that are used
-most come first (``order``). The behaviour of the program does not change.
+are always needed become one (``merge``), as do others that come and go together (``join``), the program's own names
+become short (``shorten``), those that are used most come first (``order``), and what is called only while nothing
+moves is imported for the call (``set_up``). The behaviour of the program does not change.
 """
 
 from __future__ import annotations
@@ -11,12 +12,15 @@ from __future__ import annotations
 import ast
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from armtempo.deploy.compact.constants import fold
 from armtempo.deploy.compact.flatten import flatten
-from armtempo.deploy.compact.frames import Functions, functions
-from armtempo.deploy.compact.merge import merge, used_whole
+from armtempo.deploy.compact.frames import Function, Functions, functions, label
+from armtempo.deploy.compact.join import join
+from armtempo.deploy.compact.merge import CORE, merge, used_whole
 from armtempo.deploy.compact.order import often_used_first
+from armtempo.deploy.compact.set_up import move, set_up_methods
 from armtempo.deploy.compact.shorten import short_names, shorten
 
 
@@ -29,26 +33,52 @@ class Compact:
 
 
 def compact(
-    sources: Mapping[str, str], main: str, entries: Collection[str], keep: Collection[str]
+    sources: Mapping[str, str],
+    main: str,
+    entries: Collection[str],
+    keep: Collection[str],
+    together: Mapping[str, Collection[str]] = MappingProxyType({}),
+    at_rest: Mapping[str, Collection[str]] = MappingProxyType({}),
 ) -> Compact:
     """A program of fewer modules and shorter names that does the same.
 
     ``sources``: text by dotted module name, packages by their own. ``main``: what it needs at once becomes the
     module ``core`` of its package. ``entries``: modules that are imported from outside, ``main`` among them.
-    ``keep``: names that must stay, as they are used from outside or made at run time. Raises ValueError where
-    a module asks another for a name that is not there, or a package cannot be made flat.
+    ``keep``: names that must stay, as they are used from outside or made at run time. ``together``: modules that
+    become part of another one (``join``). ``at_rest``: methods, by module, class and name, that are called only
+    while nothing moves, under the name of the module that is to hold them (``set_up``). Raises ValueError where a
+    module asks another for a name that is not there, or a package cannot be made flat.
     """
     trees, flat = flatten({module: _at_run_time(ast.parse(text)) for module, text in sources.items()})
     whole = used_whole(trees)
     fold(trees, whole)
+    join(trees, {flat[home]: [flat[module] for module in modules] for home, modules in together.items()})
     merged = merge(trees, flat[main], {flat[entry] for entry in entries})
+    core = f"{main.split('.', 1)[0]}.{CORE}"
+    apart = {
+        target: set_up_methods(merged[core], {_in_core(name) for name in names})
+        for target, names in at_rest.items()
+    }
     names = short_names(merged, keep, whole)
     known = functions(merged, names)
+    labels = {
+        target: [label(CORE, method.name, node.name) for node, method in methods]
+        for target, methods in apart.items()
+    }
     shorten(merged, names)
+    for target, methods in apart.items():
+        for name, of in zip(move(merged, core, target, methods), labels[target], strict=True):
+            known[target, name] = [Function(of, name, frozenset(), named=True)]
     for tree in merged.values():
         often_used_first(tree)
     texts = {module: ast.unparse(ast.fix_missing_locations(tree)) for module, tree in merged.items()}
     return Compact(texts, known)
+
+
+def _in_core(method: str) -> str:
+    """Class and method as they are called in ``core``."""
+    module, name = method.rsplit(".", 2)[0], method.split(".", method.count(".") - 1)[-1]
+    return f"{module.rsplit('.', 1)[-1]}__{name}"
 
 
 def _at_run_time(tree: ast.Module) -> ast.Module:

@@ -36,12 +36,18 @@ def functions(trees: Mapping[str, ast.Module], names: Names) -> Functions:
         last = module.rsplit(".", 1)[-1]
         for node, around in _functions(tree):
             short = (names.attributes if around else names.own[module]).get(node.name, node.name)
-            label = ".".join([name for name in (around, node.name) if name])
-            label = label.replace("__", ".", 1) if "__" in label.split(".")[0] else f"{last}.{label}"
             name = around if node.name == "__init__" else f".{node.name}" if around else node.name
-            called = Function(label, name, frozenset(_mentions(node)), short == node.name)
+            called = Function(
+                label(last, node.name, around), name, frozenset(_mentions(node)), short == node.name
+            )
             found.setdefault((last, short), []).append(called)
     return found
+
+
+def label(module: str, name: str, around: str = "") -> str:
+    """Module, class (``around``) and name in the sources; a name of the merged module has its module before it."""
+    found = ".".join([each for each in (around, name) if each])
+    return found.replace("__", ".", 1) if "__" in found.split(".")[0] else f"{module}.{found}"
 
 
 def _mentions(function: ast.FunctionDef) -> Iterator[str]:

@@ -35,6 +35,8 @@ _TYPES = (
 _SHORTEST = 3
 """Shorter names are kept."""
 _BUILT_IN = """
+    ArithmeticError AssertionError EOFError Ellipsis GeneratorExit IndentationError KeyboardInterrupt LookupError
+    NameError NoneType NotImplementedError OverflowError RuntimeError StopIteration SyntaxError ZeroDivisionError
     abs all any append bool builtins bytearray bytecode bytes callable chr classmethod clear copy count dict dir
     divmod end endswith eval exec extend find format from_bytes get getattr globals hasattr hash id index insert int
     isalpha isdigit isinstance islower isspace issubclass isupper items iter join key len list little locals lower
@@ -47,6 +49,12 @@ _BUILT_IN = """
 Without those that MicroPython itself looks for in objects, and without ``const``, whose calls the compiler takes for
 declarations.
 """
+_OF_MODULES = """
+    e pi acos arg asin atan bin ceil clz cmp cos deinit done dump dumps erf exp fabs feed floor fmod freq frexp hard
+    hex imag inf isinf isnan load loads log match math micros millis mode modf nan peek phase polar poll pull push pwm
+    radians real rect rng scan search seed sin sqrt tan tau tell trunc uniform wfi
+"""
+"""Names that the port's own modules have (``math``, ``pyb``, ...): they stand in the firmware and need no memory."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +79,7 @@ def short_names(trees: Mapping[str, ast.Module], keep: Collection[str], whole: C
     meant = {*keep, *modules, *_imported(nodes, trees), *_keywords(nodes), *_strings(nodes)}
     fixed = meant | set(_built_in())
     mentioned = {name for node in nodes for name in _mentioned(node)}
-    there = [name for name in _BUILT_IN.split() if name not in meant | mentioned]
+    there = [name for name in (_BUILT_IN + _OF_MODULES).split() if name not in meant | mentioned]
 
     def ours(names: Collection[str]) -> list[str]:
         return sorted(name for name in names if _is_long(name) and name not in fixed)

@@ -7,6 +7,7 @@ All is in this one small file, because it shares the chip's heap with the progra
 import gc
 import os
 import sys
+import time
 from binascii import hexlify
 
 import machine
@@ -16,6 +17,8 @@ from micropython import mem_info
 FRAMES = "/flash/frames"
 TURNS = 20
 """Turns of the program's loop between two frames, and at the end."""
+STARTS_US = 50
+"""What the engine waits for after it has let the counters run."""
 _STAGE = 0x8000  # in the place of a frame's length, with the length of a stage's name, which follows
 
 
@@ -85,6 +88,13 @@ def tell(name):
     mem_info()
 
 
+def wait(us):
+    """A motion starts: most is in use."""
+    if us == STARTS_US:
+        tell("started")
+    time.sleep_us(us)
+
+
 def nothing(*arguments):
     """In the place of what does not matter here."""
 
@@ -92,5 +102,6 @@ def nothing(*arguments):
 def replace():
     """Put the port, and what the emulator has not, into place."""
     sys.modules["pyb"] = Beyond(pyb, USB_VCP=Port)
+    sys.modules["time"] = Beyond(time, sleep_us=wait)
     sys.modules["os"] = Beyond(os, dupterm=nothing, urandom=bytes)
     sys.modules["machine"] = Beyond(machine, unique_id=lambda: b"123456789012")

@@ -20,7 +20,7 @@ SEED = 20263
 CHANGES = 6
 LONGEST_STOP_TICKS = 2 * (BRAKE_TICKS + TICK_HZ // 13)
 """A change that has just been asked for begins 75 ms later, and the stop 75 ms behind its end."""
-MOTIONS = int(([word for word in sys.argv[1:] if word.isdigit()] or [6 // FEWER])[0])
+MOTIONS = int(([word for word in sys.argv[1:] if word.isdigit()] or [4 // FEWER])[0])
 
 
 class Recorder:

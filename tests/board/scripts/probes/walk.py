@@ -14,7 +14,7 @@ from armtempo_board.errors import Refused
 from armtempo_board.memory import Memory
 from armtempo_board.motion import motion_check as checking
 from armtempo_board.motion import rate_check
-from armtempo_board.motion.override import Override
+from armtempo_board.stepgen.override import Override
 from armtempo_board.stepgen.step_generator import StepGenerator
 from armtempo_shared import engine_memory
 from armtempo_shared.motion import Motion

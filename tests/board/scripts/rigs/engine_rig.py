@@ -244,7 +244,7 @@ class Rig:
             armtempo_board.motion.joint_drive.StepGenerator = StepGenerator
             armtempo_board.motion.endpoints = Evaluator
             armtempo_board.motion.motion_check.check = Evaluator.check
-            heap.forget = lambda: None  # what stands in for the evaluator stays
+            heap.forget = lambda *names: None  # what stands in for the evaluator stays
         self.arm = machine_state.arm = motors.ArmOnPins(self.board, pins, lambda: (self.head, joints), 1, ())
         self.pins = pins
         self.pulses = [
