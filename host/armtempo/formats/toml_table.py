@@ -74,6 +74,10 @@ class Table:
         """Whether the key is given."""
         return key in self._values
 
+    def names(self) -> tuple[str, ...]:
+        """Its keys, in the order of the file."""
+        return tuple(self._values)
+
     def known(self, *keys: str) -> None:
         """These keys may be there, whether a getter asks for them or not."""
         self._asked.extend(keys)

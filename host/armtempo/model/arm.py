@@ -9,6 +9,8 @@ from pathlib import Path
 
 from armtempo.errors import InputError
 from armtempo.formats import json_codec
+from armtempo.model import posture as named
+from armtempo.model.posture import ArmPosture
 
 
 @dataclass(frozen=True)
@@ -183,6 +185,8 @@ class Arm:
     driver: Driver = field(default_factory=Driver)
     safety: Safety = field(default_factory=Safety)
     source: str = ""
+    postures: tuple[ArmPosture, ...] = field(default=(), metadata=json_codec.ADDED)
+    """In the order of the file; the board knows nothing of them."""
 
     @classmethod
     def load(cls, path: Path | str) -> Arm:
@@ -223,6 +227,15 @@ class Arm:
     def home_deg(self) -> tuple[float, ...]:
         """The home posture: an angle for each driven joint, degrees (J,)."""
         return tuple(joint.home_deg for joint in self.driven)
+
+    def posture(self, name: str) -> ArmPosture:
+        """The posture of that name, "home" among them; InputError, naming the nearest, where there is none."""
+        if name == named.HOME:
+            return ArmPosture(name, self.home_deg)
+        found = [posture for posture in self.postures if posture.name == name]
+        if not found:
+            raise named.unknown(self, name)
+        return found[0]
 
 
 def _driven(arm: str, joint: Joint, motor: Motor) -> DrivenJoint:

@@ -9,6 +9,7 @@ from typing import Any
 from armtempo.errors import InputError
 from armtempo.formats import json_codec
 from armtempo.formats.atomic_file import replace_text, why
+from armtempo.model import posture as named
 from armtempo.model.arm import Arm, Joint
 
 FORMAT = "armtempo arm"
@@ -43,6 +44,9 @@ def check(arm: Arm, where: str, hint: str) -> None:
     for joint in arm.joints:
         if problem := _problem(joint):
             raise InputError(f"{where}: {joint.name}: {problem}", hint)
+    for posture in arm.postures:
+        if problem := named.problem(arm, posture):
+            raise InputError(f"{where}: posture {posture.name!r}: {problem}", hint)
 
 
 def _problem(joint: Joint) -> str:

@@ -16,7 +16,7 @@ from armtempo.link import Client
 from armtempo.link.board_messages import Hello, Status, StoredMotion
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
-from armtempo.planning import point_to_point
+from armtempo.planning import point_to_point, via_points
 from armtempo.ports.names import is_sim
 from armtempo.progress import Progress
 from armtempo.records import encoded_motion
@@ -27,8 +27,8 @@ from armtempo.robot.recording import Watcher
 from armtempo.robot.run import Run
 from armtempo.robot.stop_request import StopRequest, stoppable
 
-Where = Plan | EncodedMotion | ArrayLike
-"""A posture: angles of the driven joints in degrees, (J,), or a motion for where it begins."""
+Where = Plan | EncodedMotion | str | ArrayLike
+"""A posture: by its name in the arm file, the driven joints' angles in degrees, (J,), or a motion for its start."""
 
 
 class Board:
@@ -247,6 +247,8 @@ class Board:
             return where.trajectory(0.0)
         if isinstance(where, EncodedMotion):
             return where.start_deg
+        if isinstance(where, str):
+            return via_points.posture_deg(self._known_arm(), self._known_arm().posture(where))
         return point_to_point.posture(where, self._known_arm())
 
     def _encoded(self, motion: Plan | EncodedMotion | str) -> EncodedMotion:
