@@ -15,7 +15,8 @@ ARM_RECORD_NAME = "/arm"
 """put_begin with this name carries the arm record, not a trajectory."""
 
 SAMPLE_BRAKING = 1  # flag of a sample: taken while braking
-START_HOMING = 1  # a limit switch ends the motion without a fault
+START_HOMING = 1  # flag of start: a limit switch ends the motion without a fault
+START_HELD = 2  # flag of start: the motion brakes unless the host says hold again and again
 
 UNCONFIGURED, UNHOMED, IDLE, MOVING, BRAKING, FAULT = 0, 1, 2, 3, 4, 5
 STATES = ("unconfigured", "unhomed", "idle", "moving", "braking", "fault")

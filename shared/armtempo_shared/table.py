@@ -26,6 +26,8 @@ C start 21 flags:B crc:I text
 C stop 22 now:B
 C clear 23
 C leave 24
+C hold 28
+C drivers 29 on:B
 C samples 30 acknowledged:I wanted:H
 A hello 01 protocol:B joints:B encoders:B state:B tick_hz:I max_rate:I max_rate_sum:I free_flash:I
  free_heap:I arm_crc:I program_crc:I boot:I engine_room:I engine_joints:B arm_problem:B arm_value:I text
@@ -44,6 +46,8 @@ A start 21 run:I duration:Q
 A stop 22
 A clear 23
 A leave 24
+A hold 28
+A drivers 29
 A samples 30 first:I count:H
 E sample 40 run:I index:I ticks:Q flags:B bytes
 E done 41 run:I ticks:Q samples:I lost:I bytes

@@ -1,7 +1,7 @@
 """What the board does for each command of the message table; refusals are raised as ``Refused``.
 
 While a motion runs only the commands of ``_WHILE_MOVING`` are taken, and all of them but ``hello`` allocate nothing.
-The commands about the store are in ``store_commands.py``, which is imported when one comes.
+Those about the store, and about the drivers, are in ``store_commands.py``, which is imported when one comes.
 """
 
 from struct import calcsize, pack_into, unpack_from
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from armtempo_board.app.controller import Controller
     from armtempo_board.link.serial_link import SerialLink
 
-_WHILE_MOVING = ("hello", "status", "stop", "samples")
+_WHILE_MOVING = ("hello", "status", "stop", "hold", "samples")
 _BYTES_PER_POSITION = const(4)
 _BYTES_OF_INDEX = const(4)  # of a sample
 _ANSWER_AT = const(6)  # in a reply: its payload begins with the command's number
@@ -218,6 +218,12 @@ class Commands:
         if not self.controller.moving():
             raise Refused(codes.NOT_MOVING)
         self.controller.stop(self._link.reader.data[PAYLOAD_AT])
+        return 0
+
+    def _hold(self, row: tuple, length: int) -> int:
+        if not self.controller.moving():
+            raise Refused(codes.NOT_MOVING)
+        self.controller.hold()
         return 0
 
     def _clear(self, row: tuple, length: int) -> None:

@@ -11,11 +11,13 @@ shared/docs/protocol.md.
 import gc
 import os
 import sys
+import time
 from array import array
 
 import machine
 from armtempo_shared import codes, messages
-from armtempo_shared.messages import ARM_RECORD_NAME, NO_JOINT, SAMPLE_BRAKING, START_HOMING
+from armtempo_shared.limits import HOLD_TIMEOUT_MS
+from armtempo_shared.messages import ARM_RECORD_NAME, NO_JOINT, SAMPLE_BRAKING, START_HELD, START_HOMING
 from micropython import const
 
 from armtempo_board import heap
@@ -75,6 +77,8 @@ class Controller:
         self._braking = False
         self._can_brake = False  # the motion can come to rest along its path
         self._by_host = False  # the run was started by a command
+        self._held = 0  # the run goes on only while the host says hold,
+        self._hold_ms: "Any" = 0  # which it did then
         self._assumed = 0  # joints whose position a homing motion took for granted
 
     # the loop
@@ -88,6 +92,8 @@ class Controller:
                 self._end()
             elif silent_ms > self._silence_ms and self._by_host and not self._braking:
                 self._fault = codes.LINK_LOST
+                self.stop(0)
+            elif self._held and time.ticks_diff(time.ticks_ms(), self._hold_ms) > HOLD_TIMEOUT_MS:
                 self.stop(0)
 
     def refill(self) -> None:
@@ -292,6 +298,8 @@ class Controller:
         gc.collect()
         heap.collect_often(False)
         self._running = True
+        self._held = flags & START_HELD
+        self.hold()
         self.engine.start(homing)
 
     def _assume(self, motion: "MotionFile", mask: int) -> None:
@@ -324,10 +332,15 @@ class Controller:
     def stop(self, now: int) -> None:
         """Brake along the path; freeze where ``now``, or where the motion has no way to brake."""
         self._braking = True
+        self._held = 0
         if now or not self._can_brake:
             self.engine.freeze()
         else:
             self.engine.brake()
+
+    def hold(self) -> None:
+        """A held run is still wanted."""
+        self._hold_ms = time.ticks_ms()
 
     def clear(self) -> None:
         """Clear what is pending; the cause must be gone."""

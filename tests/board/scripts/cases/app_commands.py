@@ -100,7 +100,7 @@ def case_only_a_few_commands_while_moving():
     for name, _, _, fields, _ in wire.COMMAND.values():
         if name != "stop":
             answer = host.ask(name, [1] * len(fields), b"")
-            busy = name not in ("hello", "status", "samples")
+            busy = name not in ("hello", "status", "hold", "samples")
             assert (answer[:2] == ("error", "busy")) == busy, (name, answer)
     assert app.controller.engine.calls[-1] == "start"
 

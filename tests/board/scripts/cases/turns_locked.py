@@ -11,7 +11,7 @@ import stand_in
 stand_in.install()
 
 from armtempo_board.app.app import App  # noqa: E402
-from armtempo_shared import wire  # noqa: E402
+from armtempo_shared import messages, wire  # noqa: E402
 
 TURNS = 2000
 
@@ -86,14 +86,18 @@ def prepared():
     host.upload("/arm", stand_in.arm())
     host.upload("feed", stand_in.record(stand_in.arm()))
     host.ask("home", (3,), bytes(8))
-    assert host.ask("start", (0, wire.record_crc(stand_in.record(stand_in.arm()))), "feed")[0] == "ok"
+    assert (
+        host.ask("start", (messages.START_HELD, wire.record_crc(stand_in.record(stand_in.arm()))), "feed")[0]
+        == "ok"
+    )
     return app
 
 
 app = prepared()
 frames = []
 for number in range(40):
-    frames.append(command(number, "samples", 5 * number, 3) if number % 2 else command(number, "status"))
+    others = ("hold",) if number % 4 else ("status",)
+    frames.append(command(number, "samples", 5 * number, 3) if number % 2 else command(number, *others))
 frames.append(b"noise" + frames[0][:-1] + b"x")
 frames.append(command(200, "home", 0) + command(201, "list", 0))
 app.link.stream = port = Port(frames)
