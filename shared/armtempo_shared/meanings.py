@@ -142,13 +142,14 @@ COMMANDS: "dict[str, str]" = {
     "set_default": "What the button starts; an empty name for nothing.",
     "home": "The joints of the mask `joints` stand at these steps; the tail has an i32 for every joint.",
     "start": "Starts a stored trajectory whose checksum is `crc`. `flags` 1: a limit switch ends it without "
-    "a fault; 2: it is held, and brakes without a fault when no `hold` came for 300 ms. Answer: number of the run and its length in ticks.",
+    "a fault; 2: it is held, and brakes without a fault when no `hold` came for 300 ms. Answer: number of the run and "
+    "its length in ticks.",
     "stop": "`now` 0: brake along the path (freeze where the motion has no braking time); 1: freeze.",
     "clear": "Clears the fault; refused with `fault_pending` while its cause is still there.",
     "leave": "Ends the program; the port becomes MicroPython's prompt.",
     "hold": "A motion that was started with flag 2 is still wanted; the host says so several times a second.",
-    "drivers": "`on` 0: the motors' current is off, and all positions are unknown; the encoders are followed. 1: it is on "
-    "again, as it is with the next motion. Refused with `fault_pending`, and while something moves.",
+    "drivers": "`on` 0: the motors' current is off, and all positions are unknown; the encoders are followed. 1: it is "
+    "on again, as it is with the next motion. Refused with `fault_pending`, and while something moves.",
     "samples": "All samples before `acknowledged` have arrived and may go; those from there on, `wanted` of "
     "them, are to be sent again. Answer: the oldest kept and how many are kept.",
 }

@@ -201,7 +201,7 @@ class Client:
         self.session.command("home", (mask,), tail)
 
     def start(self, name: str, crc: int, flags: int = 0) -> Started:
-        """Start a stored motion; ``crc`` is the record's own checksum, ``flags`` START_HOMING or 0."""
+        """Start a stored motion; ``crc`` is the record's own checksum, ``flags`` of START_HOMING and START_HELD."""
         (run, duration), _ = self.session.command(
             "start", (flags, crc), name, silence_timeout_s=FLASH_TIMEOUT_S, answer_timeout_s=FLASH_TIMEOUT_S
         )
@@ -210,6 +210,14 @@ class Client:
     def stop(self, now: bool = False) -> None:
         """Brake along the path, or freeze."""
         self.session.command("stop", (int(now),))
+
+    def hold(self, answer_timeout_s: float = ANSWER_TIMEOUT_S) -> None:
+        """What was started with START_HELD is still wanted; BoardError ``not_moving`` where it has ended."""
+        self.session.command("hold", silence_timeout_s=answer_timeout_s, answer_timeout_s=answer_timeout_s)
+
+    def drivers(self, on: bool) -> None:
+        """The motors' current on or off; off, all positions are unknown, and only encoders know where the arm is."""
+        self.session.command("drivers", (int(on),))
 
     def clear(self) -> None:
         """Clear a fault."""
