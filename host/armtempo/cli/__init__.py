@@ -20,7 +20,20 @@ from armtempo.formats.spelling import did_you_mean
 
 GROUPS = {
     "Plan": ("new", "plan", "ik", "fk", "check", "import", "export", "import-urdf"),
-    "Run": ("demo", "home", "goto", "teach", "run", "stop", "clear", "status", "watch", "fetch", "report"),
+    "Run": (
+        "demo",
+        "home",
+        "goto",
+        "jog",
+        "teach",
+        "run",
+        "stop",
+        "clear",
+        "status",
+        "watch",
+        "fetch",
+        "report",
+    ),
     "Board": (
         *("ports", "deploy", "undeploy", "firmware", "flash", "configure"),
         *("upload", "list", "show", "remove", "rename"),

@@ -25,6 +25,7 @@ from armtempo.records import encoded_motion
 from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.robot import arm_state, board_state, goto, homing, jog, recording, stored_motion
 from armtempo.robot.board_state import BoardState
+from armtempo.robot.by_hand import HandGuided
 from armtempo.robot.jog import HeldJog
 from armtempo.robot.recording import Watcher
 from armtempo.robot.run import Run
@@ -217,6 +218,14 @@ class Board:
         move = _jog_move(arm, joint, axis, None if along else by, along)
         self._home_virtual_arm(arm)
         return HeldJog(self.client, arm, jog.plan(self.client, arm, move, speed))
+
+    def by_hand(self) -> HandGuided:
+        """The arm without its motors' current, to be moved by hand while its encoders are followed, in a ``with``
+        statement: its ``angles_deg()``. Hold the arm before: it sinks.
+
+        Raises InputError for a driven joint without an encoder, LinkError where the position is unknown.
+        """
+        return HandGuided(self.client, self._known_arm())
 
     def run(
         self,

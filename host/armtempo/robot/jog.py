@@ -152,18 +152,16 @@ class HeldJog:
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Brake, and wait for rest; BoardError where a fault ended it."""
-        if value is not None:
-            with suppress(LinkError):  # the first error says more
-                self._rest()
-            with suppress(LinkError):
-                self._clean_up()
-            return
         try:
             self._rest()
-        finally:
-            with suppress(LinkError):
-                self._clean_up()
-        if self.fault is not None:
+        except LinkError:
+            self._client.session.reopen = self._reopen
+            if value is None:  # the first error says more
+                raise
+            return
+        with suppress(LinkError):
+            self._clean_up()
+        if self.fault is not None and value is None:
             raise refusal("the jog ended by a fault", self.fault.code, self.fault.joint)
 
     def _rest(self) -> None:
