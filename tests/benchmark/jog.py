@@ -1,7 +1,7 @@
 """Random held jogs on the virtual board: ``python -m tests.benchmark.jog --cases 1000``.
 
-Each begins near the end of a range and is let go, falls silent, is cut off, or is held to its end. Says how many did not
-come to rest within the stated time, or left a range, and how long the rest took at most, of the stated time.
+Each begins near the end of a range and is let go, falls silent, is cut off, or is held to its end. Says how many did
+not come to rest within the stated time, or left a range, and how long the rest took at most, of the stated time.
 """
 
 from __future__ import annotations

@@ -200,6 +200,7 @@ def _within(trajectory: Trajectory, arm: Arm) -> bool:
     times = np.linspace(0.0, trajectory.duration_s, 8 * len(trajectory.joints[0].time_polynomials) + 1)
     angles = trajectory(times)
     low, high = np.array([joint.range_deg for joint in arm.driven]).T
+    low, high = np.minimum(low, angles[0]), np.maximum(high, angles[0])  # a whole step may lie just beyond
     return bool(np.all(angles >= low - 1e-9) and np.all(angles <= high + 1e-9))
 
 
