@@ -12,6 +12,9 @@ STEP_FRACTION_BITS = 28
 SAMPLE_TICKS = TICK_HZ // 10
 """Ticks between two samples: 0.1 s exactly."""
 
+HOLD_TIMEOUT_MS = 300
+"""A held motion brakes when the host has not said hold for this long."""
+
 LONGEST_TICKS = 1 << 38
 """A time control point is below it, a little under an hour: units of 1024 ticks stay small integers of the board."""
 LONGEST_RUN_TICKS = 1 << 39

@@ -195,8 +195,9 @@ COMMANDS: "dict[str, str]" = {
     "set_default": "What the button starts; an empty name for nothing.",
     "home": "The joints of the mask `joints` stand at these steps; the tail has an i32 for every joint.",
     "start": "Starts a stored trajectory whose checksum is `crc`. `flags` 1: a limit switch ends it without "
-    "a fault. Answer: number of the run and its length in ticks. Or starts a sequence, each of whose motions is a run "
-    "of its own; then the answer has the number of the last run and 0.",
+    "a fault; 2: it is held, and brakes without a fault when no `hold` came for 300 ms. Answer: number of the run and "
+    "its length in ticks. Or starts a sequence, each of whose motions is a run of its own; then the answer has the "
+    "number of the last run and 0.",
     "stop": "`now` 0: brake along the path (freeze where the motion has no braking time); 1: freeze.",
     "speed": "Lets the motion's own time go on at `rate` thousandths of its planned rate (10 to 1000), along the same "
     "path; 0: pause, 65535: as before the pause. Refused with `fixed_speed`, or with `too_long` where the run would "
@@ -208,6 +209,9 @@ COMMANDS: "dict[str, str]" = {
     "inputs": "Answer: `levels` has a bit for each input of the arm record, set where it is active; the tail has "
     "an u16 for each output, the value that it has. Also while a motion runs.",
     "leave": "Ends the program; the port becomes MicroPython's prompt.",
+    "hold": "A motion that was started with flag 2 is still wanted; the host says so several times a second.",
+    "drivers": "`on` 0: the motors' current is off, and all positions are unknown; the encoders are followed. 1: it is "
+    "on again, as it is with the next motion. Refused with `fault_pending`, and while something moves.",
     "samples": "All samples before `acknowledged` have arrived and may go; those from there on, `wanted` of "
     "them, are to be sent again. Answer: the oldest kept and how many are kept.",
 }

@@ -20,7 +20,8 @@ SLOWEST_PERMILLE = 10
 """A rate of the motion's own time is in thousandths: from 10 (1 %) to 1000, as planned."""
 RESUME = 0xFFFF
 """In the place of a rate: as before the pause."""
-START_HOMING = 1  # a limit switch ends the motion without a fault
+START_HOMING = 1  # flag of start: a limit switch ends the motion without a fault
+START_HELD = 2  # flag of start: the motion brakes unless the host says hold again and again
 
 UNCONFIGURED, UNHOMED, IDLE, MOVING, BRAKING, FAULT = 0, 1, 2, 3, 4, 5
 STATES = ("unconfigured", "unhomed", "idle", "moving", "braking", "fault")

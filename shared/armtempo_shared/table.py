@@ -31,6 +31,8 @@ C leave 24
 S sequence 18
 O output 26 number:B value:H
 O inputs 27
+C hold 28
+C drivers 29 on:B
 C samples 30 acknowledged:I wanted:H
 A hello 01 protocol:B joints:B encoders:B state:B tick_hz:I max_rate:I max_rate_sum:I free_flash:I
  free_heap:I arm_crc:I program_crc:I boot:I engine_room:I engine_joints:B arm_problem:B arm_value:I text
@@ -53,6 +55,8 @@ A leave 24
 T sequence 18 ending:B code:B step:H row:H cycle:I text
 P output 26
 P inputs 27 levels:B bytes
+A hold 28
+A drivers 29
 A samples 30 first:I count:H
 E sample 40 run:I index:I ticks:Q path:Q flags:B bytes
 E done 41 run:I ticks:Q path:Q samples:I lost:I bytes

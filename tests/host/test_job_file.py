@@ -107,7 +107,7 @@ def test_a_position_may_ask_for_a_part_of_the_orientation(
         ("position_mm = [1, 2, 3]\nquaternion = [1, 1, 0, 0]", "length 1.41421"),
         ("position_mm = [1, 2, 3]\nrpy_deg = [0, 0, 0]\nangles_deg = [0, 0, 0]", "exactly one of"),
         ("position_mm = [1, 2, 3]\nrpy_deg = [0, 0, 0]\nrpy = 1", "rpy"),
-        ("posture_deg = [0, 0, 0, 0, 0, 0]", "exactly one of angles_deg, matrix and position_mm"),
+        ("posture_deg = [0, 0, 0, 0, 0, 0]", "exactly one of angles_deg, matrix, position_mm and posture"),
     ],
 )
 def test_what_can_be_wrong_with_a_turned_position(via: str, said: str, tmp_path: Path) -> None:

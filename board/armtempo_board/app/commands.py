@@ -1,8 +1,8 @@
 """What the board does for each command of the message table; refusals are raised as ``Refused``.
 
 While a motion runs only the commands of ``_WHILE_MOVING`` and those of ``Controller.rows`` are taken, and all of them
-but ``hello``, ``stop`` and ``speed`` allocate nothing. The commands about the store are in ``store_commands.py``, which
-is imported when one comes; those about outputs and inputs in ``output_commands.py``, which is there for arms that have
+but ``hello``, ``stop`` and ``speed`` allocate nothing. The commands about the store and the drivers are in
+``store_commands.py``, which is imported when one comes; those about outputs and inputs in ``output_commands.py``, which is there for arms that have
 any, and the one about sequences in ``sequence_command.py``, which is there when one has been started.
 """
 
@@ -30,8 +30,11 @@ if TYPE_CHECKING:
     from armtempo_board.app.controller import Controller
     from armtempo_board.link.serial_link import SerialLink
 
-_WHILE_MOVING = ("hello", "status", "stop", "speed", "samples")
-_STORE = range(0x10, 0x20)  # numbers of the commands about the store
+_WHILE_MOVING = ("hello", "status", "stop", "hold", "speed", "samples")
+_ELSEWHERE = (
+    *range(0x10, 0x20),
+    0x29,
+)  # numbers of the commands in store_commands.py: the store, the drivers
 _BYTES_PER_POSITION = const(4)
 _BYTES_OF_INDEX = const(4)  # of a sample
 _ANSWER_AT = const(6)  # in a reply: its payload begins with the command's number
@@ -109,7 +112,7 @@ class Commands:
         from armtempo_board.app.command_rows import ROWS  # here, so that it can be forgotten
 
         name, fields, values, tail = ROWS[number]
-        return name if number in _STORE else getattr(type(self), name), fields, values, tail
+        return name if number in _ELSEWHERE else getattr(type(self), name), fields, values, tail
 
     def _store(self, name: str, row: tuple, length: int) -> "int | None":
         from armtempo_board.app import store_commands  # here, so that it can be forgotten
@@ -248,6 +251,13 @@ class Commands:
         if not (rate in (0, RESUME) or SLOWEST_PERMILLE <= rate <= PERMILLE):
             raise Refused(codes.MALFORMED)
         self.controller.change_speed(rate)
+
+    def hold(self, row: tuple, length: int) -> int:
+        """A held run is still wanted."""
+        if not self.controller.moving():
+            raise Refused(codes.NOT_MOVING)
+        self.controller.hold()
+        return 0
 
     def clear(self, row: tuple, length: int) -> None:
         """Clear the pending fault."""

@@ -16,7 +16,15 @@ from array import array
 
 import machine
 from armtempo_shared import codes, messages
-from armtempo_shared.messages import ARM_RECORD_NAME, NO_JOINT, RESUME, SAMPLE_BRAKING, START_HOMING
+from armtempo_shared.limits import HOLD_TIMEOUT_MS
+from armtempo_shared.messages import (
+    ARM_RECORD_NAME,
+    NO_JOINT,
+    RESUME,
+    SAMPLE_BRAKING,
+    START_HELD,
+    START_HOMING,
+)
 from micropython import const
 
 from armtempo_board import heap
@@ -84,6 +92,8 @@ class Controller:
         self._next_rate = _PERMILLE  # of the next run that a host starts
         self._by_host = False  # the run was started by a command
         self.sequence: "Any" = None  # the one under way
+        self._held = 0  # the run goes on only while the host says hold,
+        self._hold_ms: "Any" = 0  # which it did then
         self._assumed = 0  # joints whose position a homing motion took for granted
 
     # the loop
@@ -101,6 +111,8 @@ class Controller:
                 self._end()
             elif silent_ms > self._silence_ms and self._by_host and not self._braking:
                 self.pending = codes.LINK_LOST
+                self.stop(0)
+            elif self._held and time.ticks_diff(time.ticks_ms(), self._hold_ms) > HOLD_TIMEOUT_MS:
                 self.stop(0)
         if self.sequence and not self.engine.moving:
             self.sequence.go_on()
@@ -316,29 +328,28 @@ class Controller:
         self._by_host = crc is not None
         rate, self._next_rate = self._next_rate if self._by_host else _PERMILLE, _PERMILLE
         if self.store().is_sequence(name):
-            self._new_sequence(name, crc, rate, homing)
+            self._new_sequence(name, crc, rate, flags)
             self.sequence.begin()
             return
-        self.begin_motion(name, crc, rate, homing, unknown)
+        self.begin_motion(name, crc, rate, flags, unknown)
 
-    def _new_sequence(self, name: str, crc: "int | None", rate: int, homing: bool) -> None:
+    def _new_sequence(self, name: str, crc: "int | None", rate: int, flags: int) -> None:
         self.forget_store()
         heap.forget()
         gc.collect()
         try:
             from armtempo_board.app import sequence_start  # here, so that it can be forgotten
 
-            self.sequence = sequence_start.sequencer(self, name, crc, rate, homing)
+            self.sequence = sequence_start.sequencer(self, name, crc, rate, flags)
         except MemoryError:
             raise Refused(codes.NO_SEQUENCE_ROOM)
 
-    def begin_motion(
-        self, name: str, crc: "int | None", rate: int, homing: bool = False, unknown: int = 0
-    ) -> None:
+    def begin_motion(self, name: str, crc: "int | None", rate: int, flags: int = 0, unknown: int = 0) -> None:
         """Start a stored motion at ``rate`` thousandths of its speed, or refuse.
 
-        ``crc`` as for ``begin``; ``unknown``: joints of unknown position.
+        ``flags``, ``crc`` as for ``begin``; ``unknown``: joints of unknown position.
         """
+        homing = bool(flags & START_HOMING)
         self.forget_store()
         heap.forget()
         gc.collect()
@@ -366,6 +377,8 @@ class Controller:
         gc.collect()
         heap.collect_often(False)
         self._running = True
+        self._held = flags & START_HELD
+        self.hold()
         self.engine.start(homing)
 
     def _assume(self, motion: "MotionFile", mask: int) -> None:
@@ -402,6 +415,7 @@ class Controller:
             if not self.engine.moving:
                 return
         self._braking = True
+        self._held = 0
         if now or not self._can_brake:
             self.engine.freeze()
         else:
@@ -419,6 +433,10 @@ class Controller:
     def forget_speed(self) -> None:
         """A new host: what another one wanted for its next run is no longer meant."""
         self._next_rate = _PERMILLE
+
+    def hold(self) -> None:
+        """A held run is still wanted."""
+        self._hold_ms = time.ticks_ms()
 
     def clear(self) -> None:
         """Clear what is pending; the cause must be gone."""

@@ -22,9 +22,12 @@ if TYPE_CHECKING:
 _NONE = -1
 
 
-def sequencer(controller: "Runner", name: str, crc: "int | None", rate: int, homing: bool) -> Sequencer:
-    """The sequence ``name``, ready for its first row, or Refused; ``crc`` as for ``Controller.begin``."""
-    if homing:
+def sequencer(controller: "Runner", name: str, crc: "int | None", rate: int, flags: int) -> Sequencer:
+    """The sequence ``name``, ready for its first row, or Refused.
+
+    ``crc`` as for ``Controller.begin``; no ``flags`` are meant for a sequence.
+    """
+    if flags:
         raise Refused(codes.IS_SEQUENCE)
     record = controller.store().sequence(name)
     if crc is not None and record.crc != crc:

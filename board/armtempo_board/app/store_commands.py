@@ -1,4 +1,4 @@
-"""What the board does for each command about the store; refusals are raised as ``Refused``.
+"""What the board does for each command about the store, and about the drivers; refusals are raised as ``Refused``.
 
 Each function has the name of its command. ``commands``: gives the command's fields and takes its answer; ``row``: the
 command's row in the table of ``Commands``; ``length``: bytes of its payload. It returns the bytes of its answer.
@@ -102,3 +102,11 @@ def get(commands: "Caller", row: tuple, length: int) -> int:
 def set_default(commands: "Caller", row: tuple, length: int) -> None:
     """Make a motion the one that the button starts."""
     commands.controller.store().set_default(commands.text(row, length))
+
+
+def drivers(commands: "Caller", row: tuple, length: int) -> None:
+    """The motors' current on or off."""
+    (on,) = commands.fields(row)
+    controller = commands.controller
+    controller.check_ready()
+    controller.engine.drivers(on)

@@ -125,6 +125,12 @@ class Engine:
                 self._encoders[number].declare(self._following[number].expected(steps[number]))
         self.known |= mask
 
+    def drivers(self, on: int) -> None:
+        """The drivers on, or off: then the arm can be moved by hand, and only its encoders know where to."""
+        self._inputs.enable(on != 0)
+        if not on:
+            self.known = 0
+
     def load(self, motion: "MotionHead", rate: int = _PERMILLE) -> None:
         """Check a motion and fill the rings; Refused where something is wrong.
 

@@ -48,7 +48,19 @@ def check_arm(arm: Arm) -> list[Finding]:
             found += part.findings(arm)
         if not any(finding.level is Level.ERROR for finding in found):
             found += drives.record_findings(arm)
+            found += _postures(arm)
     return _sorted(found)
+
+
+def _postures(arm: Arm) -> list[Finding]:
+    """Tool poses of the arm's named postures that it cannot take."""
+    from armtempo.planning import via_points  # here, because it brings the inverse kinematics
+
+    try:
+        via_points.check_postures(arm)
+    except InputError as refused:
+        return [error("posture", refused.problem, refused.hint)]
+    return []
 
 
 def _sorted(found: list[Finding]) -> list[Finding]:

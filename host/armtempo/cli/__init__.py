@@ -24,6 +24,8 @@ GROUPS = {
         "demo",
         "home",
         "goto",
+        "jog",
+        "teach",
         "run",
         "speed",
         "pause",

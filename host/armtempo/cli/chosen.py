@@ -30,13 +30,19 @@ def tell(text: str) -> None:
 
 
 def named_arm(path: Path | None) -> Arm | None:
-    """The arm of ``--arm``, of the variable or of the project folder; None where none is named."""
+    """The arm of ``--arm``, of the variable or of the project folder, with its postures checked; None without one."""
     setting = ProjectSettings().get(ARM, path)
     if not setting:
         return None
     from armtempo.model.arm import Arm
+    from armtempo.model.tool_pose import Pose
 
-    return Arm.load(setting.path)
+    arm = Arm.load(setting.path)
+    if any(isinstance(posture.where, Pose) for posture in arm.postures):
+        from armtempo.planning import via_points  # here, because most arms need no kinematics
+
+        via_points.check_postures(arm)
+    return arm
 
 
 def arm_file(path: Path | None) -> Path:

@@ -26,8 +26,8 @@ def command(
     """Print the tool's pose and every frame for given joint angles.
 
     WHERE: angles in degrees ('0,-60,40', or as separate numbers), of all joints or of those that have a motor, the
-    others at home; a via point such as P0; or a trajectory file for its start. Without it, or for 'home', the arm's
-    home. Hold the frames against the arm: a wrong row of its table shows at once.
+    others at home; a posture of the arm file; a via point such as P0; or a trajectory file for its start. Without it,
+    or for 'home', the arm's home. Hold the frames against the arm: a wrong row of its table shows at once.
     """
     from armtempo.cli import posture
     from armtempo.kinematics import frame_listing

@@ -1,8 +1,7 @@
-"""Postures on the command line: home, angles, a via point of a job, or the start of a trajectory."""
+"""Postures on the command line: by name, angles, a via point of a job, or the start of a trajectory."""
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +10,9 @@ import click
 
 from armtempo.cli import chosen, state
 from armtempo.errors import InputError
+from armtempo.model.posture import HOME as HOME
+from armtempo.model.posture import is_via as is_via
+from armtempo.model.posture import name_problem
 
 if TYPE_CHECKING:
     from armtempo.arrays import Array
@@ -20,13 +22,10 @@ if TYPE_CHECKING:
     from armtempo.model.sequence_plan import SequencePlan
     from armtempo.robot.board import Board
 
-HOME = "home"
-_VIA = re.compile(r"[Pp]\d+")
-
 
 def is_named(text: str) -> bool:
-    """Whether the text means home, a via point or a trajectory file, and no angles."""
-    return text == HOME or is_via(text) or text.endswith(".json")
+    """Whether the text means home or another posture by name, a via point or a trajectory file, and no angles."""
+    return text == HOME or is_via(text) or text.endswith(".json") or not name_problem(text)
 
 
 @dataclass(frozen=True)
@@ -53,16 +52,21 @@ class NamedPosture:
             return cls(text, plan.arm, plan)
         if not is_named(text):
             _numbers(text)  # what is no posture is said before a port is opened
-        return cls(text, chosen.named_arm(arm_path), None)
+        arm = chosen.named_arm(arm_path)
+        if arm is not None and is_named(text) and not is_via(text):
+            arm.posture(text)  # the same
+        return cls(text, arm, None)
 
     def angles_deg(self, arm: Arm, job_path: Path | None) -> Array:
         """Angles in degrees (J,); InputError where the text is no posture, or does not fit the arm."""
-        from armtempo.planning import point_to_point
+        from armtempo.planning import point_to_point, via_points
 
         if self.sequence is not None:
             return point_to_point.posture(self.sequence.start_deg or arm.home_deg, arm)
         if self.plan is not None:
             return self.plan.trajectory(0.0)
+        if not name_problem(self.text):
+            return via_points.posture_deg(arm, arm.posture(self.text))
         if self.text == HOME:
             return point_to_point.posture(arm.home_deg, arm)
         if is_via(self.text):
@@ -76,7 +80,8 @@ def _numbers(text: str) -> list[float]:
     except ValueError:
         raise InputError(
             f"{text!r} is no posture",
-            "give angles in degrees ('0,-60,40'), 'home', a via point of the job ('P0') or a trajectory file",
+            "give angles in degrees ('0,-60,40'), 'home' or another posture of the arm file, a via point of the job "
+            "('P0') or a trajectory file",
         ) from None
 
 
@@ -93,11 +98,6 @@ def words(angles_deg: Array, arm: Arm) -> str:
         f"{joint.name} {round(angle, 2) + 0.0:.2f}° ({round(angle * joint.steps_per_deg)} steps)"
         for joint, angle in zip(arm.driven, angles_deg, strict=True)
     )
-
-
-def is_via(text: str) -> bool:
-    """Whether the text means a via point of a job, such as P0."""
-    return bool(_VIA.fullmatch(text))
 
 
 def via_deg(text: str, arm: Arm, job: Job) -> Array:

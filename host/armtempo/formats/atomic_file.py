@@ -10,17 +10,17 @@ from pathlib import Path
 from armtempo.errors import InputError
 
 
-def replace_text(path: Path, text: str) -> None:
+def replace_text(path: Path, text: str, newline: str | None = None) -> None:
     """Write a file aside and put it in place of the old one, so that it is never half there.
 
-    A link stays one; a pipe or a device, such as /dev/stdout, is written to. Raises InputError where it
-    cannot be written; what was there before stays.
+    ``newline``: as of ``open``; "" leaves the ends of lines as they are. A link stays one; a pipe or a device, such as
+    /dev/stdout, is written to. Raises InputError where it cannot be written; what was there before stays.
     """
     try:
         if path.exists() and not path.is_file():
-            path.write_text(text, encoding="utf-8")
+            path.write_text(text, encoding="utf-8", newline=newline)
         else:
-            _replace(path.resolve(), text)
+            _replace(path.resolve(), text, newline)
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {why(error)}", "choose another place") from None
 
@@ -61,10 +61,10 @@ def why(error: Exception) -> str:
     return getattr(error, "strerror", None) or str(error)
 
 
-def _replace(path: Path, text: str) -> None:
+def _replace(path: Path, text: str, newline: str | None) -> None:
     aside = path.with_name(f".{path.name}.{os.getpid()}.new")
     try:
-        aside.write_text(text, encoding="utf-8")
+        aside.write_text(text, encoding="utf-8", newline=newline)
         os.replace(aside, path)
     except OSError:
         if aside.is_file():

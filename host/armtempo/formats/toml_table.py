@@ -82,6 +82,10 @@ class Table:
         """Whether the key is given, as a text."""
         return isinstance(self._values.get(key), str)
 
+    def names(self) -> tuple[str, ...]:
+        """Its keys, in the order of the file."""
+        return tuple(self._values)
+
     def known(self, *keys: str) -> None:
         """These keys may be there, whether a getter asks for them or not."""
         self._asked.extend(keys)

@@ -217,7 +217,8 @@ class Client:
         self.session.command("home", (mask,), tail)
 
     def start(self, name: str, crc: int, flags: int = 0) -> Started:
-        """Start a stored motion at ``rate``; ``crc`` is the record's own checksum, ``flags`` START_HOMING or 0."""
+        """Start a stored motion at ``rate``; ``crc`` is the record's own checksum, ``flags`` of START_HOMING and
+        START_HELD."""
         if self.rate != PERMILLE:
             self.session.command("speed", (self.rate,))
         (run, duration), _ = self.session.command(
@@ -232,6 +233,14 @@ class Client:
     def speed(self, rate: int) -> None:
         """Let what moves go on at ``rate`` thousandths of its planned speed; 0: pause, RESUME: as before it."""
         self.session.command("speed", (rate,))
+
+    def hold(self, answer_timeout_s: float = ANSWER_TIMEOUT_S) -> None:
+        """What was started with START_HELD is still wanted; BoardError ``not_moving`` where it has ended."""
+        self.session.command("hold", silence_timeout_s=answer_timeout_s, answer_timeout_s=answer_timeout_s)
+
+    def drivers(self, on: bool) -> None:
+        """The motors' current on or off; off, all positions are unknown, and only encoders know where the arm is."""
+        self.session.command("drivers", (int(on),))
 
     def clear(self) -> None:
         """Clear a fault."""

@@ -11,7 +11,9 @@ from armtempo.errors import InputError
 from armtempo.formats import json_codec
 from armtempo.formats.spelling import did_you_mean
 from armtempo.model import boards
+from armtempo.model import posture as named
 from armtempo.model.outputs import Input, Output
+from armtempo.model.posture import ArmPosture
 
 
 @dataclass(frozen=True)
@@ -191,6 +193,8 @@ class Arm:
     outputs: tuple[Output, ...] = field(default=(), metadata=json_codec.ADDED)
     """In the order of the file, which is also the board's."""
     inputs: tuple[Input, ...] = field(default=(), metadata=json_codec.ADDED)
+    postures: tuple[ArmPosture, ...] = field(default=(), metadata=json_codec.ADDED)
+    """In the order of the file; the board knows nothing of them."""
 
     @classmethod
     def load(cls, path: Path | str) -> Arm:
@@ -245,6 +249,15 @@ class Arm:
     def home_deg(self) -> tuple[float, ...]:
         """The home posture: an angle for each driven joint, degrees (J,)."""
         return tuple(joint.home_deg for joint in self.driven)
+
+    def posture(self, name: str) -> ArmPosture:
+        """The posture of that name, "home" among them; InputError, naming the nearest, where there is none."""
+        if name == named.HOME:
+            return ArmPosture(name, self.home_deg)
+        found = [posture for posture in self.postures if posture.name == name]
+        if not found:
+            raise named.unknown(self, name)
+        return found[0]
 
 
 def _driven(arm: str, joint: Joint, motor: Motor) -> DrivenJoint:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,7 +12,8 @@ from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS
 from armtempo.errors import InputError
 from armtempo.formats import toml_table
 from armtempo.formats.toml_table import Table
-from armtempo.model import boards, outputs_file, pin_use
+from armtempo.model import boards, outputs_file, pin_use, pose_table
+from armtempo.model import posture as named
 from armtempo.model.arm import (
     Arm,
     Driver,
@@ -23,6 +25,7 @@ from armtempo.model.arm import (
     Motor,
     Safety,
 )
+from armtempo.model.posture import ArmPosture
 
 MAX_ANGLE_DEG = 36_000.0
 """Largest angle, either way, that an arm file may give: a hundred turns."""
@@ -81,8 +84,37 @@ def of_table(top: Table) -> Arm:
     joints = tuple(_joint(table, number) for number, table in enumerate(tables, 1))
     board = top.choice("board", tuple(boards.BOARDS), boards.DEFAULT)
     outputs, inputs = outputs_file.outputs(top), outputs_file.inputs(top)
+    postures = top.table("posture")
     top.done()
-    return Arm(name, joints, driver, safety, top.file, board, outputs, inputs)
+    arm = Arm(name, joints, driver, safety, top.file, board, outputs, inputs)
+    return replace(arm, postures=_postures(postures, arm)) if postures else arm
+
+
+def _postures(tables: Table, arm: Arm) -> tuple[ArmPosture, ...]:
+    """[posture.NAME]: ``angles_deg``, or a tool pose as in a job."""
+    return tuple(_posture(tables, name, arm) for name in tables.names())
+
+
+def _posture(tables: Table, name: str, arm: Arm) -> ArmPosture:
+    where = f"{tables.file}: posture.{name}"
+    table = tables.table(name)
+    if problem := named.name_problem(name):
+        raise InputError(f"{where}: {problem}", "choose another name")
+    if table is None:
+        raise tables.fail(name, "a table")
+    forms = [key for key in ("angles_deg", "matrix", "position_mm") if table.has(key)]
+    if len(forms) != 1:
+        raise InputError(
+            f"{where}: exactly one of angles_deg, matrix and position_mm is needed", "give one of them"
+        )
+    if forms == ["angles_deg"]:
+        found = ArmPosture(name, table.numbers("angles_deg", len(arm.driven)))
+    else:
+        found = ArmPosture(name, replace(pose_table.read(table, where), posture_deg=arm.all_home_deg))
+    table.done()
+    if problem := named.problem(arm, found):
+        raise InputError(f"{where}: {problem}", "give a posture that the arm can take")
+    return found
 
 
 def _driver(table: Table | None) -> Driver:

@@ -10,6 +10,7 @@ from armtempo.errors import InputError
 from armtempo.formats import json_codec
 from armtempo.formats.atomic_file import replace_text, why
 from armtempo.model import boards, pin_use
+from armtempo.model import posture as named
 from armtempo.model.arm import Arm, Joint
 from armtempo.model.outputs import KINDS, SWITCH, Output
 
@@ -52,6 +53,10 @@ def check(arm: Arm, where: str, hint: str) -> None:
             raise InputError(f"{where}: output {output.name!r}: {problem}", hint)
     for pin in pin_use.problems(arm):
         raise InputError(f"{where}: {pin.where}: {pin.what}", hint)
+
+    for posture in arm.postures:
+        if problem := named.problem(arm, posture):
+            raise InputError(f"{where}: posture {posture.name!r}: {problem}", hint)
 
 
 def _output_problem(output: Output) -> str:

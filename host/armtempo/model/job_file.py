@@ -145,12 +145,16 @@ def _stop(table: Table, via: int, count: int) -> Stop:
 
 
 def _via(table: Table, where: str, arm: Arm) -> tuple[float, ...] | Pose:
-    forms = [key for key in ("angles_deg", "matrix", "position_mm") if table.has(key)]
+    forms = [key for key in ("angles_deg", "matrix", "position_mm", "posture") if table.has(key)]
     if len(forms) != 1:
         raise InputError(
-            f"{where}: exactly one of angles_deg, matrix and position_mm is needed",
+            f"{where}: exactly one of angles_deg, matrix, position_mm and posture is needed",
             "leave all but one of them out",
         )
+    if forms == ["posture"]:
+        name = table.text("posture")
+        table.done()
+        return _named(name, where, arm)
     if forms == ["angles_deg"]:
         found = angles(table, "angles_deg", arm)
         table.done()
@@ -159,6 +163,14 @@ def _via(table: Table, where: str, arm: Arm) -> tuple[float, ...] | Pose:
     pose = pose_table.read(table, where)
     table.done()
     return replace(pose, posture_deg=posture)
+
+
+def _named(name: str, where: str, arm: Arm) -> tuple[float, ...] | Pose:
+    """A posture of the arm file."""
+    try:
+        return arm.posture(name).where
+    except InputError as error:
+        raise InputError(f"{where}: {error.problem}", error.hint) from None
 
 
 def angles(table: Table, key: str, arm: Arm) -> tuple[float, ...]:

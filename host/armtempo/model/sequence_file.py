@@ -67,6 +67,9 @@ def arm_named(path: Path | str) -> Path | None:
 def _postures(top: Table, arm: Arm) -> dict[str, NamedAngles]:
     """The arm's postures by name, the arm's home, and those of the sequence itself."""
     found = {HOME: NamedAngles(HOME, tuple(float(angle) for angle in arm.home_deg))}
+    for posture in arm.postures:
+        if isinstance(posture.where, tuple):
+            found[posture.name] = NamedAngles(posture.name, posture.where)
     own = top.table("posture")
     for name in own.rest() if own else ():
         table = own.table(name) if own else None
@@ -154,6 +157,11 @@ class _Reader:
             return NamedAngles(", ".join(f"{angle:g}" for angle in angles) + "°", angles)
         name = table.text(key)
         if name not in self.postures:
+            if any(posture.name == name for posture in self.arm.postures):
+                raise InputError(
+                    f"{_place(table)}{key} = {name!r}: a tool pose of the arm file; a sequence goes to angles",
+                    f"give its angles_deg ('armtempo goto {name}', then 'armtempo teach --posture' another name)",
+                )
             near = did_you_mean(name, self.postures)
             raise InputError(
                 f"{_place(table)}{key} = {name!r}: there is no such posture{near}",

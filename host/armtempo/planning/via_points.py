@@ -30,6 +30,7 @@ from armtempo.kinematics.rejection import table
 from armtempo.kinematics.solver import PoseSolver
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.model.posture import ArmPosture
 from armtempo.model.tool_pose import WHOLE, Pose
 
 STAYS_DEG = 0.01
@@ -111,7 +112,8 @@ def resolve(arm: Arm, job: Job) -> Resolved:
         if isinstance(via, Pose):
             target = via.exact(where)
             previous = posture if via.posture_deg is None else _preferred(setup, via.posture_deg, where)
-            needed, choice = _solve(setup, target, previous, via.posture_deg is None, where)
+            home_first = via.posture_deg in (None, arm.all_home_deg)
+            needed, choice = _solve(setup, target, previous, home_first, where)
             notes += _miss_note(setup, target, needed, number)
         else:
             needed = _spread(setup, via, where)
@@ -122,6 +124,34 @@ def resolve(arm: Arm, job: Job) -> Resolved:
             if before and Pose in (type(via), type(job.via[number - 2])):
                 notes += _branch_note(before, branch, choice, number)
     return Resolved(np.degrees(np.array(postures)[:, setup.driven]), tuple(notes))
+
+
+def posture_deg(arm: Arm, posture: ArmPosture) -> Array:
+    """The driven joints' angles of a named posture, degrees (J,); of the solutions of a pose the one nearest to home.
+
+    They are the ones that ``resolve`` takes. Raises PlanError where the arm cannot stand so.
+    """
+    if not isinstance(posture.where, Pose):
+        return np.array(posture.where, dtype=float)
+    setup = _Setup.of(arm)
+    where = f"posture {posture.name!r}"
+    target = posture.where.exact(where)
+    needed, _ = _solve(setup, target, setup.home, True, where)
+    if not Constraint.of(target).reached(setup.miss(target, needed)):
+        raise PlanError(
+            f"{where}: the pose needs joints that have no motor: {_needs(setup, needed)}",
+            "ask for less of its orientation, or give angles",
+        )
+    return np.asarray(np.degrees(setup.moved(needed)[setup.driven]))
+
+
+def check_postures(arm: Arm) -> None:
+    """InputError for a named posture whose tool pose the arm cannot take."""
+    for posture in arm.postures:
+        try:
+            posture_deg(arm, posture)
+        except PlanError as error:
+            raise InputError(f"{arm.source}: {error.problem}", error.hint) from None
 
 
 def _spread(setup: _Setup, via: tuple[float, ...], where: str) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -20,13 +21,16 @@ from armtempo.link.board_messages import Hello, SequenceState, Status, StoredMot
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequencePlan
-from armtempo.planning import point_to_point
+from armtempo.planning import point_to_point, via_points
+from armtempo.planning.jog import SPEED, JogMove, number_of_joint
 from armtempo.ports.names import is_sim
 from armtempo.progress import Progress
 from armtempo.records import encoded_motion, encoded_sequence
 from armtempo.records.encoded_motion import EncodedMotion, MotionKey
-from armtempo.robot import arm_state, board_state, goto, homing, recording, sequence_run, stored_motion
+from armtempo.robot import arm_state, board_state, goto, homing, jog, recording, sequence_run, stored_motion
 from armtempo.robot.board_state import BoardState
+from armtempo.robot.by_hand import HandGuided
+from armtempo.robot.jog import HeldJog
 from armtempo.robot.outputs import BoardInput, BoardOutput
 from armtempo.robot.recording import Watcher
 from armtempo.robot.run import Run
@@ -34,8 +38,9 @@ from armtempo.robot.sequence_run import SequenceWatcher
 from armtempo.robot.speed import change_speed, permille
 from armtempo.robot.stop_request import StopRequest, stoppable
 
-Where = Plan | EncodedMotion | SequencePlan | ArrayLike
-"""A posture: angles of the driven joints in degrees, (J,), or a motion for where it begins."""
+Where = Plan | EncodedMotion | SequencePlan | str | ArrayLike
+"""A posture: by its name in the arm file, the driven joints' angles in degrees, (J,), or a motion
+or sequence for its start."""
 
 
 class Board:
@@ -206,6 +211,58 @@ class Board:
             self._home_virtual_arm(arm)
             goto.go_to(self.client, arm, target_deg, wanted, progress)
 
+    def jog(
+        self,
+        joint: int | str | None = None,
+        by_deg: float | None = None,
+        axis: str | None = None,
+        by_mm: float | None = None,
+        speed: float = SPEED,
+        stop: StopRequest | None = None,
+    ) -> Array:
+        """Move a little, straight, and wait: ``joint=2, by_deg=-5``, ``axis="z", by_mm=10``, or ``axis="z", by_deg=5``.
+
+        ``joint``: number, from 1, or name; ``axis``: "x", "y", "z" of the base or "tool-x", "tool-y", "tool-z", along
+        which the tool moves by ``by_mm``, or about which it turns by ``by_deg``; ``speed``: part of the speed limits,
+        0.01 to 1. The jog ends at the end of a range, or where the tool cannot go on along the line, at the latest.
+        Gives the posture in degrees, (J,). Raises LinkError where the position is unknown, InputError where nothing
+        can move that way.
+        """
+        arm = self._known_arm()
+        move = _jog_move(arm, joint, axis, by_deg, by_mm)
+        with self._stoppable(stop) as wanted:
+            self._home_virtual_arm(arm)
+            jog.step(self.client, arm, move, speed, wanted)
+        return self.posture_deg()
+
+    def held_jog(
+        self,
+        joint: int | str | None = None,
+        axis: str | None = None,
+        direction: int = 1,
+        turn: bool = False,
+        speed: float = SPEED,
+    ) -> HeldJog:
+        """A jog to the end of the range that goes on only while its ``hold`` is called, in a ``with`` statement.
+
+        ``direction``: 1 or -1; ``turn``: about ``axis`` instead of along it; the rest as in ``jog``. Where the calls
+        cease the board brakes; leaving the context brakes too, and waits for rest.
+        """
+        arm = self._known_arm()
+        by = math.copysign(math.inf, direction)
+        along = None if turn or joint is not None else by
+        move = _jog_move(arm, joint, axis, None if along else by, along)
+        self._home_virtual_arm(arm)
+        return HeldJog(self.client, arm, jog.plan(self.client, arm, move, speed))
+
+    def by_hand(self) -> HandGuided:
+        """The arm without its motors' current, to be moved by hand while its encoders are followed, in a ``with``
+        statement: its ``angles_deg()``. Hold the arm before: it sinks.
+
+        Raises InputError for a driven joint without an encoder, LinkError where the position is unknown.
+        """
+        return HandGuided(self.client, self._known_arm())
+
     def run(
         self,
         motion: Plan | EncodedMotion | str,
@@ -349,6 +406,8 @@ class Board:
             return point_to_point.posture(
                 where.arm.home_deg if where.start_deg is None else where.start_deg, where.arm
             )
+        if isinstance(where, str):
+            return via_points.posture_deg(self._known_arm(), self._known_arm().posture(where))
         return point_to_point.posture(where, self._known_arm())
 
     def _encoded(self, motion: Plan | EncodedMotion | str) -> EncodedMotion:
@@ -385,3 +444,18 @@ class Board:
         if is_sim(self.port) and not self._moved:
             arm_state.home_unknown(self.client, arm)
         self._moved = True
+
+
+def _jog_move(
+    arm: Arm, joint: int | str | None, axis: str | None, by_deg: float | None, by_mm: float | None
+) -> JogMove:
+    """What a jog's arguments say; InputError where they do not go together."""
+    ways = [by for by in (by_deg, by_mm) if by is not None]
+    if (joint is None) == (axis is None) or len(ways) != 1 or (joint is not None and by_deg is None):
+        raise InputError(
+            "a jog moves a joint by degrees, or the tool along an axis by mm or about it by degrees",
+            "give joint and by_deg, axis and by_mm, or axis and by_deg",
+        )
+    if joint is not None:
+        return JogMove(ways[0], joint=number_of_joint(arm, joint))
+    return JogMove(ways[0], axis=axis or "", about=by_deg is not None)

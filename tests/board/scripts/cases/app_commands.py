@@ -102,7 +102,7 @@ def case_only_a_few_commands_while_moving():
             assert host.ask(name, [1] * len(fields))[:2] == ("error", "unknown_command"), name
         elif name != "stop":
             answer = host.ask(name, [1] * len(fields), b"")
-            busy = name not in ("hello", "status", "speed", "samples")
+            busy = name not in ("hello", "status", "hold", "speed", "samples")
             assert (answer[:2] == ("error", "busy")) == busy, (name, answer)
     assert app.controller.engine.calls[-1] == "start"
 

@@ -11,7 +11,7 @@ import stand_in
 stand_in.install()
 
 from armtempo_board.app.app import App  # noqa: E402
-from armtempo_shared import wire  # noqa: E402
+from armtempo_shared import messages, wire  # noqa: E402
 
 TURNS = 2000
 PUMP = {
@@ -102,14 +102,15 @@ def prepared():
     record = stand_in.record(arm)
     host.upload("feed", record)
     host.ask("home", (3,), bytes(8))
-    assert host.ask("start", (0, wire.record_crc(record)), "feed")[0] == "ok"
+    assert host.ask("start", (messages.START_HELD, wire.record_crc(record)), "feed")[0] == "ok"
     return app
 
 
 app = prepared()
 frames = []
 for number in range(40):
-    frames.append(command(number, "samples", 5 * number, 3) if number % 2 else command(number, "status"))
+    others = ("hold",) if number % 4 else ("status",)
+    frames.append(command(number, "samples", 5 * number, 3) if number % 2 else command(number, *others))
 for number in range(8):
     frames.append(command(50 + 2 * number, "output", number % 3, 9000 * number))  # there are two
     frames.append(command(51 + 2 * number, "inputs"))

@@ -165,6 +165,11 @@ class Engine:
     def close(self):
         self.calls.append("close")
 
+    def drivers(self, on):
+        self.calls.append("on" if on else "off")
+        if not on:
+            self.known = 0
+
     def home(self, mask, steps):
         self.calls.append("home")
         self.known |= mask

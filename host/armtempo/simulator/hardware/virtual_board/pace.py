@@ -2,8 +2,9 @@
 
 While a timer has something to do soon, virtual time runs as fast as this process can, or, with ``speed``, at
 that multiple of real time. It keeps to real time while nothing moves (asleep until input comes), where the
-arm is to stop when the host falls silent (the host's silence is real), and while the host does not read, so
-that a host which is busy for a moment loses no more than with a real board.
+arm is to stop when the host falls silent (the host's silence is real), for a while after the host has spoken twice in
+quick succession, as one does that holds a motion (the same), and while the host does not read, so that a host which is
+busy for a moment loses no more than with a real board.
 """
 
 import time
@@ -16,6 +17,9 @@ from virtual_board.chip.reset import PowerOff
 _HORIZON_TICKS = 500 * TICKS_PER_MS
 _NAP_MS = 5
 _LAG_US = 20_000  # a longer delay is not caught up
+_QUICK_US = 150_000
+_TALK_US = 1_000_000
+_NEVER_US = 1 << 28
 
 
 class Pace:
@@ -27,10 +31,12 @@ class Pace:
         self._speed = speed
         self._ticks_us = time.ticks_us
         self._ticks_diff = time.ticks_diff
-        self._last_us = self._ticks_us()
+        self._last_us = self._looked_us = self._ticks_us()
         self._lead_us = 0
         self._last_tick = 0
         self._free = False
+        self._pieces = 0
+        self._quiet_us = self._since_talk_us = _NEVER_US
         board.millisecond = self._first_millisecond
 
     def idle(self):
@@ -54,10 +60,29 @@ class Pace:
             raise KeyboardInterrupt
         if not self._board.moving(_HORIZON_TICKS):
             self._nap()
-        elif self._speed or (machine_state.arm and machine_state.arm.watches_host) or self._serial.stuck():
+        elif (
+            self._speed
+            or (machine_state.arm and machine_state.arm.watches_host)
+            or self._host_talks()
+            or self._serial.stuck()
+        ):
             self._keep_pace(self._speed or 1)
         else:
             self._free = True
+
+    def _host_talks(self):
+        """Whether input has come twice within a short time since the motion began, and not long ago."""
+        now = self._ticks_us()
+        passed = self._ticks_diff(now, self._looked_us)
+        self._looked_us = now
+        self._since_talk_us = min(self._since_talk_us + passed, _NEVER_US)
+        self._quiet_us = min(self._quiet_us + passed, _NEVER_US)
+        if self._serial.pieces != self._pieces:
+            self._pieces = self._serial.pieces
+            if self._quiet_us < _QUICK_US:
+                self._since_talk_us = 0
+            self._quiet_us = 0
+        return self._since_talk_us < _TALK_US
 
     def _elapsed_us(self):
         now = self._ticks_us()
@@ -80,6 +105,9 @@ class Pace:
             board.next_ms = (board.now // TICKS_PER_MS + 1) * TICKS_PER_MS
         self._lead_us = 0
         self._last_tick = board.now
+        self._pieces = self._serial.pieces
+        self._quiet_us = self._since_talk_us = _NEVER_US
+        self._looked_us = self._last_us
 
     def _keep_pace(self, speed):
         """Moving in real time: sleep while virtual time is ahead."""

@@ -31,6 +31,7 @@ class SilentPort:
         """The board was reset: what was under way is lost."""
         self.silent = False
         self.received = bytearray()
+        self.pieces = 0  # how often input has come
         self.sending = bytearray()
         self.rts = self.cts = False
         self.attached = True
@@ -95,6 +96,7 @@ class Serial(SilentPort):
             if not count:
                 self.ended = count == 0
                 return
+            self.pieces += 1
             self._take_in(bytes(piece[:count]), room)
             if count < len(piece):
                 return

@@ -1,0 +1,107 @@
+"""``armtempo jog``: move a joint, or the tool along or about an axis, by keys or by so much."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from armtempo.cli import chosen, options, posture
+from armtempo.errors import InputError
+
+if TYPE_CHECKING:
+    from armtempo.cli.jog_screen import JogScreen
+    from armtempo.cli.keys import Keys
+    from armtempo.model.arm import Arm
+    from armtempo.robot.board import Board
+
+_AXES = click.Choice(["x", "y", "z", "tool-x", "tool-y", "tool-z"])
+
+
+@click.command()
+@click.option(
+    "--joint", metavar="JOINT", help="Move this joint, by its number (from 1) or name, by --by degrees."
+)
+@click.option("--axis", type=_AXES, help="Move the tool along this axis by --by mm.")
+@click.option("--about", type=_AXES, help="Turn the tool about this axis by --by degrees.")
+@click.option("--by", type=float, metavar="NUMBER", help="How far: degrees or mm.")
+@click.option(
+    "--speed",
+    type=click.FloatRange(1, 100),
+    default=25,
+    show_default=True,
+    help="Percent of the speed limits.",
+)
+@options.arm_of_board
+@options.replace_arm
+@options.port
+@options.log_traffic
+def command(
+    joint: str | None,
+    axis: str | None,
+    about: str | None,
+    by: float | None,
+    speed: float,
+    arm_path: Path | None,
+    replace_arm: bool,
+    port: str | None,
+    log_traffic: Path | None,
+) -> None:
+    """Jog: move a joint or the tool a little, straight, never beyond a range.
+
+    Without --joint, --axis and --about keys move the arm, in steps or while one is held down, and one line says where
+    it is. With one of them, and --by, it moves once. Axes are the base's, or the tool's as it stands. The arm must be
+    homed. Ctrl-C brakes.
+    """
+    from armtempo.cli import keys
+
+    given = [option for option in (joint, axis, about) if option is not None]
+    if len(given) > 1 or (by is None) != (not given):
+        raise InputError(
+            "one of --joint, --axis and --about goes with --by",
+            "give --joint 2 --by -5, say; or none, for the keys",
+        )
+    if not given and not keys.is_terminal():
+        raise InputError("the keys of jog need a terminal", "give --joint, --axis or --about, and --by")
+    arm = chosen.named_arm(arm_path)
+    with chosen.board(port, log_traffic, arm) as board:
+        prepare(board, chosen.arm_of_board(board, arm), replace_arm)
+        if not given:
+            with keys.of_terminal() as pressed:
+                screen(board, pressed, speed).loop()
+        else:
+            along = by if axis else None
+            board.jog(joint, None if axis else by, axis or about, along, speed / 100)
+        posture.say_where_it_is(board)
+
+
+def prepare(board: Board, arm: Arm, replace_arm: bool = False) -> None:
+    """Set the board up; LinkError where the position is unknown. A virtual arm that has just come stands at home."""
+    from armtempo.errors import LinkError
+    from armtempo.ports.names import is_sim
+
+    board.configure(arm, replace=replace_arm)
+    try:
+        board.posture_deg()
+    except LinkError:
+        if not is_sim(board.port):
+            raise
+        board.home(arm)
+
+
+def screen(
+    board: Board,
+    pressed: Keys,
+    speed: float = 25,
+    more: dict[str, Callable[[], str]] | None = None,
+    told: str = "",
+) -> JogScreen:
+    """The jog screen, its keys said; ``more``: the caller's, which ``told`` says."""
+    from armtempo.cli.jog_screen import KEYS, SPEEDS, JogScreen
+
+    click.echo(f"{KEYS}\n{told}" if told else KEYS)
+    made = JogScreen(board, pressed, more)
+    made.choice.speed = min(range(len(SPEEDS)), key=lambda index: abs(SPEEDS[index] - speed))
+    return made

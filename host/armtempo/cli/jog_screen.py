@@ -1,0 +1,254 @@
+"""The jog screen: keys move the arm, one line says where it is. Any terminal will do, over ssh too."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from threading import Thread
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+import click
+
+from armtempo.cli.keys import END, INTERRUPT, Keys
+from armtempo.errors import ArmtempoError, BoardError, InputError, LinkError, PlanError
+from armtempo.robot.stop_request import Stopped, StopRequest
+
+if TYPE_CHECKING:
+    from armtempo.robot.board import Board
+
+STEPS = (0.1, 1.0, 10.0)
+"""deg or mm."""
+SPEEDS = (1, 5, 10, 25, 50, 75, 100)
+"""Percent of the speed limits."""
+FIRST_REPEAT_S = 0.8
+"""A key that is held down repeats after less than this in any usual terminal."""
+RELEASE_S = 0.3
+"""A key that has not repeated for so long was released."""
+_POLL_S = 0.03
+_IDLE_S = 0.5
+_FORWARD, _BACKWARD = ("+", "=", "right", "up"), ("-", "_", "left", "down")
+_ENDS = ("q", "Q", END, INTERRUPT)
+_CLEAR_LINE = "\r\x1b[K"
+
+KEYS = f"""\
+  1 2 3 ...    a joint                        x y z   the tool along an axis, X Y Z about it
+  + -, arrows  move                           f       axes of the base, or of the tool
+  s            steps of 0.1, 1, 10 (deg, mm)  h       steps, or moving while + or - is held down
+  < >          slower, faster                 space   stop
+  c            clear a fault                  q       end, with the arm at rest
+A terminal tells no release: it is noticed {RELEASE_S:g} s after a held key's last repeat; then the arm brakes."""
+
+
+@dataclass
+class JogChoice:
+    """What the keys move, and how."""
+
+    joint: int | None = 1
+    """Number, from 1; None: the tool."""
+    axis: str = "x"
+    about: bool = False
+    in_tool: bool = False
+    """Axes of the tool, not of the base."""
+    step: int = 1
+    """Of STEPS."""
+    held: bool = False
+    speed: int = SPEEDS.index(25)
+
+    @property
+    def tool_axis(self) -> str | None:
+        """As the library calls it; None where a joint moves."""
+        return None if self.joint is not None else f"tool-{self.axis}" if self.in_tool else self.axis
+
+    def press(self, key: str, joints: int) -> bool:
+        """Take a key that chooses something; whether it is one."""
+        if key.isdecimal() and 1 <= int(key) <= joints:
+            self.joint = int(key)
+        elif key in "xyzXYZ":
+            self.joint, self.axis, self.about = None, key.lower(), key.isupper()
+        elif key == "f":
+            self.in_tool = not self.in_tool
+        elif key == "s":
+            self.step, self.held = (self.step + 1) % len(STEPS), False
+        elif key == "h":
+            self.held = not self.held
+        elif key in "<>":
+            self.speed = min(max(self.speed + (1 if key == ">" else -1), 0), len(SPEEDS) - 1)
+        else:
+            return False
+        return True
+
+    def words(self, names: list[str]) -> str:
+        """In a few words."""
+        if self.joint is not None:
+            what, unit = names[self.joint - 1], "°"
+        else:
+            frame = "tool's " if self.in_tool else ""
+            what = f"tool {'about' if self.about else 'along'} {frame}{self.axis}"
+            unit = "°" if self.about else " mm"
+        how = "held" if self.held else f"step {STEPS[self.step]:g}{unit}"
+        return f"{what}, {how}, {SPEEDS[self.speed]} %"
+
+
+class JogScreen:
+    """``loop`` until the user ends it; ``more``: keys of the caller, each with what it does and gives to say."""
+
+    def __init__(self, board: Board, keys: Keys, more: dict[str, Callable[[], str]] | None = None) -> None:
+        if board.arm is None:
+            raise InputError("no arm is known to move", "say which with home(arm) or configure(arm)")
+        self.choice = JogChoice()
+        self._arm = board.arm
+        self._board = board
+        self._keys = keys
+        self._more = more or {}
+        self._said = ""
+        self._ended_by = ""
+
+    def loop(self) -> None:
+        """Read keys until q, Ctrl-C or the end of the input. LinkError where the board cannot be reached."""
+        self._show()
+        while True:
+            key = self._ended_by or self._keys.read(_IDLE_S)
+            if key in _ENDS:
+                click.echo()
+                if key == INTERRUPT:
+                    raise KeyboardInterrupt
+                return
+            if key:
+                self._said = ""
+                self._act(key)
+                self._show()
+
+    def _act(self, key: str) -> None:
+        try:
+            if key in self._more:
+                self._said = self._more[key]()
+            elif key in (*_FORWARD, *_BACKWARD):
+                self._move(key, 1 if key in _FORWARD else -1)
+            elif key == "c":
+                self._board.clear()
+                self._said = "cleared"
+            elif not self.choice.press(key, len(self._arm.driven)) and key != " ":
+                self._said = f"{key!r} is no key here"
+        except (BoardError, InputError, PlanError) as error:
+            self._said = _words(error)
+        except LinkError as error:
+            if not isinstance(error, BoardError) and "unknown" not in error.problem:
+                click.echo()
+                raise
+            self._said = _words(error)
+
+    def _move(self, key: str, sign: int) -> None:
+        if self.choice.held:
+            self._move_held(key, sign)
+            return
+        choice = self.choice
+        by = sign * STEPS[choice.step]
+        degrees = choice.joint is not None or choice.about
+        self._said = "moving; space stops"
+        self._show()
+        stop = _StopKeys(self._keys)
+        try:
+            with stop:
+                self._board.jog(
+                    choice.joint,
+                    by if degrees else None,
+                    choice.tool_axis,
+                    None if degrees else by,
+                    SPEEDS[choice.speed] / 100,
+                    stop.request,
+                )
+            self._said = ""
+        except Stopped:
+            self._said = "stopped"
+        self._end_if(stop.pressed)
+        self._keys.flush()
+
+    def _end_if(self, key: str) -> None:
+        self._ended_by = key if key in _ENDS else ""
+
+    def _move_held(self, key: str, sign: int) -> None:
+        if not self._repeats(key, FIRST_REPEAT_S):
+            self._said = "hold the key down"
+            return
+        choice = self.choice
+        held = self._board.held_jog(
+            choice.joint, choice.tool_axis, sign, choice.about, SPEEDS[choice.speed] / 100
+        )
+        self._keys.flush()
+        if not self._repeats(key, RELEASE_S):
+            return
+        with held:
+            self._said = f"moving; released, it rests within {held.rest_s + RELEASE_S:.1f} s"
+            self._keys.flush()
+            last_s = shown_s = time.monotonic()
+            while held.hold(_POLL_S):
+                now_s = time.monotonic()
+                pressed = self._keys.read(0.0)
+                if pressed == key:
+                    last_s = now_s
+                elif pressed or now_s - last_s > RELEASE_S:
+                    self._end_if(pressed)
+                    break
+                if now_s - shown_s > _IDLE_S:
+                    shown_s = now_s
+                    self._show(held.angles_deg.tolist())
+            ended = not held.moving
+        self._said = held.motion.ends if ended else ""
+        self._keys.flush()
+
+    def _repeats(self, key: str, within_s: float) -> bool:
+        return self._keys.read(within_s) == key
+
+    def _show(self, angles_deg: list[float] | None = None) -> None:
+        names = [joint.name for joint in self._arm.driven]
+        try:
+            where = self._where(angles_deg or self._board.posture_deg().tolist())
+        except LinkError as error:
+            where = error.problem
+        said = f" | {self._said}" if self._said else ""
+        click.echo(f"{_CLEAR_LINE}{self.choice.words(names)} | {where}{said}", nl=False)
+
+    def _where(self, angles_deg: list[float]) -> str:
+        from armtempo.kinematics.of_arm import forward
+        from armtempo.model.pose import to_rpy_deg
+
+        pose = forward(self._arm, angles_deg)
+        angles = " ".join(f"{angle + 0.0:.2f}" for angle in angles_deg)
+        position = " ".join(f"{value + 0.0:.1f}" for value in pose[:3, 3])
+        turned = " ".join(f"{value + 0.0:.1f}" for value in to_rpy_deg(pose))
+        return f"{angles} ° | tool {position} mm, rpy {turned} °"
+
+
+class _StopKeys:
+    """While a step is under way, space ends it, and so does what ends the screen."""
+
+    def __init__(self, keys: Keys) -> None:
+        self.request = StopRequest()
+        self.pressed = ""
+        """The key that ended it."""
+        self._keys = keys
+        self._done = False
+        self._thread = Thread(target=self._look, name="armtempo keys", daemon=True)
+
+    def _look(self) -> None:
+        while not self._done and not self.pressed:
+            key = self._keys.read(_POLL_S)
+            if key in (" ", *_ENDS):
+                self.pressed = key
+                self.request.wanted = True
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._done = True
+        self._thread.join()
+
+
+def _words(error: ArmtempoError) -> str:
+    return f"{error.problem}: {error.hint}" if error.hint else error.problem

@@ -1,0 +1,136 @@
+"""``armtempo teach``: where the arm stands becomes a posture of its file, or the via points of a job."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from armtempo.cli import chosen, jog, keys, options
+from armtempo.errors import InputError
+
+if TYPE_CHECKING:
+    from armtempo.cli.keys import Keys
+    from armtempo.cli.teach_points import TaughtPoints
+    from armtempo.robot.board import Board
+
+
+@click.command()
+@click.argument(
+    "job_file", required=False, metavar="[JOB.toml]", type=click.Path(dir_okay=False, path_type=Path)
+)
+@click.option("--posture", "name", metavar="NAME", help="Write [posture.NAME] into the arm file instead.")
+@click.option("--by-hand", is_flag=True, help="Switch the motors' current off and follow the encoders.")
+@click.option(
+    "--replace", "replace_old", is_flag=True, help="Replace the posture, or the job file, of that name."
+)
+@options.arm_of_board
+@options.port
+@options.log_traffic
+def command(
+    job_file: Path | None,
+    name: str | None,
+    by_hand: bool,
+    replace_old: bool,
+    arm_path: Path | None,
+    port: str | None,
+    log_traffic: Path | None,
+) -> None:
+    """Teach: keep where the arm stands.
+
+    JOB.toml collects via points into a job file that plans at once: by the keys of 'armtempo jog' and p for a point,
+    or --by-hand. --posture NAME writes one posture into the arm file, whose comments and layout stay, and moves
+    nothing; then 'armtempo goto NAME' brings the arm there, and a job may pass it: [[via]] posture = "NAME".
+    """
+    if (job_file is None) == (name is None) or (name is not None and by_hand):
+        raise InputError(
+            "teach makes a job or a posture", "give JOB.toml, or --posture NAME without --by-hand"
+        )
+    if name is not None:
+        file = _own_arm_file(arm_path, name)
+        arm = chosen.load_arm(arm_path)
+        with chosen.board(port, log_traffic, arm) as board:
+            jog.prepare(board, arm)
+            _write_posture(board, file, name, replace_old)
+    elif job_file is not None:
+        from armtempo.cli import teach_points
+
+        teach_points.check_free(job_file, replace_old)
+        if not keys.is_terminal():
+            raise InputError("the keys of teach need a terminal", "run it in one")
+        named = chosen.named_arm(arm_path)
+        with chosen.board(port, log_traffic, named) as board:
+            jog.prepare(board, chosen.arm_of_board(board, named))
+            _write_job(board, job_file, by_hand)
+
+
+def _own_arm_file(arm_path: Path | None, name: str) -> Path:
+    """The arm file to write to; InputError for one that ships, and for what is no name."""
+    from armtempo.model import posture, shipped
+    from armtempo.project.settings import ARM, ProjectSettings, nothing_set
+
+    if problem := posture.name_problem(name):
+        raise InputError(f"--posture {name}: {problem}", "choose another name")
+    setting = ProjectSettings().get(ARM, arm_path)
+    if not setting:
+        raise nothing_set(ARM, "into which arm file?")
+    found = shipped.find(setting.path)
+    if found.ships or found.path.resolve() in [path.resolve() for path in shipped.files().values()]:
+        raise InputError(
+            f"the arm file {found.path.name} ships with armtempo and is not written to",
+            f"make your own of it: armtempo new FOLDER --like {found.path.stem}, then name it with --arm",
+        )
+    return found.path
+
+
+def _write_posture(board: Board, file: Path, name: str, replace_old: bool) -> None:
+    from armtempo.model import posture_text
+
+    arm = board.arm
+    assert arm is not None  # it was configured
+    angles_deg = posture_text.digits(arm, board.posture_deg().tolist())
+    posture_text.save(file, arm, name, angles_deg, replace_old)
+    words = ", ".join(
+        f"{joint.name} {angle:.12g}°" for joint, angle in zip(arm.driven, angles_deg, strict=True)
+    )
+    click.echo(f"{file}: posture {name!r}: {words}")
+
+
+def _write_job(board: Board, file: Path, by_hand: bool) -> None:
+    """Collect the points and write them; where that fails they are told."""
+    from armtempo.cli.teach_points import TaughtPoints
+
+    arm = board.arm
+    assert arm is not None  # it was configured
+    points = TaughtPoints(arm, board.posture_deg)
+    try:
+        with keys.of_terminal() as pressed:
+            if by_hand:
+                _guide(board, pressed, points)
+            else:
+                jog.screen(board, pressed, more=points.keys, told=_MORE).loop()
+        points.save(file)
+    except BaseException:
+        points.tell()
+        raise
+
+
+_MORE = "  p            take a point                   u       forget the last one"
+
+
+def _guide(board: Board, pressed: Keys, points: TaughtPoints) -> None:
+    from armtempo.cli.teach_points import by_hand
+
+    guided = board.by_hand()
+    click.echo(
+        "hold the arm: it sinks when the motors' current goes off. Enter: off; any other key: leave it on"
+    )
+    if pressed.read(600.0) not in ("\r", "\n"):
+        raise InputError("the motors kept their current", "run it again with somebody who holds the arm")
+    points.where = guided.angles_deg
+    with guided:
+        click.echo(
+            "the current is off. p takes a point, u forgets the last, q gives the current back and ends"
+        )
+        by_hand(pressed, points)

@@ -1,0 +1,64 @@
+"""Guiding the arm by hand: the motors' current is off, and the encoders say where the arm is."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from armtempo.arrays import Array
+from armtempo.errors import BoardError, InputError, LinkError
+from armtempo.link import Client
+from armtempo.model.arm import Arm
+from armtempo.robot import arm_state
+
+SETTLES_S = 0.3
+"""Motors that get their current again turn to the next place where they can hold, at most two full steps away."""
+
+
+class HandGuided:
+    """An arm without its motors' current, as a context; in the end it has it again, and its position by the encoders.
+
+    Whoever begins it holds the arm: it sinks under its weight. Raises InputError for a driven joint without an
+    encoder, LinkError where the position is unknown before.
+    """
+
+    def __init__(self, client: Client, arm: Arm) -> None:
+        blind = [joint.name for joint in arm.driven if joint.encoder is None]
+        if blind:
+            raise InputError(
+                f"{', '.join(blind)}: no encoder, so nobody would know where the arm was moved by hand",
+                "teach with the keys instead: armtempo teach without --by-hand",
+            )
+        arm_state.posture_deg(client, arm)
+        self._client = client
+        self._arm = arm
+
+    def __enter__(self) -> Self:
+        """Take the current away; the position is unknown to the board until the end."""
+        self._client.drivers(False)
+        return self
+
+    def angles_deg(self) -> Array:
+        """Where the joints are by their encoders, degrees (J,)."""
+        counts = np.array(self._client.status().positions.counts, dtype=float)
+        return np.asarray(counts / [joint.counts_per_deg for joint in self._arm.driven])
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Give the current back and declare where the arm is; LinkError where a joint is beyond its range."""
+        self._client.drivers(True)
+        time.sleep(SETTLES_S)
+        scale = np.array([joint.steps_per_deg for joint in self._arm.driven])
+        angles = self.angles_deg()
+        try:
+            self._client.home([round(steps) for steps in angles * scale])
+        except BoardError as error:
+            if value is None:
+                raise LinkError(
+                    f"the arm was left beyond a range ({error.problem}), so its position is unknown",
+                    "bring it within its ranges by hand and run 'armtempo home'",
+                ) from error

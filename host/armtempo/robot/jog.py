@@ -1,0 +1,191 @@
+"""Jogging: a step, or a motion that goes on only while somebody says so."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from armtempo_shared.codes import NOT_MOVING
+from armtempo_shared.limits import HOLD_TIMEOUT_MS
+from armtempo_shared.messages import START_HELD
+
+from armtempo.arrays import Array
+from armtempo.errors import BoardError, LinkError
+from armtempo.link import Client
+from armtempo.link.board_messages import Done, Event, Fault, Positions, Sample
+from armtempo.link.refusal import refusal
+from armtempo.link.transport import Transport
+from armtempo.model.arm import Arm
+from armtempo.planning import jog
+from armtempo.planning.jog import JogMotion, JogMove
+from armtempo.records import encode
+from armtempo.records.encoded_motion import EncodedMotion
+from armtempo.robot import arm_state, goto, stored_motion
+from armtempo.robot.stop_request import StopRequest
+
+NAME = stored_motion.TEMPORARY + "jog"
+HOLD_S = 0.08
+"""Interval at which the board is told that a held jog is still wanted: three may be lost."""
+BEFORE_BRAKING_S = 0.15
+"""From a stop command until the board brakes: what is in its rings is still stepped, and one more step where these come
+slowly."""
+_ANSWER_S = 1.0
+_FIRST = 2  # times it is said at once: a virtual board keeps to real time from then on
+
+
+def rest_s(motion: JogMotion, told: bool = False) -> float:
+    """A held jog rests so long after the board heard its last hold; ``told``: after a stop that arrives."""
+    silence_s = 0.0 if told else HOLD_TIMEOUT_MS / 1000.0
+    return silence_s + BEFORE_BRAKING_S + motion.brake_s
+
+
+def plan(client: Client, arm: Arm, move: JogMove, speed: float = jog.SPEED) -> JogMotion:
+    """The jog from where the arm stands; LinkError where that is unknown, else errors as of ``planning.jog.plan``."""
+    return jog.plan(NAME, arm, arm_state.posture_deg(client, arm).tolist(), move, speed)
+
+
+def step(client: Client, arm: Arm, move: JogMove, speed: float, stop: StopRequest) -> JogMotion:
+    """Move by so much, or to the end of the range, and wait for it.
+
+    BoardError where the board refuses or a fault ends it; the rest as ``plan``.
+    """
+    motion = plan(client, arm, move, speed)
+    goto.move_once(client, _encoded(motion, arm), stop)
+    return motion
+
+
+def _encoded(motion: JogMotion, arm: Arm) -> EncodedMotion:
+    data = encode.motion_record(motion.trajectory, arm, motion.brake_s)
+    return EncodedMotion(motion.trajectory.name, arm, motion.trajectory, data)
+
+
+class HeldJog:
+    """A jog that goes on while ``hold`` is called, and no longer; a context that ends with the arm at rest.
+
+    Whoever calls ``hold`` is the dead man's switch: no thread does it. Where the calls cease, or nothing of them
+    reaches the board for HOLD_TIMEOUT_MS, the board brakes by itself; ``rest_s`` says when it rests at the latest.
+    """
+
+    def __init__(self, client: Client, arm: Arm, motion: JogMotion) -> None:
+        self.motion = motion
+        self.arm = arm
+        self.moving = False
+        """Whether it still goes on, as far as the board has said."""
+        self.fault: Fault | None = None
+        """What ended it, where that was one."""
+        self._client = client
+        self._run = 0
+        self._said_s = 0.0
+        self._positions: Positions | None = None
+        self._reopen: Callable[[], Transport] | None = None
+
+    def __enter__(self) -> Self:
+        """Upload and start it; BoardError where the board refuses."""
+        client = self._client
+        encoded = _encoded(self.motion, self.arm)
+        client.upload(encoded.name, encoded.data)
+        self._reopen, client.session.reopen = (
+            client.session.reopen,
+            None,
+        )  # nobody holds it while a port is waited for
+        try:
+            self._run = client.start(encoded.name, encoded.key.crc, START_HELD).run
+        except BaseException:
+            self._clean_up()
+            raise
+        self.moving = True
+        for _ in range(_FIRST):
+            self._say_so()
+        return self
+
+    @property
+    def rest_s(self) -> float:
+        """The arm rests at the latest so long after the last hold that the board heard."""
+        return rest_s(self.motion)
+
+    @property
+    def angles_deg(self) -> Array:
+        """Where the joints were commanded to be by the last message of the board, (J,)."""
+        if self._positions is None:
+            return self.motion.trajectory(0.0)
+        scale = np.array([joint.steps_per_deg for joint in self.arm.driven])
+        return np.asarray(np.array(self._positions.commanded_steps, dtype=float) / scale)
+
+    def hold(self, seconds: float = 0.05) -> bool:
+        """Hold it for so long, looking at what the board says; False once it has ended.
+
+        Raises LinkError where the board cannot be reached any more: it brakes by itself then.
+        """
+        session = self._client.session
+        until_s = session.clock() + seconds
+        while self.moving:
+            now_s = session.clock()
+            if now_s - self._said_s >= HOLD_S:
+                self._say_so()
+            left_s = min(until_s, self._said_s + HOLD_S) - session.clock()
+            self._take(session.poll(max(0.0, left_s)))
+            if session.clock() >= until_s:
+                break
+        return self.moving
+
+    def _say_so(self) -> None:
+        self._said_s = self._client.session.clock()
+        try:
+            self._client.hold(_ANSWER_S)
+        except BoardError as error:
+            if error.code != NOT_MOVING:
+                raise
+            self.moving = False
+
+    def _take(self, event: Event | None) -> None:
+        if not isinstance(event, Sample | Done | Fault) or event.run != self._run:
+            return
+        self._positions = event.positions
+        if isinstance(event, Fault):
+            self.fault = event
+        self.moving = self.moving and isinstance(event, Sample)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Brake, and wait for rest; BoardError where a fault ended it."""
+        try:
+            self._rest()
+        except LinkError:
+            self._client.session.reopen = self._reopen
+            if value is None:  # the first error says more
+                raise
+            return
+        with suppress(LinkError):
+            self._clean_up()
+        if self.fault is not None and value is None:
+            raise refusal("the jog ended by a fault", self.fault.code, self.fault.joint)
+
+    def _rest(self) -> None:
+        client = self._client
+        stored_motion.send_stop(client)
+        limit_s = client.session.clock() + rest_s(self.motion, told=True) + stored_motion.BRAKE_S
+        while (status := client.status()).moving:
+            if client.session.clock() > limit_s:
+                stored_motion.stop(client, now=True)
+            self._take(client.session.poll(HOLD_S))
+        while client.session.events:
+            self._take(client.session.events.popleft())
+        self._positions = status.positions
+        self.moving = False
+        if status.fault and self.fault is None:
+            self.fault = Fault(
+                status.run,
+                status.fault,
+                status.fault_joint,
+                status.ticks,
+                status.path_ticks,
+                status.positions,
+            )
+
+    def _clean_up(self) -> None:
+        self._client.session.reopen = self._reopen
+        self._client.remove(self.motion.trajectory.name)

@@ -1,0 +1,206 @@
+"""Jogs as they are planned: within ranges and limits, on their line, and quick to brake."""
+
+from __future__ import annotations
+
+import math
+import random
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from armtempo.errors import InputError
+from armtempo.kinematics.of_arm import forward
+from armtempo.model.arm import Arm
+from armtempo.planning import jog, jog_law
+from armtempo.planning.jog import JogMotion, JogMove
+from armtempo.planning.jog_law import WayLimits
+from armtempo.records import encode
+from armtempo.splines import extremes
+from armtempo.splines.trajectory import JointSpline
+
+PAPER, AR4 = Arm.paper(), Arm.load("ar4")
+ELBOW_DEG = [20.0, 10.0, -20.0, 15.0, 40.0, 30.0]
+"""A posture of AR4 far from any singular one."""
+INF = math.inf
+
+
+def on_steps(arm: Arm, angles_deg: list[float]) -> list[float]:
+    """The posture of whole steps next to the angles."""
+    return [
+        round(angle * joint.steps_per_deg) / joint.steps_per_deg
+        for angle, joint in zip(angles_deg, arm.driven, strict=True)
+    ]
+
+
+def check_limits(motion: JogMotion, arm: Arm, speed: float) -> None:
+    """Speed and ramps keep their parts of the limits, and every joint its range."""
+    for reached, joint in zip(extremes.of_joints(motion.trajectory.joints), arm.driven, strict=True):
+        most = joint.limits
+        assert reached.speed_deg_s <= speed * most.speed_deg_s * (1 + 1e-9)
+        assert reached.acceleration_deg_s2 <= jog.RAMP * most.acceleration_deg_s2 * (1 + 1e-9)
+        assert reached.jerk_deg_s3 <= jog.RAMP * most.jerk_deg_s3 * (1 + 1e-9)
+    angles = motion.trajectory(np.linspace(0.0, motion.trajectory.duration_s, 2000))
+    low, high = np.array([joint.range_deg for joint in arm.driven]).T
+    assert np.all(angles >= low)
+    assert np.all(angles <= high)
+
+
+def test_the_law_keeps_its_limits_and_its_speed_in_the_middle() -> None:
+    seed = 7
+    print("seed", seed)
+    rng = random.Random(seed)
+    for _ in range(200):
+        limits = WayLimits(*(10 ** rng.uniform(-1, 3) for _ in range(3)))
+        length = 10 ** rng.uniform(-3, 3)
+        law = jog_law.law(length, limits, rng.choice([INF, length / 10]))
+        way = JointSpline(jog_law.DEGREE, 1, law.way, law.time_s)
+        assert np.all(np.diff(law.time_s) > 0)
+        assert way(0.0) == pytest.approx(0.0, abs=1e-9 * length)
+        assert way(way.duration_s) == pytest.approx(length)
+        reached = extremes.of_joint(way)
+        for value, most in zip(reached.values, (limits.speed, limits.acceleration, limits.jerk), strict=True):
+            assert value <= most * (1 + 1e-6)
+        for order in (1, 2, 3):
+            assert way(0.0, order) == pytest.approx(0.0, abs=1e-6 * reached.values[order - 1])
+        middle = way(np.linspace(0.45, 0.55, 5) * way.duration_s, 1)
+        np.testing.assert_allclose(middle, middle[0], rtol=1e-6)
+
+
+def test_a_joint_goes_to_the_end_of_its_range_and_not_beyond() -> None:
+    for arm in (PAPER, AR4):
+        here = on_steps(arm, list(arm.home_deg))
+        for number, joint in enumerate(arm.driven):
+            for sign in (1, -1):
+                try:
+                    motion = jog.plan("x", arm, here, JogMove(sign * INF, joint=number))
+                except InputError:  # home is there already
+                    assert here[number] in joint.range_deg
+                    continue
+                assert "end of its range" in motion.ends
+                check_limits(motion, arm, jog.SPEED)
+                edge = joint.range_deg[sign > 0]
+                assert 0 <= sign * (edge - motion.end_deg[number]) < 1 / joint.steps_per_deg
+                others = np.delete(motion.end_deg - here, number)
+                np.testing.assert_allclose(others, 0.0, atol=1e-9)
+
+
+def test_at_the_end_of_the_range_only_the_way_back_is_open() -> None:
+    here = on_steps(PAPER, [0.0, -60.0, 40.0])
+    end = jog.plan("x", PAPER, here, JogMove(INF, joint=1)).end_deg
+    with pytest.raises(InputError, match="joint 2 is at the end of its range"):
+        jog.plan("x", PAPER, end, JogMove(1.0, joint=1))
+    back = jog.plan("x", PAPER, end, JogMove(-1.0, joint=1))
+    assert back.end_deg[1] == pytest.approx(end[1] - 1.0)
+
+
+@pytest.mark.parametrize("by", [0.1, -1.0, 10.0])
+@pytest.mark.parametrize("speed", [0.01, 0.25, 1.0])
+def test_a_step_goes_as_far_as_it_says(by: float, speed: float) -> None:
+    here = on_steps(AR4, ELBOW_DEG)
+    motion = jog.plan("x", AR4, here, JogMove(by, joint=4), speed)
+    assert motion.end_deg[4] - here[4] == pytest.approx(by)
+    assert not motion.ends
+    check_limits(motion, AR4, speed)
+
+
+def test_a_stop_is_quick() -> None:
+    """Braking from a constant speed takes what EXCESS of the limits allows, as the rise of a jog uses half of them."""
+    for arm in (PAPER, AR4):
+        here = on_steps(arm, list(arm.home_deg))
+        for number, joint in enumerate(arm.driven):
+            motion = jog.plan("x", arm, here, JogMove(-INF, joint=number))
+            speed, most = jog.SPEED * joint.limits.speed_deg_s, joint.limits
+            from_speed_s = max(
+                1.5 * speed / most.acceleration_deg_s2, (10 / 3**0.5 * speed / 1.25 / most.jerk_deg_s3) ** 0.5
+            )
+            assert motion.brake_s < 2.0 * from_speed_s
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z", "tool-x", "tool-y", "tool-z"])
+@pytest.mark.parametrize("by", [INF, -INF, 5.0, -0.1])
+def test_the_tool_moves_along_a_line_and_keeps_its_orientation(axis: str, by: float) -> None:
+    here = on_steps(AR4, ELBOW_DEG)
+    motion = jog.plan("x", AR4, here, JogMove(by, axis=axis))
+    check_limits(motion, AR4, jog.SPEED)
+    start = forward(AR4, here)
+    unit = np.eye(3)["xyz".index(axis[-1])] * math.copysign(1, by)
+    direction = start[:3, :3] @ unit if axis.startswith("tool") else unit
+    poses = forward(AR4, motion.trajectory(np.linspace(0.0, motion.trajectory.duration_s, 500)))
+    gaps = poses[:, :3, 3] - start[:3, 3]
+    along = gaps @ direction
+    assert np.abs(gaps - along[:, None] * direction).max() < 0.5
+    assert np.abs(poses[:, :3, :3] - start[:3, :3]).max() < 0.01
+    assert np.all(np.diff(along) > -0.02)
+    if math.isinf(by):
+        assert motion.ends
+        assert along[-1] > 10.0
+    else:
+        assert along[-1] == pytest.approx(abs(by), abs=0.01)
+
+
+@pytest.mark.parametrize("by", [10.0, -INF])
+def test_the_tool_turns_about_its_own_point(by: float) -> None:
+    here = on_steps(AR4, ELBOW_DEG)
+    motion = jog.plan("x", AR4, here, JogMove(by, axis="tool-y", about=True))
+    check_limits(motion, AR4, jog.SPEED)
+    start = forward(AR4, here)
+    poses = forward(AR4, motion.trajectory(np.linspace(0.0, motion.trajectory.duration_s, 300)))
+    assert np.abs(poses[:, :3, 3] - start[:3, 3]).max() < 0.5
+    assert np.abs(poses[:, :3, 1] - start[:3, 1]).max() < 0.01  # the axis stays
+    if by > 0:
+        turned = math.degrees(math.acos(poses[-1, :3, 0] @ start[:3, 0]))
+        assert turned == pytest.approx(by, abs=0.02)
+
+
+def test_an_arm_of_three_joints_moves_its_tool_and_lets_it_turn() -> None:
+    here = on_steps(PAPER, [0.0, -60.0, 40.0])
+    motion = jog.plan("x", PAPER, here, JogMove(10.0, axis="z"))
+    way = forward(PAPER, motion.end_deg)[:3, 3] - forward(PAPER, here)[:3, 3]
+    np.testing.assert_allclose(way, [0.0, 0.0, 10.0], atol=0.05)
+    with pytest.raises(InputError, match="cannot turn the tool about z"):
+        jog.plan("x", PAPER, here, JogMove(10.0, axis="z", about=True))
+
+
+def test_a_line_ends_before_a_singular_posture() -> None:
+    motion = jog.plan("x", AR4, on_steps(AR4, ELBOW_DEG), JogMove(INF, axis="x"))
+    assert "singular" in motion.ends
+    assert (
+        np.abs(np.diff(motion.trajectory(np.linspace(0, motion.trajectory.duration_s, 400)), axis=0)).max()
+        < 2.0
+    )
+
+
+def test_a_held_jog_is_a_small_record() -> None:
+    for move in (JogMove(INF, joint=0), JogMove(INF, axis="x"), JogMove(-INF, axis="y")):
+        motion = jog.plan("x", AR4, on_steps(AR4, ELBOW_DEG), move)
+        assert len(encode.motion_record(motion.trajectory, AR4, motion.brake_s)) < 2048
+
+
+@pytest.mark.parametrize(
+    ("move", "speed", "said"),
+    [
+        (JogMove(0.0, joint=0), 0.25, "by 0 moves nothing"),
+        (JogMove(math.nan, joint=0), 0.25, "by 0 moves nothing"),
+        (JogMove(1.0), 0.25, "a joint or the tool"),
+        (JogMove(1.0, joint=0, axis="x"), 0.25, "a joint or the tool"),
+        (JogMove(1.0, axis="w"), 0.25, "no axis 'w'"),
+        (JogMove(1.0, joint=0), 0.0, "a speed of 0"),
+        (JogMove(1.0, joint=0), 1.5, "a speed of 1.5"),
+    ],
+)
+def test_what_is_no_jog_is_refused(move: JogMove, speed: float, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        jog.plan("x", PAPER, [0.0, -60.0, 40.0], move, speed)
+
+
+def test_joints_have_numbers_and_names() -> None:
+    named = replace(PAPER, joints=tuple(replace(j, name=f"j{n}") for n, j in enumerate(PAPER.joints, 1)))
+    assert (
+        jog.number_of_joint(named, "j2")
+        == jog.number_of_joint(named, 2)
+        == jog.number_of_joint(named, "2")
+        == 1
+    )
+    for wrong in (0, 4, "j9", "-1", -1):
+        with pytest.raises(InputError, match="drives no joint"):
+            jog.number_of_joint(named, wrong)
