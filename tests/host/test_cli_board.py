@@ -175,7 +175,7 @@ def test_arm_is_not_replaced_silently(run: Run, file: str, tmp_path: Path) -> No
     ("where", "words"),
     [
         ("P9", "give one of P0 to P6"),
-        ("here", "is no posture"),
+        ("here", "has no posture"),
         ("1,2", "3 angles, not 2"),
         ("-11,0,0", "outside of its range"),
         ("x.json", "x.json"),

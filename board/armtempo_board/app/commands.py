@@ -1,9 +1,9 @@
 """What the board does for each command of the message table; refusals are raised as ``Refused``.
 
 While a motion runs only the commands of ``_WHILE_MOVING`` and those of ``Controller.rows`` are taken, and all of them
-but ``hello``, ``stop`` and ``speed`` allocate nothing. The commands about the store and the drivers are in
-``store_commands.py``, which is imported when one comes; those about outputs and inputs in ``output_commands.py``, which is there for arms that have
-any, and the one about sequences in ``sequence_command.py``, which is there when one has been started.
+but ``hello``, ``stop`` and ``speed`` allocate nothing. Those about the store and the drivers are in
+``store_commands.py``, which is imported when one comes; those about outputs and inputs in ``output_commands.py``, which
+is there for arms that have any, and the one about sequences in ``sequence_command.py``, once one has been started.
 """
 
 from struct import calcsize, pack_into, unpack_from
@@ -112,7 +112,12 @@ class Commands:
         from armtempo_board.app.command_rows import ROWS  # here, so that it can be forgotten
 
         name, fields, values, tail = ROWS[number]
-        return name if number in _ELSEWHERE else getattr(type(self), name), fields, values, tail
+        return (
+            name if number in _STORE or number == _DRIVERS else getattr(type(self), name),
+            fields,
+            values,
+            tail,
+        )
 
     def _store(self, name: str, row: tuple, length: int) -> "int | None":
         from armtempo_board.app import store_commands  # here, so that it can be forgotten
