@@ -31,10 +31,8 @@ if TYPE_CHECKING:
     from armtempo_board.link.serial_link import SerialLink
 
 _WHILE_MOVING = ("hello", "status", "stop", "hold", "speed", "samples")
-_ELSEWHERE = (
-    *range(0x10, 0x20),
-    0x29,
-)  # numbers of the commands in store_commands.py: the store, the drivers
+_STORE = range(0x10, 0x20)  # numbers of the commands in store_commands.py,
+_DRIVERS = const(0x29)  # and of one more
 _BYTES_PER_POSITION = const(4)
 _BYTES_OF_INDEX = const(4)  # of a sample
 _ANSWER_AT = const(6)  # in a reply: its payload begins with the command's number
