@@ -30,8 +30,8 @@ def own_settings() -> Iterator[None]:
     shutil.rmtree(folder, ignore_errors=True)
 
 
-SLOW = ("micropython-arm", "anywhere]")
-"""What in a test's name says that it takes long: the emulator, and cases that try many moments."""
+SLOW = ("micropython-arm", "[cpython-engine", "anywhere]")
+"""What in a test's name says that it takes long: the emulator, the engine on CPython, cases of many moments."""
 
 
 @pytest.fixture(params=interpreters.AVAILABLE)
@@ -48,10 +48,8 @@ def pytest_xdist_auto_num_workers() -> int:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Several workers begin with what takes long, so that they end together; ``make quick`` leaves it out."""
     for item in items:
-        if (
-            item.path.is_relative_to(interpreters.ROOT / "tests" / "system")
-            or "micropython-arm" in item.nodeid
-        ):
+        in_system = item.path.is_relative_to(interpreters.ROOT / "tests" / "system")
+        if in_system or any(word in item.nodeid for word in SLOW):
             item.add_marker(pytest.mark.slow)
     if hasattr(config, "workerinput"):  # of pytest-xdist
         items.sort(key=lambda item: item.get_closest_marker("slow") is None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 
 from armtempo.errors import INTERRUPTED
 
@@ -18,6 +19,10 @@ def main() -> None:
     """The command; ``armtempo.cli`` takes Ctrl-C over when a subcommand begins."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # it may be ignored, in the background
         signal.signal(signal.SIGINT, _end)
+    if sys.argv[1:2] == ["stop"]:
+        from armtempo.project import quick_stop
+
+        quick_stop.send(sys.argv[2:])
     from armtempo.cli import main as command
 
     command(prog_name="armtempo")

@@ -8,6 +8,8 @@ import pytest
 
 from tests import interpreters
 
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("cortex_m4")]
+
 BENCHMARK = interpreters.ROOT / "tests" / "benchmark" / "cortex_m4.py"
 
 
@@ -22,7 +24,6 @@ COUNTS = ("steps", "stretches")
 """What was done; the rest is what it cost."""
 
 
-@pytest.mark.slow
 def test_steps_cost_no_more_than_is_stored(figures: dict[str, dict[str, float]]) -> None:
     stored = json.loads(BENCHMARK.with_suffix(".json").read_text())
     assert figures.keys() == stored.keys()
@@ -42,6 +43,5 @@ def test_a_million_steps_a_second_leave_time_to_spare(figures: dict[str, dict[st
     assert 999_000 * figures["cruise"]["all"] * 1.3 < 0.9 * 168e6
 
 
-@pytest.mark.slow
 def test_the_machine_code_computes_what_cpython_does() -> None:
     assert interpreters.run("cpython", BENCHMARK, "--verify") == "the same\n"

@@ -11,6 +11,8 @@ from tests import interpreters
 from tests.benchmark import freeze
 from tests.board.emulated import Machine
 
+pytestmark = pytest.mark.xdist_group("interrupt cost")  # what they share is made once
+
 BOARD = interpreters.ROOT / "board" / "armtempo_board"
 
 SERVE = {1: (209, 382), 3: (257, 478), 6: (329, 622)}

@@ -79,6 +79,7 @@ def test_all_interpreters_give_the_same_edges(
     assert walking.walk(interpreter, tmp_path, records, room=2)[1] == expected
 
 
+@pytest.mark.slow
 def test_edges_do_not_depend_on_how_the_ring_is_filled(
     shared: tuple[list[bytes], list[bytes]], tmp_path: Path
 ) -> None:

@@ -21,6 +21,8 @@ from armtempo.model.job import Job
 from armtempo.research.bench import cases, result_plot, result_store, result_table, worker_pool
 from click.testing import CliRunner
 
+pytestmark = pytest.mark.xdist_group("bench")  # what they share is made once
+
 ITERATIONS = 6
 SMALL = ["--populations", "4,6", "--seeds", "2", "--iterations", str(ITERATIONS), "--workers", "2"]
 

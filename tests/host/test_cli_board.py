@@ -112,6 +112,7 @@ def test_run_by_stored_name(run: Run, file: str) -> None:
     assert "no trajectory of this name" in run("run", "other", code=1).output
 
 
+@pytest.mark.slow
 def test_fault_during_a_run(run: Run, file: str, pipe: Pipe, monkeypatch: pytest.MonkeyPatch) -> None:
     run("upload", file)
     run("home")

@@ -325,6 +325,7 @@ def _frame(label: str) -> str:
     return f'  File "{module}", line 1, in {short}\n'
 
 
+@pytest.mark.slow
 def test_traceback_of_the_compiled_program_is_readable() -> None:
     """A short name stands for several functions; who calls whom tells which it is."""
     chain = (

@@ -62,6 +62,7 @@ def test_compiled_files_fit_the_smallest_board() -> None:
     assert all(data[:2] == b"M\x06" for data in library.values())
 
 
+@pytest.mark.slow
 def test_sources_go_where_there_is_room() -> None:
     library = changes.choose(replace(BOARD, free_blocks=2000, free_heap=200_000), False, quiet)
     assert "/flash/lib/armtempo_board/app/app.py" in library
@@ -138,6 +139,7 @@ def test_compiled_files_of_another_version_are_refused(mpy: int) -> None:
         program_files.library(mpy)
 
 
+@pytest.mark.slow
 def test_package_folder_lists_what_it_holds(tmp_path: Path) -> None:
     package.write(tmp_path / "new")
     content = json.loads((tmp_path / "new" / "package.json").read_text())

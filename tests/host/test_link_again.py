@@ -99,6 +99,7 @@ def test_a_command_under_way_is_answered_after_the_greeting(tmp_path: Path) -> N
     assert board.find("feed") is not None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("trouble", ["unplug_for", "silence_for"])
 def test_a_wanted_stop_shortens_the_waiting(tmp_path: Path, trouble: str) -> None:
     pipe = Pipe(tmp_path / "flash")

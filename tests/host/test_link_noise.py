@@ -29,6 +29,7 @@ def test_thousand_uploads_over_a_bad_line_arrive_identical(tmp_path: Path) -> No
     assert from_board.hits > 300
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8))
 def test_runs_over_a_bad_line_are_complete(tmp_path: Path, seed: int) -> None:
     pipe = Pipe(tmp_path / "flash", Noise(f"to {seed}", 0.01), Noise(f"from {seed}", 0.01))

@@ -11,6 +11,8 @@ from armtempo.research.bench.result_table import rows
 from armtempo.research.paper import motions, postures, printed, searches
 from armtempo.research.paper.claims import BETTER, DIFFERS, SAME, compared
 
+pytestmark = pytest.mark.xdist_group("paper")  # what they share is made once
+
 
 @pytest.fixture(scope="module")
 def made() -> motions.Plans:

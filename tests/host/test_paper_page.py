@@ -20,6 +20,8 @@ from armtempo.robot.stop_request import StopRequest
 from tests import browser
 from tests.host import made_runs
 
+pytestmark = pytest.mark.xdist_group("paper")  # what they share is made once
+
 FIGURES = 7
 """4 to 7 and 10 to 12."""
 PARTS = 16

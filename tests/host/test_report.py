@@ -18,13 +18,15 @@ from armtempo.model import trajectory_file
 from armtempo.model.arm import Driver, Joint, Limits
 from armtempo.model.plan import Plan
 from armtempo.planning import path_deviation
-from armtempo.report import comparison, run_report, verdict
+from armtempo.report import comparison, drawing, run_report, verdict
 from armtempo.report.evaluation import evaluate
 from armtempo.runs.run_folder import MOTION
 from click.testing import CliRunner
 
 from tests import browser
 from tests.host import made_runs
+
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("report")]
 
 FIGURES = ("tracking", "errors", "motion", "convergence", "postures")
 PARTS = 11
@@ -37,6 +39,18 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = made_runs.make(tmp_path_factory.mktemp("runs") / "feed-001", drop=(5, 6))
     run_report.write(path)
     return path
+
+
+def draw_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures take most of a report's time; a test of what the page says in words has them left empty."""
+    monkeypatch.setattr(drawing, "save", lambda figure, path: path.write_bytes(b""))
+    monkeypatch.setattr(drawing, "inline_svg", lambda figure, name, description: "<svg></svg>")
+
+
+@pytest.fixture
+def without_drawing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures are not drawn."""
+    draw_nothing(monkeypatch)
 
 
 def test_the_page_and_every_figure_are_written(folder: Path) -> None:
@@ -168,6 +182,7 @@ def limited(joints: Sequence[Joint], limits: Sequence[Limits]) -> Iterator[Joint
         yield replace(joint, limits=next(left)) if joint.motor else joint
 
 
+@pytest.mark.usefixtures("without_drawing")
 @pytest.mark.parametrize("blind", [(), (0, 1, 2)])
 def test_a_motion_that_only_the_board_had_is_reported(tmp_path: Path, blind: tuple[int, ...]) -> None:
     plan = made_runs.blind_plan(*blind)
@@ -185,6 +200,7 @@ def test_a_motion_that_only_the_board_had_is_reported(tmp_path: Path, blind: tup
     assert found.limits == [joint.limits for joint in plan.arm.driven]
 
 
+@pytest.mark.usefixtures("without_drawing")
 def test_of_a_folder_without_an_arm_the_limits_are_not_known(tmp_path: Path) -> None:
     path = made_runs.make(tmp_path / "run", on_board=True)
     (path / "arm.json").write_text("{")
@@ -197,6 +213,7 @@ def test_of_a_folder_without_an_arm_the_limits_are_not_known(tmp_path: Path) -> 
     assert evaluate(path).complaints == ()
 
 
+@pytest.mark.usefixtures("without_drawing")
 def test_the_verdict_of_a_good_run_is_ok(folder: Path, tmp_path: Path) -> None:
     whole = made_runs.make(tmp_path / "whole")
     told = verdict.of(evaluate(whole))
@@ -276,7 +293,7 @@ def test_a_folder_that_is_no_run_is_refused(tmp_path: Path, spoil: object, said:
     assert "Traceback" not in result.output
 
 
-def test_two_runs_are_compared_on_one_page(tmp_path: Path) -> None:
+def test_two_runs_are_compared_on_one_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     runs = [str(made_runs.make(tmp_path / f"run-{seed}", seed=seed)) for seed in (1, 2)]
     broken = tmp_path / "broken"
     broken.mkdir()
@@ -285,6 +302,7 @@ def test_two_runs_are_compared_on_one_page(tmp_path: Path) -> None:
     page = (tmp_path / comparison.PAGE).read_text()
     assert "run-1" in page
     assert page.count("<figure") == 3
+    draw_nothing(monkeypatch)
     three = CliRunner().invoke(main, ["report", *runs, str(broken), "--out", str(tmp_path / "three.html")])
     assert three.exit_code == 0, three.output
     assert "broken is not a run folder" in three.stderr
@@ -296,6 +314,7 @@ def test_two_runs_are_compared_on_one_page(tmp_path: Path) -> None:
     assert not (tmp_path / "none.html").exists()
 
 
+@pytest.mark.usefixtures("without_drawing")
 def test_a_run_cut_short_is_said_and_the_rest_reported(tmp_path: Path) -> None:
     path = made_runs.make(tmp_path / "run", repetitions=2)
     meta = json.loads((path / "run.json").read_text())
@@ -321,6 +340,7 @@ def test_when_the_joints_pass_the_via_points_is_told(folder: Path) -> None:
     assert f"strays up to {path_deviation.tool_stray_mm(plan.arm, plan.trajectory):.1f} mm" in text
 
 
+@pytest.mark.usefixtures("without_drawing")
 def test_shared_timing_needs_no_such_section(tmp_path: Path) -> None:
     path = made_runs.make(tmp_path / "run", repetitions=1)
     spoil_plan(
@@ -338,6 +358,7 @@ def spoil_plan(path: Path, change: Callable[[Plan], Plan]) -> None:
     trajectory_file.save(change(trajectory_file.load(file)), file, force=True)
 
 
+@pytest.mark.usefixtures("without_drawing")
 @pytest.mark.parametrize("changes", [{"name": "another"}, {"driver": Driver(pulse_us=9.0)}])
 def test_runs_of_different_arms_are_told_apart(tmp_path: Path, changes: dict[str, Any]) -> None:
     runs = [made_runs.make(tmp_path / name, repetitions=1) for name in ("one", "two")]

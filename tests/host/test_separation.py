@@ -39,6 +39,7 @@ def test_per_joint_timing_separates_joints(apart: Plan) -> None:
     assert spread.max() > 0.5
 
 
+@pytest.mark.slow
 def test_tool_strays_as_far_as_the_nearest_point_of_the_path_is(apart: Plan) -> None:
     """Against a plain search over u for the worst of a few times."""
     from armtempo.kinematics.forward import forward

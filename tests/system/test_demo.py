@@ -15,6 +15,8 @@ from tests import interpreters
 from tests.system import commandline
 from tests.system.commandline import Ended
 
+pytestmark = pytest.mark.xdist_group("demo")  # what they share is made once
+
 FIGURES = ("tracking", "errors", "motion", "convergence", "postures")
 LIMITS = {"joint 1": (50.0, 50.0, 150.0), "joint 2": (40.0, 30.0, 120.0), "joint 3": (60.0, 40.0, 150.0)}
 """Speed, acceleration and jerk (Tables 5 and 7)."""

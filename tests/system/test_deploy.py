@@ -71,7 +71,10 @@ def test_from_an_empty_board_and_back(tmp_path: Path, name: str) -> None:
         assert "armtempo deploy" in armtempo("status", "--port", port, cwd=tmp_path, code=1)
         assert "kept as /flash/main.py.before-armtempo" in armtempo("deploy", "--port", port, cwd=tmp_path)
         assert "unconfigured" in armtempo("status", "--port", port, cwd=tmp_path)
-        assert "up to date" in armtempo("deploy", "--port", port, cwd=tmp_path)
+        again = armtempo("deploy", "--arm", "paper", "--port", port, cwd=tmp_path)
+        assert "up to date" in again
+        assert "memory for an arm:" in again
+        assert "bytes for 3 joints of" in again
         damaged = next((flash / "lib" / "armtempo_board").rglob("program.*py"))
         damaged.write_bytes(b"")
         assert "1 files of the library written" in armtempo("deploy", "--port", port, cwd=tmp_path)

@@ -17,6 +17,8 @@ from armtempo.cli.interrupts import raised_by_signals
 
 from tests.interpreters import ROOT
 
+pytestmark = pytest.mark.xdist_group("start")  # what they share is made once
+
 COMMAND = (sys.executable, "-X", "importtime", "-c", "from armtempo.__main__ import main; main()", "plan")
 SHORT = ("--iterations", "1", "--population", "4")
 ENDLESS = ("--iterations", "1000000")

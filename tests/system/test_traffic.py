@@ -28,6 +28,8 @@ from tests import interpreters
 from tests.replay_transport import ReplayTransport
 from tests.system import boards
 
+pytestmark = pytest.mark.xdist_group("traffic")  # what they share is made once
+
 AWAY_DEG = np.array([20.0, -10.0, 15.0])
 INTERPRETERS = [name for name in interpreters.AVAILABLE if name != "micropython-arm"]
 WAIT_S = 60.0

@@ -11,6 +11,8 @@ import pytest
 
 from tests.interpreters import ROOT
 
+pytestmark = pytest.mark.xdist_group("wheel")  # what they share is made once
+
 PACKAGES = {"armtempo": "host", "armtempo_shared": "shared", "armtempo_board": "board"}
 
 

@@ -18,20 +18,28 @@ from armtempo.cli.progress import ProgressBar
     metavar="FOLDER",
     help="Instead write FOLDER for 'mpremote mip install --target /flash FOLDER/package.json'.",
 )
+@options.arm
 @options.port
-def command(mpy: bool, package: Path | None, port: str | None) -> None:
+def command(mpy: bool, package: Path | None, arm_path: Path | None, port: str | None) -> None:
     """Put the board program on a board, or bring it up to date.
 
     mpremote copies what differs below /flash/lib; every file is read back. A boot.py or main.py that was
-    there before is kept aside. Interrupted, do it again.
+    there before is kept aside. Interrupted, do it again. At the end it says which arms fit into the memory that
+    is left, and whether the arm that is named does.
     """
     from armtempo.deploy import deploy
     from armtempo.deploy import package as packages
+    from armtempo.robot import engine_room
 
     if package is not None:
         packages.write(package)
         click.echo(f"written: {package}")
         return
+    arm = chosen.named_arm(arm_path)
     with ProgressBar("copying") as progress:
-        deploy(chosen.port(port), mpy, click.echo, progress)
+        info = deploy(chosen.port(port), mpy, click.echo, progress)
     click.echo("the board runs armtempo")
+    for line in engine_room.of_board(info):
+        click.echo(line)
+    if arm is not None:
+        click.echo(f"{chosen.words(arm)}: {engine_room.of_arm(arm, info)}")

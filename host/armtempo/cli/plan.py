@@ -120,11 +120,13 @@ def _plans(arm: Arm, job: Job, split: bool) -> list[Plan]:
 
 def _write(plan: Plan, target: Path, force: bool) -> None:
     from armtempo import pipeline
+    from armtempo.robot import engine_room
 
     plan.save(target, force)
     click.echo(f"arm: {chosen.words(plan.arm)}")
     for line in pipeline.summary(plan):
         click.echo(line)
+    click.echo(engine_room.of_arm(plan.arm))
     click.echo(f"written: {target}")
 
 

@@ -9,6 +9,8 @@ import click
 
 from armtempo.cli import chosen, options
 from armtempo.errors import LinkError, NoAnswerError, PortError
+from armtempo.project import quick_stop
+from armtempo.project.quick_stop import StopAnswer
 from armtempo.robot import shared_board
 from armtempo.robot.board_state import BoardState
 from armtempo.robot.shared_board import SharedBoard
@@ -29,25 +31,35 @@ def command(now: bool, port: str | None, log_traffic: Path | None, as_json: bool
     Where another armtempo program has the port, it is told to stop and ends what it does.
     """
     name = chosen.port(port, others=True)
+    answer = quick_stop.take_answer(name, now)
+    if answer is not None:
+        _tell(name, answer, now)
     shared = shared_board.find(name)
-    found = None if shared is None else _through(shared, name, now)
+    if shared is None:
+        found = None
+    else:
+        with shared:
+            if answer is None:
+                _tell(name, StopAnswer(shared.stop(now, quick_stop.BY), shared.program), now)
+            found = _rest(shared)
     if found is None:
-        found = _directly(name, log_traffic, now, _PORT_FREE_S if shared else 0.0)
+        found = _directly(name, log_traffic, now, _PORT_FREE_S if shared or answer else 0.0)
     _show(found, as_json)
 
 
-def _through(shared: SharedBoard, port: str, now: bool) -> BoardState | None:
-    """Stop through the program that has the port; None where that gives up the port before the arm rests."""
-    with shared:
-        moving = shared.stop(now, "'armtempo stop'")
-        did = ("frozen" if now else "braking") if moving else "nothing moved"
-        chosen.tell(f"port {port}: {did}, through {shared.program}")
-        try:
-            return shared.wait_for_rest()
-        except NoAnswerError:
-            raise
-        except LinkError:
-            return None
+def _tell(port: str, answer: StopAnswer, now: bool) -> None:
+    did = ("frozen" if now else "braking") if answer.moved else "nothing moved"
+    chosen.tell(f"port {port}: {did}, through {answer.program}")
+
+
+def _rest(shared: SharedBoard) -> BoardState | None:
+    """Where the arm comes to rest; None where the other program gives up the port before."""
+    try:
+        return shared.wait_for_rest()
+    except NoAnswerError:
+        raise
+    except LinkError:
+        return None
 
 
 def _directly(port: str, log_traffic: Path | None, now: bool, patience_s: float) -> BoardState:

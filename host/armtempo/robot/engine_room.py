@@ -2,50 +2,103 @@
 
 from __future__ import annotations
 
-from armtempo_shared import engine_memory
+from dataclasses import dataclass
+
+from armtempo_shared import engine_memory, limits
 
 from armtempo.errors import InputError
 from armtempo.link.board_messages import Hello
 from armtempo.model.arm import Arm
 from armtempo.records import encode
 
-_FIRMWARE = "or put the program into the board's firmware, which leaves more memory (board/docs/firmware.md)"
+
+@dataclass(frozen=True)
+class Room:
+    """Memory for engines: ``size`` bytes, and heap for the objects of so many ``joints``."""
+
+    size: int
+    joints: int
+
+    @classmethod
+    def of_board(cls, info: Hello) -> Room:
+        """What a board states."""
+        return cls(info.engine_room, info.engine_joints)
+
+    def holds(self, rates: list[int]) -> bool:
+        """Whether an engine for joints of these highest step rates (steps/s) fits."""
+        return len(rates) <= self.joints and engine_memory.fits(rates, self.size // 4)
+
+    def words(self) -> str:
+        """What fits: bytes, joints, steps/s."""
+        return f"{self.size} bytes: {', '.join(self._fitting()) or 'no arm fits'}"
+
+    def _fitting(self) -> list[str]:
+        found = [(joints, self._highest_rate(joints)) for joints in range(1, self.joints + 1)]
+        return [f"{joints} x {rate} steps/s" for joints, rate in found if rate]
+
+    def _highest_rate(self, joints: int) -> int:
+        """The highest step rate, in whole 1000 steps/s, at which so many joints fit; 0 where none do."""
+        for rate in range(limits.MAX_STEP_RATE_SUM // joints // 1000, 0, -1):
+            if self.holds([1000 * rate] * joints):
+                return 1000 * rate
+        return 0
+
+
+AS_FILES = Room(11_460, 3)
+IN_FIRMWARE = Room(21_368, 6)
+"""The program as compiled files on MicroPython's own firmware for the STM32F4DISC, and built into it.
+
+Measured: ``python -m tests.benchmark.room MICROPYTHON``.
+"""
+_BUILD = "'armtempo firmware' (board/docs/firmware.md)"
 
 
 def check(arm: Arm, info: Hello) -> None:
     """InputError with the bytes needed, the bytes there and what to do, where the engine for the arm does not fit."""
+    rates, room = encode.step_rates(arm), Room.of_board(info)
+    if room.holds(rates):
+        return
+    if len(rates) > room.joints:
+        raise InputError(
+            f"arm {arm.name!r} drives {len(rates)} joints; the board has memory for {room.joints}",
+            f"drive fewer joints{_or_firmware(rates, room)}",
+        )
+    raise InputError(
+        f"arm {arm.name!r} needs {4 * engine_memory.words(rates)} bytes for its engine, the board has {room.size}",
+        f"lower its top speeds (its joints step up to {', '.join(map(str, rates))} steps/s; slower ones have "
+        f"smaller rings), drive fewer joints{_or_firmware(rates, room)}",
+    )
+
+
+def of_arm(arm: Arm, info: Hello | None = None) -> str:
+    """In a line: the memory that an arm needs, and whether a board has it; without one, where it fits."""
     rates = encode.step_rates(arm)
-    if len(rates) > info.engine_joints:
-        raise InputError(
-            f"arm {arm.name!r} drives {len(rates)} joints; the board has memory for {info.engine_joints}",
-            f"drive fewer joints, {_FIRMWARE}",
+    needs = f"memory on the board: {4 * engine_memory.words(rates)} bytes for {len(rates)} joints"
+    if info is not None:
+        room = Room.of_board(info)
+        return (
+            f"{needs} of {room.size}"
+            if room.holds(rates)
+            else f"{needs}, too much{_or_firmware(rates, room)}"
         )
-    if not engine_memory.fits(rates, info.engine_room // 4):
-        raise InputError(
-            f"arm {arm.name!r} needs {4 * engine_memory.words(rates)} bytes for its engine, the board has "
-            f"{info.engine_room}",
-            f"lower its top speeds (its joints step up to {', '.join(map(str, rates))} steps/s; "
-            f"slower ones have smaller rings), drive fewer joints, {_FIRMWARE}",
-        )
+    if AS_FILES.holds(rates):
+        return f"{needs}: fits with the program as files or in the firmware"
+    if IN_FIRMWARE.holds(rates):
+        return f"{needs}: fits only with the program in the firmware, {_BUILD}"
+    return f"{needs}: too much for an STM32F407"
 
 
-def words(info: Hello) -> str:
-    """What fits, for ``status`` and ``deploy``: joints, steps/s and bytes."""
-    return f"{info.engine_room} bytes: {', '.join(_fitting(info)) or 'no arm fits'}"
+def of_board(info: Hello) -> list[str]:
+    """What fits on a board, and what more would with the program in its firmware."""
+    room = Room.of_board(info)
+    lines = [f"memory for an arm: {room.words()}"]
+    if room.size < IN_FIRMWARE.size:
+        lines.append(f"with the program in the firmware, {_BUILD}: {IN_FIRMWARE.words()}")
+    return lines
 
 
-def _fitting(info: Hello) -> list[str]:
-    found = []
-    for joints in range(1, info.engine_joints + 1):
-        rate = _highest_rate(joints, info)
-        if rate:
-            found.append(f"{joints} x {rate} steps/s")
-    return found
-
-
-def _highest_rate(joints: int, info: Hello) -> int:
-    """The highest step rate, in whole 1000 steps/s, at which so many joints fit; 0 where none do."""
-    for rate in range(info.max_rate_sum // joints // 1000, 0, -1):
-        if engine_memory.fits([1000 * rate] * joints, info.engine_room // 4):
-            return 1000 * rate
-    return 0
+def _or_firmware(rates: list[int], room: Room) -> str:
+    """The firmware as a way out, where it is one."""
+    if room.size >= IN_FIRMWARE.size or not IN_FIRMWARE.holds(rates):
+        return ""
+    return f", or put the program into the board's firmware, where this arm fits: {_BUILD}"

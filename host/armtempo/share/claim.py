@@ -6,17 +6,14 @@ was killed leaves its file behind; nobody answers at its address then.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
-import secrets
 import stat
 import sys
-import tempfile
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 VERSION = 1
 LOCAL_SOCKETS = os.name == "posix"
@@ -25,9 +22,8 @@ _LONGEST_SOCKET_PATH = 100
 """Bytes; an operating system takes 104 to 108."""
 
 
-@dataclass(frozen=True)
-class PortClaim:
-    """One program's claim to one port."""
+class PortClaim(NamedTuple):
+    """One program's claim to one port. (A data class would take 10 ms to import, which a stop has not.)"""
 
     name: str
     """The port, by a name that is the same for every program (``ports.names.same_for_all``)."""
@@ -63,7 +59,7 @@ class PortClaim:
     def _write(self, path: Path) -> None:
         aside = path.with_suffix(f".{self.number}")
         with os.fdopen(os.open(aside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
-            json.dump(asdict(self), file)
+            json.dump(self._asdict(), file)
         os.replace(aside, path)
 
     def _marker(self, path: Path) -> Path:
@@ -90,6 +86,8 @@ class PortClaim:
 
     def _files(self) -> list[Path]:
         """Where the claim to this port stands: in the folder for new ones, and wherever an earlier one does."""
+        import hashlib
+
         name = f"{hashlib.sha256(self.name.encode()).hexdigest()[:16]}.json"
         first, *others = [place / name for place in _folders()]
         return [first, *(path for path in others if path.exists())]
@@ -97,6 +95,8 @@ class PortClaim:
 
 def new(name: str, port: str, device: str) -> PortClaim:
     """This program's claim, not yet written. OSError where there is no private folder for it."""
+    import secrets
+
     number = secrets.token_hex(8)
     address = str(folder() / f"{number}.socket") if LOCAL_SOCKETS else ""
     token = "" if LOCAL_SOCKETS else secrets.token_hex(16)
@@ -140,6 +140,8 @@ def program() -> str:
 
 def _folders() -> Iterator[Path]:
     """The folder for new claims, then one where another program of this user may have put its own."""
+    import tempfile
+
     user = str(os.getuid()) if hasattr(os, "getuid") else os.environ.get("USERNAME", "")
     private = Path(tempfile.gettempdir()) / f"armtempo-{user}"
     runtime = os.environ.get("XDG_RUNTIME_DIR") or (os.environ.get("LOCALAPPDATA") if os.name == "nt" else "")

@@ -12,7 +12,6 @@ import socket
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import replace
 from hmac import compare_digest
 from threading import Lock, Thread
 
@@ -46,7 +45,7 @@ class Server:
         self._lock = Lock()
         self._checked_s = 0.0
         self._socket = _listen(claim)
-        self.claim = claim if claim.address else replace(claim, address=str(self._socket.getsockname()[1]))
+        self.claim = claim if claim.address else claim._replace(address=str(self._socket.getsockname()[1]))
         self.claim.write()
         self._thread = Thread(target=self._accept, name="armtempo share", daemon=True)
         self._thread.start()

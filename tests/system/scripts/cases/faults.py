@@ -35,6 +35,7 @@ class Trial:
     def begin(self, ticks=None, action=None):
         """Start; ``action()`` comes when the motion's time is ``ticks``."""
         world = self.world
+        world.what = str(self.what)
         yield from world.home(HOME)
         self.before = world.steps()
         if action:

@@ -209,6 +209,18 @@ def case_compare_interrupt_comes_soon_and_gets_the_timer():
     channel.callback(None)
 
 
+def case_a_match_before_there_was_a_callback_calls_none():
+    board = standalone.start()
+    seen = []
+    timer = pyb.Timer(2, prescaler=0, period=0x3FFFFFFF)
+    channel = timer.channel(4, pyb.Timer.OC_TIMING, compare=50_000)
+    timer.counter(0)
+    board.spend(60_000)
+    channel.callback(seen.append)
+    board.spend(60_000)
+    assert not seen
+
+
 def case_an_exception_in_a_callback_switches_it_off():
     board = standalone.start()
     calls = []

@@ -63,6 +63,7 @@ class World(SilentPort):
         self._boot = boot
         self.arm = armrecord.unpack(read(flash + "/armtempo/arm.ata"))[:2]
         self.error = None
+        self.what = ""  # is being tried, for the message of what fails
         self.counters = []
         self.zero = None
         super().__init__()
@@ -191,7 +192,7 @@ class World(SilentPort):
                 yield
             if self.frames:
                 break
-        assert self.frames, name + " is not answered"
+        assert self.frames, name + " is not answered; tried: " + self.what
         sequence, kind, fields, rest = self.frames.pop(0)
         assert sequence == self._sequence and fields[0] == entry[1], (name, kind, fields)
         if kind == "ok":

@@ -1,0 +1,76 @@
+"""What is said of the memory for an arm: on a board, and before there is one."""
+
+import pytest
+from armtempo import Arm
+from armtempo.errors import InputError
+from armtempo.link.board_messages import Hello
+from armtempo.robot import engine_room
+from armtempo.robot.engine_room import AS_FILES, IN_FIRMWARE, Room
+from armtempo_shared import engine_memory
+
+PAPER = Arm.paper()
+
+
+def board(room: Room) -> Hello:
+    """A board with so much memory for engines."""
+    return Hello(
+        protocol=1, joints=0, encoders=0, state="unconfigured", tick_hz=84_000_000, max_rate=240_000,
+        max_rate_sum=240_000, free_flash=0, free_heap=0, arm_crc=0, program_crc=0, boot=1,
+        engine_room=room.size, engine_joints=room.joints, arm_problem=0, arm_value=0, board_id="1",
+    )  # fmt: skip
+
+
+def six_joints() -> Arm:
+    return Arm.load("ar4")
+
+
+def test_an_arm_that_fits_is_told_with_its_bytes() -> None:
+    line = engine_room.of_arm(PAPER, board(AS_FILES))
+    needed = 4 * engine_memory.words([round(rate) for rate in engine_room.encode.step_rates(PAPER)])
+    assert line == f"memory on the board: {needed} bytes for 3 joints of {AS_FILES.size}"
+    assert "fits with the program as files or in the firmware" in engine_room.of_arm(PAPER)
+
+
+def test_an_arm_with_more_joints_is_sent_to_the_firmware() -> None:
+    arm = six_joints()
+    with pytest.raises(InputError) as refused:
+        engine_room.check(arm, board(AS_FILES))
+    assert "drives 6 joints; the board has memory for 3" in refused.value.problem
+    assert "armtempo firmware" in refused.value.hint
+    assert "too much, or put the program into the board's firmware" in engine_room.of_arm(
+        arm, board(AS_FILES)
+    )
+    assert "fits only with the program in the firmware" in engine_room.of_arm(arm)
+    engine_room.check(arm, board(IN_FIRMWARE))
+
+
+def test_a_room_that_is_too_small_is_told_in_bytes() -> None:
+    small = Room(5_000, 3)
+    with pytest.raises(InputError) as refused:
+        engine_room.check(PAPER, board(small))
+    assert "the board has 5000" in refused.value.problem
+    assert "lower its top speeds" in refused.value.hint
+
+
+def test_no_way_out_is_promised_that_is_none() -> None:
+    """On the firmware itself there is no other firmware to go to."""
+    with pytest.raises(InputError) as refused:
+        engine_room.check(six_joints(), board(Room(IN_FIRMWARE.size, 3)))
+    assert "armtempo firmware" not in refused.value.hint
+
+
+def test_a_board_tells_what_the_firmware_would_give() -> None:
+    lines = engine_room.of_board(board(AS_FILES))
+    assert len(lines) == 2
+    assert "3 x 80000 steps/s" in lines[0]
+    assert "6 x 40000 steps/s" in lines[1]
+    assert len(engine_room.of_board(board(IN_FIRMWARE))) == 1
+
+
+def test_the_words_name_the_highest_rate_that_fits() -> None:
+    room = Room(8_200, 3)
+    (rate,) = [
+        int(part.split()[2]) for part in room.words().split(": ")[1].split(", ") if part.startswith("3 x")
+    ]
+    assert room.holds([rate] * 3)
+    assert not room.holds([rate + 1000] * 3)
