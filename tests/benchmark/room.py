@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any
 from zlib import crc32
 
-from armtempo.deploy import firmware as deployed
 from armtempo.deploy import program_files
+from armtempo.deploy.firmware import frozen
 from armtempo.deploy.package import STM32F4
 from armtempo_shared import armrecord, engine_memory, wire
 
@@ -214,7 +214,7 @@ def main(micropython: Path, count: int) -> None:
     """Print the figures."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        deployed.write(folder / "program", "$(BOARD_DIR)/manifest.py")
+        frozen.write(folder / "program", "$(BOARD_DIR)/manifest.py")
         for title, manifest in (("files", None), ("in the firmware", folder / "program" / "manifest.py")):
             elf = build(micropython, folder, manifest)
             print(f"{title}: in use / largest free block, bytes")

@@ -62,7 +62,7 @@ def test_no_way_out_is_promised_that_is_none() -> None:
 def test_a_board_tells_what_the_firmware_would_give() -> None:
     lines = engine_room.of_board(board(AS_FILES))
     assert len(lines) == 2
-    assert "3 x 80000 steps/s" in lines[0]
+    assert "3 x 41000 steps/s" in lines[0]
     assert "6 x 40000 steps/s" in lines[1]
     assert len(engine_room.of_board(board(IN_FIRMWARE))) == 1
 
