@@ -90,7 +90,7 @@ def case_hold_allocates_nothing():
     micropython.heap_lock()
     try:
         app.controller.hold()
-        app.commands._hold((), 0)
+        app.commands.hold((), 0)
         app.controller.service(0)
     finally:
         micropython.heap_unlock()

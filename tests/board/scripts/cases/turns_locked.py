@@ -56,6 +56,11 @@ class Still:
     def snapshot(self, raw):
         raw[0] = self.turns
 
+    def brake(self):  # where the last hold is more than 300 ms ago
+        pass
+
+    freeze = brake
+
 
 class Port:
     """Gives one prepared frame after the other, one every 20 turns; takes everything and counts it."""
