@@ -6,7 +6,8 @@ because a heap has few large ones. For each joint the engine takes from it a rin
 generator works in.
 """
 
-_LASTS_MS = 3
+LONG_MS, SHORT_MS = 3, 2
+"""So long a full ring lasts: where there is memory for it, and where there is not (board/docs/evaluator.md)."""
 _LEAST_ENTRIES = 64
 _MOST_ENTRIES = 1024
 _SPARE_ENTRIES = 8  # of a ring, that are not overwritten: as in isr.py
@@ -21,13 +22,13 @@ LARGEST_WORDS = 6 * GENERATOR_WORDS + 5 * 513 + 257
 """For any arm whose joints' highest step rates sum up to 240 000 steps/s."""
 
 
-def ring_words(rate: int) -> int:
+def ring_words(rate: int, lasts_ms: int = LONG_MS) -> int:
     """Words of the ring of a joint of at most ``rate`` steps/s: one more than its entries, which are a power of two.
 
-    A full ring lasts 3 ms, or has 1024 entries. The interrupt that fills it comes every 0.5 ms; nothing is added in the
-    last 390 us.
+    A full ring lasts ``lasts_ms``, or has 1024 entries. The interrupt that fills it comes every 0.5 ms; nothing is
+    added in the last 390 us.
     """
-    wanted = 2 * rate * _LASTS_MS // 1000 + _SPARE_ENTRIES
+    wanted = 2 * rate * lasts_ms // 1000 + _SPARE_ENTRIES
     entries = _LEAST_ENTRIES
     while entries < min(wanted, _MOST_ENTRIES):
         entries *= 2
@@ -35,8 +36,8 @@ def ring_words(rate: int) -> int:
 
 
 def words(rates: "list[int]") -> int:
-    """Words that the engine takes for joints of these highest step rates, in steps/s."""
-    return sum([GENERATOR_WORDS + ring_words(rate) for rate in rates])
+    """Words that the engine takes at least for joints of these highest step rates, in steps/s."""
+    return sum([GENERATOR_WORDS + ring_words(rate, SHORT_MS) for rate in rates])
 
 
 def object_bytes(joints: int) -> int:
@@ -54,13 +55,23 @@ def blocks(room_words: int) -> "list[int]":
     return [min(_BLOCK_WORDS, room_words - begin) for begin in range(0, room_words, _BLOCK_WORDS)]
 
 
-def fits(rates: "list[int]", room_words: int, beside_bytes: int = 0) -> bool:
-    """Whether all parts of the engine find their place: the largest rings first, each in the first block with room.
+def lasting_ms(rates: "list[int]", room_words: int) -> int:
+    """How long the rings can last in a room of so many words: LONG_MS, SHORT_MS, or 0 where the engine does not fit."""
+    for lasts_ms in (LONG_MS, SHORT_MS):
+        if _find_place(rates, room_words, lasts_ms):
+            return lasts_ms
+    return 0
 
-    ``beside_bytes``: what else comes out of the room.
-    """
-    free = blocks(room_words - beside_bytes // 4)
-    parts = sorted([ring_words(rate) for rate in rates], reverse=True)
+
+def fits(rates: "list[int]", room_words: int, beside_bytes: int = 0) -> bool:
+    """Whether the engine fits; ``beside_bytes``: what else comes out of the room."""
+    return lasting_ms(rates, room_words - beside_bytes // 4) > 0
+
+
+def _find_place(rates: "list[int]", room_words: int, lasts_ms: int) -> bool:
+    """Whether all parts of the engine find theirs: the largest rings first, each in the first block with room."""
+    free = blocks(room_words)
+    parts = sorted([ring_words(rate, lasts_ms) for rate in rates], reverse=True)
     for _ in rates:
         parts.extend(GENERATOR_PARTS)
     for part in parts:

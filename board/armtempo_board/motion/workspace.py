@@ -26,10 +26,15 @@ class Workspace:
 
     def rings(self, rates: "list[int]") -> "list[Any]":
         """Take all memory back and out of it, the largest first, the words of a ring for each of these step rates."""
-        from armtempo_shared.engine_memory import ring_words  # here, so that it can be forgotten
+        from armtempo_shared.engine_memory import (  # here, so that it can be forgotten
+            SHORT_MS,
+            lasting_ms,
+            ring_words,
+        )
 
         self.memory.release()
-        sizes = [ring_words(rate) for rate in rates]
+        lasts_ms = lasting_ms(rates, self.memory.size) or SHORT_MS
+        sizes = [ring_words(rate, lasts_ms) for rate in rates]
         found: "dict[int, Any]" = {}
         for joint in sorted(range(len(sizes)), key=lambda joint: -sizes[joint]):
             found[joint] = self.memory.take(sizes[joint])
