@@ -8,7 +8,7 @@ import pytest
 from armtempo import new_project
 from armtempo.cli import main
 from armtempo.errors import InputError
-from armtempo.model import arm_file, job_file, shipped
+from armtempo.model import arm_file, job_file, sequence_file, shipped
 from armtempo.new_project import joint_entry
 from click.testing import CliRunner, Result
 
@@ -50,6 +50,8 @@ def test_the_first_job_of_every_arm_that_ships_is_within_its_ranges(name: str, t
     new_project.write(tmp_path / name, new_project.from_shipped(name), "sim:board")
     arm = arm_file.load(tmp_path / name / "arm.toml")
     job = job_file.load(tmp_path / name / "first.toml", arm)
+    sequence = sequence_file.load(tmp_path / name / "sequence.toml", arm)
+    assert sequence.name == "cycle"
     assert len(job.via) == 3
     for angles in job.via:
         assert isinstance(angles, tuple)

@@ -28,6 +28,27 @@ via_deg = [
 {rows}]
 """
 
+_SEQUENCE = """\
+# What the arm does again and again: the motion in first.toml, back home, half a second's rest, three times.
+name = "cycle"
+start = "home"
+
+[[step]]
+repeat = 3               # or "for ever"
+
+[[step]]
+run = "first.toml"
+
+[[step]]
+goto = "home"
+
+[[step]]
+wait_s = 0.5
+
+[[step]]
+end = "repeat"
+"""
+
 _PAGE = """\
 # {name}
 
@@ -37,6 +58,9 @@ _PAGE = """\
     armtempo home --arm arm.toml        # "the arm stands in its home posture"; nothing moves
     armtempo run first.json             # replay and record it
     armtempo report runs/first-001      # how well the arm followed
+    armtempo plan sequence.toml         # a sequence: the motion, back home, again and again
+    armtempo goto home
+    armtempo run cycle.json
 
 `armtempo.toml` names arm, job and port; the port `sim:board` is a virtual board, its flash in the folder `board`.
 """
@@ -52,6 +76,7 @@ def write(folder: Path, arm: ArmText, port: str) -> list[Path]:
     files = {"arm.toml": arm.text, "armtempo.toml": _SETTINGS.format(port=_quoted(port))}
     if arm.arm.driven_indices:
         files["first.toml"] = _JOB.format(rows=_rows(arm.arm))
+        files["sequence.toml"] = _SEQUENCE
     files["README.md"] = _PAGE.format(name=arm.arm.name)
     try:
         _put(folder, files)
