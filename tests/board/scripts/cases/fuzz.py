@@ -121,7 +121,7 @@ def board():
     chip = flash.Flash()
     store.os = chip
     store.open = motion_file.open = chip.open
-    heap.forget = lambda: None  # a store that is imported anew would be on the real flash
+    heap.forget = lambda *names: None  # a store that is imported anew would be on the real flash
     port = stand_in.Port()
     app = App(port, "/flash")
     host = stand_in.Host(app, port)
