@@ -81,6 +81,10 @@ class Status:
         """Whether the position of this joint (from 0) is known."""
         return bool(self.known >> joint & 1)
 
+    def as_fault(self) -> Fault:
+        """The event that told of the pending fault, where it did not arrive."""
+        return Fault(self.run, self.fault, self.fault_joint, self.ticks, self.path_ticks, self.positions)
+
 
 @dataclass(frozen=True)
 class Levels:

@@ -170,14 +170,7 @@ class Follower:
         self._asked_s = self._client.session.clock()
         if status.run == self._run and not status.moving:
             if status.state == "fault":
-                self._last = Fault(
-                    status.run,
-                    status.fault,
-                    status.fault_joint,
-                    status.ticks,
-                    status.path_ticks,
-                    status.positions,
-                )
+                self._last = status.as_fault()
             else:
                 self._last = Done(
                     status.run, status.ticks, status.path_ticks, 0, status.samples_lost, status.positions

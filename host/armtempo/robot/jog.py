@@ -177,14 +177,7 @@ class HeldJog:
         self._positions = status.positions
         self.moving = False
         if status.fault and self.fault is None:
-            self.fault = Fault(
-                status.run,
-                status.fault,
-                status.fault_joint,
-                status.ticks,
-                status.path_ticks,
-                status.positions,
-            )
+            self.fault = status.as_fault()
 
     def _clean_up(self) -> None:
         self._client.session.reopen = self._reopen
