@@ -20,6 +20,7 @@ LEAVES = {
     "sweep.py": "sweep.csv",
     "animate.py": "arm.gif",
     "plan_and_plot.ipynb": "reach.png",
+    "pick_and_place.py": "two-parts.toml",
 }
 ARGUMENTS = {"sweep.py": ["--jobs", "6"]}
 
