@@ -14,8 +14,16 @@ SCRIPTS = [
     for name in ("engine_pulses", "engine_faults", "engine_brake", "engine_override", "rings", "encoders")
 ]
 
+LONG = {"case_estop_anywhere", "case_long_pause", "case_underrun_anywhere"}
+"""Left to the two quick interpreters: in the emulator they take half a minute each."""
+CHOSEN = [
+    case
+    for case in scripted.cases(*SCRIPTS)
+    if case.interpreter != "micropython-arm" or case.name not in LONG
+]
 
-@pytest.mark.parametrize("case", scripted.cases(*SCRIPTS), ids=str)
+
+@pytest.mark.parametrize("case", CHOSEN, ids=str)
 def test_case(case: scripted.Case) -> None:
     case.run(*["short"] * (case.interpreter == "micropython-arm"))
 

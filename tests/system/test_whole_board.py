@@ -29,10 +29,9 @@ FEWER = {"micropython": 3, "cpython": 10, "micropython-arm": 12}
 CHOSEN = {
     ("micropython-arm", "standalone"): {
         "case_button_starts_the_default_and_a_host_fetches_its_samples",
-        "case_level_present_at_power_up",
     },
     ("micropython-arm", "prompt"): {"case_boot_leaves_a_serial_port_only"},
-    ("micropython-arm", "faults"): {"case_interrupt_dies", "case_stop", "case_underrun"},
+    ("micropython-arm", "faults"): {"case_interrupt_dies"},
     ("cpython", "prompt"): {"case_replay_typed_at_the_prompt"},
 }
 """The emulated interpreter is slow, and CPython has no prompt of its own on a board: what they are to run."""
