@@ -83,7 +83,7 @@ def test_problem(problem: problems.Problem) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("part", range(10))
 def test_random_jobs_keep_their_limits_or_say_why_not(part: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """3000 jobs (``tests.benchmark.random_plans`` takes more); floors, which a plan only quotes, have their own test."""
+    """3000 jobs (``tests.benchmark.random_plans`` takes more); floors have their own test."""
     monkeypatch.setattr(lower_bounds, "of_path", lambda *_: Floor(math.ulp(0.0), "rests"))
     planned = 0
     for seed in range(300 * part, 300 * part + 300):
