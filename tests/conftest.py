@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import compileall
 import os
 import shutil
 import signal
@@ -55,8 +56,16 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items.sort(key=lambda item: item.get_closest_marker("slow") is None)
 
 
+def _compile_sources() -> None:
+    """Once for all: virtual boards and scripts that the tests start write no byte code, and would compile each time."""
+    for name in ("board", "shared", "host/armtempo", "tests"):
+        compileall.compile_dir(interpreters.ROOT / name, quiet=2, workers=0)
+
+
 def pytest_sessionstart(session: pytest.Session) -> None:
     """In CI nothing may be left out."""
+    if not hasattr(session.config, "workerinput"):
+        _compile_sources()
     if interpreters.MISSING and os.environ.get("CI"):
         pytest.exit(f"CI needs the interpreters {', '.join(interpreters.MISSING)}", returncode=1)
 

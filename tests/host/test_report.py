@@ -295,6 +295,7 @@ def test_a_folder_that_is_no_run_is_refused(tmp_path: Path, spoil: object, said:
 
 def test_two_runs_are_compared_on_one_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     runs = [str(made_runs.make(tmp_path / f"run-{seed}", seed=seed)) for seed in (1, 2)]
+    draw_nothing(monkeypatch)
     broken = tmp_path / "broken"
     broken.mkdir()
     result = CliRunner().invoke(main, ["report", *runs])
@@ -302,7 +303,6 @@ def test_two_runs_are_compared_on_one_page(tmp_path: Path, monkeypatch: pytest.M
     page = (tmp_path / comparison.PAGE).read_text()
     assert "run-1" in page
     assert page.count("<figure") == 3
-    draw_nothing(monkeypatch)
     three = CliRunner().invoke(main, ["report", *runs, str(broken), "--out", str(tmp_path / "three.html")])
     assert three.exit_code == 0, three.output
     assert "broken is not a run folder" in three.stderr
