@@ -98,6 +98,8 @@ def test_who_lost_the_port_uses_it_no_more(server: Server) -> None:
     taker.close()
     with pytest.raises(PortError, match="has taken /dev/p over"):
         server.check()  # also after the other one has given it up again
+    with pytest.raises(PortError, match="has taken /dev/p over"):
+        server.check()  # and at once again: who opens the port anew minds no error
     taker = Server(claim.new("/dev/p", "/dev/p", "/dev/p"), {})
     try:
         time.sleep(0.05)

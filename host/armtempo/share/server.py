@@ -44,6 +44,7 @@ class Server:
         self._connections: set[_Connection] = set()
         self._lock = Lock()
         self._checked_s = 0.0
+        self._taken_by: PortClaim | None = None
         self._socket = _listen(claim)
         self.claim = claim if claim.address else claim._replace(address=str(self._socket.getsockname()[1]))
         self.claim.write()
@@ -65,13 +66,12 @@ class Server:
     def check(self) -> None:
         """Raise PortError where another program has taken the port over, because this one did not answer."""
         now_s = time.monotonic()
-        if now_s - self._checked_s < _CHECK_S:
-            return
-        self._checked_s = now_s
-        taken_by = self.claim.taken_by()
-        if taken_by is not None:
+        if self._taken_by is None and now_s - self._checked_s >= _CHECK_S:
+            self._checked_s = now_s
+            self._taken_by = self.claim.taken_by()
+        if self._taken_by is not None:  # said each time: whoever tries to open the port again minds no error
             raise PortError(
-                f"{taken_by.who} has taken {self.claim.port} over, as this program did not answer",
+                f"{self._taken_by.who} has taken {self.claim.port} over, as this program did not answer",
                 "ask 'armtempo status' what became of the motion",
             )
 
