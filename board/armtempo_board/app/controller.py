@@ -254,8 +254,14 @@ class Controller:
             known, steps = self.engine.known, [self.engine.commanded(joint) for joint in range(self.joints)]
         self._drop_engine()
         self._share_room(len(outputs), len(inputs))
+        heap.forget("room", "engine_memory")
+        gc.collect()
         heap.hold(_MOTION_CODE_BYTES)
         try:
+            self.engine = Engine(head, joints, self._workspace)
+        except MemoryError:  # rather an arm whose motions may be refused for want of a large piece than none
+            heap.release()
+            gc.collect()
             self.engine = Engine(head, joints, self._workspace)
         finally:
             heap.release()

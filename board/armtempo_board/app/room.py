@@ -16,7 +16,7 @@ _RESERVE = 28_900  # bytes of heap for the rest
 _USUAL_JOINTS = 3  # there is heap for their objects before there is memory for larger rings
 _MOST_SAMPLES = 4096  # bytes of the sample buffer at most,
 _LEAST_SAMPLES = 1024  # and at least;
-_SAMPLES_SHARE = 24  # between them, this part of the free heap
+_SAMPLES_SHARE = 48  # between them, this part of the free heap
 _STEP_WORDS = 64
 
 
