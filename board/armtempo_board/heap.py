@@ -9,9 +9,9 @@ _held: "list[bytearray]" = []
 _NOT_ALWAYS = """
     pins registers arm_setup run_start start_check motion_check rate_check override time_law interval_steps
     cubics endpoints arm_check motion_file engine_memory room armtempo_shared.motion bezier_weights store
-    store_commands command_rows armrecord table program_hash basis output_setup start_up set_up loading
+    store_commands command_rows armrecord table program_hash basis output_setup start_up set_up
 """
-"""Modules; the last three are those of the compact form that hold what is called at rest only."""
+"""Modules; the last two are those of the compact form that hold what is called at rest only."""
 
 
 def collect_often(often: bool = True) -> None:

@@ -17,7 +17,7 @@ from armtempo_shared.messages import RESUME, SAMPLE_BRAKING, START_HELD, START_H
 from micropython import const
 
 from armtempo_board import heap
-from armtempo_board.app.arm_state import MOTION_CODE_BYTES, ArmState
+from armtempo_board.app.arm_state import ArmState
 from armtempo_board.errors import Refused
 
 TYPE_CHECKING = False
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from armtempo_board.storage.motion_file import MotionFile
 
 _PERMILLE = const(1000)
-_LAST_PIECES_BYTES = const(1_300)  # one of the pieces of a motion's code
+_PIECES_BYTES = (2_112, 1_904, 1_584, 1_344, 1_200, 1_088)
 
 
 class Controller(ArmState):
@@ -139,6 +139,12 @@ class Controller(ArmState):
 
         self._assumed = run_start.assume(self, motion, unknown)
 
+    def tidy(self) -> None:
+        """Free what only the last commands needed: what comes then lies close to what stays."""
+        self.forget_store()
+        heap.forget()
+        gc.collect()
+
     def begin(self, name: str, flags: int, crc: "int | None" = None) -> None:
         """Start a stored motion or sequence, or refuse. ``crc``: of the record that the host means; None: there is no
         host.
@@ -150,16 +156,14 @@ class Controller(ArmState):
             raise Refused(codes.UNHOMED, _lowest(unknown))
         self._by_host = crc is not None
         rate, self._next_rate = self._next_rate if self._by_host else _PERMILLE, _PERMILLE
-        if self.store().is_sequence(name):
+        if self._is_sequence(name):
             self._new_sequence(name, crc, rate, flags)
             self.sequence.begin()
             return
         self.begin_motion(name, crc, rate, flags, unknown)
 
     def _new_sequence(self, name: str, crc: "int | None", rate: int, flags: int) -> None:
-        self.forget_store()
-        heap.forget()
-        gc.collect()
+        self.tidy()
         try:
             from armtempo_board.app import sequence_start  # here, so that it can be forgotten
 
@@ -167,21 +171,28 @@ class Controller(ArmState):
         except MemoryError:
             raise Refused(codes.NO_SEQUENCE_ROOM)
 
+    def _is_sequence(self, name: str) -> bool:
+        self._make_room()
+        try:
+            return bool(self.store().is_sequence(name))
+        finally:
+            heap.release()
+
+    def _make_room(self) -> None:
+        """Keep pieces for the code that a motion needs, before anything that its start needs can lie in them."""
+        self.tidy()
+        heap.hold(*_PIECES_BYTES)
+
     def begin_motion(self, name: str, crc: "int | None", rate: int, flags: int = 0, unknown: int = 0) -> None:
         """Start a stored motion at ``rate`` thousandths of its speed, or refuse.
 
         ``flags``, ``crc`` as for ``begin``; ``unknown``: joints of unknown position.
         """
         homing = bool(flags & START_HOMING)
-        self.forget_store()
-        heap.forget()
-        gc.collect()
-        heap.hold(MOTION_CODE_BYTES, _LAST_PIECES_BYTES, _LAST_PIECES_BYTES)
+        self._make_room()
         try:
             motion = self.load(name, crc)
-            self.forget_store()
-            heap.forget()
-            gc.collect()
+            self.tidy()
             if homing:
                 self._assume(motion, unknown)
             self.engine.load(motion, rate)

@@ -49,19 +49,14 @@ _TOGETHER = {
 """Modules that are imported later, with those that come and go with them: each costs memory for names and a table."""
 _AT_REST = {
     "start_up": (
+        "app.arm_state.ArmState.__init__",
         "app.commands.Commands.__init__",
-        "app.commands.Commands.home",
         "app.events.Events.__init__",
         "hardware.sampler.Sampler.__init__",
         "link.frame_reader.FrameReader.__init__",
         "link.serial_link.SerialLink.__init__",
         "motion.engine_parts.EngineParts.home",
         "motion.ring_feeder.RingFeeder.__init__",
-    ),
-    "loading": (
-        "hardware.sampler.Sampler.plan",
-        "motion.joint_drive.JointDrive.load",
-        "stepgen.step_generator.StepGenerator.load",
     ),
     "set_up": (
         "hardware.encoders.EncoderInput.__init__",
@@ -82,8 +77,9 @@ _AT_REST = {
         "stepgen.subintervals.Subintervals.__init__",
     ),
 }
-"""Methods of the board package that are called only when the program starts, before a motion is in the rings, and only
-when an arm is taken; by the module that holds them in the compact form."""
+"""Methods of the board package that are called only when the program starts, and only when it takes an arm; by the
+module that holds them in the compact form. What is called when a motion is brought into the rings is not among them:
+most is in memory then."""
 _ARCHITECTURES = {1: "x86", 2: "x64", 3: "armv6", 4: "armv6m", 5: "armv7m", 6: "armv7em", 7: "armv7emsp"}
 """By the number in ``sys.implementation._mpy`` (MicroPython's py/persistentcode.h)."""
 

@@ -9,13 +9,15 @@ from armtempo.deploy.compact.scopes import Scoped
 
 _FIRST = 120
 """A few numbers go to the names of the file and of the module."""
+_WORTH_IT = 200
+"""Names of a module; where there are fewer, the list takes more of the flash than the numbers save."""
 
 
 def often_used_first(tree: ast.Module) -> None:
     """Begin the module with a list of its most used names, which gives them their numbers and is dropped."""
     counter = _Counter()
     counter.visit(tree)
-    if len(counter.uses) > _FIRST:
+    if len(counter.uses) > _WORTH_IT:
         names: list[ast.expr] = [ast.Constant(name) for name, _ in counter.uses.most_common(_FIRST)]
         tree.body.insert(0, ast.Assign([ast.Name("_", ast.Store())], ast.List(names, ast.Load())))
         tree.body.insert(1, ast.Delete([ast.Name("_", ast.Del())]))
@@ -48,6 +50,10 @@ class _Counter(Scoped):
         if isinstance(node.value, str):
             self._count(node.value)
         return node
+
+    def visit_Expr(self, node: ast.Expr) -> ast.AST:
+        """What documents a function is not compiled."""
+        return node if isinstance(node.value, ast.Constant) else self.generic_visit(node)
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
         """Machine code has numbers of its own."""
