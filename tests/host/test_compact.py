@@ -6,14 +6,12 @@ import ast
 import re
 import sys
 import textwrap
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from armtempo.deploy import program_files
 from armtempo.deploy.compact import Compact, compact
-from armtempo.deploy.compact.order import often_used_first
 
 SOURCES = {
     "made": "",
@@ -233,35 +231,6 @@ def test_what_nothing_uses_is_left_out() -> None:
     assert "return 1" in core
     assert "77" not in core
     assert core.count("def ") == 1
-
-
-@pytest.mark.slow
-def test_the_most_used_names_come_first() -> None:
-    """What gives them their numbers is the first thing in the file, and goes again."""
-    body = ast.parse(program_files.compact_program().sources["armtempo_board.first"]).body
-    first, gone = body[:2]
-    assert isinstance(first, ast.Assign)
-    assert isinstance(first.value, ast.List)
-    assert isinstance(gone, ast.Delete)
-    names = [ast.literal_eval(each) for each in first.value.elts]
-    uses = Counter(node.attr for each in body for node in ast.walk(each) if isinstance(node, ast.Attribute))
-    often = [name for name, _ in uses.most_common(20) if name != "viper"]
-    assert set(often) <= set(names)
-    assert len(names) == 120, "numbers below 128 take a byte; a few are the file's own"
-
-
-def test_the_order_is_that_of_the_number_of_uses() -> None:
-    """Names that are used more than 40 times, down to once; the last ones have no place in the list."""
-    uses = {f"name_{number}": 1 + number // 5 for number in range(205)}
-    lines = [f"    thing.{name} = 0" for name, count in sorted(uses.items()) for _ in range(count)]
-    tree = ast.parse("def function(thing):\n" + "\n".join(lines))
-    often_used_first(tree)
-    first = tree.body[0]
-    assert isinstance(first, ast.Assign)
-    names = ast.literal_eval(first.value)
-    assert len(names) == len(set(names)) == 120
-    counts = [uses[name] for name in names]
-    assert counts == sorted(uses.values(), reverse=True)[:120]
 
 
 def test_a_name_that_is_not_there_is_told() -> None:

@@ -3,8 +3,9 @@
 MicroPython keeps every name that a file mentions, and 10 to 20 bytes for each place where a module holds one. So
 packages within packages go (``flatten``), constants are put in where they are used (``constants``), the modules that
 are always needed become one (``merge``), as do others that come and go together (``join``), the program's own names
-become short (``shorten``), those that are used most come first (``order``), and what is called only while nothing
-moves is imported for the call (``set_up``). The behaviour of the program does not change.
+become short (``shorten``), what is called only while nothing moves is imported for the call (``set_up``), and the one
+module becomes two, of which the second fills what the import of the first leaves (``halve``). The behaviour of the
+program does not change.
 """
 
 from __future__ import annotations
@@ -20,7 +21,6 @@ from armtempo.deploy.compact.frames import Function, Functions, functions, label
 from armtempo.deploy.compact.halve import halve
 from armtempo.deploy.compact.join import join
 from armtempo.deploy.compact.merge import CORE, merge, used_whole
-from armtempo.deploy.compact.order import often_used_first
 from armtempo.deploy.compact.set_up import move, set_up_methods
 from armtempo.deploy.compact.shorten import short_names, shorten
 
@@ -75,8 +75,6 @@ def compact(
             known[target, name] = [Function(of, name, frozenset(), named=True)]
     halve(merged, core, FIRST)
     known |= {(FIRST, name): functions for (module, name), functions in known.items() if module == CORE}
-    for tree in merged.values():
-        often_used_first(tree)
     texts = {module: ast.unparse(ast.fix_missing_locations(tree)) for module, tree in merged.items()}
     return Compact(texts, known)
 
