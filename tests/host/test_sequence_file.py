@@ -142,6 +142,31 @@ def test_outputs_waits_and_inputs(tmp_path: Path) -> None:
     ]
 
 
+def test_a_counter_is_one_by_its_name(tmp_path: Path) -> None:
+    written(tmp_path, 'count = "parts"', 'count = "called"', name="other")
+    plan = planned(
+        tmp_path,
+        "repeat = 2",
+        'goto = "a"',
+        'count = "trays"',
+        'call = "other.toml"',
+        'count = "parts"',
+        'end = "repeat"',
+    )
+    assert plan.counters == ("trays", "parts", "called")
+    data = record.SequenceData(encoded_sequence.of_plan(plan).data)
+    assert [data.counter(number) for number in range(data.counters)] == [b"trays", b"parts", b"called"]
+    counted = [row.words for row in plan.rows if row.op == record.COUNT]
+    assert counted == ["count trays", "count parts", "count called", "count parts"] * 2
+    plan.save(tmp_path / "seq.json")
+    assert SequencePlan.load(tmp_path / "seq.json").counters == plan.counters
+
+
+def test_more_counters_than_the_board_keeps_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="9 counters; the board keeps 8"):
+        planned(tmp_path, *(f'count = "c{number}"' for number in range(9)))
+
+
 def test_a_called_sequence_stands_in_its_place(tmp_path: Path) -> None:
     written(tmp_path, 'goto = "b"', 'goto = "a"', name="inner")
     plan = planned(tmp_path, 'goto = "a"', 'call = "inner.toml"')

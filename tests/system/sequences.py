@@ -50,6 +50,8 @@ wait_s = 0.02
 [[step]]
 goto = "home"
 [[step]]
+count = "parts"
+[[step]]
 end = "repeat"
 """
 

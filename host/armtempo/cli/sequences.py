@@ -111,6 +111,7 @@ class Shown:
 
 def run_and_tell(board: Board, sequence: SequencePlan | str, replace: bool = False) -> SequenceState:
     """Run a sequence and print where it stands and how it ended; exit code 1 where an input did not come."""
+    from armtempo.cli.state import counted
     from armtempo.errors import ArmtempoError
     from armtempo.robot.sequence_run import cycles, where
     from armtempo.robot.stop_request import Stopped
@@ -120,12 +121,12 @@ def run_and_tell(board: Board, sequence: SequencePlan | str, replace: bool = Fal
         end = board.run_sequence(sequence, shown, replace=replace)
     except Stopped:
         shown.close()
-        click.echo(f"stopped {where(board.client.sequence())}")
+        click.echo(f"stopped {where(board.client.sequence())}{counted(board.counters)}")
         raise
     shown.close()
     if end.ending == "timed_out":
         raise ArmtempoError(
             f"an input did not come in time {where(end)}", "see why, 'armtempo goto' its start, run it again"
         )
-    click.echo(f"{end.ending} after {cycles(end)}")
+    click.echo(f"{end.ending} after {cycles(end)}{counted(board.counters)}")
     return end

@@ -31,50 +31,50 @@ class SourceMotion:
     source: Job | Plan
 
 
-@dataclass(frozen=True, eq=False)
-class Goto:
-    """Move straight to a posture, or to where a motion begins."""
+@dataclass(frozen=True)
+class Placed:
+    """A step of a sequence file."""
 
     where: str
+    """File and step, for messages."""
     step: int
+    """Its number in the sequence's own file, from 1."""
+
+
+@dataclass(frozen=True, eq=False)
+class Goto(Placed):
+    """Move straight to a posture, or to where a motion begins."""
+
     target: NamedAngles | SourceMotion
 
 
 @dataclass(frozen=True, eq=False)
-class RunMotion:
+class RunMotion(Placed):
     """Run a motion from its beginning."""
 
-    where: str
-    step: int
     motion: SourceMotion
 
 
 @dataclass(frozen=True)
-class SetOutput:
+class SetOutput(Placed):
     """Set an output; ``raw`` as the board takes it, ``words`` as the user wrote it."""
 
-    where: str
-    step: int
     number: int
     raw: int
     words: str
 
 
 @dataclass(frozen=True)
-class Wait:
+class Wait(Placed):
     """Wait for a time."""
 
-    where: str
-    step: int
     wait_s: float
 
 
 @dataclass(frozen=True)
-class WaitInput:
+class WaitInput(Placed):
     """Wait until an input is active, or not; ``timeout_s`` 0: for ever."""
 
-    where: str
-    step: int
     number: int
     active: bool
     timeout_s: float
@@ -83,17 +83,21 @@ class WaitInput:
 
 
 @dataclass(frozen=True)
-class Repeat:
+class Count(Placed):
+    """Add one to a counter."""
+
+    counter: str
+
+
+@dataclass(frozen=True)
+class Repeat(Placed):
     """Steps that come ``times`` times, 0: for ever."""
 
-    where: str
-    step: int
     times: int
     steps: tuple[Step, ...]
 
 
-Step = Goto | RunMotion | SetOutput | Wait | WaitInput | Repeat
-"""``where`` names file and step for messages; ``step`` is the number in the sequence's own file, from 1."""
+Step = Goto | RunMotion | SetOutput | Wait | WaitInput | Count | Repeat
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from armtempo.model.sequence import (
     FOR_EVER,
     ON_TIMEOUT,
     STOP,
+    Count,
     Goto,
     NamedAngles,
     Repeat,
@@ -35,7 +36,7 @@ LONGEST_NAME = 20
 """Of a sequence: its motions are stored as NAME-1, NAME-2 …, within the board's 24 characters."""
 HOME = "home"
 _MOST_S = MAX_WAIT_MS / 1000
-_KINDS = ("goto", "run", "output", "wait_s", "wait_input", "repeat", "end", "call")
+_KINDS = ("goto", "run", "output", "wait_s", "wait_input", "count", "repeat", "end", "call")
 
 
 def is_sequence(path: Path | str) -> bool:
@@ -210,6 +211,10 @@ class _Reader:
         words = name if active else f"{name} not"
         return [WaitInput(place, step, number, active, timeout_s, then, words)]
 
+    def count(self, table: Table, step: int) -> list[Step]:
+        only(table, "count")
+        return [Count(_place(table), step, job_file.name_of(table, key="count"))]
+
     def call(self, table: Table, step: int) -> list[Step]:
         only(table, "call")
         path = (self.file.parent / table.text("call")).resolve()
@@ -238,6 +243,7 @@ _GETTERS: dict[str, _Getter] = {
     "output": _Reader.output,
     "wait_s": _Reader.wait,
     "wait_input": _Reader.wait_input,
+    "count": _Reader.count,
     "call": _Reader.call,
 }
 

@@ -11,7 +11,7 @@ from typing import Self
 
 import numpy as np
 from armtempo_shared.messages import RESUME
-from armtempo_shared.sequence import MAGIC as SEQUENCE
+from armtempo_shared.sequence import KIND_BYTES, MAGIC
 from numpy.typing import ArrayLike
 
 from armtempo.arrays import Array
@@ -149,7 +149,7 @@ class Board:
         InputError where the record is damaged or does not fit the arm.
         """
         data = self.client.fetch(name)
-        if data.startswith(SEQUENCE):
+        if data.startswith(MAGIC[:KIND_BYTES]):
             raise InputError(f"{name!r} is a sequence, not a motion", f"run it with: armtempo run {name}")
         return encoded_motion.of_record(name, data, arm or self._known_arm())
 
@@ -309,6 +309,14 @@ class Board:
         with self._stoppable(stop) as wanted:
             key = self._sequence(sequence, wanted, replace)
             return sequence_run.run(self.client, key, wanted, watcher)
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """What the counters of the sequence that runs stand at, or those of the last one, by name.
+
+        They begin at 0 whenever a sequence starts; the board keeps them until then, or until its power goes.
+        """
+        return self.client.counters()
 
     def _sequence(self, sequence: SequencePlan | str, stop: StopRequest, replace: bool) -> MotionKey:
         """What the board has it as; a virtual arm is brought to its start."""

@@ -1,12 +1,13 @@
 """Sequences before they run: stored whole, refused before anything moves."""
 
 import gc
+from binascii import crc32
 
 import cases
 import stand_in
 from app_rig import App, flash, state
 from armtempo_shared import sequence, wire
-from sequence_rig import ARM_CRC, END, INPUT, LEGS, MOVE, OUTPUT, REPEAT, WAIT, begin, put, ready, runs
+from sequence_rig import ARM_CRC, COUNT, END, INPUT, LEGS, MOVE, OUTPUT, REPEAT, WAIT, begin, put, ready, runs
 
 
 def case_refused_before_anything_moves():
@@ -106,11 +107,31 @@ def case_a_sequence_is_stored_whole_or_not_at_all():
         sequence.pack(ARM_CRC, [(REPEAT, 0, 0, 2, 1)] * 5 + [(END, 0, 0, 0, 1)] * 5, []),
         sequence.pack(ARM_CRC, [], []),
         sequence.pack(ARM_CRC, rows, [("", 1)]),
+        sequence.pack(ARM_CRC, rows, [], [""]),
+        sequence.pack(ARM_CRC, rows, [], ["a"] * 9),
+        sequence.pack(ARM_CRC, [(COUNT, 1, 0, 0, 1)], [], ["a"]),
+        sequence.pack(ARM_CRC, [(COUNT, 0, 0, 1, 1)], [], ["a"]),
     ):
         assert host.upload("seq", bad)[-1][:2] == ("error", "bad_record")
     assert host.ask("get", (0, 200), "seq")[2] == kept
     again = App(host.port, flash())
     assert again.controller.store().is_sequence("seq")
+
+
+def case_one_of_an_older_version_is_named():
+    app, host = ready([(WAIT, 0, 0, 1)])
+    with open(flash() + "/seq.atm", "rb") as file:
+        data = bytearray(file.read())
+    data[3] = ord("1")
+    data[-4:] = crc32(bytes(data[:-4])).to_bytes(4, "little")
+    with open(flash() + "/seq.atm", "wb") as file:
+        file.write(data)
+    assert host.ask("start", (0, 0), "seq")[:2] == ("error", "other_version")
+    assert runs(app) == 0 and not app.controller.sequence
+    found = [host.ask("list", (index,)) for index in range(5)]
+    assert [fields[1:] for _, fields, name in found if name == "seq"] == [(len(data), 0, 0, 0, 0, 1)]
+    assert host.upload("other", bytes(data))[-1][:2] == ("error", "other_version")
+    assert host.upload("seq", host.seq)[-1][0] == "ok" and begin(host)[0] == "ok"
 
 
 def case_a_power_cut_before_the_rename_loses_nothing():

@@ -4,7 +4,21 @@ import cases
 import stand_in
 from app_rig import connected, start, state
 from armtempo_shared import armrecord, codes, sequence, wire
-from sequence_rig import END, INPUT, MOVE, OUTPUT, REPEAT, WAIT, arrive, begin, leg, ready, runs, stands
+from sequence_rig import (
+    COUNT,
+    END,
+    INPUT,
+    MOVE,
+    OUTPUT,
+    REPEAT,
+    WAIT,
+    arrive,
+    begin,
+    leg,
+    ready,
+    runs,
+    stands,
+)
 
 
 def case_steps_come_one_after_the_other():
@@ -48,6 +62,81 @@ def case_repeats_within_repeats_are_counted():
     host.turn(100)
     assert stands(host)[0] == "finished" and stands(host)[4] == 3
     assert app.controller.outputs.log == [(0, 1), (1, 2), (1, 2)] * 3
+
+
+def counters_of(host):
+    """{name: value} of the counters, and that behind the last there is none."""
+    found = {}
+    count = host.ask("counter", (0,))[1][0]
+    for index in range(count):
+        _, fields, name = host.ask("counter", (index,))
+        assert fields[0] == count
+        found[name] = fields[1]
+    assert host.ask("counter", (count,)) == host.ask("counter", (255,)) == ("ok", (count, 0), "")
+    return found
+
+
+def rows_of(host):
+    """(passed, row, value) of the events of rows; they are taken off."""
+    found = [(fields[0], fields[2], fields[5]) for kind, fields, _ in host.events if kind == "row"]
+    host.events = []
+    return found
+
+
+COUNTING = [(REPEAT, 0, 0, 3), (COUNT, 1, 0, 0), (WAIT, 0, 0, 5000), (END, 0, 1, 0), (COUNT, 0, 0, 0)]
+
+
+def case_counters_count_until_it_begins_anew():
+    _, host = ready(COUNTING, counters=("trays", "parts"))
+    begin(host)
+    assert counters_of(host) == {"trays": 0, "parts": 1}
+    stand_in.Clock.now_ms += 5000
+    host.turn(5)
+    assert counters_of(host) == {"trays": 0, "parts": 2}
+    for _ in range(2):
+        stand_in.Clock.now_ms += 5000
+        host.turn(5)
+    assert stands(host)[0] == "finished"
+    assert counters_of(host) == {"trays": 1, "parts": 3}
+    host.hello(5)
+    assert counters_of(host) == {"trays": 1, "parts": 3}
+    begin(host)
+    assert counters_of(host) == {"trays": 0, "parts": 1}
+
+
+def case_without_counters_there_are_none():
+    _, host = ready([(WAIT, 0, 0, 1)])
+    assert host.ask("counter", (0,))[:2] == ("error", "unknown_command")
+    begin(host)
+    assert counters_of(host) == {}
+
+
+def case_each_row_is_told_when_it_begins():
+    _, host = ready(COUNTING, counters=("trays", "parts"))
+    host.turn()
+    host.events = []
+    begin(host)
+    for _ in range(3):
+        stand_in.Clock.now_ms += 5000
+        host.turn()
+    once = [0, 1, 2, 3]
+    rows = rows_of(host)
+    assert [row for _, row, _ in rows] == once + once[1:] * 2 + [4]
+    assert [passed for passed, _, _ in rows] == list(range(1, len(rows) + 1))
+    assert [value for _, row, value in rows if row == 1] == [1, 2, 3] and rows[-1][2] == 1
+    assert not any(value for _, row, value in rows if row in (0, 2, 3))
+
+
+def case_a_motions_row_is_told_with_its_run():
+    app, host = ready([(MOVE, "there", 0, 0), (WAIT, 0, 0, 10), (MOVE, "back", 0, 0)])
+    host.turn()
+    host.events = []
+    run = host.ask("status")[1][4]
+    begin(host)
+    arrive(app, host, 10)
+    host.turn(20)
+    told = [(fields[1], fields[2]) for kind, fields, _ in host.events if kind == "row"]
+    assert told == [(run + 1, 0), (run + 1, 1), (run + 2, 2)]
 
 
 def case_for_ever_ends_only_by_a_stop():

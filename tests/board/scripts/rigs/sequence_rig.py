@@ -10,7 +10,7 @@ del sys.modules["armtempo_board.motion.endpoints"]  # the real one
 from armtempo_board.motion import endpoints  # noqa: E402, F401
 
 MOVE, OUTPUT, WAIT, INPUT = sequence.MOVE, sequence.OUTPUT, sequence.WAIT, sequence.WAIT_INPUT
-REPEAT, END = sequence.REPEAT, sequence.END
+REPEAT, END, COUNT = sequence.REPEAT, sequence.END, sequence.COUNT
 ARM_CRC = armrecord.unpack(stand_in.arm())[2]
 ONE_STEP = 1 << 28
 ONE_TICK = 1 << 16
@@ -59,25 +59,26 @@ def leg(first, last, arm_crc=ARM_CRC):
 LEGS = {"there": leg(0, 10), "back": leg(10, 0), "on": leg(10, 20)}
 
 
-def ready(rows, legs=LEGS, outputs=2):
+def ready(rows, legs=LEGS, outputs=2, counters=()):
     """A board with these motions and the sequence "seq", homed at 0; app and host."""
     app, host = connected()
     app.controller.outputs = Outputs(outputs) if outputs else None
     app.controller.inputs = Inputs() if outputs else None
     for name in sorted(legs):
         assert host.upload(name, legs[name])[-1][0] == "ok"
-    put(host, rows, legs)
+    put(host, rows, legs, counters=counters)
     return app, host
 
 
-def put(host, rows, legs=LEGS, name="seq"):
+def put(host, rows, legs=LEGS, name="seq", counters=()):
     """Store a sequence of rows (op, number, value, amount); MOVE's number is the name of a motion."""
     names = sorted(legs)
     numbered = [
         (row[0], names.index(row[1]) if row[0] == MOVE else row[1], row[2], row[3], step)
         for step, row in enumerate(rows, 1)
     ]
-    host.seq = sequence.pack(ARM_CRC, numbered, [(leg, wire.record_crc(legs[leg])) for leg in names])
+    motions = [(leg, wire.record_crc(legs[leg])) for leg in names]
+    host.seq = sequence.pack(ARM_CRC, numbered, motions, counters)
     answer = host.upload(name, host.seq)[-1]
     assert answer[0] == "ok", answer
 
