@@ -84,8 +84,8 @@ _ROWS = (
     ),
     (
         "pin_taken",
-        "an output or input of the arm has a pin or timer that the engine takes",
-        "'armtempo check' says which pin; give another one (board/docs/hardware.md)",
+        "an output or input of the arm has a pin or timer that is taken",
+        "give another pin ('armtempo check' names the arm file's key; board/docs/hardware.md lists what is free)",
     ),
     ("is_sequence", "this is a sequence, not a motion", "run it with 'armtempo run' and its name"),
     (

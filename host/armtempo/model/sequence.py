@@ -8,19 +8,12 @@ from pathlib import Path
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
+from armtempo.model.posture import ArmPosture
 
 STOP, FAULT, NEXT = "stop", "fault", "next"
 ON_TIMEOUT = (STOP, FAULT, NEXT)
 """What happens where an input does not come in time: the sequence ends in order, or by a fault, or goes on."""
 FOR_EVER = "for ever"
-
-
-@dataclass(frozen=True)
-class NamedAngles:
-    """Angles of the driven joints (J,), and what the user calls them."""
-
-    name: str
-    angles_deg: tuple[float, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +38,7 @@ class Placed:
 class Goto(Placed):
     """Move straight to a posture, or to where a motion begins."""
 
-    target: NamedAngles | SourceMotion
+    target: ArmPosture | SourceMotion
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +98,7 @@ class Sequence:
     """What the arm is to do, step by step."""
 
     name: str
-    start: NamedAngles | None
+    start: ArmPosture | None
     """Where it begins; None: where its first step that moves says."""
     steps: tuple[Step, ...]
     source: str

@@ -12,9 +12,10 @@ from armtempo.model import sequence as kinds
 from armtempo.model.arm import Arm
 from armtempo.model.job import GRADIENT, Job
 from armtempo.model.plan import Plan
-from armtempo.model.sequence import NamedAngles, Sequence, SourceMotion, Step
+from armtempo.model.posture import ArmPosture
+from armtempo.model.sequence import Sequence, SourceMotion, Step
 from armtempo.model.sequence_plan import SequencePlan, SequenceRow, check_size
-from armtempo.planning import checks, planner
+from armtempo.planning import checks, planner, via_points
 from armtempo.progress import Progress
 from armtempo.splines.trajectory import Trajectory
 
@@ -33,8 +34,10 @@ def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> Sequ
     left to do; PlanError where a motion cannot be planned.
     """
     compiler = _Compiler(arm, progress)
-    here = sequence.start.angles_deg if sequence.start else None
-    rows, _ = compiler.rows(sequence.steps, here, sequence.start.name if sequence.start else "")
+    start = (
+        compiler.posture(sequence.start, f"{sequence.source}: start: ") if sequence.start else _End(None, "")
+    )
+    rows, _ = compiler.rows(sequence.steps, start.angles_deg, start.name)
     if not rows:
         raise InputError(f"{sequence.source}: nothing is left to do", "add a step that moves, sets or waits")
     check_size(len(rows), len(compiler.legs), len(compiler.counters), sequence.source)
@@ -45,8 +48,16 @@ def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> Sequ
 
 
 @dataclass(frozen=True)
+class _Place:
+    """Where the arm stands, and what the user calls that."""
+
+    angles_deg: Angles
+    name: str
+
+
+@dataclass(frozen=True)
 class _End:
-    """Where rows lead: the angles, None where nothing has moved yet, and what the user calls them."""
+    """The same of where rows lead; None where nothing has moved yet."""
 
     angles_deg: Angles | None
     name: str
@@ -98,7 +109,7 @@ class _Compiler:
         return [*(first if apart else ()), begin, *rows, close], last
 
     def _goto(self, step: kinds.Goto, here: _End) -> tuple[list[SequenceRow], _End]:
-        target = self._posture(step.target)
+        target = self._target(step)
         if here.angles_deg is None or here.angles_deg == target.angles_deg:
             return [], _End(target.angles_deg, target.name)
         key = (here.angles_deg, target.angles_deg)
@@ -123,11 +134,18 @@ class _Compiler:
             end, f"the end of {step.motion.name}"
         )
 
-    def _posture(self, target: NamedAngles | SourceMotion) -> NamedAngles:
-        if isinstance(target, NamedAngles):
-            return target
-        trajectory = self._planned(target, "")
-        return NamedAngles(f"the start of {target.name}", _angles(trajectory(0.0)))
+    def _target(self, step: kinds.Goto) -> _Place:
+        if isinstance(step.target, ArmPosture):
+            return self.posture(step.target, f"{step.where}goto: ")
+        trajectory = self._planned(step.target, "")
+        return _Place(_angles(trajectory(0.0)), f"the start of {step.target.name}")
+
+    def posture(self, posture: ArmPosture, where: str) -> _Place:
+        """Where the arm stands then; PlanError where it cannot."""
+        try:
+            return _Place(_angles(via_points.posture_deg(self.arm, posture)), posture.name)
+        except ArmtempoError as error:
+            raise type(error)(f"{where}{error.problem}", error.hint) from error
 
     def _planned(self, motion: SourceMotion, where: str) -> Trajectory:
         if id(motion) not in self._plans:
