@@ -73,6 +73,7 @@ class Sequencer:
         self._first = array("i", [0] * sequence.MAX_NESTING)  # of each repeat that has begun: its first row
         self._left = array("i", [0] * sequence.MAX_NESTING)  # passes left, 0: for ever
         self._depth = 0
+        self._judged = bytearray(record.motions)  # 1: the motion was checked in this run
         self.told = array("i", [sequence.RUNNING] + [0] * VALUE)
         self.stopping = False
         self._command = SequenceCommand(
@@ -132,8 +133,7 @@ class Sequencer:
         self._since_ms = time.ticks_ms()
         op, number, value, _, _ = self._row
         if op == sequence.MOVE:
-            name, crc = self._record.motion(number)
-            self._controller.begin_motion(name, crc, self._rate)
+            self._move(number)
         elif op == sequence.OUTPUT:
             self._controller.outputs.set(number, value)
         elif op == sequence.REPEAT:
@@ -148,6 +148,19 @@ class Sequencer:
             self.told[VALUE] = self._command.count(number)
         self.told[RUN] = self._controller.run_number
         self.told[PASSED] = (self.told[PASSED] + 1) & _MOST
+
+    def _move(self, number: int) -> None:
+        """Begin a motion. Its splines are checked once in a run of the sequence: neither its record, whose checksum is
+        compared each time, nor the arm can change meanwhile.
+        """
+        name, crc = self._record.motion(number)
+        engine = self._controller.engine
+        engine.judged = bool(self._judged[number])
+        try:
+            self._controller.begin_motion(name, crc, self._rate)
+        finally:
+            engine.judged = False
+        self._judged[number] = 1
 
     def _count(self, passes: int) -> None:
         self.told[CYCLE] = (self.told[CYCLE] + passes) & _MOST

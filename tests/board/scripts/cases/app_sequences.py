@@ -2,7 +2,7 @@
 
 import cases
 import stand_in
-from app_rig import connected, start, state
+from app_rig import connected, flash, start, state
 from armtempo_shared import armrecord, codes, sequence, wire
 from sequence_rig import (
     COUNT,
@@ -137,6 +137,35 @@ def case_a_motions_row_is_told_with_its_run():
     host.turn(20)
     told = [(fields[1], fields[2]) for kind, fields, _ in host.events if kind == "row"]
     assert told == [(run + 1, 0), (run + 1, 1), (run + 2, 2)]
+
+
+def case_a_motion_is_checked_once_in_a_run():
+    """Again in the next run; one whose start was refused counts as unchecked."""
+    app, host = ready([(REPEAT, 0, 0, 2), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 1, 0)])
+    engine = app.controller.engine
+    for _ in range(2):
+        engine.calls.clear()
+        begin(host)
+        for at in (10, 0, 10, 0):
+            arrive(app, host, at)
+            assert not engine.judged
+        assert [call for call in engine.calls if call.startswith("load")] == ["load"] * 2 + [
+            "load judged"
+        ] * 2
+    start(host)
+    assert engine.calls[-2:] == ["load", "start"]
+
+
+def case_a_record_that_is_another_now_is_refused_though_it_was_checked():
+    app, host = ready([(REPEAT, 0, 0, 2), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 1, 0)])
+    begin(host)
+    arrive(app, host, 10)
+    with open(flash() + "/there.atm", "r+b") as file:
+        file.seek(100)
+        file.write(b"\x55")
+    arrive(app, host, 0)
+    assert stands(host)[:2] == ("refused", codes.BAD_RECORD), stands(host)
+    assert runs(app) == 2 and not app.controller.engine.judged
 
 
 def case_for_ever_ends_only_by_a_stop():
