@@ -56,12 +56,14 @@ end = "repeat"
 """
 
 
-def small(folder: Path, times: int | str, on_timeout: str = "stop", name: str = "small") -> SequencePlan:
+def small(
+    folder: Path, times: int | str, on_timeout: str = "stop", name: str = "small", arm: Arm = ARM
+) -> SequencePlan:
     """A pick and place over fractions of a degree."""
     path = folder / f"{name}.toml"
     value = f'"{times}"' if isinstance(times, str) else times
     path.write_text(SMALL.format(name=name, times=value, on_timeout=on_timeout))
-    return armtempo.plan_sequence(ARM, Sequence.load(path, ARM))
+    return armtempo.plan_sequence(arm, Sequence.load(path, arm))
 
 
 def part_lies_there() -> InjectedFault:
