@@ -233,9 +233,12 @@ EVENTS: "dict[str, str]" = {
     "row": "A row of the sequence has begun, the `passed`-th since its start: `row`, `step` and `cycle` as in "
     "`sequence`, `run`: the number of the last run that it started, that of this row where it is a motion; `value` of "
     "the counter where the row counts, else 0. Where the link has no room until the next row it is not sent.",
-    "notice": "Words, such as the traceback behind an `internal` fault.",
+    "notice": "Words, such as the traceback behind an `internal` fault; they begin with `button:` where the board's "
+    "button was pressed and could start nothing, as while an arm is guided by hand.",
     "ok": "The command was carried out; behind its number the answer's fields.",
     "error": "The command was refused, nothing was changed (behind `failed` and `no_memory` look at `status`). "
     "`code` from the table below, `joint` 255 where it is about none, `value` as the code says.",
 }
 """What each event and reply says."""
+BUTTON_NOTICE = "button:"
+"""How a notice begins that tells of a press of the board's button."""

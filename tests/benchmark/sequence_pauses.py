@@ -3,7 +3,7 @@
     python -m tests.benchmark.sequence_pauses MICROPYTHON [FOLDER]
 
 As firmware_run: MicroPython's own firmware, with the program built in and with the program in compiled files, on QEMU,
-which counts instructions, at 1.3 cycles each. The pick and place of the tests runs three cycles; in the first the
+which counts instructions, at 1.3 cycles each. The paper's arm moves between three postures, three times; in the first cycle the
 board checks each motion whole, in the others only that it is still the same. Printed is how long the loop's turn lasts
 in which one motion gives way to the next: code is imported, the motion checked, the rings are filled. What the clock of
 the virtual board tells (tests/benchmark/sequences.py) comes on top. FOLDER keeps what was built.
@@ -16,19 +16,37 @@ import sys
 import tempfile
 from pathlib import Path
 
+import armtempo
+from armtempo.model.arm import Arm
+from armtempo.model.sequence import Sequence
 from armtempo.robot.connect import connect
 
 from tests.benchmark import firmware, firmware_run
-from tests.system import sequences
 
 CYCLES = 3
 LEGS = 3
+SEQUENCE = """
+name = "there-and-back"
+start = "home"
+[[step]]
+repeat = %d
+[[step]]
+goto = [10, -65, 45]
+[[step]]
+goto = [-5, -50, 30]
+[[step]]
+goto = "home"
+[[step]]
+end = "repeat"
+"""
 
 
-def pauses_ms(elf: Path, image: Path, plan_in: Path) -> list[int]:
+def pauses_ms(elf: Path, image: Path, folder: Path) -> list[int]:
     """How long each took, ms, in their order."""
-    arm = firmware_run.unwatched(sequences.ARM)
-    plan = sequences.small(plan_in, CYCLES, "next", arm=arm)
+    arm = firmware_run.unwatched(Arm.paper())
+    file = folder / "sequence.toml"
+    file.write_text(SEQUENCE % CYCLES)
+    plan = armtempo.plan_sequence(arm, Sequence.load(file, arm))
     with firmware_run.running(elf, image) as (port, said):
         with connect(port) as board:
             board.home(arm)
