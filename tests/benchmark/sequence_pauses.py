@@ -5,8 +5,8 @@
 As firmware_run: MicroPython's own firmware, with the program built in and with the program in compiled files, on QEMU,
 which counts instructions, at 1.3 cycles each. The paper's arm moves between three postures, three times; in the first
 cycle the board checks each motion whole, later only that it is still the same. Printed is how long the loop's turn
-lasts in which one motion gives way to the next: code is imported, the motion checked, the rings are filled. What the clock of
-the virtual board tells (tests/benchmark/sequences.py) comes on top. FOLDER keeps what was built.
+lasts in which one motion gives way to the next: code is imported, the motion checked, the rings are filled. What the
+clock of the virtual board tells (tests/benchmark/sequences.py) comes on top. FOLDER keeps what was built.
 """
 
 from __future__ import annotations

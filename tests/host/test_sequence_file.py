@@ -330,6 +330,12 @@ def test_every_damage_of_a_record_is_seen(tmp_path: Path) -> None:
                 record.SequenceData(damaged)
 
 
+def test_the_shipped_arm_is_the_papers_with_a_gripper() -> None:
+    """Its file stands by itself, for whoever copies it; what both say must not differ."""
+    paper = Arm.paper()
+    assert (ARM.joints, ARM.driver, ARM.safety) == (paper.joints, paper.driver, paper.safety)
+
+
 def test_the_shipped_sequence_plans() -> None:
     sequence = Sequence.load(FOLDER / "sequence.toml", ARM)
     plan = armtempo.plan_sequence(ARM, sequence)
