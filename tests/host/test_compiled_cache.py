@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from armtempo.deploy import compiled_cache, program_files
 
+pytestmark = pytest.mark.xdist_group("compact program")  # which takes seconds to make
+
 FILES = {"armtempo_board/core.mpy": bytes(range(256)), "armtempo_board/__init__.mpy": b""}
 
 
