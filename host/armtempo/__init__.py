@@ -37,6 +37,7 @@ __all__ = [
     "RunFolderError",
     "Sequence",
     "SequencePlan",
+    "SequenceRun",
     "SharedBoard",
     "Spline",
     "StopRequest",
@@ -86,6 +87,7 @@ if TYPE_CHECKING:
     from armtempo.robot.run import Run
     from armtempo.robot.shared_board import SharedBoard, attach
     from armtempo.robot.stop_request import Stopped, StopRequest
+    from armtempo.runs.sequence_reader import SequenceRun
     from armtempo.splines.spline import Spline
     from armtempo.splines.trajectory import Trajectory
 
@@ -114,6 +116,7 @@ _HOMES = {
     "armtempo.robot.run": ("Run",),
     "armtempo.robot.shared_board": ("SharedBoard", "attach"),
     "armtempo.robot.stop_request": ("StopRequest", "Stopped"),
+    "armtempo.runs.sequence_reader": ("SequenceRun",),
     "armtempo.splines.spline": ("Spline",),
     "armtempo.splines.trajectory": ("Trajectory",),
 }

@@ -12,7 +12,18 @@ SCRIPTS = Path(__file__).parent / "scripts"
 BASICS = SCRIPTS / "probes" / "app_basics.py"
 SUBJECTS = [
     SCRIPTS / "cases" / f"app_{name}.py"
-    for name in ("commands", "storing", "runs", "held", "faults", "outputs", "prompt", "start", "sequences")
+    for name in (
+        "commands",
+        "storing",
+        "runs",
+        "held",
+        "faults",
+        "outputs",
+        "prompt",
+        "start",
+        "sequence_start",
+        "sequences",
+    )
 ]
 
 

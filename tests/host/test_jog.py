@@ -166,6 +166,16 @@ def test_an_arm_of_three_joints_moves_its_tool_and_lets_it_turn() -> None:
         jog.plan("x", PAPER, here, JogMove(10.0, axis="z", about=True))
 
 
+def test_a_fast_jog_stays_on_its_line_where_its_ramps_take_all_of_it() -> None:
+    here = on_steps(PAPER, [42.186, -67.396, 17.178])
+    motion = jog.plan("x", PAPER, here, JogMove(-INF, axis="x"), 1.0)
+    check_limits(motion, PAPER, 1.0)
+    start = forward(PAPER, here)[:3, 3]
+    tool = forward(PAPER, motion.trajectory(np.linspace(0.0, motion.trajectory.duration_s, 800)))[:, :3, 3]
+    assert np.linalg.norm((tool - start)[:, 1:], axis=1).max() < 1.1 * jog.STRAY_MM
+    assert start[0] - tool[-1, 0] > 700.0
+
+
 def test_a_line_ends_before_a_singular_posture() -> None:
     motion = jog.plan("x", AR4, on_steps(AR4, ELBOW_DEG), JogMove(INF, axis="x"))
     assert "singular" in motion.ends

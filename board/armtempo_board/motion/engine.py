@@ -109,6 +109,7 @@ class Engine:
         self.rate = self._running_rate = _PERMILLE  # wanted, in thousandths; the last that was not 0
         self._in_service = False  # service() or refill() is at work, or has not come to its end
         self.moving = False
+        self.judged = False  # the next motion is one that was checked before, and nothing has changed since
         self.finished = False
         self.fault = 0
         self.fault_joint = NO_JOINT
@@ -175,7 +176,8 @@ class Engine:
         self._watch_idle()
         if self.fault:
             raise Refused(codes.FAULT_PENDING, self.fault_joint, self.fault)
-        self._check_splines(motion)
+        if not self.judged:
+            self._check_splines(motion)
         heap.forget()
         from armtempo_board.motion import endpoints  # here, so that it can be forgotten
 

@@ -21,7 +21,7 @@ from armtempo.cli import messages, options
 )
 @options.force("any other file too")
 def command(runs: tuple[Path, ...], out: Path | None, force: bool) -> None:
-    """Write report.html and its figures into the run folder RUNS.
+    """Write report.html and its figures into the run folder RUNS, of a motion or a sequence.
 
     With two or more run folders, each gets its page, and one more page compares them. One that cannot be read
     is named there.
@@ -30,6 +30,7 @@ def command(runs: tuple[Path, ...], out: Path | None, force: bool) -> None:
     from armtempo.errors import InputError, RunFolderError
     from armtempo.formats.atomic_file import check_replaceable
     from armtempo.robot.run import Run
+    from armtempo.runs.sequence_reader import SequenceRun, is_sequence_run
 
     if len(runs) == 1:
         if out is not None:
@@ -37,7 +38,8 @@ def command(runs: tuple[Path, ...], out: Path | None, force: bool) -> None:
                 "--out goes with two or more runs",
                 "leave it out: the page of one run is report.html in its folder",
             )
-        click.echo(f"wrote {pipeline.report(Run.load(runs[0]))}")
+        sequence = is_sequence_run(runs[0])
+        click.echo(f"wrote {pipeline.report(SequenceRun.load(runs[0]) if sequence else Run.load(runs[0]))}")
         return
     if out is not None:
         check_replaceable(out, "", force or _is_comparison(out), "a page that compares runs is replaced")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -90,17 +91,20 @@ def _made_of(share: Any) -> str:
 class Shown:
     """A watcher that keeps one line on a terminal, or says each new cycle elsewhere."""
 
-    def __init__(self, planned: SequencePlan | None) -> None:
+    def __init__(self, planned: SequencePlan | None, aside: bool = False) -> None:
         self._rows = planned.rows if planned else ()
+        self._aside = aside  # not where results go
         self._cycle = -1
+        self.last: SequenceState | None = None
 
     def __call__(self, state: SequenceState) -> None:
         """Show where the sequence stands."""
+        self.last = state
         doing = f": {self._rows[state.row].words}" if state.row < len(self._rows) else ""
         if sys.stderr.isatty():
             click.echo(f"\r\x1b[Kcycle {state.cycle}, step {state.step}{doing}", nl=False, err=True)
         elif state.cycle != self._cycle:
-            click.echo(f"cycle {state.cycle}, step {state.step}{doing}")
+            click.echo(f"cycle {state.cycle}, step {state.step}{doing}", err=self._aside)
         self._cycle = state.cycle
 
     def close(self) -> None:
@@ -109,23 +113,52 @@ class Shown:
             click.echo(err=True)
 
 
-def run_and_tell(board: Board, sequence: SequencePlan | str, replace: bool = False) -> SequenceState:
-    """Run a sequence and print where it stands and how it ended; exit code 1 where an input did not come."""
-    from armtempo.errors import ArmtempoError
+def run_and_tell(
+    board: Board, sequence: SequencePlan | str, replace: bool, out: Path | None, as_json: bool = False
+) -> SequenceState:
+    """Run a sequence into a run folder below ``out`` (None: nowhere), print where it stands and how it ended.
+
+    ``as_json``: the end as JSON. Exit code 1 where an input did not come.
+    """
+    from armtempo.cli.state import counted
+    from armtempo.errors import ArmtempoError, LinkError
     from armtempo.robot.sequence_run import cycles, where
     from armtempo.robot.stop_request import Stopped
 
-    shown = Shown(sequence if not isinstance(sequence, str) else None)
+    shown = Shown(sequence if not isinstance(sequence, str) else None, aside=as_json)
     try:
-        end = board.run_sequence(sequence, shown, replace=replace)
+        end = board.run_sequence(sequence, shown, replace=replace, out=out)
     except Stopped:
         shown.close()
-        click.echo(f"stopped {where(board.client.sequence())}")
+        click.echo(f"stopped {where(board.client.sequence())}{counted(board.counters)}", err=as_json)
         raise
+    except LinkError:
+        shown.close()
+        if shown.last is not None:
+            click.echo(f"last heard of {where(shown.last)}", err=as_json)
+        raise
+    finally:
+        if (recorded := board.last_sequence) is not None and out is not None:
+            click.echo(f"recorded in {recorded.path}", err=as_json)
     shown.close()
     if end.ending == "timed_out":
         raise ArmtempoError(
             f"an input did not come in time {where(end)}", "see why, 'armtempo goto' its start, run it again"
         )
-    click.echo(f"{end.ending} after {cycles(end)}")
+    if as_json:
+        click.echo(json.dumps(_as_json(end, board, recorded.path if recorded else None)))
+    else:
+        click.echo(f"{end.ending} after {cycles(end)}{counted(board.counters)}")
     return end
+
+
+def _as_json(end: SequenceState, board: Board, folder: Path | None) -> dict[str, Any]:
+    """How it ended, for other programs."""
+    return {
+        "name": end.name,
+        "folder": str(folder) if folder else "",
+        "ending": end.ending,
+        "step": end.step,
+        "cycle": end.cycle,
+        "counters": board.counters,
+    }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,7 +26,7 @@ RAMP = 0.5
 STRAY_MM = 0.2
 """How far the tool may leave its line."""
 LINE_PARTS = (8, 16, 32, 64)
-"""Into so many parts a line is cut, until the tool stays on it."""
+"""Into so many parts a line is cut, until the tool stays on it; then its ramps too, which takes longer."""
 _SHORTER = 0.98
 _TRIES = 6
 _INSIDE_STEPS = 1e-6
@@ -186,8 +187,8 @@ def _on_line(name: str, followed: FollowedLine, length: float, speed: float) -> 
     """The motion along the line; None where a joint would leave its range, or the tool the line."""
     arm = followed.line.arm
     limits = _line_limits(followed, length, speed)
-    for parts in LINE_PARTS:
-        law = jog_law.law(length, limits, length / parts)
+    for short_ramps, parts in itertools.product((False, True), LINE_PARTS):
+        law = jog_law.law(length, limits, length / parts, short_ramps)
         angles = followed.at(np.clip(law.at_knots, 0.0, length))
         trajectory = _trajectory(name, list(bspline.fit(angles, DEGREE).T), law.time_s)
         if not _within(trajectory, arm):

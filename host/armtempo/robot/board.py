@@ -11,7 +11,7 @@ from typing import Self
 
 import numpy as np
 from armtempo_shared.messages import RESUME
-from armtempo_shared.sequence import MAGIC as SEQUENCE
+from armtempo_shared.sequence import KIND_BYTES, MAGIC
 
 from armtempo.arrays import Array
 from armtempo.errors import InputError, LinkError
@@ -25,7 +25,17 @@ from armtempo.ports.names import is_sim
 from armtempo.progress import Progress
 from armtempo.records import encoded_motion, encoded_sequence
 from armtempo.records.encoded_motion import EncodedMotion, MotionKey
-from armtempo.robot import arm_state, board_state, goto, homing, jog, recording, sequence_run, stored_motion
+from armtempo.robot import (
+    arm_state,
+    board_state,
+    goto,
+    homing,
+    jog,
+    recording,
+    sequence_recording,
+    sequence_run,
+    stored_motion,
+)
 from armtempo.robot.board_state import BoardState
 from armtempo.robot.by_hand import HandGuided
 from armtempo.robot.jog import HeldJog
@@ -36,6 +46,7 @@ from armtempo.robot.sequence_run import SequenceWatcher
 from armtempo.robot.speed import change_speed, permille
 from armtempo.robot.stop_request import StopRequest, stoppable
 from armtempo.robot.where import Where, posture_deg
+from armtempo.runs.sequence_reader import SequenceRun
 
 
 class Board:
@@ -57,6 +68,7 @@ class Board:
         self._stack = stack or ExitStack()
         self._moved = False
         self._last_folder: Path | None = None
+        self._last_sequence: Path | None = None
 
     def close(self) -> None:
         """Free the port; a virtual board ends."""
@@ -144,7 +156,7 @@ class Board:
         InputError where the record is damaged or does not fit the arm.
         """
         data = self.client.fetch(name)
-        if data.startswith(SEQUENCE):
+        if data.startswith(MAGIC[:KIND_BYTES]):
             raise InputError(f"{name!r} is a sequence, not a motion", f"run it with: armtempo run {name}")
         return encoded_motion.of_record(name, data, arm or self._known_arm())
 
@@ -294,17 +306,35 @@ class Board:
         watcher: SequenceWatcher = lambda _: None,
         stop: StopRequest | None = None,
         replace: bool = False,
+        out: Path | str | None = None,
     ) -> SequenceState:
         """Run a planned sequence, or the stored one of that name, to its end, and say how it ended and where.
 
-        Each of its motions is a run of its own on the board; none is recorded. The arm must be homed and be where the
-        sequence begins, else LinkError or BoardError; the arm of a virtual board is brought there. ``watcher`` gets
-        how it stands. What an input that does not come does is the sequence's affair: an end as ``timed_out``, or
-        BoardError. With Stopped, its end is what ``client.sequence()`` says.
+        Its rows and samples are recorded in a new run folder below ``out``; None: nowhere. The arm must be homed and
+        be where the sequence begins, else LinkError or BoardError; the arm of a virtual board is brought there.
+        ``watcher`` gets how it stands. What an input that does not come does is the sequence's affair: an end as
+        ``timed_out``, or BoardError. With Stopped, its end is what ``client.sequence()`` says.
         """
         with self._stoppable(stop) as wanted:
             key = self._sequence(sequence, wanted, replace)
-            return sequence_run.run(self.client, key, wanted, watcher)
+            if out is None:
+                return sequence_run.run(self.client, key, wanted, watcher)
+            content = (
+                sequence_recording.fetched(self.client, sequence, self._known_arm())
+                if isinstance(sequence, str)
+                else sequence_recording.of_plan(sequence)
+            )
+            with sequence_recording.recorder(self.client, content, Path(out), self.port) as recorder:
+                self._last_sequence = recorder.path
+                return sequence_run.run(self.client, key, wanted, watcher, recorder)
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """What the counters of the sequence that runs stand at, or those of the last one, by name.
+
+        They begin at 0 whenever a sequence starts; the board keeps them until then, or until its power goes.
+        """
+        return self.client.counters()
 
     def _sequence(self, sequence: SequencePlan | str, stop: StopRequest, replace: bool) -> MotionKey:
         """What the board has it as; a virtual arm is brought to its start."""
@@ -332,6 +362,11 @@ class Board:
     def last_run(self) -> Run | None:
         """The last run that this object recorded, however it ended; None before the first."""
         return Run.load(self._last_folder) if self._last_folder else None
+
+    @property
+    def last_sequence(self) -> SequenceRun | None:
+        """The last sequence that this object recorded, however it ended; None before the first."""
+        return SequenceRun.load(self._last_sequence) if self._last_sequence else None
 
     def fetch(self, motion: Plan | EncodedMotion | str | None = None, out: Path | str = "runs") -> Run:
         """The samples that the board keeps of its last run, in a new run folder below ``out``.

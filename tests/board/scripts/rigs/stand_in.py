@@ -123,9 +123,10 @@ class Engine:
         self.duration_ticks = 84000
         self.ticks = 0
         self.rate = 1000
+        self.judged = False
 
     def load(self, motion, rate=1000):
-        self.calls.append("load")
+        self.calls.append("load judged" if self.judged else "load")
         self.rate = rate
         if self.refusal:
             from armtempo_board.errors import Refused
