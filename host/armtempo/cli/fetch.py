@@ -10,7 +10,7 @@ from armtempo.cli import chosen, options
 
 
 @click.command()
-@click.argument("what", required=False)
+@click.argument("what", required=False, shell_complete=options.files)
 @options.out
 @options.arm_of_file
 @options.altered

@@ -11,7 +11,7 @@ from armtempo.cli.progress import ProgressBar
 
 
 @click.command(context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
-@click.argument("where")
+@click.argument("where", shell_complete=options.files)
 @options.job
 @options.arm_of_board
 @options.replace_arm

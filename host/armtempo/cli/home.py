@@ -11,7 +11,7 @@ from armtempo.errors import InputError
 
 
 @click.command(context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
-@click.argument("where", default=posture.HOME)
+@click.argument("where", default=posture.HOME, shell_complete=options.files)
 @click.option("--switches", is_flag=True, help="Move to the limit switches instead of taking WHERE on trust.")
 @options.job
 @options.arm_of_board

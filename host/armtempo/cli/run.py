@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("what")
+@click.argument("what", shell_complete=options.files)
 @click.option("--repeat", type=click.IntRange(1, 99), default=1, show_default=True, help="Repetitions.")
 @click.option("--live", is_flag=True, help="Open a window that follows the run (matplotlib and a display).")
 @options.speed
