@@ -18,6 +18,7 @@ from armtempo.cli.progress import ProgressBar
 @options.altered
 @options.port
 @options.log_traffic
+@options.as_json
 def command(
     where: str,
     job_path: Path | None,
@@ -26,6 +27,7 @@ def command(
     altered: bool,
     port: str | None,
     log_traffic: Path | None,
+    as_json: bool,
 ) -> None:
     """Move straight to a posture.
 
@@ -44,6 +46,6 @@ def command(
             with ProgressBar("moving") as progress:
                 board.goto(target_deg, progress)
         except Stopped:
-            posture.say_where_it_is(board)
+            posture.say_where_it_is(board, as_json)
             raise
-        posture.say_where_it_is(board)
+        posture.say_where_it_is(board, as_json)

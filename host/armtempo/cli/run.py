@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from armtempo.cli import chosen, options, sequences
+from armtempo.cli import chosen, options, results, sequences
 from armtempo.errors import InputError
 
 if TYPE_CHECKING:
@@ -56,37 +55,35 @@ def command(
     from armtempo.model.sequence_plan import is_sequence_plan
 
     if chosen.is_file(what) and is_sequence_plan(Path(what)):
-        only_for_motions(repeat, live, out, as_json)
+        only_for_motions(repeat, live, out)
         sequence = chosen.load_sequence_plan(Path(what), arm_path)
         with chosen.board(port, log_traffic, sequence.arm) as board:
             board.configure(sequence.arm, replace=replace_arm)
-            click.echo(f"arm: {chosen.words(sequence.arm)}")
+            results.teller(as_json)(f"arm: {chosen.words(sequence.arm)}")
             board.speed(percent / 100)
-            sequences.run_and_tell(board, sequence, force)
+            sequences.run_and_tell(board, sequence, force, as_json)
         return
     plan = chosen.load_plan(Path(what), arm_path, altered) if chosen.is_file(what) else None
     named = plan.arm if plan else chosen.named_arm(arm_path)
     with chosen.board(port, log_traffic, named) as board:
         arm = chosen.arm_of_board(board, named)
         board.configure(arm, replace=replace_arm)
-        say = chosen.tell if as_json else click.echo
-        say(f"arm: {chosen.words(arm)}")
+        results.teller(as_json)(f"arm: {chosen.words(arm)}")
         motion = board.upload(plan, replace=force) if plan else what
         board.speed(percent / 100)
         if isinstance(motion, str) and _is_sequence(board, motion):
-            only_for_motions(repeat, live, out, as_json)
-            sequences.run_and_tell(board, motion)
+            only_for_motions(repeat, live, out)
+            sequences.run_and_tell(board, motion, as_json=as_json)
             return
         run_and_tell(board, motion, repeat, chosen.runs(out), live, as_json)
 
 
-def only_for_motions(repeat: int, live: bool, out: Path | None, as_json: bool) -> None:
-    """InputError for what a sequence has not: repetitions of its own, a plot, a run folder and what is in it."""
+def only_for_motions(repeat: int, live: bool, out: Path | None) -> None:
+    """InputError for what a sequence has not: repetitions of its own, a plot, a run folder."""
     given_options = (
         ("--repeat", repeat != 1),
         ("--live", live),
         ("--out", out is not None),
-        ("--json", as_json),
     )
     for name, given in given_options:
         if given:
@@ -118,9 +115,5 @@ def run_and_tell(
     virtual = chosen.virtual_words(board.port) if board.info.virtual else ""
     with Live(window=live, where=virtual, aside=as_json) as watcher:
         run = board.run(motion, repeat, out, watcher=watcher)
-    if as_json:
-        click.echo(json.dumps(run.to_json()))
-        return run
-    for line in text_summary.result_lines(run.results):
-        click.echo(line)
+    results.show(as_json, run.to_json(), text_summary.result_lines(run.results))
     return run
