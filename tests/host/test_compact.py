@@ -15,6 +15,8 @@ from armtempo.deploy import program_files
 from armtempo.deploy.compact import Compact, compact
 from armtempo.deploy.compact.order import often_used_first
 
+pytestmark = pytest.mark.xdist_group("compact program")  # which takes seconds to make
+
 SOURCES = {
     "made": "",
     "made.main": """

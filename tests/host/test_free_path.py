@@ -39,7 +39,7 @@ def test_the_shipped_motion_is_5_percent_faster_and_keeps_everything() -> None:
     assert plan.searches[0].floor_kind == "vias"
 
 
-@pytest.mark.parametrize("seed", [1, 3, 5, 12, 79, 83, 92, 109])
+@pytest.mark.parametrize("seed", [1, 5, 79, 83, 92, 109])
 def test_random_jobs_keep_their_limits_and_pass_their_via_points(seed: int) -> None:
     """More of them: tests/benchmark/random_plans.py. The last four have repeated via points, a dwell at angles
     that hardly differ, and one far shorter than the rest: there rounding exceeded limits, the dwell came out too short,

@@ -72,6 +72,24 @@ class JogMotion:
         return self.trajectory(self.trajectory.duration_s)
 
 
+def move_of(
+    arm: Arm, joint: int | str | None, axis: str | None, by_deg: float | None, by_mm: float | None
+) -> JogMove:
+    """What is to move: a joint by degrees, or the tool along an axis by mm or about it by degrees.
+
+    Raises InputError where the arguments do not go together, or the arm has no such joint.
+    """
+    ways = [by for by in (by_deg, by_mm) if by is not None]
+    if (joint is None) == (axis is None) or len(ways) != 1 or (joint is not None and by_deg is None):
+        raise InputError(
+            "a jog moves a joint by degrees, or the tool along an axis by mm or about it by degrees",
+            "give joint and by_deg, axis and by_mm, or axis and by_deg",
+        )
+    if joint is not None:
+        return JogMove(ways[0], joint=number_of_joint(arm, joint))
+    return JogMove(ways[0], axis=axis or "", about=by_deg is not None)
+
+
 def plan(name: str, arm: Arm, here_deg: Sequence[float], move: JogMove, speed: float = SPEED) -> JogMotion:
     """The jog from rest at ``here_deg`` (J,), at ``speed`` of the arm's speed limits.
 

@@ -12,7 +12,6 @@ from typing import Self
 import numpy as np
 from armtempo_shared.messages import RESUME
 from armtempo_shared.sequence import MAGIC as SEQUENCE
-from numpy.typing import ArrayLike
 
 from armtempo.arrays import Array
 from armtempo.errors import InputError, LinkError
@@ -21,8 +20,7 @@ from armtempo.link.board_messages import Hello, SequenceState, Status, StoredMot
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequencePlan
-from armtempo.planning import point_to_point, via_points
-from armtempo.planning.jog import SPEED, JogMove, number_of_joint
+from armtempo.planning.jog import SPEED, move_of
 from armtempo.ports.names import is_sim
 from armtempo.progress import Progress
 from armtempo.records import encoded_motion, encoded_sequence
@@ -37,10 +35,7 @@ from armtempo.robot.run import Run
 from armtempo.robot.sequence_run import SequenceWatcher
 from armtempo.robot.speed import change_speed, permille
 from armtempo.robot.stop_request import StopRequest, stoppable
-
-Where = Plan | EncodedMotion | SequencePlan | str | ArrayLike
-"""A posture: by its name in the arm file, the driven joints' angles in degrees, (J,), or a motion
-or sequence for its start."""
+from armtempo.robot.where import Where, posture_deg
 
 
 class Board:
@@ -173,7 +168,7 @@ class Board:
         Raises InputError for a posture that does not fit the arm, LinkError where the board is set up for another.
         """
         self.configure(arm)
-        arm_state.home(self.client, arm, None if where is None else self._posture(where))
+        arm_state.home(self.client, arm, None if where is None else posture_deg(where, arm))
 
     def home_to_switches(self, arm: Arm, stop: StopRequest | None = None) -> None:
         """Home the joints that have a limit switch of known angle: they move to it, off it, slowly to it again.
@@ -206,7 +201,8 @@ class Board:
 
         Raises LinkError where the position is unknown, InputError for a posture that does not fit the arm.
         """
-        arm, target_deg = self._known_arm(), self._posture(where)
+        arm = self._known_arm()
+        target_deg = posture_deg(where, arm)
         with self._stoppable(stop) as wanted:
             self._home_virtual_arm(arm)
             goto.go_to(self.client, arm, target_deg, wanted, progress)
@@ -229,7 +225,7 @@ class Board:
         can move that way.
         """
         arm = self._known_arm()
-        move = _jog_move(arm, joint, axis, by_deg, by_mm)
+        move = move_of(arm, joint, axis, by_deg, by_mm)
         with self._stoppable(stop) as wanted:
             self._home_virtual_arm(arm)
             jog.step(self.client, arm, move, speed, wanted)
@@ -251,7 +247,7 @@ class Board:
         arm = self._known_arm()
         by = math.copysign(math.inf, direction)
         along = None if turn or joint is not None else by
-        move = _jog_move(arm, joint, axis, None if along else by, along)
+        move = move_of(arm, joint, axis, None if along else by, along)
         self._home_virtual_arm(arm)
         return HeldJog(self.client, arm, jog.plan(self.client, arm, move, speed))
 
@@ -397,19 +393,6 @@ class Board:
         self.configure(arm)
         return arm
 
-    def _posture(self, where: Where) -> Array:
-        if isinstance(where, Plan):
-            return where.trajectory(0.0)
-        if isinstance(where, EncodedMotion):
-            return where.start_deg
-        if isinstance(where, SequencePlan):
-            return point_to_point.posture(
-                where.arm.home_deg if where.start_deg is None else where.start_deg, where.arm
-            )
-        if isinstance(where, str):
-            return via_points.posture_deg(self._known_arm(), self._known_arm().posture(where))
-        return point_to_point.posture(where, self._known_arm())
-
     def _encoded(self, motion: Plan | EncodedMotion | str) -> EncodedMotion:
         """The motion for a board that is set up for its arm."""
         if isinstance(motion, str):
@@ -444,18 +427,3 @@ class Board:
         if is_sim(self.port) and not self._moved:
             arm_state.home_unknown(self.client, arm)
         self._moved = True
-
-
-def _jog_move(
-    arm: Arm, joint: int | str | None, axis: str | None, by_deg: float | None, by_mm: float | None
-) -> JogMove:
-    """What a jog's arguments say; InputError where they do not go together."""
-    ways = [by for by in (by_deg, by_mm) if by is not None]
-    if (joint is None) == (axis is None) or len(ways) != 1 or (joint is not None and by_deg is None):
-        raise InputError(
-            "a jog moves a joint by degrees, or the tool along an axis by mm or about it by degrees",
-            "give joint and by_deg, axis and by_mm, or axis and by_deg",
-        )
-    if joint is not None:
-        return JogMove(ways[0], joint=number_of_joint(arm, joint))
-    return JogMove(ways[0], axis=axis or "", about=by_deg is not None)
