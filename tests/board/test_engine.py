@@ -37,6 +37,7 @@ def test_case(case: scripted.Case) -> None:
     case.run(*["short"] * (case.interpreter == "micropython-arm"))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif("micropython" not in interpreters.AVAILABLE, reason="needs MicroPython")
 def test_more_changes_of_speed() -> None:
     """Where it is quickest, on more motions; the other interpreters have a few of them above."""

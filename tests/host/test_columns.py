@@ -49,6 +49,7 @@ def test_what_is_longer_widens_its_column() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_a_plan_of_joints_with_long_names(made: Plan) -> None:
     table = text_summary.lines(made)[1:6]
     assert len({len(line) for line in table}) == 1

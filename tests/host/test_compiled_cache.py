@@ -84,6 +84,7 @@ def test_every_file_is_part_of_the_key(tmp_path: Path) -> None:
     assert len(keys) == 5
 
 
+@pytest.mark.slow
 def test_the_program_that_is_kept_is_the_one_that_is_made(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -132,6 +132,7 @@ def random_motion(seed: int, most: int = 25) -> tuple[Arm, Job]:
     return problems.make_arm(limits.tolist()), job
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_no_plan_is_below_its_floor(seed: int) -> None:
     """1000 jobs of up to 500 via points: tests/benchmark/floors.py."""
@@ -141,6 +142,7 @@ def test_no_plan_is_below_its_floor(seed: int) -> None:
     assert 0.0 < search.floor_s <= plan.total_s, f"seed {seed}"
 
 
+@pytest.mark.slow
 def test_many_via_points_and_jerk_that_hardly_matters() -> None:
     """Where a floor without an error bound was 8 % above the plan."""
     rng = np.random.default_rng(1)
@@ -164,6 +166,7 @@ def test_floor_of_a_free_path_counts_turns_stops_and_dwells() -> None:
     assert loose.time_s == pytest.approx(rest_to_rest.floor_s(np.array([0.0, 10.0]), limits[0]), rel=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["feeding", "feeding-shared"])
 def test_floor_of_a_free_path_is_below_its_plan(name: str) -> None:
     problem = next(each for each in problems.load() if each.name == name)

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import click
 import pytest
 from armtempo.cli import COMMANDS, GROUPS, main
 from click.testing import CliRunner
@@ -37,8 +38,28 @@ def test_a_completion_script_for(shell: str) -> None:
     assert "_ARMTEMPO_COMPLETE" in done.output
 
 
-def test_what_the_script_asks_is_answered() -> None:
-    words = {"COMP_WORDS": "armtempo st", "COMP_CWORD": "1", "_ARMTEMPO_COMPLETE": "bash_complete"}
+def completed(line: str) -> set[str]:
+    """What the script is answered: kind and word."""
+    words = {
+        "COMP_WORDS": line,
+        "COMP_CWORD": str(len(line.split(" ")) - 1),
+        "_ARMTEMPO_COMPLETE": "bash_complete",
+    }
     command = [sys.executable, "-m", "armtempo"]
-    done = subprocess.run(command, env={**os.environ, **words}, capture_output=True, text=True)
-    assert {line.partition(",")[2] for line in done.stdout.split()} == {"stop", "status"}
+    done = subprocess.run(command, env={**os.environ, **words}, capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+def test_what_the_script_asks_is_answered() -> None:
+    assert completed("armtempo st") == {"plain,stop", "plain,status"}
+    assert completed("armtempo plan --timing p") == {"plain,per-joint"}
+    assert completed("armtempo check --arm mo") == {"plain,moveo"}
+    assert completed("armtempo check --arm my") == {"file,my"}
+
+
+@pytest.mark.parametrize("name", ["run", "fetch", "goto", "home"])
+def test_files_complete_where_an_argument_may_be_one(name: str) -> None:
+    command = main.get_command(click.Context(main), name)
+    assert command is not None
+    offered = command.params[0].shell_complete(click.Context(command), "fir")
+    assert [(item.type, item.value) for item in offered] == [("file", "fir")]

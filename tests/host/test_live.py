@@ -57,6 +57,7 @@ def test_without_a_display_the_run_goes_on(capsys: pytest.CaptureFixture[str]) -
     assert "no live plot: there is no display" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_window_follows_the_samples(monkeypatch: pytest.MonkeyPatch) -> None:
     import matplotlib.pyplot as plt
 

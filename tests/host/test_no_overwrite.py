@@ -40,6 +40,7 @@ WRITES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("force", [(), ("--force",)], ids=["", "force"])
 @pytest.mark.parametrize("arguments", WRITES.values(), ids=list(WRITES))
 def test_inputs_are_never_written(arguments: tuple[str, ...], force: tuple[str, ...]) -> None:

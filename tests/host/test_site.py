@@ -30,6 +30,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out / "html"
 
 
+@pytest.mark.slow
 def test_every_page_is_built_and_reached_from_the_first(site: Path) -> None:
     first = (site / "host" / "docs" / "index.html").read_text(encoding="utf-8")
     links = set(re.findall(r'class="reference internal" href="([^"#]+)"', first))

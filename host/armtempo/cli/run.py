@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from armtempo.cli import chosen, options, sequences
+from armtempo.cli import chosen, options, results, sequences
 from armtempo.errors import InputError
 
 if TYPE_CHECKING:
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("what")
+@click.argument("what", shell_complete=options.files)
 @click.option("--repeat", type=click.IntRange(1, 99), default=1, show_default=True, help="Repetitions.")
 @click.option("--live", is_flag=True, help="Open a window that follows the run (matplotlib and a display).")
 @options.speed
@@ -60,7 +59,7 @@ def command(
         sequence = chosen.load_sequence_plan(Path(what), arm_path)
         with chosen.board(port, log_traffic, sequence.arm) as board:
             board.configure(sequence.arm, replace=replace_arm)
-            click.echo(f"arm: {chosen.words(sequence.arm)}", err=as_json)
+            results.teller(as_json)(f"arm: {chosen.words(sequence.arm)}")
             board.speed(percent / 100)
             sequences.run_and_tell(board, sequence, force, chosen.runs(out), as_json)
         return
@@ -69,8 +68,7 @@ def command(
     with chosen.board(port, log_traffic, named) as board:
         arm = chosen.arm_of_board(board, named)
         board.configure(arm, replace=replace_arm)
-        say = chosen.tell if as_json else click.echo
-        say(f"arm: {chosen.words(arm)}")
+        results.teller(as_json)(f"arm: {chosen.words(arm)}")
         motion = board.upload(plan, replace=force) if plan else what
         board.speed(percent / 100)
         if isinstance(motion, str) and _is_sequence(board, motion):
@@ -112,9 +110,5 @@ def run_and_tell(
     virtual = chosen.virtual_words(board.port) if board.info.virtual else ""
     with Live(window=live, where=virtual, aside=as_json) as watcher:
         run = board.run(motion, repeat, out, watcher=watcher)
-    if as_json:
-        click.echo(json.dumps(run.to_json()))
-        return run
-    for line in text_summary.result_lines(run.results):
-        click.echo(line)
+    results.show(as_json, run.to_json(), text_summary.result_lines(run.results))
     return run

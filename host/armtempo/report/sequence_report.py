@@ -37,6 +37,12 @@ def write(folder: Path) -> Path:
     return path
 
 
+def verdict_of(folder: Path) -> Verdict:
+    """The verdict on a recorded sequence in its folder; RunFolderError where it is none."""
+    found = SequenceRun.load(folder)
+    return verdict(found, results(found))
+
+
 def verdict(found: SequenceRun, legs: tuple[LegResult, ...]) -> Verdict:
     """What can be told: how it ended, whether everything came, whether the arm was where it was to be."""
     items = [_ending(found), *_losses(found, legs), *_followed(found, legs)]

@@ -21,6 +21,7 @@ INTERPRETER_VARIABLE = "ARMTEMPO_MICROPYTHON"
 _CHOOSE_INTERPRETER = (
     f"set {INTERPRETER_VARIABLE} to a MicroPython that runs here, or unset it to use this Python"
 )
+_MOUNT_PTYS = "in a container or chroot, mount them: mount -t devpts devpts /dev/pts"
 _MAIN = Path(__file__).with_name("main.py")
 _HEAP = "4M"
 _DEPLOYED_BLOCKS = 256
@@ -38,7 +39,7 @@ class VirtualBoard:
         self.flash_dir = flash
         self.log_path = folder.path / "board.log"
         self._folder = folder
-        master, self._slave = pty.openpty()
+        master, self._slave = _pseudo_terminal()
         try:
             tty.setraw(self._slave)
             os.set_blocking(master, False)
@@ -116,6 +117,16 @@ class VirtualBoard:
     ) -> None:
         self.stop()
         self._folder.remove()
+
+
+def _pseudo_terminal() -> tuple[int, int]:
+    """Both ends; LinkError where the system has none to give, as in a container without /dev/pts."""
+    try:
+        return pty.openpty()
+    except OSError as error:
+        raise LinkError(
+            f"the virtual board gets no pseudo terminal for its serial port: {error}", _MOUNT_PTYS
+        ) from None
 
 
 def launch(options: LaunchOptions | None = None) -> VirtualBoard:

@@ -28,6 +28,7 @@ def frozen_by(manifest: str) -> tuple[list[str], list[tuple[str, int]]]:
     return included, packages
 
 
+@pytest.mark.slow
 def test_the_manifest_takes_every_module_of_the_program(tmp_path: Path) -> None:
     folder = tmp_path / "program"
     frozen.write(folder)
@@ -44,6 +45,7 @@ def test_the_manifest_takes_every_module_of_the_program(tmp_path: Path) -> None:
             assert (folder / name).read_bytes() == source.read_bytes(), "the sources as they are"
 
 
+@pytest.mark.slow
 def test_the_frozen_program_tells_the_hash_of_the_sources() -> None:
     told: dict[str, Any] = {}
     exec(frozen.files()[frozen.HASH], told)
