@@ -99,5 +99,5 @@ def replace(settings):
     blocks = Blocks()
     vfs.VfsFat.mkfs(blocks)
     vfs.mount(vfs.VfsFat(blocks), "/ram")
-    loop.replace(settings, Port)
+    loop.replace(dict(settings, again=True), Port)
     loop.here["uart"] = pyb.UART(_UART, 115200, timeout=0, rxbuf=1024)
