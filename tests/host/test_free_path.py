@@ -56,6 +56,14 @@ def test_random_jobs_keep_their_limits_and_pass_their_via_points(seed: int) -> N
         assert search.floor_s <= search.total_s, f"seed {seed}"
 
 
+@pytest.mark.parametrize("pieces", [3, 4])
+def test_one_dwell_after_the_other_on_few_pieces(pieces: int) -> None:
+    """No control point is held by two dwells, which lie five pieces apart at least."""
+    plan = planner.plan(ARM, replace(FEED, refine=pieces, stops=(Stop(1, 0.5), Stop(2, 0.5))))
+    assert faults(plan) == []
+    assert plan.trajectory.joints[0].via_segments[1:3] == (pieces, pieces + 10)
+
+
 @pytest.mark.slow
 def test_ranges_hold_between_the_via_points() -> None:
     """The spline through these swings out of its range; a free path need not, and turns at the end of it."""

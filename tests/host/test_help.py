@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
 
 import click
 import pytest
-from armtempo.cli import COMMANDS, GROUPS, main
+from armtempo.cli import COMMANDS, GROUPS, examples, main
 from click.testing import CliRunner
 
 
@@ -29,6 +30,26 @@ def test_the_help_page_shows_the_groups_and_their_commands() -> None:
             assert re.search(rf"^  {name} ", section, re.MULTILINE), name
     for line in re.findall(r"^    armtempo (\S+)", page, re.MULTILINE):
         assert line == "COMMAND" or line in COMMANDS
+
+
+def test_every_command_has_examples() -> None:
+    assert set(examples.EXAMPLES) == set(COMMANDS)
+
+
+@pytest.mark.parametrize("line", [line for lines in examples.EXAMPLES.values() for line in lines])
+def test_an_example_is_a_command_that_can_be_given(
+    line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    name, *arguments = shlex.split(re.sub(r" >>? .*", "", line))
+    for argument in arguments:  # what must be there is made
+        if argument.startswith("runs/"):
+            (tmp_path / argument).mkdir(parents=True)
+    command = main.get_command(click.Context(main), name)
+    assert command is not None
+    command.make_context(name, arguments)
+    page = CliRunner().invoke(main, [name, "--help"]).output
+    assert f"  armtempo {line}\n" in page
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

@@ -78,7 +78,7 @@ def _ending(found: SequenceRun) -> VerdictItem:
     if found.state == "stopped":
         return VerdictItem(OPEN, f"stopped {where}")
     code = f" ({ended['code']})" if ended.get("code") else ""
-    return VerdictItem(BAD, f"{found.state}{code} {where}")
+    return VerdictItem(BAD, f"{found.state.replace('_', ' ')}{code} {where}")
 
 
 def _last(found: SequenceRun) -> str:

@@ -130,16 +130,13 @@ class RunFolder:
         meta = {
             "format": FORMAT,
             "version": VERSION,
-            "armtempo": __version__,
-            "name": self.name,
-            "started": self.started,
-            "written": now(),
+            **written_head(self.name, self.started),
             "joints": [vars(joint) for joint in self.joints],
             "columns": columns(self.joints),
             **self.origin,
             "repetitions": [vars(repetition) for repetition in self.repetitions],
         }
-        replace_text(self.path / META, json.dumps(meta, indent=2, ensure_ascii=False) + "\n")
+        write_meta(self.path, meta)
 
     def write_motion(self, data: bytes) -> None:
         """Keep the record that the board replays; RunFolderError where it cannot be written."""
@@ -226,6 +223,16 @@ def writing(path: Path) -> Iterator[None]:
             f"{path}: cannot be written: {error.strerror}; what came before is kept",
             "make room, then run again",
         ) from None
+
+
+def written_head(name: str, started: str) -> dict[str, Any]:
+    """What run.json says of any run, behind its format: by which version, of what, when."""
+    return {"armtempo": __version__, "name": name, "started": started, "written": now()}
+
+
+def write_meta(folder: Path, meta: dict[str, Any]) -> None:
+    """Write run.json into a run folder, whole or not at all."""
+    replace_text(folder / META, json.dumps(meta, indent=2, ensure_ascii=False) + "\n")
 
 
 def now() -> str:

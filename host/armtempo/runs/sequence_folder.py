@@ -15,7 +15,6 @@ As in ``run_folder`` lines are flushed one by one: after a power failure they sa
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -23,11 +22,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from armtempo import __version__
-from armtempo.formats.atomic_file import replace_text
 from armtempo.link.board_messages import RowBegun, Sample, SequenceState
 from armtempo.runs import run_folder
-from armtempo.runs.run_folder import BROKEN, INTERRUPTED, META, RUNNING, JointScale
+from armtempo.runs.run_folder import BROKEN, INTERRUPTED, RUNNING, JointScale
 
 FORMAT = "armtempo sequence run"
 VERSION = 1
@@ -114,10 +111,7 @@ class SequenceFolder:
         meta = {
             "format": FORMAT,
             "version": VERSION,
-            "armtempo": __version__,
-            "name": self.name,
-            "started": self.started,
-            "written": run_folder.now(),
+            **run_folder.written_head(self.name, self.started),
             "state": self.state,
             "ended": self.ended,
             "joints": [vars(joint) for joint in self.joints],
@@ -129,7 +123,7 @@ class SequenceFolder:
             "columns": sample_columns(self.joints),
             **self.origin,
         }
-        replace_text(self.path / META, json.dumps(meta, indent=2, ensure_ascii=False) + "\n")
+        run_folder.write_meta(self.path, meta)
 
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import os
-import pty
 import shutil
 import subprocess
 import sys
 import time
-import tty
 from pathlib import Path
 from types import TracebackType
 
@@ -41,7 +39,7 @@ class VirtualBoard:
         self._folder = folder
         master, self._slave = _pseudo_terminal()
         try:
-            tty.setraw(self._slave)
+            _set_raw(self._slave)
             os.set_blocking(master, False)
             self.port = os.ttyname(self._slave)
             with self.log_path.open("wb") as log:
@@ -121,6 +119,8 @@ class VirtualBoard:
 
 def _pseudo_terminal() -> tuple[int, int]:
     """Both ends; LinkError where the system has none to give, as in a container without /dev/pts."""
+    import pty
+
     try:
         return pty.openpty()
     except OSError as error:
@@ -129,12 +129,23 @@ def _pseudo_terminal() -> tuple[int, int]:
         ) from None
 
 
+def _set_raw(terminal: int) -> None:
+    import tty  # of POSIX
+
+    tty.setraw(terminal)
+
+
 def launch(options: LaunchOptions | None = None) -> VirtualBoard:
     """Start a virtual board; use it as a context manager.
 
     Raises InputError where the flash's folder cannot be made, LinkError where the board does not start.
     """
     wanted = options or LaunchOptions()
+    if os.name != "posix":
+        raise LinkError(
+            "a virtual board needs pseudo terminals, which this operating system has not",
+            "run it on Linux or macOS, or in WSL; plans and boards of metal do without",
+        )
     folder = TemporaryFolder()
     flash = Path(wanted.flash_dir).resolve() if wanted.flash_dir else folder.path / "flash"
     try:
