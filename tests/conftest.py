@@ -27,6 +27,7 @@ def own_settings() -> Iterator[None]:
         del os.environ[name]
     folder = tempfile.mkdtemp(prefix="run-")  # short: the path of a socket has 100 bytes
     os.environ["XDG_RUNTIME_DIR"] = folder
+    os.environ["XDG_CACHE_HOME"] = str(interpreters.ROOT / ".cache")
     yield
     shutil.rmtree(folder, ignore_errors=True)
 

@@ -24,6 +24,21 @@ def collect_often(often: bool = True) -> None:
         gc.threshold((gc.mem_free() + gc.mem_alloc()) // 64 if often else -1)
 
 
+def overwrite_stack(calls: int, first: int = 0, second: int = 0, third: int = 0) -> None:
+    """Overwrite what ended calls have left on the stack: the collector takes it for references.
+
+    Frames of two sizes, as each has words that it does not write.
+    """
+    if calls:
+        overwrite_stack(calls - 1, first, second, third)
+        _overwrite(calls)
+
+
+def _overwrite(calls: int) -> None:
+    if calls:
+        _overwrite(calls - 1)
+
+
 def hold(*sizes: int) -> None:
     """Keep pieces of the heap free of what stays, for the code that a motion needs; as large as there are, at most."""
     release()

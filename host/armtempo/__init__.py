@@ -17,8 +17,7 @@ imported when they are first used, so that ``import armtempo`` by itself loads n
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+TYPE_CHECKING = False  # as "typing" has it, which takes longer to import than the rest of a stop
 
 __all__ = [
     "Arm",
@@ -37,6 +36,7 @@ __all__ = [
     "RunFolderError",
     "Sequence",
     "SequencePlan",
+    "SequenceRun",
     "SharedBoard",
     "Spline",
     "StopRequest",
@@ -59,6 +59,8 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
+    from typing import Any
+
     __version__: str
 
     from armtempo import deploy, optimise, simulator
@@ -86,6 +88,7 @@ if TYPE_CHECKING:
     from armtempo.robot.run import Run
     from armtempo.robot.shared_board import SharedBoard, attach
     from armtempo.robot.stop_request import Stopped, StopRequest
+    from armtempo.runs.sequence_reader import SequenceRun
     from armtempo.splines.spline import Spline
     from armtempo.splines.trajectory import Trajectory
 
@@ -114,6 +117,7 @@ _HOMES = {
     "armtempo.robot.run": ("Run",),
     "armtempo.robot.shared_board": ("SharedBoard", "attach"),
     "armtempo.robot.stop_request": ("StopRequest", "Stopped"),
+    "armtempo.runs.sequence_reader": ("SequenceRun",),
     "armtempo.splines.spline": ("Spline",),
     "armtempo.splines.trajectory": ("Trajectory",),
 }
@@ -124,6 +128,8 @@ _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 def __getattr__(name: str) -> Any:
     """A public name, imported when it is first used (PEP 562)."""
+    from importlib import import_module
+
     if name in _MODULES:
         return import_module(f"{__name__}.{name}")
     if name == "__version__":

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
 
 from armtempo.errors import INTERRUPTED
 
 
-def _end(number: int, frame: object) -> None:
+def _end(*signalled: object) -> None:
     """At once: nothing is open yet, and what is being imported may swallow an exception."""
     os.write(2, b"armtempo: interrupted\n")
     os._exit(INTERRUPTED)
@@ -17,12 +16,17 @@ def _end(number: int, frame: object) -> None:
 
 def main() -> None:
     """The command; ``armtempo.cli`` takes Ctrl-C over when a subcommand begins."""
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # it may be ignored, in the background
-        signal.signal(signal.SIGINT, _end)
     if sys.argv[1:2] == ["stop"]:
         from armtempo.project import quick_stop
 
-        quick_stop.send(sys.argv[2:])
+        try:
+            quick_stop.send(sys.argv[2:])
+        except KeyboardInterrupt:
+            _end()
+    import signal  # a stop did not wait for it
+
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # it may be ignored, in the background
+        signal.signal(signal.SIGINT, _end)
     from armtempo.cli import main as command
 
     command(prog_name="armtempo")

@@ -30,10 +30,11 @@ from armtempo.planning import split as cut
 from armtempo.planning.corridor_curve import CorridorTime
 from armtempo.progress import Progress, part
 from armtempo.records import encode
-from armtempo.report import comparison, text_summary
+from armtempo.report import comparison, sequence_report, text_summary
 from armtempo.robot.connect import connect
 from armtempo.robot.recording import Watcher
 from armtempo.robot.run import Run
+from armtempo.runs.sequence_reader import SequenceRun
 
 __all__ = [
     "compare",
@@ -119,9 +120,10 @@ def run(
         return board.run(plan, repeat, out, progress, watcher)
 
 
-def report(run: Run) -> Path:
-    """Write report.html and its figures into the run folder; gives the page. Errors as in ``Run.report``."""
-    return run.report()
+def report(run: Run | SequenceRun) -> Path:
+    """Write report.html, of a motion with its figures, into the run folder; gives the page. Errors as in
+    ``Run.report``."""
+    return sequence_report.write(run.path) if isinstance(run, SequenceRun) else run.report()
 
 
 def compare(folders: abc.Sequence[Path], page: Path | None = None) -> Path:

@@ -84,8 +84,8 @@ _ROWS = (
     ),
     (
         "pin_taken",
-        "an output or input of the arm has a pin or timer that the engine takes",
-        "'armtempo check' says which pin; give another one (board/docs/hardware.md)",
+        "an output or input of the arm has a pin or timer that is taken",
+        "give another pin ('armtempo check' names the arm file's key; board/docs/hardware.md lists what is free)",
     ),
     ("is_sequence", "this is a sequence, not a motion", "run it with 'armtempo run' and its name"),
     (
@@ -107,6 +107,11 @@ _ROWS = (
         "no_sequence_room",
         "the board has no room to run a sequence of motions for this arm; nothing has moved",
         "put the program into the firmware (board/docs/firmware.md), or let the host run the steps (board.run)",
+    ),
+    (
+        "other_version",
+        "the sequence on the board is of another version of armtempo",
+        "plan it again and store it with 'armtempo upload --force'",
     ),
     ("estop", "the E-stop input tripped", "release it, then 'armtempo clear' and home"),
     ("limit_switch", "a limit switch tripped", "'armtempo clear', then move the arm away from it"),
@@ -189,6 +194,8 @@ COMMANDS: "dict[str, str]" = {
     "started. `ending`: 1 it runs, 2 finished, 3 stopped, 4 an input did not come and the sequence was to stop then, "
     "5 a fault, 6 a leg was refused; `code`: of that fault or refusal. `step`: of the sequence file; `row`: of the "
     "record; `cycle`: finished passes of its outermost repeats. Tail: its name.",
+    "counter": "Counter `index` (from 0) of the `count` that the sequence has, or that the last one had: its `value`, "
+    "0 behind the last. They begin at 0 with each start. Unknown as `sequence` is. Tail: its name.",
     "remove": "Removes the trajectory of that name.",
     "rename": "The tail is the old name (`old_length` bytes), then the new one. The default goes with it.",
     "get": "Up to `length` bytes of a stored record (`/arm`: the arm record) from `offset` on.",
@@ -223,9 +230,15 @@ EVENTS: "dict[str, str]" = {
     "`lost`: samples that gave way before they were acknowledged. Tail as in `sample`.",
     "fault": "Something went wrong; no step comes any more. `code` from the table below, `joint` 255 where "
     "it is about none. Tail as in `sample`.",
-    "notice": "Words, such as the traceback behind an `internal` fault.",
+    "row": "A row of the sequence has begun, the `passed`-th since its start: `row`, `step` and `cycle` as in "
+    "`sequence`, `run`: the number of the last run that it started, that of this row where it is a motion; `value` of "
+    "the counter where the row counts, else 0. Where the link has no room until the next row it is not sent.",
+    "notice": "Words, such as the traceback behind an `internal` fault; they begin with `button:` where the board's "
+    "button was pressed and could start nothing, as while an arm is guided by hand.",
     "ok": "The command was carried out; behind its number the answer's fields.",
     "error": "The command was refused, nothing was changed (behind `failed` and `no_memory` look at `status`). "
     "`code` from the table below, `joint` 255 where it is about none, `value` as the code says.",
 }
 """What each event and reply says."""
+BUTTON_NOTICE = "button:"
+"""How a notice begins that tells of a press of the board's button."""

@@ -5,13 +5,14 @@ Little endian. It names its motions by name and checksum, and carries no motion 
 ::
 
     offset  type   field
-    0       4s     magic  b"ATS1"
+    0       4s     magic  b"ATS2"
     4       I      crc32 of the arm record it was made for
     8       H      rows R
     10      B      motions M
-    11      B      0
+    11      B      counters C
     12      10 R   the rows: B op, B number, H value, I amount, H step
     ...     28 M   the motions: 24s name (padded with 0), I crc32 of the motion's record
+    ...     24 C   the counters: 24s name (padded with 0)
     end     I      crc32 over all before it
 
 A repeat whose first pass begins elsewhere than the others has the rows of that pass before it. ``step`` is the step
@@ -26,7 +27,10 @@ op                 number              value                            amount
 4     WAIT_INPUT   of the input        level | what a time-out does     ms until the time-out, 0: for ever
 5     REPEAT       0                   1: a pass stands before it      how many times, 0: for ever
 6     END          0                   1: its passes count as cycles    0
+7     COUNT        of the counter      0                                0
 ====  ===========  ==================  ===============================  ================================
+
+ATS1 had no counters.
 """
 
 import struct
@@ -34,8 +38,10 @@ from binascii import crc32
 
 from armtempo_shared.limits import MAX_NAME
 
-MAGIC = b"ATS1"
-MOVE, OUTPUT, WAIT, WAIT_INPUT, REPEAT, END = 1, 2, 3, 4, 5, 6
+MAGIC = b"ATS2"
+KIND_BYTES = 3
+"""Of the magic that are the same in all versions."""
+MOVE, OUTPUT, WAIT, WAIT_INPUT, REPEAT, END, COUNT = 1, 2, 3, 4, 5, 6, 7
 ACTIVE = 1
 """Bit of the value of WAIT_INPUT: the level waited for. The others say what a time-out does:"""
 STOP_THEN, FAULT_THEN, NEXT_THEN = 0, 2, 4
@@ -44,13 +50,14 @@ ENDINGS = ("none", "running", "finished", "stopped", "timed_out", "fault", "refu
 """How a sequence stands or ended, by its number on the wire; none: there was none since the start."""
 NONE, RUNNING, FINISHED, STOPPED, TIMED_OUT, FAULTED, REFUSED = 0, 1, 2, 3, 4, 5, 6
 
-MAX_ROWS, MAX_MOTIONS, MAX_NESTING = 500, 64, 4
+MAX_ROWS, MAX_MOTIONS, MAX_NESTING, MAX_COUNTERS = 500, 64, 4, 8
 MAX_WAIT_MS = 3_600_000
 MAX_REPEATS = 1_000_000
 
 _HEAD = "<4sIHBB"
 _ROW = "<BBHIH"
 _MOTION = "<%dsI" % MAX_NAME
+_COUNTER_BYTES = MAX_NAME
 _HEAD_BYTES, _ROW_BYTES, _MOTION_BYTES = (
     struct.calcsize(_HEAD),
     struct.calcsize(_ROW),
@@ -63,32 +70,49 @@ class SequenceError(ValueError):
     """The record is damaged or of an unknown kind."""
 
 
-def pack(arm_crc: int, rows: "list[tuple[int, ...]]", motions: "list[tuple[str, int]]") -> bytes:
-    """A sequence record of ``rows`` (op, number, value, amount, step) and ``motions`` (name, crc32)."""
-    data = struct.pack(_HEAD, MAGIC, arm_crc, len(rows), len(motions), 0)
+class OtherVersionError(SequenceError):
+    """The record is of another version."""
+
+
+def pack(
+    arm_crc: int,
+    rows: "list[tuple[int, ...]]",
+    motions: "list[tuple[str, int]]",
+    counters: "list[str] | tuple[str, ...]" = (),
+) -> bytes:
+    """A sequence record of ``rows`` (op, number, value, amount, step), ``motions`` (name, crc32), names of counters."""
+    data = struct.pack(_HEAD, MAGIC, arm_crc, len(rows), len(motions), len(counters))
     for row in rows:
         data += struct.pack(_ROW, *row)
     for name, crc in motions:
         data += struct.pack(_MOTION, name.encode(), crc)
+    for name in counters:
+        data += struct.pack("%ds" % _COUNTER_BYTES, name.encode())
     return data + struct.pack("<I", crc32(data))
 
 
 class SequenceRecord:
     """What a record of ``length`` bytes says; who subclasses it gives the bytes in ``part``, and checks the checksum.
 
-    Raises SequenceError where the record is cut or of an unknown kind. What its rows say is judged by
-    ``sequence_check.check``.
+    Raises SequenceError where the record is cut or of an unknown kind, OtherVersionError where it is of another
+    version. What its rows say is judged by ``sequence_check.check``.
     """
 
     def __init__(self, length: int) -> None:
         if length < _HEAD_BYTES + _CRC_BYTES:
             raise SequenceError("too short")
-        magic, self.arm_crc, self.rows, self.motions, zero = struct.unpack(_HEAD, self.part(0, _HEAD_BYTES))
-        if magic != MAGIC or zero != 0:
-            raise SequenceError("not a sequence record of this version")
-        size = _HEAD_BYTES + _ROW_BYTES * self.rows + _MOTION_BYTES * self.motions + _CRC_BYTES
-        if length != size or not 1 <= self.rows <= MAX_ROWS or self.motions > MAX_MOTIONS:
+        magic, self.arm_crc, self.rows, self.motions, self.counters = struct.unpack(
+            _HEAD, self.part(0, _HEAD_BYTES)
+        )
+        if magic != MAGIC:
+            if magic[:KIND_BYTES] == MAGIC[:KIND_BYTES]:
+                raise OtherVersionError("a sequence record of another version")
+            raise SequenceError("no sequence record")
+        self._counters_at = _HEAD_BYTES + _ROW_BYTES * self.rows + _MOTION_BYTES * self.motions
+        if length != self._counters_at + _COUNTER_BYTES * self.counters + _CRC_BYTES:
             raise SequenceError("length does not fit the header")
+        if not 1 <= self.rows <= MAX_ROWS or self.motions > MAX_MOTIONS or self.counters > MAX_COUNTERS:
+            raise SequenceError("more of something than the board takes")
 
     def part(self, offset: int, size: int) -> bytes:
         """So many bytes of the record from ``offset`` on."""
@@ -106,6 +130,10 @@ class SequenceRecord:
             return name.rstrip(b"\x00").decode(), crc
         except UnicodeError:
             raise SequenceError("a motion's name")
+
+    def counter(self, index: int) -> bytes:
+        """The name of a counter."""
+        return self.part(self._counters_at + _COUNTER_BYTES * index, _COUNTER_BYTES).rstrip(b"\x00")
 
 
 class SequenceData(SequenceRecord):

@@ -7,8 +7,8 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from armtempo_shared.sequence import SequenceRecord
 
-_MOST_VALUES = (0, 0, 0xFFFF, 0, sequence.ACTIVE | sequence.NEXT_THEN, 1, 1)
-_MOST_AMOUNTS = (0, 0, 0, sequence.MAX_WAIT_MS, sequence.MAX_WAIT_MS, sequence.MAX_REPEATS, 0)
+_MOST_VALUES = (0, 0, 0xFFFF, 0, sequence.ACTIVE | sequence.NEXT_THEN, 1, 1, 0)
+_MOST_AMOUNTS = (0, 0, 0, sequence.MAX_WAIT_MS, sequence.MAX_WAIT_MS, sequence.MAX_REPEATS, 0, 0)
 """The most that a row's value and amount may be, by its op."""
 
 
@@ -17,10 +17,16 @@ def check(record: "SequenceRecord") -> None:
     depth = 0
     for index in range(record.rows):
         op, number, value, amount, step = record.row(index)
-        if not sequence.MOVE <= op <= sequence.END or value > _MOST_VALUES[op] or amount > _MOST_AMOUNTS[op]:
+        if (
+            not sequence.MOVE <= op <= sequence.COUNT
+            or value > _MOST_VALUES[op]
+            or amount > _MOST_AMOUNTS[op]
+        ):
             raise SequenceError("row %d" % index)
         if op == sequence.MOVE:
             known = number < record.motions
+        elif op == sequence.COUNT:
+            known = number < record.counters
         elif op in (sequence.OUTPUT, sequence.WAIT_INPUT):
             known = True  # the arm says how many there are
         else:
@@ -36,3 +42,6 @@ def check(record: "SequenceRecord") -> None:
         name, _ = record.motion(index)
         if not name:
             raise SequenceError("motion %d" % index)
+    for index in range(record.counters):
+        if not record.counter(index):
+            raise SequenceError("counter %d" % index)

@@ -29,6 +29,7 @@ C clear 23
 C speed 25 rate:H
 C leave 24
 S sequence 18
+S counter 19 index:B
 O output 26 number:B value:H
 O inputs 27
 C hold 28
@@ -53,6 +54,7 @@ A clear 23
 A speed 25
 A leave 24
 T sequence 18 ending:B code:B step:H row:H cycle:I text
+T counter 19 count:B value:I text
 P output 26
 P inputs 27 levels:B bytes
 A hold 28
@@ -62,6 +64,7 @@ E sample 40 run:I index:I ticks:Q path:Q flags:B bytes
 E done 41 run:I ticks:Q path:Q samples:I lost:I bytes
 E fault 42 run:I code:B joint:B ticks:Q path:Q bytes
 E notice 43 text
+E row 44 passed:I run:I row:H step:H cycle:I value:I
 R ok 7e command:B bytes
 R error 7f command:B code:B joint:B value:q
 """

@@ -31,7 +31,8 @@ from armtempo.errors import ArmtempoError
 from armtempo.model.arm import Arm, LimitSwitches, Safety
 from armtempo.model.job import Job
 from armtempo.planning import planner
-from armtempo.robot.board import Board, connect
+from armtempo.robot.board import Board
+from armtempo.robot.connect import connect
 
 from tests.benchmark import firmware, loop
 

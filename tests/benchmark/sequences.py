@@ -2,7 +2,8 @@
 
 ``--cycles``: a pick and place of so many cycles, while hosts come and go; every motion's pulses must be those of the
 same motion before, to the tick, and the steps must add up to nothing. ``--faults``: so many sequences that an E-stop, a
-limit switch or an input that never comes ends at a random moment. Prints the pauses between two motions as well.
+limit switch, a joint that is held fast or an input that never comes ends at a random moment, each in turn. Prints the
+pauses between two motions as well.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from armtempo.model.arm import LimitSwitches
 from armtempo.model.sequence_plan import SequencePlan
 from armtempo.robot.board import Board
 from armtempo.simulator import InjectedFault, LaunchOptions, edgelog, launch
+from armtempo_shared import wire
 
 from tests import interpreters
 from tests.system.sequences import ARM, ESTOP, PART, net_steps, part_lies_there, pauses_s, small
@@ -28,7 +30,9 @@ from tests.system.sequences import ARM, ESTOP, PART, net_steps, part_lies_there,
 LEGS = 3
 GUARDED = replace(ARM, joints=(replace(ARM.joints[0], switches=LimitSwitches(high=1)), *ARM.joints[1:]))
 LIMIT = "D8"
-KINDS = {"estop": ESTOP, "limit_switch": LIMIT, "input_timeout": ""}
+KINDS = {"estop": ESTOP, "limit_switch": LIMIT, "stall": "", "input_timeout": ""}
+FAR = 20.0
+"""So many times as far the arm goes where a joint is to stall: the encoder must notice."""
 
 
 def cycles(number: int, numbers: random.Random, interpreter: str, folder: Path) -> None:
@@ -82,13 +86,16 @@ def _check_edges(power: edgelog.PowerCycle, number: int) -> int:
 
 def faults(number: int, numbers: random.Random, interpreter: str, folder: Path) -> None:
     """Sequences that something ends at a random moment."""
-    plans = small(folder, 4, "fault")
+    near = small(folder, 4, "fault", arm=GUARDED)
+    far = small(folder, 4, "fault", "far", GUARDED, FAR)
     told: dict[str, int] = {}
     for trial in range(number):
-        kind = numbers.choice(list(KINDS))
+        kind = list(KINDS)[trial % len(KINDS)]
         run, at_s = numbers.randrange(2, 10), numbers.uniform(0.0, 0.6)
         pin = KINDS[kind] or PART
         fault = InjectedFault("input", at_s, run, name=pin, level=0 if KINDS[kind] else 1)
+        if kind == "stall":
+            fault = InjectedFault("block", at_s, run, joint=numbers.randrange(LEGS))
         options = LaunchOptions(
             arm=GUARDED,
             faults=[part_lies_there(), fault],
@@ -96,11 +103,12 @@ def faults(number: int, numbers: random.Random, interpreter: str, folder: Path) 
             interpreter=interpreters.starter(interpreter),
         )
         with launch(options) as process, armtempo.connect(process.port, GUARDED) as board:
-            result = _one(board, replace(plans, arm=GUARDED))
+            result = _one(board, far if kind == "stall" else near)
         (power,) = edgelog.read(folder / f"edges{trial}")
         moved = [at - start for at, start in zip(result[1], result[2], strict=True)]
         assert moved == net_steps(power), (trial, kind, run, at_s, moved, net_steps(power))
-        told[f"{kind}: {result[0]}"] = told.get(f"{kind}: {result[0]}", 0) + 1
+        what = f"{kind}: {result[0]}"
+        told[what] = told.get(what, 0) + 1
         (folder / f"edges{trial}").unlink()
     for what, times in sorted(told.items()):
         print(f"{times:>4} {what}")
@@ -108,7 +116,7 @@ def faults(number: int, numbers: random.Random, interpreter: str, folder: Path) 
 
 
 def _one(board: Board, plan: SequencePlan) -> tuple[str, list[int], list[int]]:
-    """How a sequence ended, where the joints are by the board and where they were, in steps."""
+    """How a sequence ended with the fault, where the joints are by the board and where they were, in steps."""
     board.home(GUARDED)
     before = list(board.status().positions.commanded_steps)
     try:
@@ -116,10 +124,11 @@ def _one(board: Board, plan: SequencePlan) -> tuple[str, list[int], list[int]]:
     except BoardError:
         assert board.output("gripper").state == "open", "not in its safe state"
     end = board.client.sequence()
+    code = f" {wire.ERRORS[end.code][0]}" if end.code else ""
     after = list(board.status().positions.commanded_steps)
     time.sleep(0.3)
     assert list(board.status().positions.commanded_steps) == after, "it goes on"
-    return end.ending, after, before
+    return end.ending + code, after, before
 
 
 def main() -> None:

@@ -19,6 +19,7 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from armtempo.robot.shared_board import SharedBoard, find
 from armtempo.simulator import LaunchOptions, launch
@@ -39,7 +40,8 @@ with armtempo.connect(sys.argv[1], arm) as board:
         print("stopped", flush=True)
 """
 """Begins anew where it was stopped, as if the arm stood at the start again: the board takes its word for it."""
-STOP = (sys.executable, "-c", "from armtempo.__main__ import main; main()", "stop", "--port")
+STOP = (str(Path(sys.executable).with_name("armtempo")), "stop", "--port")
+"""The command as pip installs it."""
 _AFTER_SAMPLES = 3
 _PATIENCE_S = 60.0
 

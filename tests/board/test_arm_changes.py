@@ -18,6 +18,7 @@ KEPT_A_RUN = 480
 motion. On the chip the collector frees machine code."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in interpreters.AVAILABLE if name == "micropython"])
 def test_arms_one_after_the_other(name: str, tmp_path: Path) -> None:
     """Uploads, runs and removals of random arms; those that do not fit are refused."""

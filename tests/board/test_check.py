@@ -89,6 +89,7 @@ def ends_of_pieces(record: bytes, at: float) -> list[float]:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["feeding", "cubic", "refined"])
 def test_rate(interpreter: str, name: str, tmp_path: Path) -> None:
     record = motions.feeding(degree=3 if name == "cubic" else 5, refine=8 if name == "refined" else 1)
@@ -151,6 +152,7 @@ def test_reversal_that_the_driver_cannot_follow(interpreter: str, tmp_path: Path
     assert verdicts[1][2] > 0.16 * (limits.TICK_HZ / walking.GAP_TICKS) ** 2
 
 
+@pytest.mark.slow
 def test_numbers_beyond_the_evaluator(interpreter: str, tmp_path: Path) -> None:
     """The bounds are those by which the host refuses a plan."""
     span_s, most_s = (ticks / limits.TICK_HZ for ticks in (limits.LONGEST_SPAN_TICKS, limits.LONGEST_TICKS))

@@ -14,8 +14,17 @@ SCRIPTS = [
     for name in ("engine_pulses", "engine_faults", "engine_brake", "engine_override", "rings", "encoders")
 ]
 
-LONG = {"case_estop_anywhere", "case_long_pause", "case_underrun_anywhere"}
-"""Left to the two quick interpreters: in the emulator they take half a minute each."""
+LONG = {
+    "case_estop_anywhere",
+    "case_interrupt_gone",
+    "case_long_pause",
+    "case_long_rest",
+    "case_refused",
+    "case_stops",
+    "case_too_late",
+    "case_underrun_anywhere",
+}
+"""Left to the two quick interpreters: in the emulator they take 10 to 30 s each."""
 CHOSEN = [
     case
     for case in scripted.cases(*SCRIPTS)
@@ -28,6 +37,7 @@ def test_case(case: scripted.Case) -> None:
     case.run(*["short"] * (case.interpreter == "micropython-arm"))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif("micropython" not in interpreters.AVAILABLE, reason="needs MicroPython")
 def test_more_changes_of_speed() -> None:
     """Where it is quickest, on more motions; the other interpreters have a few of them above."""

@@ -153,6 +153,7 @@ def frozen(machine: Machine, chip: Chip, edge: float, cycles: float) -> array[in
     return block
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("cycles", "latency"), [(1.0, 3), (1.3, 40), (2.5, 10)])
 def test_at_every_tick_of_a_step(cycles: float, latency: int) -> None:
     """No pulse is cut or lasts on, no step comes behind the stop, and the count is that of the pins."""

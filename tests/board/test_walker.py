@@ -22,6 +22,7 @@ QUICK = next(name for name in ("micropython", "cpython") if name in interpreters
 """The interpreter for the long cases; that all give the same is shown on shorter ones."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", motions.NAMED)
 def test_steps_are_where_the_spline_says(name: str, tmp_path: Path) -> None:
     record = motions.NAMED[name]()
@@ -94,6 +95,7 @@ def test_edges_do_not_depend_on_how_the_ring_is_filled(
 BRAKES = [(2.0, 0.6), (3.1, 0.1), (0.2, 0.5), (1.0, 2.5), (5.5, 0.4)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("start_s", "length_s"), BRAKES)
 def test_braking_stays_on_the_path(interpreter: str, start_s: float, length_s: float, tmp_path: Path) -> None:
     start, length = round(start_s * walking.TICK_HZ), round(length_s * walking.TICK_HZ)

@@ -408,6 +408,7 @@ def test_a_job_is_not_looked_at_before_its_arm_is_right(tmp_path: Path) -> None:
     assert found[-1].what == "not looked at"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_the_picture_shows_home_and_every_driven_joint(name: str) -> None:
     from armtempo.report.arm_picture import arm_picture
@@ -433,6 +434,7 @@ def test_the_picture_is_written_once(tmp_path: Path) -> None:
     assert run("--picture", tmp_path / "arm.txt").exit_code == 2
 
 
+@pytest.mark.slow
 def test_a_dollar_in_a_name_is_no_formula(tmp_path: Path) -> None:
     path = changed(tmp_path, ('name = "joint 1"', 'name = "$$ \\\\theta"'), ('"paper-1to5"', '"$x^$"'))
     result = run("--arm", path, "--picture", tmp_path / "arm.svg")

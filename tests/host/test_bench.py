@@ -206,6 +206,7 @@ def test_the_paper_stands_beside_its_own_problem_only(tmp_path: Path) -> None:
         assert ("10.491" in done.output) is expected
 
 
+@pytest.mark.slow
 def test_draws_the_curves(runs: dict[cases.Case, cases.Trial], tmp_path: Path) -> None:
     figure = result_plot.convergence(result_table.rows(runs.values(), ITERATIONS))
     titles = [axis.get_title() for axis in figure.axes]
@@ -215,6 +216,7 @@ def test_draws_the_curves(runs: dict[cases.Case, cases.Trial], tmp_path: Path) -
     assert lines["ACS"].get_ydata() == pytest.approx(np.mean(both, axis=0))
 
 
+@pytest.mark.slow
 def test_without_matplotlib_the_tables_stand(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     small = ["--algorithms", "ga", "--populations", "4", "--seeds", "1", "--iterations", "2"]

@@ -71,6 +71,7 @@ def test_help_lists_every_command() -> None:
         assert CliRunner().invoke(main, [name, "--help"]).exit_code == 0
 
 
+@pytest.mark.slow
 def test_store_commands(run: Run, file: str) -> None:
     assert "stored" in run("upload", file, "--default").output
     listing = run("list").output
@@ -99,12 +100,14 @@ def test_run_writes_a_folder(run: Run, file: str, pipe: Pipe) -> None:
     assert (Path("runs/small-001") / "motion.bin").read_bytes()[:4] == b"ATM1"
 
 
+@pytest.mark.slow
 def test_run_refuses_another_start(run: Run, file: str) -> None:
     run("upload", file)
     run("home", "5,-60,40")
     assert "armtempo goto" in run("run", file, code=1).output
 
 
+@pytest.mark.slow
 def test_run_by_stored_name(run: Run, file: str) -> None:
     run("upload", file)
     run("home")
@@ -132,6 +135,7 @@ def test_fault_during_a_run(run: Run, file: str, pipe: Pipe, monkeypatch: pytest
     assert "no fault was pending" in run("clear").output
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("samples", "calls"), [(12, ["brake"]), (120, ["brake", "freeze"])])
 def test_interrupt_brakes_then_freezes_and_keeps_the_samples(
     run: Run, file: str, pipe: Pipe, monkeypatch: pytest.MonkeyPatch, samples: int, calls: list[str]
@@ -156,6 +160,7 @@ def test_interrupt_brakes_then_freezes_and_keeps_the_samples(
     assert len(found.index)
 
 
+@pytest.mark.slow
 def test_arm_is_not_replaced_silently(run: Run, file: str, tmp_path: Path) -> None:
     run("upload", file)
     other = tmp_path / "other.toml"
@@ -171,6 +176,7 @@ def test_arm_is_not_replaced_silently(run: Run, file: str, tmp_path: Path) -> No
     assert "planned for another arm" in run("run", file, "--arm", str(other), code=2).output
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("where", "words"),
     [

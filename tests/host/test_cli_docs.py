@@ -22,7 +22,8 @@ SHARED = "\n".join(line for line in PAGE.splitlines() if line.startswith(("| `--
 
 def row(name: str) -> str:
     """The line of the tables of commands that describes this one."""
-    found = [line for line in PAGE.splitlines() if re.search(rf"^\|[^|]*`{name}[ `]", line)]
+    page = re.sub(r"^## JSON\n.*?^## ", "## ", PAGE, flags=re.MULTILINE | re.DOTALL)
+    found = [line for line in page.splitlines() if re.search(rf"^\|[^|]*`{name}[ `]", line)]
     assert len(found) == 1, f"{name}: {found}"
     return found[0]
 

@@ -13,6 +13,8 @@ import pytest
 from armtempo.deploy import program_files
 from armtempo.deploy.compact import Compact, compact
 
+pytestmark = pytest.mark.xdist_group("compact program")  # which takes seconds to make
+
 SOURCES = {
     "made": "",
     "made.main": """
@@ -341,6 +343,7 @@ def test_traceback_of_the_compiled_program_is_readable() -> None:
     assert program_files.in_full(alone) == f"{alone[:-1]} ({labels})\n", "nothing tells which"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("folder", ["", "/flash/lib/"])
 def test_traceback_of_the_plain_program_reads_the_same(folder: str) -> None:
     """From a firmware, or from sources in the flash: as of the compiled program, and with lines."""

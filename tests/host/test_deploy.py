@@ -16,6 +16,8 @@ from armtempo.errors import InputError, LinkError, MissingPackageError
 from armtempo.link.program_version import PACKAGES, own_crc, package_folder
 from armtempo_shared.program_hash import sources_crc
 
+pytestmark = pytest.mark.xdist_group("compact program")  # which takes seconds to make
+
 CORTEX_M4 = 6 | 3 << 8 | 7 << 10
 BOARD = Survey("STM32F4DISC with STM32F407", (1, 29, 0), CORTEX_M4, 95_000, 189, 512, False, None, {})
 

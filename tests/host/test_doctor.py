@@ -37,6 +37,7 @@ STATE = BoardState(
     fault="",
     frames_bad=0,
     samples_lost=0,
+    sequence=None,
     joints=(),
 )
 

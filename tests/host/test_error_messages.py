@@ -35,6 +35,7 @@ def test_every_error_of_the_host_says_what_to_do_next(message: ErrorMessage) -> 
     )
 
 
+@pytest.mark.slow
 def test_the_collector_finds_what_has_no_next_step() -> None:
     source = """
 raise InputError("no")

@@ -28,6 +28,7 @@ def test_bounds_hold_and_are_reached(seed: int) -> None:
         assert seen >= bound * (1 - 2e-3), f"seed {seed}, order {order}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
 def test_bounds_are_sharp(seed: int) -> None:
     joint = random_joint(seed)

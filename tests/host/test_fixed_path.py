@@ -42,6 +42,7 @@ def test_derivatives_of_the_ratios_are_theirs(seed: int) -> None:
         assert curvature[number] == pytest.approx(bend, rel=1e-6, abs=1e-6 * np.abs(curvature).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["feeding", "feeding-shared", "feeding-cubic"])
 def test_polished_plan_is_the_best_known_to_1e_6(name: str) -> None:
     """From a short search on purpose, so that the solver has work to do."""
@@ -53,6 +54,7 @@ def test_polished_plan_is_the_best_known_to_1e_6(name: str) -> None:
         assert search.optimum_s <= search.total_s <= search.optimum_s * (1 + 1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
 def test_gradients_never_make_it_worse(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -65,6 +67,7 @@ def test_gradients_never_make_it_worse(seed: int) -> None:
     assert found.bound_s <= found.total_s
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(40))
 def test_every_polished_axis_has_a_bound_near_it(seed: int) -> None:
     arm, job = problems.random_problem(seed)
@@ -75,6 +78,7 @@ def test_every_polished_axis_has_a_bound_near_it(seed: int) -> None:
         assert search.total_s <= 1.02 * search.optimum_s, f"seed {seed}"
 
 
+@pytest.mark.slow
 def test_equal_plans_have_equal_bounds() -> None:
     plans = [
         planner.plan(problem.arm, replace(problem.job, polish=True, seed=seed))
@@ -103,6 +107,7 @@ def test_refined_joints_come_near_their_floor(joint: int, most_s: float) -> None
     assert total <= 1.006 * floor
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("refine", "most_s"), [(1, 8.19), (4, 7.2975), (8, 7.254), (64, 7.2272), ("auto", 7.228)]
 )
@@ -112,12 +117,14 @@ def test_refined_shared_timing(refine: int | str, most_s: float) -> None:
     assert 7.15 <= floor <= total
 
 
+@pytest.mark.slow
 def test_more_refinement_is_never_slower() -> None:
     """Also where it is no multiple of what came before."""
     totals = [refined([0, 1, 2], "shared", refine)[0] for refine in (1, 2, 3, 8)]
     assert np.all(np.diff(totals) < 0)
 
 
+@pytest.mark.slow
 def test_automatic_refinement_stays_within_the_record() -> None:
     rng = np.random.default_rng(3)
     via = tuple(map(tuple, np.cumsum(rng.normal(0, 10, (120, 3)), axis=0).tolist()))
@@ -128,6 +135,7 @@ def test_automatic_refinement_stays_within_the_record() -> None:
     assert 119 * refine <= 2048
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["feeding", "feeding-shared"])
 def test_gradients_from_several_starts_find_the_best_known(name: str) -> None:
     problem = PROBLEMS[name]
@@ -149,6 +157,7 @@ def test_bounds_follow_from_the_job() -> None:
     assert box[0, 1] / box[1, 0] > 30.0
 
 
+@pytest.mark.slow
 def test_bounds_that_hold_the_search_back_are_widened_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
     via, _ = uneven()
     arm = problems.make_arm([[50.0, 50.0, 150.0]])
@@ -163,6 +172,7 @@ def test_bounds_that_hold_the_search_back_are_widened_and_named(monkeypatch: pyt
     assert held.total_s == pytest.approx(best, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_gradients_start_within_bounds_and_are_not_held_by_them() -> None:
     via, _ = uneven()
     arm = problems.make_arm([[50.0, 50.0, 150.0]])

@@ -119,7 +119,7 @@ def test_whatever_the_multipliers_the_bound_is_below_every_motion(seed: int) -> 
     assert dual_value.value(cells, Multipliers(*scattered)) * unit_s <= 7.2268, f"seed {seed}"
 
 
-def random_motion(seed: int, most: int = 60) -> tuple[Arm, Job]:
+def random_motion(seed: int, most: int = 25) -> tuple[Arm, Job]:
     """Two to ``most`` via points, limits over some decades, on one axis."""
     rng = np.random.default_rng(seed)
     count = int(np.exp(rng.uniform(np.log(2), np.log(most))))
@@ -132,6 +132,7 @@ def random_motion(seed: int, most: int = 60) -> tuple[Arm, Job]:
     return problems.make_arm(limits.tolist()), job
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_no_plan_is_below_its_floor(seed: int) -> None:
     """1000 jobs of up to 500 via points: tests/benchmark/floors.py."""
@@ -141,10 +142,11 @@ def test_no_plan_is_below_its_floor(seed: int) -> None:
     assert 0.0 < search.floor_s <= plan.total_s, f"seed {seed}"
 
 
+@pytest.mark.slow
 def test_many_via_points_and_jerk_that_hardly_matters() -> None:
     """Where a floor without an error bound was 8 % above the plan."""
     rng = np.random.default_rng(1)
-    via = tuple(map(tuple, rng.normal(0, 40, (150, 3)).tolist()))
+    via = tuple(map(tuple, rng.normal(0, 40, (100, 3)).tolist()))
     arm = problems.make_arm([[50.0, 50.0, 1e5]] * 3)
     plan = planner.plan(arm, Job("many", via, refine=1, iterations=5, population=4))
     assert 0.85 * plan.total_s <= plan.searches[0].floor_s <= plan.total_s
@@ -164,6 +166,7 @@ def test_floor_of_a_free_path_counts_turns_stops_and_dwells() -> None:
     assert loose.time_s == pytest.approx(rest_to_rest.floor_s(np.array([0.0, 10.0]), limits[0]), rel=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["feeding", "feeding-shared"])
 def test_floor_of_a_free_path_is_below_its_plan(name: str) -> None:
     problem = next(each for each in problems.load() if each.name == name)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
 
+import click
 import pytest
-from armtempo.cli import COMMANDS, GROUPS, main
+from armtempo.cli import COMMANDS, GROUPS, examples, main
 from click.testing import CliRunner
 
 
@@ -30,6 +32,26 @@ def test_the_help_page_shows_the_groups_and_their_commands() -> None:
         assert line == "COMMAND" or line in COMMANDS
 
 
+def test_every_command_has_examples() -> None:
+    assert set(examples.EXAMPLES) == set(COMMANDS)
+
+
+@pytest.mark.parametrize("line", [line for lines in examples.EXAMPLES.values() for line in lines])
+def test_an_example_is_a_command_that_can_be_given(
+    line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    name, *arguments = shlex.split(re.sub(r" >>? .*", "", line))
+    for argument in arguments:  # what must be there is made
+        if argument.startswith("runs/"):
+            (tmp_path / argument).mkdir(parents=True)
+    command = main.get_command(click.Context(main), name)
+    assert command is not None
+    command.make_context(name, arguments)
+    page = CliRunner().invoke(main, [name, "--help"]).output
+    assert f"  armtempo {line}\n" in page
+
+
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_a_completion_script_for(shell: str) -> None:
     done = CliRunner().invoke(main, ["completion", shell])
@@ -37,8 +59,29 @@ def test_a_completion_script_for(shell: str) -> None:
     assert "_ARMTEMPO_COMPLETE" in done.output
 
 
-def test_what_the_script_asks_is_answered() -> None:
-    words = {"COMP_WORDS": "armtempo st", "COMP_CWORD": "1", "_ARMTEMPO_COMPLETE": "bash_complete"}
+def completed(line: str) -> set[str]:
+    """What the script is answered: kind and word."""
+    words = {
+        "COMP_WORDS": line,
+        "COMP_CWORD": str(len(line.split(" ")) - 1),
+        "_ARMTEMPO_COMPLETE": "bash_complete",
+    }
     command = [sys.executable, "-m", "armtempo"]
-    done = subprocess.run(command, env={**os.environ, **words}, capture_output=True, text=True)
-    assert {line.partition(",")[2] for line in done.stdout.split()} == {"stop", "status"}
+    done = subprocess.run(command, env={**os.environ, **words}, capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+@pytest.mark.slow
+def test_what_the_script_asks_is_answered() -> None:
+    assert completed("armtempo st") == {"plain,stop", "plain,status"}
+    assert completed("armtempo plan --timing p") == {"plain,per-joint"}
+    assert completed("armtempo check --arm mo") == {"plain,moveo"}
+    assert completed("armtempo check --arm my") == {"file,my"}
+
+
+@pytest.mark.parametrize("name", ["run", "fetch", "goto", "home"])
+def test_files_complete_where_an_argument_may_be_one(name: str) -> None:
+    command = main.get_command(click.Context(main), name)
+    assert command is not None
+    offered = command.params[0].shell_complete(click.Context(command), "fir")
+    assert [(item.type, item.value) for item in offered] == [("file", "fir")]

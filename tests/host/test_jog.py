@@ -45,6 +45,7 @@ def check_limits(motion: JogMotion, arm: Arm, speed: float) -> None:
     assert np.all(angles <= high)
 
 
+@pytest.mark.slow
 def test_the_law_keeps_its_limits_and_its_speed_in_the_middle() -> None:
     seed = 7
     print("seed", seed)
@@ -66,6 +67,7 @@ def test_the_law_keeps_its_limits_and_its_speed_in_the_middle() -> None:
         np.testing.assert_allclose(middle, middle[0], rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_joint_goes_to_the_end_of_its_range_and_not_beyond() -> None:
     for arm in (PAPER, AR4):
         here = on_steps(arm, list(arm.home_deg))
@@ -93,6 +95,7 @@ def test_at_the_end_of_the_range_only_the_way_back_is_open() -> None:
     assert back.end_deg[1] == pytest.approx(end[1] - 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("by", [0.1, -1.0, 10.0])
 @pytest.mark.parametrize("speed", [0.01, 0.25, 1.0])
 def test_a_step_goes_as_far_as_it_says(by: float, speed: float) -> None:
@@ -103,6 +106,7 @@ def test_a_step_goes_as_far_as_it_says(by: float, speed: float) -> None:
     check_limits(motion, AR4, speed)
 
 
+@pytest.mark.slow
 def test_a_stop_is_quick() -> None:
     """Braking from a constant speed takes what EXCESS of the limits allows, as the rise of a jog uses half of them."""
     for arm in (PAPER, AR4):
@@ -116,6 +120,7 @@ def test_a_stop_is_quick() -> None:
             assert motion.brake_s < 2.0 * from_speed_s
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", ["x", "y", "z", "tool-x", "tool-y", "tool-z"])
 @pytest.mark.parametrize("by", [INF, -INF, 5.0, -0.1])
 def test_the_tool_moves_along_a_line_and_keeps_its_orientation(axis: str, by: float) -> None:
@@ -161,6 +166,16 @@ def test_an_arm_of_three_joints_moves_its_tool_and_lets_it_turn() -> None:
         jog.plan("x", PAPER, here, JogMove(10.0, axis="z", about=True))
 
 
+def test_a_fast_jog_stays_on_its_line_where_its_ramps_take_all_of_it() -> None:
+    here = on_steps(PAPER, [42.186, -67.396, 17.178])
+    motion = jog.plan("x", PAPER, here, JogMove(-INF, axis="x"), 1.0)
+    check_limits(motion, PAPER, 1.0)
+    start = forward(PAPER, here)[:3, 3]
+    tool = forward(PAPER, motion.trajectory(np.linspace(0.0, motion.trajectory.duration_s, 800)))[:, :3, 3]
+    assert np.linalg.norm((tool - start)[:, 1:], axis=1).max() < 1.1 * jog.STRAY_MM
+    assert start[0] - tool[-1, 0] > 700.0
+
+
 def test_a_line_ends_before_a_singular_posture() -> None:
     motion = jog.plan("x", AR4, on_steps(AR4, ELBOW_DEG), JogMove(INF, axis="x"))
     assert "singular" in motion.ends
@@ -170,6 +185,7 @@ def test_a_line_ends_before_a_singular_posture() -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_held_jog_is_a_small_record() -> None:
     for move in (JogMove(INF, joint=0), JogMove(INF, axis="x"), JogMove(-INF, axis="y")):
         motion = jog.plan("x", AR4, on_steps(AR4, ELBOW_DEG), move)

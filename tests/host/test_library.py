@@ -53,6 +53,7 @@ def test_the_import_alone_loads_nothing_heavy() -> None:
     assert not modules_after("import armtempo") & set(LAZY)
 
 
+@pytest.mark.slow
 def test_a_plan_is_computed_without_plots_and_ports() -> None:
     code = (
         "import armtempo\n"
@@ -108,6 +109,7 @@ def test_a_job_takes_angles_and_refuses_what_is_no_motion(arm: armtempo.Arm) -> 
             armtempo.plan(arm, armtempo.Job("mine", via_deg=wrong))
 
 
+@pytest.mark.slow
 def test_a_plan_goes_through_its_via_points_and_its_file(plan: armtempo.Plan, tmp_path: Path) -> None:
     np.testing.assert_allclose(plan.trajectory(0.0), START_DEG, atol=1e-9)
     np.testing.assert_allclose(plan.trajectory(plan.total_s), END_DEG, atol=1e-9)
@@ -159,6 +161,7 @@ def test_a_second_run_of_the_same_board_starts_where_it_should(
             assert all(abs(joint.error_deg) < 0.2 for joint in run.results)
 
 
+@pytest.mark.slow
 def test_a_real_arm_does_not_move_by_surprise(plan: armtempo.Plan, arm: armtempo.Arm, tmp_path: Path) -> None:
     with launch(LaunchOptions(arm=arm)) as process, armtempo.connect(process.port) as board:
         with pytest.raises(armtempo.InputError, match="no arm is known"):
@@ -183,6 +186,7 @@ def test_the_arm_goes_where_a_motion_begins(plan: armtempo.Plan, arm: armtempo.A
         assert board.run(plan, out=tmp_path).complete
 
 
+@pytest.mark.slow
 def test_a_stop_that_is_asked_for_ends_a_run_early(
     plan: armtempo.Plan, arm: armtempo.Arm, tmp_path: Path
 ) -> None:

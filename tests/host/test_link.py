@@ -17,6 +17,7 @@ from tests.host.linked import ARM, follow, random_motion, ready, started
 from tests.inprocess import Pipe, connect
 
 
+@pytest.mark.slow
 def test_store_commands(tmp_path: Path) -> None:
     board, data = ready(Pipe(tmp_path / "flash"))
     assert board.fetch("feed") == data
@@ -34,6 +35,7 @@ def test_store_commands(tmp_path: Path) -> None:
     assert caught.value.code == wire.ERROR_CODES["not_found"]
 
 
+@pytest.mark.slow
 def test_run_gives_every_sample_once_in_order(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
     samples, end = follow(started(pipe))
@@ -42,6 +44,7 @@ def test_run_gives_every_sample_once_in_order(tmp_path: Path) -> None:
     assert samples[-1].positions == end.positions
 
 
+@pytest.mark.slow
 def test_repeated_command_acts_once(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
     board, data = ready(pipe)
@@ -66,6 +69,7 @@ def test_ten_minutes_to_a_host_that_pauses_two_seconds_lose_nothing(tmp_path: Pa
     assert indices == list(range(6000))
 
 
+@pytest.mark.slow
 def test_gap_is_counted_where_the_board_ran_out_of_memory(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
     pipe.run_samples = 500
@@ -81,6 +85,7 @@ def test_gap_is_counted_where_the_board_ran_out_of_memory(tmp_path: Path) -> Non
     assert follower.end.samples_lost + follower.end.received == 500
 
 
+@pytest.mark.slow
 def test_what_arrived_is_not_lost_though_the_board_has_let_it_go(tmp_path: Path) -> None:
     """The system of a host that is stopped goes on reading: then the board keeps only younger samples."""
     pipe = Pipe(tmp_path / "flash")
@@ -90,6 +95,7 @@ def test_what_arrived_is_not_lost_though_the_board_has_let_it_go(tmp_path: Path)
     assert [sample.index for sample in follower.samples()] == list(range(250))
 
 
+@pytest.mark.slow
 def test_fault_ends_the_run(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
     follower = started(pipe)
@@ -102,6 +108,7 @@ def test_fault_ends_the_run(tmp_path: Path) -> None:
     assert (follower.end.fault, follower.end.fault_joint) == (wire.ERROR_CODES["following"], 1)
 
 
+@pytest.mark.slow
 def test_homing_motion_starts_anywhere_and_leaves_nothing_known(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
     board = connect(pipe)
@@ -127,6 +134,7 @@ def test_a_motion_that_does_not_end_is_given_up(tmp_path: Path, monkeypatch: pyt
         follow(follower)
 
 
+@pytest.mark.slow
 def test_a_board_that_does_not_stop_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pipe = Pipe(tmp_path / "flash")
     board, data = ready(pipe)

@@ -40,6 +40,7 @@ def replay(
     return stored_motion.replay(board, stored, stop or StopRequest(), take), indices
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("trouble", ["unplug_for", "silence_for"])
 def test_trouble_is_told_once_and_its_end_once(tmp_path: Path, trouble: str) -> None:
     pipe = Pipe(tmp_path / "flash")
@@ -81,6 +82,7 @@ def test_another_board_at_the_same_port_gets_no_command(tmp_path: Path) -> None:
     assert pipe.app.controller.engine.calls == []  # above all no stop
 
 
+@pytest.mark.slow
 def test_the_same_board_started_anew_is_found_out_before_any_command(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
     board, _ = prepared(pipe)
@@ -117,6 +119,7 @@ def test_a_wanted_stop_shortens_the_waiting(tmp_path: Path, trouble: str) -> Non
     assert pipe.clock() - begin_s < 20.0
 
 
+@pytest.mark.slow
 def test_cable_out_during_a_run_costs_no_sample(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
     board, data = ready(pipe)
@@ -152,6 +155,7 @@ def test_cable_that_stays_out(tmp_path: Path) -> None:
     assert 50 < pipe.clock() - begin_s < 70
 
 
+@pytest.mark.slow
 def test_board_that_started_anew_is_found_out(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
     with pytest.raises(LinkError, match="started anew during the motion"):
@@ -168,6 +172,7 @@ def test_silent_board_is_reported_in_time(tmp_path: Path) -> None:
     assert pipe.clock() - begin_s < 4.0
 
 
+@pytest.mark.slow
 def test_a_cable_that_is_out_does_not_keep_who_wants_an_end(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
     stop = StopRequest()

@@ -36,6 +36,7 @@ def shown_safely(text: str) -> bool:
     return all(char.isprintable() or char == "\n" for char in text)
 
 
+@pytest.mark.slow
 def test_a_formula_in_a_name_is_text_in_every_figure(tmp_path: Path) -> None:
     path = made_runs.make(tmp_path / "run", repetitions=1, plan=named(*FORMULAS))
     result = CliRunner().invoke(main, ["report", str(path)])
@@ -79,6 +80,7 @@ def test_a_trajectory_file_with_them_is_refused(tmp_path: Path, name: str) -> No
     assert shown_safely(str(caught.value))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [CONTROL[0], CONTROL[-1]])
 def test_they_are_spelt_out_in_a_run_folder(tmp_path: Path, name: str) -> None:
     path = made_runs.make(tmp_path / "run", repetitions=1, on_board=True)

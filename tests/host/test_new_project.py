@@ -24,6 +24,7 @@ def new(*arguments: str, text: str | None = None) -> Result:
     return CliRunner().invoke(main, ["new", *arguments], input=text)
 
 
+@pytest.mark.slow
 def test_an_own_arm_of_four_joints_is_planned_at_once(tmp_path: Path) -> None:
     folder = tmp_path / "my arm"
     done = new(str(folder), *(word for joint in FOUR for word in ("--joint", joint)))

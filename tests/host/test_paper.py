@@ -20,6 +20,7 @@ def made() -> motions.Plans:
     return motions.plans()
 
 
+@pytest.mark.slow
 def test_table_2_comes_out_but_for_its_misprint(made: motions.Plans) -> None:
     found = postures.claims(made.arm)
     assert [claim.verdict for claim in found] == [SAME] * 3 + [DIFFERS] + [SAME] * 4

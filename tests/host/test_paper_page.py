@@ -50,6 +50,7 @@ def searched() -> list[Row]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("quintic", "cubic", "verdict"), [(0.02, 0.2, SAME), (0.2, 0.02, DIFFERS)])
 def test_fig_12_is_judged_by_how_rough_the_ends_are(
     quintic: float, cubic: float, verdict: str, tmp_path: Path
@@ -60,6 +61,7 @@ def test_fig_12_is_judged_by_how_rough_the_ends_are(
     assert all("times" in claim.found for claim in ends)
 
 
+@pytest.mark.slow
 def test_a_limit_that_is_exceeded_shows(tmp_path: Path) -> None:
     runs = series(tmp_path, {QUINTIC: 0.02, CUBIC: 0.02, UNOPTIMISED: 0.02})
     found = runs[0].found
@@ -130,6 +132,7 @@ def test_an_interrupt_ends_all(made: motions.Plans, tmp_path: Path, monkeypatch:
         experiment.run(made, tmp_path, True, None)
 
 
+@pytest.mark.slow
 def test_the_three_motions_are_the_paper_s(
     made: motions.Plans, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

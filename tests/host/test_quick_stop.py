@@ -2,18 +2,35 @@
 
 from __future__ import annotations
 
+import os
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
+from armtempo.errors import LinkError
+from armtempo.ports import names
 from armtempo.project import quick_stop
-from armtempo.share import claim
+from armtempo.project.settings import ProjectSettings
+from armtempo.share import claim, claim_file
+from armtempo.share.caller import Ownership, ownership
 from armtempo.share.lines import Message
 from armtempo.share.server import Server
 
 PORT = "/dev/q"
-HEAVY = ("click", "numpy", "serial", "dataclasses", "armtempo.cli", "armtempo.robot")
+HEAVY = (
+    *("click", "numpy", "serial", "dataclasses", "typing", "pathlib", "collections", "contextlib"),
+    *("re", "json", "enum", "signal", "socket", "tempfile", "importlib", "armtempo.cli", "armtempo.robot"),
+)
+
+
+@pytest.fixture(autouse=True)
+def alone(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No claims of programs outside of the tests, no answers of other tests."""
+    monkeypatch.setattr(quick_stop, "_answers", {})
+    monkeypatch.setenv("TMPDIR", str(tmp_path_factory.mktemp("temporary")))
 
 
 @pytest.fixture
@@ -69,9 +86,108 @@ def test_the_port_may_come_from_the_environment(
     assert len(asked) == 1
 
 
+@pytest.mark.parametrize("folder", [".", "below/it"])
+def test_the_port_may_come_from_the_project_folder(
+    asked: list[Message], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, folder: str
+) -> None:
+    (tmp_path / "armtempo.toml").write_text(f'port = "{PORT}"\n')
+    (tmp_path / folder).mkdir(parents=True, exist_ok=True)
+    monkeypatch.chdir(tmp_path / folder)
+    quick_stop.send([])
+    assert len(asked) == 1
+    assert quick_stop.take_answer(PORT, False) is not None
+
+
+def test_a_virtual_board_of_the_project_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "armtempo.toml").write_text('port = "sim:board"\n')
+    (tmp_path / "below").mkdir()
+    monkeypatch.chdir(tmp_path / "below")
+    port = ProjectSettings().get("port").value
+    server = Server(
+        claim.new(names.same_for_all(port), port, "/dev/x"), {"stop": lambda _: {"moving": False}}
+    )
+    try:
+        quick_stop.send(["--now"])
+    finally:
+        server.close()
+    answer = quick_stop.take_answer(port, True)
+    assert answer is not None
+    assert not answer.moved
+
+
+def test_a_program_that_has_died_is_none_to_choose(asked: list[Message]) -> None:
+    died = subprocess.Popen([sys.executable, "-c", ""])
+    died.wait()
+    left = claim.new("/dev/r", "/dev/r", "/dev/r")._replace(pid=died.pid)
+    left.write()
+    try:
+        quick_stop.send([])
+    finally:
+        left.remove()
+    assert len(asked) == 1
+
+
+def test_of_several_open_ports_none_is_chosen(asked: list[Message]) -> None:
+    second = Server(claim.new("/dev/r", "/dev/r", "/dev/r"), {})
+    try:
+        quick_stop.send([])
+    finally:
+        second.close()
+    assert not asked
+
+
+def test_a_program_that_hangs_is_left_to_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    deaf = claim.new(PORT, PORT, PORT)
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind(deaf.address)
+        listening.listen(1)
+        deaf.write()
+        monkeypatch.setattr(quick_stop, "_HELLO_S", 0.05)
+        quick_stop.send(["--port", PORT])
+        assert quick_stop.take_answer(PORT, False) is None
+        assert ownership(deaf) is Ownership.HANGS  # known by now: it is not waited for again
+    deaf.remove()
+
+
+def test_a_refusal_is_left_to_the_command() -> None:
+    def stop(request: Message) -> Message:
+        raise LinkError("no", "ask again")
+
+    server = Server(claim.new(PORT, PORT, PORT), {"stop": stop})
+    try:
+        quick_stop.send(["--port", PORT])
+    finally:
+        server.close()
+    assert quick_stop.take_answer(PORT, False) is None
+
+
+@pytest.mark.parametrize("port", ["/dev/ü", "C:\\x\ny", "rfc2217://host:1", ""])
+def test_a_claim_comes_back_from_its_file_as_it_was(port: str) -> None:
+    made = claim.new(port, port, "/dev/x")
+    made.write()
+    try:
+        assert claim.find(port, port) == made
+    finally:
+        made.remove()
+
+
+def test_the_folder_for_temporary_files_is_the_one_of_tempfile(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for value in (str(tmp_path), "/nowhere", ""):
+        for name in ("TMPDIR", "TEMP", "TMP"):
+            monkeypatch.setenv(name, value)
+        code = "import tempfile; print(tempfile.gettempdir())"
+        wanted = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        ).stdout
+        assert os.path.dirname([*claim_file.folders()][-1]) == wanted.strip()
+
+
 def test_nothing_heavy_is_imported_for_it() -> None:
     code = (
-        f"import sys, armtempo.project.quick_stop; print([name for name in {HEAVY} if name in sys.modules])"
+        f"import sys; before = set(sys.modules); import armtempo.__main__, armtempo.project.quick_stop as quick; "
+        f"quick.send(['--port', 'x']); print([name for name in {HEAVY} if name in set(sys.modules) - before])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

@@ -38,9 +38,8 @@ SAID = {
     "no_room": "no: the engine for this arm does not fit into the board's memory; nothing was changed (joint 2) "
     "[bytes needed: 4711]; lower its top speeds, drive fewer joints, or put the program into the firmware "
     "(board/docs/firmware.md)",
-    "pin_taken": "no: an output or input of the arm has a pin or timer that the engine takes (joint 2) [16 times the "
-    "port (A is 0) and the number in it: 4711]; 'armtempo check' says which pin; give another one "
-    "(board/docs/hardware.md)",
+    "pin_taken": "no: an output or input of the arm has a pin or timer that is taken (joint 2) [PE9: encoder 1]; give "
+    "another pin ('armtempo check' names the arm file's key; board/docs/hardware.md lists what is free)",
     "leg_missing": "no: the board does not have a motion that the sequence runs, or another one under its name "
     "(joint 2) [number of the motion in the sequence, from 1: 4711]; upload the sequence again, which brings its "
     "motions",
@@ -59,9 +58,18 @@ SAID = {
 
 @pytest.mark.parametrize("name", SAID)
 def test_every_number_is_said_with_what_it_is(name: str) -> None:
-    error = refusal("no", wire.ERROR_CODES[name], 1, 4711)
+    error = refusal("no", wire.ERROR_CODES[name], 1, 0x49 if name == "pin_taken" else 4711)
     assert error.code == wire.ERROR_CODES[name]
     assert str(error) == SAID[name]
+
+
+def test_a_pin_is_named_with_what_can_hold_it() -> None:
+    code = wire.ERROR_CODES["pin_taken"]
+    assert "[PA0: the button, STEP of channel 6]" in str(refusal("no", code))
+    assert "[PE12: ENABLE of the drivers]" in str(refusal("no", code, value=0x4C))
+    assert "[PD0: it, or its timer, has another output or input already]" in str(
+        refusal("no", code, value=0x30)
+    )
 
 
 def test_every_code_with_a_number_is_tried() -> None:

@@ -11,11 +11,13 @@ import armtempo
 import numpy as np
 import pytest
 from armtempo.errors import ArmtempoError, InputError
+from armtempo.kinematics.of_arm import forward
 from armtempo.model import sequence_file
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.sequence import Sequence
 from armtempo.model.sequence_plan import PAUSE_S, SequencePlan
+from armtempo.planning import via_points
 from armtempo.records import encoded_sequence
 from armtempo_shared import sequence as record
 from armtempo_shared import sequence_check
@@ -110,6 +112,7 @@ def test_a_repeat_that_begins_where_it_ends_stands_once(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_repeats_within_repeats(tmp_path: Path) -> None:
     inner = "repeat = 2", 'goto = "a"', 'goto = "b"', 'end = "repeat"'
     plan = planned(tmp_path, 'repeat = "for ever"', *inner, 'goto = "home"', 'end = "repeat"')
@@ -140,6 +143,59 @@ def test_outputs_waits_and_inputs(tmp_path: Path) -> None:
         (record.WAIT_INPUT, record.ACTIVE | record.NEXT_THEN, 2000, 5),
         (record.WAIT_INPUT, record.ACTIVE, 2000, 6),
     ]
+
+
+@pytest.mark.slow
+def test_tool_poses_are_solved_when_it_is_planned(tmp_path: Path) -> None:
+    """Of the arm file and of the sequence's own; the angles are those of armtempo goto."""
+    pose = forward(ARM, (10.0, -55.0, 35.0))[:3, 3]
+    position = f"position_mm = {[round(float(value), 6) for value in pose]}"
+    source = tmp_path / "arm.toml"
+    source.write_text((FOLDER / "arm.toml").read_text() + f"\n[posture.tray]\n{position}\n")
+    arm = Arm.load(source)
+    path = written(tmp_path, 'goto = "tray"', 'goto = "a"', 'goto = "own"', top='start = "home"')
+    path.write_text(path.read_text() + f"\n[posture.own]\n{position}\n")
+    plan = armtempo.plan_sequence(arm, Sequence.load(path, arm))
+    tray_deg = via_points.posture_deg(arm, arm.posture("tray"))
+    assert words(plan) == ["goto tray", "goto a", "goto own"]
+    np.testing.assert_allclose(ends(plan)[0][1], tray_deg, atol=1e-9)
+    np.testing.assert_allclose(ends(plan)[2][1], tray_deg, atol=1e-9)
+    assert plan.rows[0].number == 0
+
+
+def test_a_tool_pose_that_cannot_be_reached_names_the_step(tmp_path: Path) -> None:
+    path = written(tmp_path, 'goto = "a"', 'goto = "far"')
+    path.write_text(path.read_text() + "\n[posture.far]\nposition_mm = [0, 0, 3000]\n")
+    with pytest.raises(ArmtempoError, match=r"posture\.far: 3000 mm from the base"):
+        armtempo.plan_sequence(ARM, Sequence.load(path, ARM))
+    path.write_text(path.read_text().replace("[0, 0, 3000]", "[0, 0, -450]"))
+    with pytest.raises(ArmtempoError, match=r"step\[2\]\.goto: posture 'far'"):
+        armtempo.plan_sequence(ARM, Sequence.load(path, ARM))
+
+
+def test_a_counter_is_one_by_its_name(tmp_path: Path) -> None:
+    written(tmp_path, 'count = "parts"', 'count = "called"', name="other")
+    plan = planned(
+        tmp_path,
+        "repeat = 2",
+        'goto = "a"',
+        'count = "trays"',
+        'call = "other.toml"',
+        'count = "parts"',
+        'end = "repeat"',
+    )
+    assert plan.counters == ("trays", "parts", "called")
+    data = record.SequenceData(encoded_sequence.of_plan(plan).data)
+    assert [data.counter(number) for number in range(data.counters)] == [b"trays", b"parts", b"called"]
+    counted = [row.words for row in plan.rows if row.op == record.COUNT]
+    assert counted == ["count trays", "count parts", "count called", "count parts"] * 2
+    plan.save(tmp_path / "seq.json")
+    assert SequencePlan.load(tmp_path / "seq.json").counters == plan.counters
+
+
+def test_more_counters_than_the_board_keeps_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="9 counters; the board keeps 8"):
+        planned(tmp_path, *(f'count = "c{number}"' for number in range(9)))
 
 
 def test_a_called_sequence_stands_in_its_place(tmp_path: Path) -> None:
@@ -215,7 +271,7 @@ def test_sequences_that_call_each_other_are_refused(tmp_path: Path) -> None:
         ('begin = "a"', "begin: unknown key"),
         ("[posture.home]\nangles_deg = [0, 0, 0]", "posture.home is there already"),
         ("[posture.d]\nangles_deg = [0, 0]", r"posture.d.angles_deg"),
-        ("[posture.d]\nangels_deg = [0, 0, 0]", "angles_deg is missing"),
+        ("[posture.d]\nangels_deg = [0, 0, 0]", "exactly one of angles_deg"),
     ],
 )
 def test_what_is_wrong_at_its_head_is_named(top: str, said: str, tmp_path: Path) -> None:
@@ -276,6 +332,13 @@ def test_every_damage_of_a_record_is_seen(tmp_path: Path) -> None:
                 record.SequenceData(damaged)
 
 
+def test_the_shipped_arm_is_the_papers_with_a_gripper() -> None:
+    """Its file stands by itself, for whoever copies it; what both say must not differ."""
+    paper = Arm.paper()
+    assert (ARM.joints, ARM.driver, ARM.safety) == (paper.joints, paper.driver, paper.safety)
+
+
+@pytest.mark.slow
 def test_the_shipped_sequence_plans() -> None:
     sequence = Sequence.load(FOLDER / "sequence.toml", ARM)
     plan = armtempo.plan_sequence(ARM, sequence)

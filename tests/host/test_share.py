@@ -49,7 +49,7 @@ def test_only_this_user_gets_in(server: Server) -> None:
     path = Path(server.claim.address)
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
     assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
-    for file in path.parent.glob("*.json"):
+    for file in path.parent.glob("*.claim"):
         assert stat.S_IMODE(file.stat().st_mode) == 0o600
     os.chmod(path.parent, 0o755)
     try:

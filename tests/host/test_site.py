@@ -12,7 +12,7 @@ import pytest
 from armtempo.cli import main
 from armtempo_shared import meanings
 
-pytestmark = pytest.mark.xdist_group("site")  # what they share is made once
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("site")]  # what they share is made once
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted(page.relative_to(ROOT) for page in ROOT.glob("*/docs/*.md"))

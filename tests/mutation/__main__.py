@@ -35,6 +35,7 @@ COPIED = (
     "shared",
     "tests",
     ".ci",
+    ".github",
     "pyproject.toml",
     "README.md",
     "LICENSE",
@@ -106,6 +107,11 @@ def noticed(folder: Path, tests: list[str], without: str, seconds: float) -> str
     return (failed or [done.stdout[-300:] + done.stderr[-300:]])[0][:200]
 
 
+def _test_in(result: str) -> str:
+    """The test that a line of pytest's summary is about."""
+    return result.removeprefix("FAILED ").split(" - ")[0]
+
+
 def main() -> None:
     """Print a line for each mistake, and the count of those that were noticed."""
     parser = argparse.ArgumentParser(
@@ -131,9 +137,11 @@ def main() -> None:
             tests = concerned.tests(path)
             result = noticed(folder, tests, without, options.seconds) if tests else ""
             (folder / path).write_bytes(source)
-            found += bool(result)
-            late += result == "time-out"
             word = "noticed " if result else "SURVIVED"
+            if result.startswith("FAILED ") and noticed(folder, [_test_in(result)], without, options.seconds):
+                word = "BROKEN  "  # the test fails without the mistake too: it says nothing
+            found += word == "noticed "
+            late += result == "time-out"
             took_s = time.monotonic() - begin_s
             print(f"{number:3} {word} {path}:{mutation.shown(source)} [{took_s:.0f} s] {result}", flush=True)
     tried = len(wanted) - options.first

@@ -87,7 +87,7 @@ def by_imports(path: Path) -> list[str]:
 
 def by_command(name: str) -> list[str]:
     """Test files in which the command's name stands in quotes."""
-    found = sorted(ROOT.glob("tests/host/test_*.py")) + sorted(ROOT.glob("tests/system/test_*.py"))
+    found = sorted(ROOT.glob("tests/host/**/test_*.py")) + sorted(ROOT.glob("tests/system/test_*.py"))
     word = f'"{name.replace("_", "-")}"'
     return [str(path.relative_to(ROOT)) for path in found if word in path.read_text(encoding="utf-8")][:MOST]
 

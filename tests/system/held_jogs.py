@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import armtempo
-from armtempo.errors import InputError, LinkError, PlanError
+from armtempo.errors import InputError, LinkError
 from armtempo.link.board_messages import Event, Sample
 from armtempo.robot import jog
 from armtempo.robot.board import Board
@@ -113,7 +113,7 @@ class HeldJogs:
         self._beyond = False
         try:
             held = board.held_jog(case.joint, case.axis, case.direction, speed=case.speed)
-        except (InputError, PlanError):
+        except InputError:
             return None
         told = case.kind == "release"
         with suppress(LinkError), held:

@@ -26,9 +26,9 @@ SMALL = """
 name = "{name}"
 start = "home"
 [posture.pick]
-angles_deg = [0.6, -60.3, 40.5]
+angles_deg = {pick}
 [posture.place]
-angles_deg = [-0.5, -59.8, 39.6]
+angles_deg = {place}
 [[step]]
 repeat = {times}
 [[step]]
@@ -50,16 +50,29 @@ wait_s = 0.02
 [[step]]
 goto = "home"
 [[step]]
+count = "parts"
+[[step]]
 end = "repeat"
 """
 
 
-def small(folder: Path, times: int | str, on_timeout: str = "stop", name: str = "small") -> SequencePlan:
-    """A pick and place over fractions of a degree."""
+def small(
+    folder: Path,
+    times: int | str,
+    on_timeout: str = "stop",
+    name: str = "small",
+    arm: Arm = ARM,
+    size: float = 1.0,
+) -> SequencePlan:
+    """A pick and place over fractions of a degree, or ``size`` times as far."""
     path = folder / f"{name}.toml"
     value = f'"{times}"' if isinstance(times, str) else times
-    path.write_text(SMALL.format(name=name, times=value, on_timeout=on_timeout))
-    return armtempo.plan_sequence(ARM, Sequence.load(path, ARM))
+    pick, place = (
+        [round(home + size * by, 3) for home, by in zip(arm.home_deg, away, strict=True)]
+        for away in ((0.6, -0.3, 0.5), (-0.5, 0.2, -0.4))
+    )
+    path.write_text(SMALL.format(name=name, times=value, on_timeout=on_timeout, pick=pick, place=place))
+    return armtempo.plan_sequence(arm, Sequence.load(path, arm))
 
 
 def part_lies_there() -> InjectedFault:

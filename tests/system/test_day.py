@@ -45,7 +45,7 @@ def test_its_commands_one_after_the_other(tmp_path: Path) -> None:
                 assert done.exit_code == 0, f"{line}: {done.output}{done.errors}"
                 outputs[line] = done.output
     assert re.search(r"^state +idle", outputs["armtempo status"], re.MULTILINE), outputs["armtempo status"]
-    assert "finished" in outputs["armtempo run feed.json --speed 60"]
+    assert "finished after 2 whole cycles; parts 2" in outputs["armtempo run feed.json --speed 60"]
     assert "feed *" in outputs["armtempo list"]
     postures = re.findall(r"^\[posture\.(\w+)\]", (folder / "arm.toml").read_text(), re.MULTILINE)
     assert postures == ["above_feeder", "at_feeder", "above_tray"]

@@ -29,8 +29,7 @@ def test_button_then_fetch(tmp_path: Path) -> None:
         on_board("upload", file, "--default")
         on_board("goto", file)  # the first motion
         commandline.wait_for(lambda: ran(port) == 2, "the button's run")
-        output = on_board("fetch")
-        assert "samples-01.csv: complete" in output
+        assert '"repetitions": ["complete"]' in on_board("fetch", "--json")
         assert "fetched" in on_board("fetch", code=1)
     fetched = reader.load(tmp_path / "runs" / "small-001")
     (samples,) = fetched.repetitions

@@ -16,7 +16,9 @@ import armtempo
 import numpy as np
 import pytest
 from armtempo.cli import main
+from armtempo.cli.teach_points import TaughtPoints, by_hand
 from armtempo.errors import InputError
+from armtempo.link.board_messages import Notice
 from armtempo.model import arm_file
 from armtempo.simulator import LaunchOptions, launch
 from click.testing import CliRunner
@@ -117,6 +119,34 @@ def test_by_hand_the_position_comes_from_the_encoders() -> None:
                 board.jog(joint=1, by_deg=1)
         np.testing.assert_allclose(board.posture_deg(), before, atol=0.2)
         board.jog(joint=1, by_deg=1)
+
+
+def test_the_boards_button_takes_a_point() -> None:
+    """A press is told by a notice; those from before do not count, and other notices are none."""
+    with homed() as port, armtempo.connect(port, PAPER) as board:
+        board.configure(PAPER)
+        board.client.session.events.append(Notice("button: refused, error 9"))
+        with board.by_hand() as guided:
+            assert not guided.button_pressed()
+            points = TaughtPoints(PAPER, guided.angles_deg)
+            presses = iter([Notice("a traceback"), Notice("button: refused, error 9"), None])
+
+            class Quiet:
+                """No key is pressed before the button was."""
+
+                def flush(self) -> None:
+                    """There are none."""
+
+                def read(self, timeout_s: float) -> str:
+                    event = next(presses)
+                    if event is None:
+                        return "q"
+                    board.client.session.events.append(event)
+                    return ""
+
+            by_hand(Quiet(), points, guided.button_pressed)
+            assert len(points.points_deg) == 1
+            assert points.points_deg[0] == pytest.approx(list(guided.angles_deg()), abs=0.01)
 
 
 class Terminal:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import itertools
+import json
 from pathlib import Path
 
 import armtempo
 import pytest
+from armtempo.cli import state
 from armtempo.errors import BoardError, LinkError
 from armtempo.simulator import InjectedFault, LaunchOptions, edgelog, launch
 from armtempo_shared.limits import TICK_HZ
@@ -33,6 +35,11 @@ def test_cycles_lead_back_to_the_step(name: str, tmp_path: Path) -> None:
         board.home(ARM)
         end = board.run_sequence(plan, seen.append)
         assert (end.ending, end.cycle) == ("finished", CYCLES)
+        assert board.counters == {"parts": CYCLES}
+        status = commandline.run("status", "--json", folder=tmp_path, ARMTEMPO_PORT=process.port)
+        told = json.loads(status.output)["sequence"]
+        assert (told["name"], told["ending"], told["counters"]) == ("small", "finished", {"parts": CYCLES})
+        assert f"small: finished, step 1, {CYCLES} whole cycles; parts {CYCLES}" in status_lines(board)
         home = [round(joint.home_deg * joint.steps_per_deg) for joint in ARM.driven]
         assert list(board.status().positions.commanded_steps) == home
     assert [state.cycle for state in seen] == sorted(state.cycle for state in seen)
@@ -49,6 +56,11 @@ def test_cycles_lead_back_to_the_step(name: str, tmp_path: Path) -> None:
         begun = power.starts[LEGS * cycle]
         assert begun + plan.legs[0].duration_s * TICK_HZ < grip < power.starts[LEGS * cycle + 1]
     assert len(sequences.pauses_s(power, plan)) == CYCLES - 1
+
+
+def status_lines(board: armtempo.Board) -> list[str]:
+    """What the status command prints of it, without the names of the lines."""
+    return [line[10:] for line in state.lines(board.state())]
 
 
 def test_whatever_ends_it_leaves_a_board_that_says_where(tmp_path: Path) -> None:
@@ -97,7 +109,7 @@ def test_from_the_command_line(tmp_path: Path) -> None:
         f'name = "s"\narm = "{arm}"\nstart = "home"\n[[step]]\nrepeat = 2\n[[step]]\ngoto = [0.5, -60, 40]\n'
     )
     text += '[[step]]\noutput = "gripper"\nto = "closed"\nwait_s = 0.1\n'
-    text += '[[step]]\ngoto = "home"\n[[step]]\nend = "repeat"\n'
+    text += '[[step]]\ngoto = "home"\n[[step]]\ncount = "parts"\n[[step]]\nend = "repeat"\n'
     path.write_text(text)
     told = said("plan", "s.toml")
     assert "cycle (step 1, 2 times):" in told
@@ -105,7 +117,7 @@ def test_from_the_command_line(tmp_path: Path) -> None:
     assert "s: sequence and 2 motions stored" in said("upload", "s.json", "--default")
     listed = said("list", "--arm", arm)
     assert [line.split()[0] for line in listed.splitlines() if line.startswith("s")] == ["s", "s-1", "s-2"]
-    assert "finished after 2 whole cycles" in said("run", "s.json")
+    assert "finished after 2 whole cycles; parts 2" in said("run", "s.json")
     assert "finished after 2 whole cycles" in said("run", "s", "--arm", arm)
     assert "--repeat: a sequence has no such thing" in said("run", "s.json", "--repeat", "2", code=2)
     path.write_text(text.replace("goto = [0.5, -60, 40]", 'goto = "home"'))

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import serial
+from armtempo.errors import LinkError
 from armtempo.simulator import LaunchOptions, VirtualBoard, edgelog, launch
 from armtempo.simulator.temporary_folder import PREFIX
 
@@ -123,6 +124,20 @@ def test_unreadable_file_system_until_it_is_formatted(flash: Path) -> None:
         assert "ENOENT" in ask(board, "os.listdir('/flash')")
         assert ask(board, "os.mount(pyb.Flash(start=0), '/flash'), os.listdir('/flash')") == "None []"
         assert "EPERM" in ask(board, "os.mount(pyb.Flash(start=0), '/flash')")
+
+
+def test_a_system_without_pseudo_terminals_is_told_where_they_come_from(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def none_left() -> tuple[int, int]:
+        raise OSError("out of pty devices")
+
+    monkeypatch.setattr("pty.openpty", none_left)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with pytest.raises(LinkError, match="out of pty devices") as caught:
+        launch()
+    assert "/dev/pts" in caught.value.hint
+    assert not list(tmp_path.iterdir())
 
 
 def test_folder_of_a_killed_launcher_is_swept_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

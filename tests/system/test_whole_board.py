@@ -24,7 +24,7 @@ ARM = Arm.paper()
 HOME_DEG = np.array(ARM.home_deg)
 HOME_STEPS = [round(angle * joint.steps_per_deg) for angle, joint in zip(HOME_DEG, ARM.driven, strict=True)]
 AWAY_DEG = ([3.0, 2.0, -2.0], [-1.0, 1.0, 2.0])
-FEWER = {"micropython": 4, "cpython": 10, "micropython-arm": 12}
+FEWER = {"micropython": 6, "cpython": 10, "micropython-arm": 12}
 """What the moments are divided by; each interpreter has others."""
 CHOSEN = {
     ("micropython-arm", "standalone"): {
@@ -32,9 +32,14 @@ CHOSEN = {
     },
     ("micropython-arm", "prompt"): {"case_boot_leaves_a_serial_port_only"},
     ("micropython-arm", "faults"): {"case_interrupt_dies"},
+    ("cpython", "standalone"): {
+        "case_button_starts_the_default_and_a_host_fetches_its_samples",
+        "case_a_run_by_button_needs_no_host",
+    },
     ("cpython", "prompt"): {"case_replay_typed_at_the_prompt"},
+    ("cpython", "faults"): {"case_host_disappears_and_the_arm_stops", "case_stop", "case_broken_trajectory"},
 }
-"""The emulated interpreter is slow, and CPython has no prompt of its own on a board: what they are to run."""
+"""The emulated interpreter is slow, and CPython never runs on a board: what they are to run."""
 INSIDE = {
     "case_a_failing_start_is_a_fault_not_the_end",
     "case_ctrl_c_stops_a_replay_wherever_it_comes",

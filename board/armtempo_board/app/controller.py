@@ -178,6 +178,14 @@ class Controller(ArmState):
         finally:
             heap.release()
 
+    def _opened(self, name: str, crc: "int | None") -> "MotionFile":
+        try:
+            return self.load(name, crc)
+        except MemoryError:  # beside the pieces that are kept
+            heap.release()
+        self.tidy()
+        return self.load(name, crc)
+
     def _make_room(self) -> None:
         """Keep pieces for the code that a motion needs, before anything that its start needs can lie in them."""
         self.tidy()
@@ -191,7 +199,7 @@ class Controller(ArmState):
         homing = bool(flags & START_HOMING)
         self._make_room()
         try:
-            motion = self.load(name, crc)
+            motion = self._opened(name, crc)
             self.tidy()
             if homing:
                 self._assume(motion, unknown)

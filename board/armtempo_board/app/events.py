@@ -48,6 +48,8 @@ class Events:
 
     def push(self) -> bool:
         """Hand the link what is waiting and has room, one sample at most; whether there was one."""
+        if self._controller.sequence:
+            self._controller.sequence.tell(self._link)
         if self._push_sample():
             return True
         if self._controller.samples.waiting() < 0:

@@ -1,43 +1,104 @@
-"""The command about the sequence, for a board on which one has been started; it allocates nothing."""
+"""What is told of the sequence, for a board on which one has been started: asked for, and row by row; it allocates
+nothing.
+"""
 
-from struct import pack_into
+from array import array
+from struct import calcsize, pack_into
 
+from armtempo_shared.messages import PAYLOAD_AT
 from micropython import const
 
 from armtempo_board.buffers import copy, pack_offsets
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from array import array
     from typing import Any
 
 _ANSWER = const(2)  # of a command's row: the format of its answer
 _ANSWER_AT = const(6)  # in a reply
-_BYTES = const(10)  # of that format
-ENDING, CODE, STEP, ROW, CYCLE = const(0), const(1), const(2), const(3), const(4)
-"""Places in what is told."""
+_MOST = const(0x3FFFFFFF)  # that a counter reaches; a larger number would take memory
+ENDING, CODE, STEP, ROW, CYCLE, PASSED, RUN, VALUE = (
+    const(0),
+    const(1),
+    const(2),
+    const(3),
+    const(4),
+    const(5),
+    const(6),
+    const(7),
+)
+"""Places in what is told: as the messages ``sequence`` and ``row`` name it."""
 
 
 class SequenceCommand:
-    """``told``: how the sequence stands or ended; ``name``: which it is."""
+    """``told``: how the sequence stands or ended; ``name``: which it is; ``counters``: their names."""
 
-    def __init__(self, told: "array[int]", name: bytes) -> None:
-        self._told = told
-        self._name = name
-
-    def attach(self, commands: "dict[int, Any]") -> None:
-        """Put it among the commands that the board knows."""
+    def __init__(self, told: "array[int]", name: bytes, counters: "list[bytes]") -> None:
         from armtempo_shared.table import rows  # here, so that it can be forgotten
 
-        (_, number, fields, _, tail), (_, _, answer, _, _) = rows("S") + rows("T")
-        commands[number] = (self.answer, fields, answer, tail)
+        self._told = told
+        self._name = name
+        self._counters = counters
+        self._counts = array("i", [0] * len(counters))
+        self._sent = 0  # rows that the host was told of
+        for event, number, layout, _, _ in rows("E"):
+            if event == "row":
+                self._number = number
+                self._layout = layout
+                self._size = calcsize(layout)
 
-    def answer(self, commands: "Any", row: tuple, length: int) -> int:
-        """Acts on the command: bytes of its answer."""
+    def attach(self, commands: "dict[int, Any]") -> None:
+        """Put what it answers among the commands that the board knows."""
+        from armtempo_shared.table import rows  # here, so that it can be forgotten
+
+        for asked, (_, _, answer, _, _) in zip(rows("S"), rows("T")):
+            name, number, fields, _, tail = asked
+            commands[number] = (getattr(self, name), fields, answer, tail)
+
+    def count(self, number: int) -> int:
+        """One more of a counter; how many there are then."""
+        self._counts[number] = (self._counts[number] + 1) & _MOST
+        return self._counts[number]
+
+    def sequence(self, commands: "Any", row: tuple, length: int) -> int:
+        """How it stands: bytes of the answer."""
         told = self._told
         reply = commands.link.reply
         pack_into(
             row[_ANSWER], reply, _ANSWER_AT, told[ENDING], told[CODE], told[STEP], told[ROW], told[CYCLE]
         )
-        copy(reply, self._name, pack_offsets(_ANSWER_AT + _BYTES, 0), len(self._name))
-        return _BYTES + len(self._name)
+        return self._named(reply, row, self._name)
+
+    def counter(self, commands: "Any", row: tuple, length: int) -> int:
+        """What a counter stands at: bytes of the answer."""
+        index = commands.link.reader.data[PAYLOAD_AT]
+        count = len(self._counts)
+        is_one = index < count
+        reply = commands.link.reply
+        pack_into(row[_ANSWER], reply, _ANSWER_AT, count, self._counts[index] if is_one else 0)
+        return self._named(reply, row, self._counters[index] if is_one else b"")
+
+    def _named(self, reply: bytearray, row: tuple, name: bytes) -> int:
+        size = calcsize(row[_ANSWER])
+        copy(reply, name, pack_offsets(_ANSWER_AT + size, 0), len(name))
+        return size + len(name)
+
+    def tell(self, link: "Any") -> None:
+        """Send the event of the row that has begun, once, as soon as there is room."""
+        told = self._told
+        passed = told[PASSED]
+        if passed == self._sent or not link.room(self._size):
+            return
+        self._sent = passed
+        pack_into(
+            self._layout,
+            link.out,
+            link.payload(),
+            passed,
+            told[RUN],
+            told[ROW],
+            told[STEP],
+            told[CYCLE],
+            told[VALUE],
+        )
+        link.event(self._number, self._size)

@@ -11,7 +11,17 @@ from armtempo_shared import codes, messages, sequence
 from micropython import const
 
 from armtempo_board import heap
-from armtempo_board.app.sequence_command import CODE, CYCLE, ENDING, ROW, STEP, SequenceCommand
+from armtempo_board.app.sequence_command import (
+    CODE,
+    CYCLE,
+    ENDING,
+    PASSED,
+    ROW,
+    RUN,
+    STEP,
+    VALUE,
+    SequenceCommand,
+)
 from armtempo_board.errors import Refused
 
 TYPE_CHECKING = False
@@ -30,6 +40,7 @@ if TYPE_CHECKING:
         sequence: Any
         rows: dict[int, Any]
         pending: int
+        run_number: int
         arm_crc: int
 
         def store(self) -> Any: ...
@@ -46,10 +57,11 @@ if TYPE_CHECKING:
 _OP, _NUMBER, _VALUE, _AMOUNT, _STEP_OF_ROW = const(0), const(1), const(2), const(3), const(4)
 _START_BYTES = const(18_000)  # of heap that the start of a motion takes at most (docs/memory.md)
 _IDLE = (0, 0, 0, 0, 0)
+_MOST = const(0x3FFFFFFF)  # that a counter reaches; a larger number would take memory
 
 
 class Sequencer:
-    """``told`` says how it stands, also after its end: ending, code, step, row, cycles."""
+    """``told`` says how it stands, also after its end; its places are in ``sequence_command``."""
 
     def __init__(self, controller: "Runner", record: "SequenceFile", name: bytes, rate: int) -> None:
         self._controller = controller
@@ -61,9 +73,13 @@ class Sequencer:
         self._first = array("i", [0] * sequence.MAX_NESTING)  # of each repeat that has begun: its first row
         self._left = array("i", [0] * sequence.MAX_NESTING)  # passes left, 0: for ever
         self._depth = 0
-        self.told = array("i", [sequence.RUNNING, 0, 0, 0, 0])
+        self._judged = bytearray(record.motions)  # 1: the motion was checked in this run
+        self.told = array("i", [sequence.RUNNING] + [0] * VALUE)
         self.stopping = False
-        self._command = SequenceCommand(self.told, name)
+        self._command = SequenceCommand(
+            self.told, name, [record.counter(number) for number in range(record.counters)]
+        )
+        self.tell = self._command.tell
 
     def begin(self) -> None:
         """From the next turn on; Refused where the heap has no room for a motion beside this."""
@@ -112,12 +128,12 @@ class Sequencer:
         self._row = self._record.row(self._next)
         self.told[STEP] = self._row[_STEP_OF_ROW]
         self.told[ROW] = self._next
+        self.told[VALUE] = 0
         self._next += 1
         self._since_ms = time.ticks_ms()
         op, number, value, _, _ = self._row
         if op == sequence.MOVE:
-            name, crc = self._record.motion(number)
-            self._controller.begin_motion(name, crc, self._rate)
+            self._move(number)
         elif op == sequence.OUTPUT:
             self._controller.outputs.set(number, value)
         elif op == sequence.REPEAT:
@@ -128,9 +144,26 @@ class Sequencer:
         elif op == sequence.END:
             self._count(value)
             self._again()
+        elif op == sequence.COUNT:
+            self.told[VALUE] = self._command.count(number)
+        self.told[RUN] = self._controller.run_number
+        self.told[PASSED] = (self.told[PASSED] + 1) & _MOST
+
+    def _move(self, number: int) -> None:
+        """Begin a motion. Its splines are checked once in a run of the sequence: neither its record, whose checksum is
+        compared each time, nor the arm can change meanwhile.
+        """
+        name, crc = self._record.motion(number)
+        engine = self._controller.engine
+        engine.judged = bool(self._judged[number])
+        try:
+            self._controller.begin_motion(name, crc, self._rate)
+        finally:
+            engine.judged = False
+        self._judged[number] = 1
 
     def _count(self, passes: int) -> None:
-        self.told[CYCLE] = (self.told[CYCLE] + passes) & 0x7FFFFFFF
+        self.told[CYCLE] = (self.told[CYCLE] + passes) & _MOST
 
     def _again(self) -> None:
         """The end of a repeat: from its first row again, or on."""

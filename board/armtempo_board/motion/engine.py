@@ -57,6 +57,7 @@ class Engine(EngineParts):
         self._watched_joint = self._background_task = 0
         self._homing = False
         self._in_service = False  # service() or refill() is at work, or has not come to its end
+        self.judged = False  # the next motion is one that was checked before, and nothing has changed since
 
     # before a motion
 
@@ -87,20 +88,27 @@ class Engine(EngineParts):
     def _checked(self, motion: "MotionHead") -> int:
         from armtempo_board.motion import start_check  # here, so that it can be forgotten
 
-        return start_check.check_start(motion, self._joints, self.limits, self.known)
+        return start_check.check_start(motion, self._joints, None if self.judged else self.limits, self.known)
 
     def _override(self, rate: int, brake_ticks: int, duration_ticks: int) -> "Any":
         """The law of the motion's time, with the code that only a motion needs."""
         heap.release()
         heap.forget()
         gc.collect()
-        from armtempo_board.stepgen.override import Override  # here, so that it can be forgotten
-
-        override = Override()
+        try:
+            override = self._new_override()
+        except MemoryError:  # what the first attempt left free lies otherwise
+            gc.collect()
+            override = self._new_override()
         override.begin(rate, brake_ticks, duration_ticks)
         if override.end_ticks() > LONGEST_RUN_TICKS:
             raise Refused(codes.TOO_LONG)
         return override
+
+    def _new_override(self) -> "Any":
+        from armtempo_board.stepgen.override import Override  # here, so that it can be forgotten
+
+        return Override()
 
     def _prefill(self, joint: JointDrive) -> None:
         now_kiticks = self._clock.kiticks()

@@ -15,10 +15,14 @@ _ANY_JOINT = 0
 
 
 def check_start(
-    motion: "MotionHead", joints: "list[JointDrive]", limits: "list[dict[str, int]]", known: int
+    motion: "MotionHead", joints: "list[JointDrive]", limits: "list[dict[str, int]] | None", known: int
 ) -> int:
-    """Duration of the motion, in ticks, or Refused; ``limits`` as the engine has them, ``known``: bit a joint."""
-    _check_splines(motion, joints[_ANY_JOINT], limits)
+    """Duration of the motion, in ticks, or Refused.
+
+    ``limits`` as the engine has them, None for a motion whose splines were checked before; ``known``: bit a joint.
+    """
+    if limits is not None:
+        _check_splines(motion, joints[_ANY_JOINT], limits)
     heap.forget()
     return _check_begin(motion, joints, known)
 

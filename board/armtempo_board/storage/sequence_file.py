@@ -1,20 +1,25 @@
 """A stored sequence, read from its file row by row: it takes no memory while motions run."""
 
-from armtempo_shared.sequence import SequenceRecord
+from armtempo_shared import codes
+from armtempo_shared.sequence import OtherVersionError, SequenceRecord
 
+from armtempo_board.errors import Refused
 from armtempo_board.storage.motion_file import stated_crc
 
 
 class SequenceFile(SequenceRecord):
     """The sequence in the file ``path`` of ``length`` bytes; ``crc``: its checksum.
 
-    Raises SequenceError or MotionError where the record is cut, damaged or of an unknown kind, OSError where the flash
-    fails.
+    Raises SequenceError or MotionError where the record is cut, damaged or of an unknown kind, Refused where it is of
+    another version, OSError where the flash fails.
     """
 
     def __init__(self, path: str, length: int) -> None:
         self._path = path
-        super().__init__(length)
+        try:
+            super().__init__(length)
+        except OtherVersionError:
+            raise Refused(codes.OTHER_VERSION)
         self.crc = stated_crc(path, length)
 
     def part(self, offset: int, size: int) -> bytes:

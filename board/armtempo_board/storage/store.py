@@ -35,7 +35,9 @@ _ST_SIZE = const(6)  # of os.stat
 _F_BSIZE = const(0)  # of os.statvfs
 _F_BAVAIL = const(3)
 _CRC_BYTES = const(4)
-_SEQUENCE_MAGIC = b"ATS1"  # as in armtempo_shared.sequence, which is loaded for sequences only
+_SEQUENCE_MAGIC = (
+    b"ATS"  # of every version, as in armtempo_shared.sequence, which is loaded for sequences only
+)
 _PIECE = const(512)
 _MOST_FREE = const(0x3FFFFFFF)
 

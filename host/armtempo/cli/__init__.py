@@ -13,7 +13,7 @@ from typing import Any
 import click
 
 from armtempo import __version__
-from armtempo.cli import messages
+from armtempo.cli import examples, messages
 from armtempo.cli.interrupts import raised_by_signals
 from armtempo.errors import INTERRUPTED, ArmtempoError
 from armtempo.formats.spelling import did_you_mean
@@ -84,6 +84,7 @@ class LazyGroup(click.Group):
             return None
         module = import_module(f"{__name__}.{name.replace('-', '_')}{'_' * iskeyword(name)}")
         command: click.Command = module.command
+        command.epilog = examples.of(name)
         return command
 
     def resolve_command(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from armtempo.cli import chosen, messages, options
+from armtempo.cli import chosen, messages, options, results
 from armtempo.cli.progress import ProgressBar
 from armtempo.errors import INTERRUPTED, InputError, MissingPackageError
 
@@ -85,6 +85,7 @@ def _sizes(ctx: click.Context, parameter: click.Parameter, value: str) -> list[i
 @click.option("--workers", type=click.IntRange(1), help="Processes; without it one for each core.")
 @click.option("--scheduler", metavar="ADDRESS", help="Use the workers of this Dask scheduler instead.")
 @click.option("--plot/--no-plot", default=True, help="Draw convergence.png (needs matplotlib), or do not.")
+@options.as_json
 @click.pass_context
 def command(
     ctx: click.Context, /, out: Path, workers: int | None, scheduler: str | None, plot: bool, **given: Any
@@ -113,7 +114,24 @@ def command(
         ctx.exit(INTERRUPTED)
     with_paper = given["joint"] == 1 and (arm.source, job.source) == (Arm.paper().source, Job.paper().source)
     found = result_table.rows((store.runs[case] for case in wanted), problem.iterations)
-    _write(out, found, with_paper, plot)
+    written = _write(out, found, with_paper, plot)
+    values = {"folder": str(out), "files": written, "rows": [_values(row) for row in found]}
+    lines = [*result_table.text(found, with_paper), f"written to {out}: {', '.join(written)}"]
+    results.show(given["as_json"], values, lines)
+
+
+def _values(row: Row) -> dict[str, Any]:
+    """Motion times of the searches' best solutions, and what they cost."""
+    return {
+        "algorithm": row.algorithm,
+        "population": row.population,
+        "seeds": row.seeds,
+        "best_s": float(row.best_s),
+        "median_s": float(row.median_s),
+        "worst_s": float(row.worst_s),
+        "evaluations": row.evaluations,
+        "computing_s": float(row.seconds),
+    }
 
 
 def _run(
@@ -131,19 +149,17 @@ def _run(
             progress(number, len(todo))
 
 
-def _write(out: Path, found: Sequence[Row], with_paper: bool, plot: bool) -> None:
-    """Table and curves to the terminal and to files."""
+def _write(out: Path, found: Sequence[Row], with_paper: bool, plot: bool) -> list[str]:
+    """Table and curves to files; gives their names."""
     from armtempo.formats.atomic_file import replace_text
     from armtempo.research.bench import result_table
 
-    for line in result_table.text(found, with_paper):
-        click.echo(line)
     replace_text(out / "table.csv", result_table.table_csv(found, with_paper))
     replace_text(out / "convergence.csv", result_table.curves_csv(found))
     written = ["table.csv", "convergence.csv"]
     if plot:
         written += _plot(out / "convergence.png", found)
-    click.echo(f"written to {out}: {', '.join(written)}")
+    return written
 
 
 def _plot(path: Path, found: Sequence[Row]) -> list[str]:

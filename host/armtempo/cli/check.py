@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from armtempo.cli import chosen, options
+from armtempo.cli import chosen, options, results
 
 if TYPE_CHECKING:
     from armtempo.arm_check import Finding
@@ -86,7 +86,6 @@ def _counted(count: int, what: str) -> str:
 
 
 def _print_json(path: Path, arm: Arm | None, joints: tuple[JointFigures, ...], found: list[Finding]) -> None:
-    import json
     from dataclasses import asdict
 
     values: dict[str, Any] = {
@@ -95,7 +94,7 @@ def _print_json(path: Path, arm: Arm | None, joints: tuple[JointFigures, ...], f
         "joints": [joint.values for joint in joints],
         "findings": [{**asdict(finding), "level": finding.level.value} for finding in found],
     }
-    click.echo(json.dumps(values, indent=1))
+    results.show_json(values)
 
 
 def _draw(arm: Arm, picture: Path) -> None:

@@ -6,13 +6,14 @@ from pathlib import Path
 
 import click
 
-from armtempo.cli import chosen, options
+from armtempo.cli import chosen, options, results
 
 
 @click.command()
 @options.port
 @options.log_traffic
-def command(port: str | None, log_traffic: Path | None) -> None:
+@options.as_json
+def command(port: str | None, log_traffic: Path | None, as_json: bool) -> None:
     """Clear the pending fault, once its cause is gone."""
     from armtempo.robot.stored_motion import fault_name
 
@@ -20,7 +21,6 @@ def command(port: str | None, log_traffic: Path | None) -> None:
         before = board.status()
         board.clear()
         after = board.status()
-    if not before.fault:
-        click.echo("no fault was pending")
-    else:
-        click.echo(f"cleared: {fault_name(before.fault)}; the board is {after.state}")
+    fault = fault_name(before.fault) if before.fault else None
+    line = f"cleared: {fault}; the board is {after.state}" if fault else "no fault was pending"
+    results.show(as_json, {"cleared": fault, "state": after.state}, [line])

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import options, results
 from armtempo.errors import InputError
 from armtempo.project import settings
 from armtempo.project.settings import ProjectSettings, Setting
@@ -35,7 +34,7 @@ def command(
         values = {
             name: {"value": one.value or None, "source": one.source or None} for name, one in found.items()
         }
-        click.echo(json.dumps({"project": str(project.file) if project.file else None, "settings": values}))
+        results.show_json({"project": str(project.file) if project.file else None, "settings": values})
         return
     click.echo(f"project   {project.file or 'none: no armtempo.toml here or above'}")
     for name, one in found.items():

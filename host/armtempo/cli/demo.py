@@ -81,4 +81,4 @@ def _pick_and_place() -> None:
         armtempo.connect(process.port, arm) as board,
     ):
         board.home(arm)
-        sequences.run_and_tell(board, plan)
+        sequences.run_and_tell(board, plan, False, None)

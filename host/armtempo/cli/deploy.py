@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from armtempo.cli import chosen, options
+from armtempo.cli import chosen, options, results
 from armtempo.cli.progress import ProgressBar
 
 
@@ -20,7 +20,8 @@ from armtempo.cli.progress import ProgressBar
 )
 @options.arm
 @options.port
-def command(mpy: bool, package: Path | None, arm_path: Path | None, port: str | None) -> None:
+@options.as_json
+def command(mpy: bool, package: Path | None, arm_path: Path | None, port: str | None, as_json: bool) -> None:
     """Put the board program on a board, or bring it up to date.
 
     mpremote copies what differs below /flash/lib; every file is read back. A boot.py or main.py that was
@@ -33,13 +34,20 @@ def command(mpy: bool, package: Path | None, arm_path: Path | None, port: str | 
 
     if package is not None:
         packages.write(package)
-        click.echo(f"written: {package}")
+        results.show(as_json, {"package": str(package)}, [f"written: {package}"])
         return
     arm = chosen.named_arm(arm_path)
     with ProgressBar("copying") as progress:
-        info = deploy(chosen.port(port), mpy, click.echo, progress)
-    click.echo("the board runs armtempo")
-    for line in engine_room.of_board(info):
-        click.echo(line)
-    if arm is not None:
-        click.echo(f"{chosen.words(arm)}: {engine_room.of_arm(arm, info)}")
+        info = deploy(chosen.port(port), mpy, results.teller(as_json), progress)
+    room = engine_room.of_board(info)
+    values = {
+        "board_id": info.board_id,
+        "virtual": info.virtual,
+        "program_crc": info.program_crc,
+        "protocol": info.protocol,
+        "engine_room_bytes": info.engine_room,
+        "arm": arm.name if arm else None,
+        "arm_fits": engine_room.Room.of_board(info).holds_arm(arm) if arm else None,
+    }
+    of_arm = [f"{chosen.words(arm)}: {engine_room.of_arm(arm, info)}"] if arm else []
+    results.show(as_json, values, ["the board runs armtempo", *room, *of_arm])

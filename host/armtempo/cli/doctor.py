@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from armtempo.cli import chosen, options
+from armtempo.cli import chosen, options, results
 from armtempo.errors import ArmtempoError
 from armtempo.project import settings
 from armtempo.project.settings import ProjectSettings
@@ -41,7 +40,7 @@ def command(arm_path: Path | None, port: str | None, as_json: bool) -> None:
     }
     wrong = any(item.level is doctor.Condition.WRONG for items in parts.values() for item in items)
     if as_json:
-        click.echo(json.dumps({part: [_values(item) for item in items] for part, items in parts.items()}))
+        results.show_json({part: [_values(item) for item in items] for part, items in parts.items()})
     else:
         _print(parts)
     if wrong:

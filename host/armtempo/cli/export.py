@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import options, results
+from armtempo.errors import InputError
 
 
 @click.command()
@@ -30,6 +31,7 @@ from armtempo.cli import options
 )
 @options.force("an existing FILE of other content")
 @options.altered
+@options.as_json
 def command(
     trajectory: Path,
     kind: str,
@@ -38,11 +40,14 @@ def command(
     output: Path | None,
     force: bool,
     altered: bool,
+    as_json: bool,
 ) -> None:
     """Write the trajectory file TRAJECTORY as CSV or as a ROS JointTrajectory, sampled at any rate."""
     from armtempo.formats.atomic_file import check_not_input, check_replaceable, replace_text
     from armtempo.model.plan import Plan
 
+    if as_json and output is None:
+        raise InputError("--json is about the file of -o", "give -o FILE, or leave --json out")
     plan = Plan.load(trajectory, altered)
     text = plan.to_csv(rate) if kind == "csv" else plan.to_ros(rate, frame_id)
     if output is None:
@@ -51,4 +56,5 @@ def command(
         check_not_input(output, (trajectory,))
         check_replaceable(output, text, force)
         replace_text(output, text)
-        click.echo(f"written: {output}")
+        values = {"file": str(output), "format": kind, "rate_hz": rate}
+        results.show(as_json, values, [f"written: {output}"])

@@ -6,16 +6,17 @@ from pathlib import Path
 
 import click
 
-from armtempo.cli import chosen, options
+from armtempo.cli import chosen, options, results
 
 
 @click.command()
-@click.argument("what", required=False)
+@click.argument("what", required=False, shell_complete=options.files)
 @options.out
 @options.arm_of_file
 @options.altered
 @options.port
 @options.log_traffic
+@options.as_json
 def command(
     what: str | None,
     out: Path | None,
@@ -23,6 +24,7 @@ def command(
     altered: bool,
     port: str | None,
     log_traffic: Path | None,
+    as_json: bool,
 ) -> None:
     """Fetch the samples that the board keeps of its last run, such as one that its button started.
 
@@ -36,5 +38,5 @@ def command(
     with chosen.board(port, log_traffic, named) as board:
         board.configure(chosen.arm_of_board(board, named))
         run = board.fetch(plan or what, chosen.runs(out))
-        click.echo(f"{run.name}: {run.path}")
-        click.echo(repetition_line(run.entries[-1]))
+        lines = [f"{run.name}: {run.path}", repetition_line(run.entries[-1])]
+        results.show(as_json, run.to_json(), lines)

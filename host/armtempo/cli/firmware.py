@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from armtempo.cli import options
+from armtempo.cli import options, results
 from armtempo.cli.flash import put_on_board
 from armtempo.cli.progress import ProgressBar
 from armtempo.errors import InputError
+
+if TYPE_CHECKING:
+    from armtempo.deploy.firmware.image import Image
 
 
 @click.command()
@@ -45,6 +49,7 @@ from armtempo.errors import InputError
 )
 @options.flash_port
 @options.flash_tool
+@options.as_json
 def command(
     board: str | None,
     micropython: Path | None,
@@ -53,6 +58,7 @@ def command(
     program: Path | None,
     port: str | None,
     tool: str | None,
+    as_json: bool,
 ) -> None:
     """Build a MicroPython firmware with the board program in it.
 
@@ -63,9 +69,9 @@ def command(
 
     if program is not None:
         frozen.write(program)
-        click.echo(
-            f"written: {program}; for MicroPython's make: FROZEN_MANIFEST={program.resolve() / frozen.MANIFEST}"
-        )
+        manifest = program.resolve() / frozen.MANIFEST
+        line = f"written: {program}; for MicroPython's make: FROZEN_MANIFEST={manifest}"
+        results.show(as_json, {"folder": str(program), "manifest": str(manifest)}, [line])
         return
     from armtempo.deploy import changes
     from armtempo.deploy.firmware import build, checkout
@@ -78,12 +84,26 @@ def command(
     folder = out or Path(f"firmware-{Path(board).name}")
     with ProgressBar("building") as progress:
         made = build.build(micropython, board, folder, progress)
-    click.echo(
+    say = results.teller(as_json)
+    say(
         f"{folder}: MicroPython {made.micropython} for {made.machine}, with the program {made.program_crc:08x}"
     )
     if changes.lacks_pins(made.machine):
         click.echo(f"it cannot drive an arm: {changes.NO_PINS}; {changes.MORE_PINS}", err=True)
     if flash_too:
-        put_on_board(folder, port, tool)
+        put_on_board(folder, port, tool, as_json)
     else:
-        click.echo(f"onto the board: armtempo flash {folder} --port PORT; then armtempo deploy --port PORT")
+        say(f"onto the board: armtempo flash {folder} --port PORT; then armtempo deploy --port PORT")
+    if as_json:
+        results.show_json({"folder": str(folder), **_values(made), "flashed": flash_too})
+
+
+def _values(made: Image) -> dict[str, Any]:
+    from armtempo.deploy import changes
+
+    return {
+        "micropython": made.micropython,
+        "machine": made.machine,
+        "program_crc": made.program_crc,
+        "can_drive_an_arm": not changes.lacks_pins(made.machine),
+    }

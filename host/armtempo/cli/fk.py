@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from armtempo.cli import chosen, options
+from armtempo.cli import chosen, options, results
 
 if TYPE_CHECKING:
     from armtempo.arrays import Array
@@ -44,9 +44,7 @@ def command(
         arm = chosen.arm_or_paper(arm_path)
         angles_deg = _angles(where, arm)
     if as_json:
-        import json
-
-        click.echo(json.dumps(frame_listing.values(arm, angles_deg), indent=1))
+        results.show_json(frame_listing.values(arm, angles_deg))
     else:
         click.echo("\n".join(frame_listing.lines(arm, angles_deg)))
 

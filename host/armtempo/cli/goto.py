@@ -11,13 +11,14 @@ from armtempo.cli.progress import ProgressBar
 
 
 @click.command(context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
-@click.argument("where")
+@click.argument("where", shell_complete=options.files)
 @options.job
 @options.arm_of_board
 @options.replace_arm
 @options.altered
 @options.port
 @options.log_traffic
+@options.as_json
 def command(
     where: str,
     job_path: Path | None,
@@ -26,6 +27,7 @@ def command(
     altered: bool,
     port: str | None,
     log_traffic: Path | None,
+    as_json: bool,
 ) -> None:
     """Move straight to a posture.
 
@@ -44,6 +46,6 @@ def command(
             with ProgressBar("moving") as progress:
                 board.goto(target_deg, progress)
         except Stopped:
-            posture.say_where_it_is(board)
+            posture.say_where_it_is(board, as_json)
             raise
-        posture.say_where_it_is(board)
+        posture.say_where_it_is(board, as_json)

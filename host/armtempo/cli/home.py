@@ -11,7 +11,7 @@ from armtempo.errors import InputError
 
 
 @click.command(context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
-@click.argument("where", default=posture.HOME)
+@click.argument("where", default=posture.HOME, shell_complete=options.files)
 @click.option("--switches", is_flag=True, help="Move to the limit switches instead of taking WHERE on trust.")
 @options.job
 @options.arm_of_board
@@ -19,6 +19,7 @@ from armtempo.errors import InputError
 @options.altered
 @options.port
 @options.log_traffic
+@options.as_json
 def command(
     where: str,
     switches: bool,
@@ -28,6 +29,7 @@ def command(
     altered: bool,
     port: str | None,
     log_traffic: Path | None,
+    as_json: bool,
 ) -> None:
     """Declare where the arm stands.
 
@@ -49,4 +51,4 @@ def command(
             board.home_to_switches(arm)
         else:
             board.home(arm, angles_deg)
-        posture.say_where_it_is(board)
+        posture.say_where_it_is(board, as_json)

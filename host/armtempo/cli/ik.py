@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from armtempo.cli import chosen, options
+from armtempo.cli.results import show_json
 
 if TYPE_CHECKING:
     from armtempo.kinematics.listing import Listing
@@ -187,15 +188,13 @@ def _print_text(solver: PoseSolver, found: Iterable[Listing]) -> None:
 
 
 def _print_json(solver: PoseSolver, found: Iterable[Listing]) -> None:
-    import json
-
     results = list(found)
     values = {
         "arm": solver.arm.name,
         "no_closed_form": solver.refusals,
         "poses": [listing.values for listing in results],
     }
-    click.echo(json.dumps(values, indent=1))
+    show_json(values)
     _fail([number for number, listing in enumerate(results, 1) if not listing.success])
 
 

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from armtempo.cli import chosen, options
+from armtempo.cli import chosen, options, results
+
+if TYPE_CHECKING:
+    from armtempo.model.exchange import ImportedPath
 
 
 @click.command("import")
@@ -29,6 +33,7 @@ from armtempo.cli import chosen, options
     help="Job file to write; without it the job's name with .toml. An existing file of other content is kept.",
 )
 @options.force("an existing FILE of other content")
+@options.as_json
 def command(
     table: Path,
     arm_path: Path | None,
@@ -37,6 +42,7 @@ def command(
     tolerance_deg: float | None,
     output: Path | None,
     force: bool,
+    as_json: bool,
 ) -> None:
     """Make a job file from the CSV file TABLE: a line a via point, a column a driven joint.
 
@@ -56,9 +62,21 @@ def command(
     job_file.of_table(toml_table.parse(text, str(table)), arm)
     check_replaceable(target, text, force)
     replace_text(target, text)
-    if found.thinned_to_deg is not None:
-        click.echo(
-            f"{found.lines} lines thinned to {len(found.via_deg)} via points: a spline through them keeps to the table "
-            f"within {found.thinned_to_deg:g} deg; the times are planned anew"
-        )
-    click.echo(f"written: {target}; plan it with: armtempo plan --job {target}")
+    values = {
+        "file": str(target),
+        "lines": found.lines,
+        "via_points": len(found.via_deg),
+        "thinned_to_deg": found.thinned_to_deg,
+    }
+    results.show(as_json, values, _lines(target, found))
+
+
+def _lines(target: Path, found: ImportedPath) -> list[str]:
+    written = f"written: {target}; plan it with: armtempo plan --job {target}"
+    if found.thinned_to_deg is None:
+        return [written]
+    thinned = (
+        f"{found.lines} lines thinned to {len(found.via_deg)} via points: a spline through them keeps to the table "
+        f"within {found.thinned_to_deg:g} deg; the times are planned anew"
+    )
+    return [thinned, written]

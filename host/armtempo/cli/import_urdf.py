@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from armtempo.cli import options, results
+
 
 @click.command()
 @click.argument("urdf", type=click.Path(dir_okay=False, path_type=Path))
@@ -22,7 +24,8 @@ import click
     "--tip", metavar="LINK", help="Link whose frame is the tool's; without it the chain's only end."
 )
 @click.option("--force", is_flag=True, help="Replace FILE if it is there.")
-def command(urdf: Path, out: Path, base: str | None, tip: str | None, force: bool) -> None:
+@options.as_json
+def command(urdf: Path, out: Path, base: str | None, tip: str | None, force: bool, as_json: bool) -> None:
     """Make an arm file of a URDF's chain of revolute joints: its Denavit-Hartenberg rows and ranges.
 
     The rows are held against the URDF's own forward kinematics at 1000 random postures before anything is
@@ -43,8 +46,19 @@ def command(urdf: Path, out: Path, base: str | None, tip: str | None, force: boo
     text = arm_text.arm_text(chain, fit, urdf.name)
     arm_file.of_table(toml_table.parse(text, str(out)))  # what would not be read again is not written
     replace_text(out, text)
-    click.echo(f"{chain.robot!r}: {len(chain.joints)} joints from link {chain.base!r} to {chain.tip!r}")
-    click.echo(
-        f"worst error at {fit.postures} random postures: {fit.position_mm:.2g} mm and {fit.rotation_deg:.2g} degrees"
-    )
-    click.echo(f"wrote {out}; now put its motors in, then: armtempo check --arm {out}")
+    values = {
+        "file": str(out),
+        "robot": chain.robot,
+        "base": chain.base,
+        "tip": chain.tip,
+        "joints": len(chain.joints),
+        "postures": fit.postures,
+        "worst_position_mm": float(fit.position_mm),
+        "worst_rotation_deg": float(fit.rotation_deg),
+    }
+    lines = [
+        f"{chain.robot!r}: {len(chain.joints)} joints from link {chain.base!r} to {chain.tip!r}",
+        f"worst error at {fit.postures} random postures: {fit.position_mm:.2g} mm and {fit.rotation_deg:.2g} degrees",
+        f"wrote {out}; now put its motors in, then: armtempo check --arm {out}",
+    ]
+    results.show(as_json, values, lines)

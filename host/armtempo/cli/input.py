@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from armtempo.cli import chosen, options
+from armtempo.cli import chosen, options, results
 
 if TYPE_CHECKING:
     from armtempo.model.outputs import Input
@@ -39,10 +39,8 @@ def command(
             if name in (None, entry.name)
         ]
     if as_json:
-        import json
-
         values = [_values(*entry) for entry in found]
-        click.echo(json.dumps(values if name is None else values[0]))
+        results.show_json(values if name is None else values[0])
         return
     if not found:
         chosen.tell(f"arm {chosen.words(board.arm)} has no inputs: write [input.NAME] tables in its file")

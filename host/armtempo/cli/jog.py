@@ -38,6 +38,7 @@ _AXES = click.Choice(["x", "y", "z", "tool-x", "tool-y", "tool-z"])
 @options.replace_arm
 @options.port
 @options.log_traffic
+@options.as_json
 def command(
     joint: str | None,
     axis: str | None,
@@ -48,6 +49,7 @@ def command(
     replace_arm: bool,
     port: str | None,
     log_traffic: Path | None,
+    as_json: bool,
 ) -> None:
     """Jog: move a joint or the tool a little, straight, never beyond a range.
 
@@ -63,6 +65,8 @@ def command(
             "one of --joint, --axis and --about goes with --by",
             "give --joint 2 --by -5, say; or none, for the keys",
         )
+    if not given and as_json:
+        raise InputError("the keys of jog give no JSON", "give --joint, --axis or --about, and --by")
     if not given and not keys.is_terminal():
         raise InputError("the keys of jog need a terminal", "give --joint, --axis or --about, and --by")
     arm = chosen.named_arm(arm_path)
@@ -74,7 +78,7 @@ def command(
         else:
             along = by if axis else None
             board.jog(joint, None if axis else by, axis or about, along, speed / 100)
-        posture.say_where_it_is(board)
+        posture.say_where_it_is(board, as_json)
 
 
 def prepare(board: Board, arm: Arm, replace_arm: bool = False) -> None:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from armtempo.cli import chosen, options, posture
+from armtempo.cli import chosen, options, posture, results
 from armtempo.errors import InputError
 
 if TYPE_CHECKING:
@@ -31,7 +29,7 @@ def command(arm_path: Path | None, port: str | None, log_traffic: Path | None, a
     with chosen.board(port, log_traffic) as board:
         found = board.list()
         if as_json:
-            click.echo(json.dumps({"virtual": board.info.virtual, "motions": [asdict(one) for one in found]}))
+            results.show_json({"virtual": board.info.virtual, "motions": [_values(one) for one in found]})
             return
         arm = _arm(board, arm_path)
         virtual = f"  on {chosen.virtual_words(board.port)}" if board.info.virtual else ""
@@ -40,6 +38,18 @@ def command(arm_path: Path | None, port: str | None, log_traffic: Path | None, a
             click.echo(_line(entry))
             for line in _ends(board, entry, arm):
                 click.echo(f"    {line}")
+
+
+def _values(entry: StoredMotion) -> dict[str, Any]:
+    return {
+        "name": entry.name,
+        "sequence": entry.sequence,
+        "size_bytes": entry.size,
+        "crc": entry.crc,
+        "joints": entry.joints,
+        "duration_s": entry.duration_s,
+        "default": entry.default,
+    }
 
 
 def _arm(board: Board, arm_path: Path | None) -> Arm | None:

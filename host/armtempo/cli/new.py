@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from armtempo.cli import options, results
 from armtempo.errors import InputError
 
 if TYPE_CHECKING:
@@ -48,8 +49,14 @@ _QUESTIONS = {
     "low_deg, high_deg, steps_per_rev, microsteps, gear_ratio, speed_deg_s, encoder_counts.",
 )
 @click.option("--port", default=None, help="Port of the board; 'sim:board' is a virtual one.", metavar="PORT")
+@options.as_json
 def command(
-    folder: Path, like: str | None, urdf: Path | None, joints: tuple[str, ...], port: str | None
+    folder: Path,
+    like: str | None,
+    urdf: Path | None,
+    joints: tuple[str, ...],
+    port: str | None,
+    as_json: bool,
 ) -> None:
     """Make a project folder: arm file, first job, settings, and a page with the next commands.
 
@@ -59,7 +66,7 @@ def command(
 
     if sum(map(bool, (like, urdf, joints))) > 1:
         raise InputError("--like, --urdf and --joint exclude each other", "give one of them")
-    asked = _asked()
+    asked = _asked() and not as_json
     if not (like or urdf or joints):
         if not asked:
             raise InputError("which arm?", "give --like ARM, --urdf FILE, or a --joint for each joint")
@@ -68,10 +75,14 @@ def command(
         arm = _given_arm(folder.name, like, urdf, joints)
     if port is None:
         port = click.prompt("port of the board", default="sim:board") if asked else "sim:board"
-    for path in new_project.write(folder, arm, port):
-        click.echo(f"wrote {path}")
-    _print_figures(arm)
-    click.echo(f"next: cd {folder}; armtempo check; the other commands are in README.md")
+    from armtempo.arm_check import figures
+
+    written = new_project.write(folder, arm, port)
+    joint_figures = figures.of(arm.arm)
+    values = {"files": [str(path) for path in written], "joints": [joint.values for joint in joint_figures]}
+    next_step = f"next: cd {folder}; armtempo check; the other commands are in README.md"
+    lines = [*(f"wrote {path}" for path in written), *figures.table(joint_figures), next_step]
+    results.show(as_json, values, lines)
 
 
 def _asked() -> bool:
@@ -121,10 +132,3 @@ def _ask_joint(number: int, count: int) -> JointEntry:
         "  speed limit, degrees/s", default=min(60.0, float(f"{0.9 * most:.2g}")), type=float
     )
     return replace(entry, speed_deg_s=speed)
-
-
-def _print_figures(arm: ArmText) -> None:
-    from armtempo.arm_check import figures
-
-    for line in figures.table(figures.of(arm.arm)):
-        click.echo(line)

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
 
 FC = TypeVar("FC", bound=Callable[..., Any] | click.Command)
 
@@ -28,8 +31,26 @@ log_traffic = click.option(
 )
 
 
+def files(ctx: click.Context, param: click.Parameter, begun: str) -> list[CompletionItem]:
+    """What the Tab key offers for an argument that may be a file: the shell's own choice of files."""
+    from click.shell_completion import CompletionItem
+
+    return [CompletionItem(begun, type="file")]
+
+
+def _arms(ctx: click.Context, param: click.Parameter, begun: str) -> list[CompletionItem]:
+    """The arms that ship and begin so; else files."""
+    from click.shell_completion import CompletionItem
+
+    from armtempo.model import shipped
+
+    names = [name for name in shipped.files() if name.startswith(begun)]
+    return [CompletionItem(name) for name in names] if names and begun else files(ctx, param, begun)
+
+
 def _arm_option(text: str) -> Callable[[FC], FC]:
-    return click.option("--arm", "arm_path", type=click.Path(path_type=Path), metavar="ARM", help=text)
+    kind = click.Path(path_type=Path)
+    return click.option("--arm", "arm_path", type=kind, metavar="ARM", help=text, shell_complete=_arms)
 
 
 arm = _arm_option(f"{_ARM}. {_ELSE.format('ARM')}.")

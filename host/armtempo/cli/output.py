@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from armtempo.cli import chosen, options
+from armtempo.cli import chosen, options, results
 from armtempo.errors import InputError
 
 if TYPE_CHECKING:
@@ -61,9 +61,7 @@ def command(
 
 
 def _print_json(values: list[dict[str, Any]], name: str | None) -> None:
-    import json
-
-    click.echo(json.dumps(values if name is None else values[0]))
+    results.show_json(values if name is None else values[0])
 
 
 def _values(output: Output, raw: int) -> dict[str, Any]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from armtempo.cli import options, results
 from armtempo.cli.progress import ProgressBar
 
 if TYPE_CHECKING:
@@ -23,7 +25,8 @@ if TYPE_CHECKING:
     metavar="FOLDER",
     help="Where page, searches and run folders go; finished searches are not repeated.",
 )
-def command(quick: bool, out: Path) -> None:
+@options.as_json
+def command(quick: bool, out: Path, as_json: bool) -> None:
     """Repeat the paper: every number beside the printed one, on one page.
 
     The replays run on the virtual board.
@@ -42,11 +45,10 @@ def command(quick: bool, out: Path) -> None:
         *searches.claims(searched),
         *experiment.claims(series),
     ]
-    for claim in claims:
-        click.echo(_line(claim))
     target = out / "paper.html"
     replace_text(target, sheet.render(claims, made, searched, series))
-    click.echo(f"written: {target}")
+    values = {"page": str(target), "claims": [asdict(claim) for claim in claims]}
+    results.show(as_json, values, [*map(_line, claims), f"written: {target}"])
 
 
 def _line(claim: Claim) -> str:

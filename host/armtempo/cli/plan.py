@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from armtempo.cli import chosen, messages, options, sequences
+from armtempo.cli import chosen, messages, options, results, sequences
 from armtempo.cli.progress import ProgressBar
 from armtempo.errors import InputError
 
@@ -94,10 +93,8 @@ def command(
     if file is not None and job_path is not None:
         raise InputError("FILE and --job are both given", "name one of them")
     if file is not None and sequence_file.is_sequence(file):
-        sequences.refuse_job_options(
-            {"split": split, "corridor_curve": corridor_curve, "json": as_json, **changes}
-        )
-        sequences.plan(file, arm_path, output, force)
+        sequences.refuse_job_options({"split": split, "corridor_curve": corridor_curve, **changes})
+        sequences.plan(file, arm_path, output, force, as_json)
         return
     job_path = file or job_path
     arm, job = chosen.arm_and_job(arm_path, job_path)
@@ -105,17 +102,14 @@ def command(
     target = output or Path(f"{job.name}.json")
     check_not_input(target, (job.source, arm.source))
     if corridor_curve:
-        _write_curve(arm, job, target, force)
+        _write_curve(arm, job, target, force, as_json)
         return
     plans = _plans(arm, job, split)
     parts = [target] if len(plans) == 1 else [_part(target, number) for number in range(1, len(plans) + 1)]
     made = dict(zip(parts, plans, strict=True))
     _save(made, force)
-    if as_json:
-        click.echo(json.dumps({"plans": [_json(file, plan) for file, plan in made.items()]}))
-        return
-    for file, plan in made.items():
-        _show(file, plan)
+    values = {"plans": [_json(file, plan) for file, plan in made.items()]}
+    results.show(as_json, values, [line for file, plan in made.items() for line in _lines(file, plan)])
 
 
 def _changed(job: Job, changes: dict[str, Any]) -> Job:
@@ -155,15 +149,12 @@ def _save(made: dict[Path, Plan], force: bool) -> None:
         plan.save(file, force)
 
 
-def _show(file: Path, plan: Plan) -> None:
+def _lines(file: Path, plan: Plan) -> list[str]:
     from armtempo import pipeline
     from armtempo.robot import engine_room
 
-    click.echo(f"arm: {chosen.words(plan.arm)}")
-    for line in pipeline.summary(plan):
-        click.echo(line)
-    click.echo(engine_room.of_arm(plan.arm))
-    click.echo(f"written: {file}")
+    room = engine_room.of_arm(plan.arm)
+    return [f"arm: {chosen.words(plan.arm)}", *pipeline.summary(plan), room, f"written: {file}"]
 
 
 def _json(file: Path, plan: Plan) -> dict[str, Any]:
@@ -172,7 +163,7 @@ def _json(file: Path, plan: Plan) -> dict[str, Any]:
     return {"file": str(file), **json_summary.of_plan(plan)}
 
 
-def _write_curve(arm: Arm, job: Job, target: Path, force: bool) -> None:
+def _write_curve(arm: Arm, job: Job, target: Path, force: bool, as_json: bool) -> None:
     """Table to the terminal and as CSV, and the figure where matplotlib is installed."""
     from armtempo import pipeline
     from armtempo.errors import MissingPackageError
@@ -186,13 +177,13 @@ def _write_curve(arm: Arm, job: Job, target: Path, force: bool) -> None:
     with ProgressBar("planning") as progress:
         points = pipeline.corridor_curve(arm, job, progress)
     unit = unit_of(job)
-    for line in corridor_plot.lines(points, unit):
-        click.echo(line)
     replace_text(table, corridor_plot.csv(points, unit))
+    written = [str(table)]
     try:
         drawing.save(corridor_plot.figure(points, unit, job.name), picture)
+        written.append(str(picture))
     except MissingPackageError as error:
         messages.show(error, "no plot")
-        click.echo(f"written: {table}")
-        return
-    click.echo(f"written: {table}, {picture}")
+    curve = [{f"corridor_{unit}": point.corridor, "duration_s": point.total_s} for point in points]
+    lines = [*corridor_plot.lines(points, unit), f"written: {', '.join(written)}"]
+    results.show(as_json, {"files": written, "curve": curve}, lines)

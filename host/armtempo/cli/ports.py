@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
-
 import click
 
-from armtempo.cli import options
+from armtempo.cli import options, results
 
 
 @click.command()
@@ -21,7 +19,7 @@ def command(as_json: bool) -> None:
         entries = [
             {"port": port.device, "description": port.description, "board": port.board} for port in found
         ]
-        click.echo(json.dumps({"ports": entries}))
+        results.show_json({"ports": entries})
         return
     width = max([24, *(1 + len(port.device) for port in found)])
     for port in found:

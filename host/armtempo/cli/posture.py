@@ -6,9 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
-
-from armtempo.cli import chosen, state
+from armtempo.cli import chosen, results, state
 from armtempo.errors import InputError
 from armtempo.model.posture import HOME as HOME
 from armtempo.model.posture import is_via as is_via
@@ -85,11 +83,11 @@ def _numbers(text: str) -> list[float]:
         ) from None
 
 
-def say_where_it_is(board: Board) -> None:
-    """Print where the arm is, as the commands that place it do in the end."""
-    click.echo("the arm stands at")
-    for line in state.joint_lines(board.state()):
-        click.echo(f"  {line}")
+def say_where_it_is(board: Board, as_json: bool = False) -> None:
+    """Print where the arm is, as the commands that place it do in the end; as JSON what ``status`` prints."""
+    found = board.state()
+    lines = ["the arm stands at", *(f"  {line}" for line in state.joint_lines(found))]
+    results.show(as_json, found.to_json(), lines)
 
 
 def words(angles_deg: Array, arm: Arm) -> str:

@@ -6,16 +6,19 @@ from pathlib import Path
 
 import click
 
-from armtempo.cli import chosen, options
+from armtempo.cli import chosen, options, results
 
 
 @click.command()
 @click.argument("names", nargs=-1, required=True)
 @options.port
 @options.log_traffic
-def command(names: tuple[str, ...], port: str | None, log_traffic: Path | None) -> None:
+@options.as_json
+def command(names: tuple[str, ...], port: str | None, log_traffic: Path | None, as_json: bool) -> None:
     """Remove the stored motions NAMES from the board."""
     with chosen.board(port, log_traffic) as board:
         for name in names:
             board.remove(name)
-            click.echo(f"{name}: removed")
+            results.teller(as_json)(f"{name}: removed")
+    if as_json:
+        results.show_json({"removed": names})

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from armtempo.cli import chosen, options
+from armtempo.cli import chosen, options, results
 
 
 @click.command()
@@ -14,8 +14,9 @@ from armtempo.cli import chosen, options
 @click.argument("new")
 @options.port
 @options.log_traffic
-def command(old: str, new: str, port: str | None, log_traffic: Path | None) -> None:
+@options.as_json
+def command(old: str, new: str, port: str | None, log_traffic: Path | None, as_json: bool) -> None:
     """Rename the stored motion OLD to NEW."""
     with chosen.board(port, log_traffic) as board:
         board.rename(old, new)
-    click.echo(f"{old} is now {new}")
+    results.show(as_json, {"old": old, "new": new}, [f"{old} is now {new}"])

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import click
 
-from armtempo.cli import messages, options
+from armtempo.cli import messages, options, results
 
 
 @click.command()
@@ -20,8 +22,9 @@ from armtempo.cli import messages, options
     "replaced where it is such a page.",
 )
 @options.force("any other file too")
-def command(runs: tuple[Path, ...], out: Path | None, force: bool) -> None:
-    """Write report.html and its figures into the run folder RUNS.
+@options.as_json
+def command(runs: tuple[Path, ...], out: Path | None, force: bool, as_json: bool) -> None:
+    """Write report.html and its figures into the run folder RUNS, of a motion or a sequence.
 
     With two or more run folders, each gets its page, and one more page compares them. One that cannot be read
     is named there.
@@ -30,6 +33,7 @@ def command(runs: tuple[Path, ...], out: Path | None, force: bool) -> None:
     from armtempo.errors import InputError, RunFolderError
     from armtempo.formats.atomic_file import check_replaceable
     from armtempo.robot.run import Run
+    from armtempo.runs.sequence_reader import SequenceRun, is_sequence_run
 
     if len(runs) == 1:
         if out is not None:
@@ -37,16 +41,31 @@ def command(runs: tuple[Path, ...], out: Path | None, force: bool) -> None:
                 "--out goes with two or more runs",
                 "leave it out: the page of one run is report.html in its folder",
             )
-        click.echo(f"wrote {pipeline.report(Run.load(runs[0]))}")
+        sequence = is_sequence_run(runs[0])
+        page = pipeline.report(SequenceRun.load(runs[0]) if sequence else Run.load(runs[0]))
+        results.show(as_json, {"runs": [_values(runs[0], page)], "comparison": None}, [f"wrote {page}"])
         return
     if out is not None:
         check_replaceable(out, "", force or _is_comparison(out), "a page that compares runs is replaced")
+    pages: dict[Path, Path] = {}
     for run in runs:
         try:
-            click.echo(f"wrote {pipeline.report(Run.load(run))}")
+            pages[run] = pipeline.report(Run.load(run))
         except RunFolderError as error:
             messages.show(error)
-    click.echo(f"wrote {pipeline.compare(runs, out)}")
+    compared = pipeline.compare(runs, out)
+    values = {"runs": [_values(run, page) for run, page in pages.items()], "comparison": str(compared)}
+    results.show(as_json, values, [f"wrote {page}" for page in (*pages.values(), compared)])
+
+
+def _values(run: Path, page: Path) -> dict[str, Any]:
+    """The verdict of a page, which is ``good``, ``bad`` or ``open``, with what it rests on."""
+    from armtempo.report import evaluation, sequence_report, verdict
+    from armtempo.runs.sequence_reader import is_sequence_run
+
+    told = sequence_report.verdict_of(run) if is_sequence_run(run) else verdict.of(evaluation.evaluate(run))
+    findings = [asdict(finding) for finding in told.findings]
+    return {"folder": str(run), "page": str(page), "verdict": told.state, "findings": findings}
 
 
 def _is_comparison(page: Path) -> bool:

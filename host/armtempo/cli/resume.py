@@ -8,12 +8,13 @@ import click
 from armtempo_shared.messages import RESUME
 
 from armtempo.cli import options
-from armtempo.cli.speed import change
+from armtempo.cli.speed import Asked, change
 
 
 @click.command()
 @options.port
 @options.log_traffic
-def command(port: str | None, log_traffic: Path | None) -> None:
+@options.as_json
+def command(port: str | None, log_traffic: Path | None, as_json: bool) -> None:
     """Go on along the path at the speed before the pause."""
-    change(port, log_traffic, RESUME, "going on")
+    change(port, log_traffic, Asked("resume", RESUME, "going on"), as_json)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from armtempo.cli import chosen, options, sequences
+from armtempo.cli import chosen, options, results, sequences
 from armtempo.errors import InputError
 
 if TYPE_CHECKING:
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("what")
+@click.argument("what", shell_complete=options.files)
 @click.option("--repeat", type=click.IntRange(1, 99), default=1, show_default=True, help="Repetitions.")
 @click.option("--live", is_flag=True, help="Open a window that follows the run (matplotlib and a display).")
 @options.speed
@@ -47,8 +46,8 @@ def command(
 ) -> None:
     """Replay a motion and record it, or run a sequence.
 
-    WHAT is a trajectory file or the name of a motion on the board; the samples go into a new run folder. Or a
-    planned sequence or the name of one on the board, which is not recorded: step and cycle are shown.
+    WHAT is a trajectory file or the name of a motion on the board, or a planned sequence or the name of one on the
+    board, whose step and cycle are shown. The samples go into a new run folder.
     The arm must be homed ('armtempo home') and stand where the motion begins ('armtempo goto'); a virtual
     board sees to that itself. Between repetitions the arm returns along the same path. Ctrl-C brakes, and so
     does 'armtempo stop' in another terminal; 'armtempo speed', 'pause' and 'resume' work there too.
@@ -56,39 +55,32 @@ def command(
     from armtempo.model.sequence_plan import is_sequence_plan
 
     if chosen.is_file(what) and is_sequence_plan(Path(what)):
-        only_for_motions(repeat, live, out, as_json)
+        only_for_motions(repeat, live)
         sequence = chosen.load_sequence_plan(Path(what), arm_path)
         with chosen.board(port, log_traffic, sequence.arm) as board:
             board.configure(sequence.arm, replace=replace_arm)
-            click.echo(f"arm: {chosen.words(sequence.arm)}")
+            results.teller(as_json)(f"arm: {chosen.words(sequence.arm)}")
             board.speed(percent / 100)
-            sequences.run_and_tell(board, sequence, force)
+            sequences.run_and_tell(board, sequence, force, chosen.runs(out), as_json)
         return
     plan = chosen.load_plan(Path(what), arm_path, altered) if chosen.is_file(what) else None
     named = plan.arm if plan else chosen.named_arm(arm_path)
     with chosen.board(port, log_traffic, named) as board:
         arm = chosen.arm_of_board(board, named)
         board.configure(arm, replace=replace_arm)
-        say = chosen.tell if as_json else click.echo
-        say(f"arm: {chosen.words(arm)}")
+        results.teller(as_json)(f"arm: {chosen.words(arm)}")
         motion = board.upload(plan, replace=force) if plan else what
         board.speed(percent / 100)
         if isinstance(motion, str) and _is_sequence(board, motion):
-            only_for_motions(repeat, live, out, as_json)
-            sequences.run_and_tell(board, motion)
+            only_for_motions(repeat, live)
+            sequences.run_and_tell(board, motion, False, chosen.runs(out), as_json)
             return
         run_and_tell(board, motion, repeat, chosen.runs(out), live, as_json)
 
 
-def only_for_motions(repeat: int, live: bool, out: Path | None, as_json: bool) -> None:
-    """InputError for what a sequence has not: repetitions of its own, a plot, a run folder and what is in it."""
-    given_options = (
-        ("--repeat", repeat != 1),
-        ("--live", live),
-        ("--out", out is not None),
-        ("--json", as_json),
-    )
-    for name, given in given_options:
+def only_for_motions(repeat: int, live: bool) -> None:
+    """InputError for what a sequence has not: repetitions of its own, a plot."""
+    for name, given in (("--repeat", repeat != 1), ("--live", live)):
         if given:
             raise InputError(
                 f"{name}: a sequence has no such thing", "leave it out; repeat is a step of the sequence"
@@ -118,9 +110,5 @@ def run_and_tell(
     virtual = chosen.virtual_words(board.port) if board.info.virtual else ""
     with Live(window=live, where=virtual, aside=as_json) as watcher:
         run = board.run(motion, repeat, out, watcher=watcher)
-    if as_json:
-        click.echo(json.dumps(run.to_json()))
-        return run
-    for line in text_summary.result_lines(run.results):
-        click.echo(line)
+    results.show(as_json, run.to_json(), text_summary.result_lines(run.results))
     return run

@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from armtempo.cli import chosen
+from armtempo.cli import chosen, results
 from armtempo.cli.progress import ProgressBar
 from armtempo.errors import InputError
 from armtempo.formats.text_table import aligned
 
 if TYPE_CHECKING:
     from armtempo.link.board_messages import SequenceState
-    from armtempo.model.sequence_plan import SequencePlan
+    from armtempo.model.sequence_plan import SequencePlan, SequenceRow, Share
     from armtempo.robot.board import Board
 
 
-def plan(file: Path, arm_path: Path | None, output: Path | None, force: bool) -> None:
+def plan(file: Path, arm_path: Path | None, output: Path | None, force: bool, as_json: bool) -> None:
     """Plan a sequence file, say what its time is made of, and write it."""
     import armtempo
     from armtempo.formats.atomic_file import check_not_input
@@ -34,10 +36,8 @@ def plan(file: Path, arm_path: Path | None, output: Path | None, force: bool) ->
     with ProgressBar("planning") as progress:
         planned = armtempo.plan_sequence(arm, sequence, progress)
     planned.save(target, force)
-    click.echo(f"arm: {chosen.words(arm)}")
-    for line in lines(planned):
-        click.echo(line)
-    click.echo(f"written: {target}")
+    found = [f"arm: {chosen.words(arm)}", *lines(planned), f"written: {target}"]
+    results.show(as_json, {"file": str(target), **values(planned)}, found)
 
 
 def refuse_job_options(options: dict[str, Any]) -> None:
@@ -50,22 +50,49 @@ def refuse_job_options(options: dict[str, Any]) -> None:
         )
 
 
+def values(planned: SequencePlan) -> dict[str, Any]:
+    """The same as ``lines``, as plain values."""
+    from armtempo.model.sequence_plan import PAUSE_S
+
+    cycles = [
+        {"step": cycle.step, "times": cycle.times or None, **_share(cycle.share)} for cycle in planned.cycles
+    ]
+    return {
+        "name": planned.name,
+        "arm": planned.arm.name,
+        "steps": [
+            {"step": row.step, "does": row.words, "duration_s": _duration_s(planned, row)}
+            for row in planned.rows
+        ],
+        "cycles": cycles,
+        "total": None if planned.total is None else _share(planned.total),
+        "pause_s": PAUSE_S,
+    }
+
+
+def _share(share: Share) -> dict[str, Any]:
+    return {"duration_s": share.total_s, **asdict(share)}
+
+
+def _duration_s(planned: SequencePlan, row: SequenceRow) -> float | None:
+    """What a row takes; None where it takes no time of its own."""
+    from armtempo_shared.sequence import MOVE, WAIT
+
+    if row.op == MOVE:
+        return float(planned.legs[row.number].duration_s)
+    return row.amount / 1000 if row.op == WAIT else None
+
+
 def lines(planned: SequencePlan) -> list[str]:
     """Each row with its time, the cycle, the whole."""
-    from armtempo_shared.sequence import END, MOVE, REPEAT, WAIT
+    from armtempo_shared.sequence import END, REPEAT
 
     from armtempo.model.sequence_plan import PAUSE_S
 
     rows, depth = [("step", "", "seconds")], 0
     for row in planned.rows:
         depth -= row.op == END
-        taken = (
-            planned.legs[row.number].duration_s
-            if row.op == MOVE
-            else row.amount / 1000
-            if row.op == WAIT
-            else None
-        )
+        taken = _duration_s(planned, row)
         rows.append((str(row.step), "  " * depth + row.words, "" if taken is None else f"{taken:.3f}"))
         depth += row.op == REPEAT
     width = max(len(words) for _, words, _ in rows)
@@ -75,7 +102,7 @@ def lines(planned: SequencePlan) -> list[str]:
         found.append(f"cycle (step {cycle.step}, {times}): {_made_of(cycle.share)}")
     if planned.total is not None:
         found.append(f"in all: {_made_of(planned.total)}")
-    found.append(f"pause between two motions: {PAUSE_S:g} s; waits for inputs are not counted")
+    found.append(f"pause between two motions: about {PAUSE_S:g} s; waits for inputs are not counted")
     return found
 
 
@@ -90,17 +117,20 @@ def _made_of(share: Any) -> str:
 class Shown:
     """A watcher that keeps one line on a terminal, or says each new cycle elsewhere."""
 
-    def __init__(self, planned: SequencePlan | None) -> None:
+    def __init__(self, planned: SequencePlan | None, say: Callable[[str], object]) -> None:
+        self._say = say
         self._rows = planned.rows if planned else ()
         self._cycle = -1
+        self.last: SequenceState | None = None
 
     def __call__(self, state: SequenceState) -> None:
         """Show where the sequence stands."""
+        self.last = state
         doing = f": {self._rows[state.row].words}" if state.row < len(self._rows) else ""
         if sys.stderr.isatty():
             click.echo(f"\r\x1b[Kcycle {state.cycle}, step {state.step}{doing}", nl=False, err=True)
         elif state.cycle != self._cycle:
-            click.echo(f"cycle {state.cycle}, step {state.step}{doing}")
+            self._say(f"cycle {state.cycle}, step {state.step}{doing}")
         self._cycle = state.cycle
 
     def close(self) -> None:
@@ -109,23 +139,51 @@ class Shown:
             click.echo(err=True)
 
 
-def run_and_tell(board: Board, sequence: SequencePlan | str, replace: bool = False) -> SequenceState:
-    """Run a sequence and print where it stands and how it ended; exit code 1 where an input did not come."""
-    from armtempo.errors import ArmtempoError
+def run_and_tell(
+    board: Board, sequence: SequencePlan | str, replace: bool, out: Path | None, as_json: bool = False
+) -> SequenceState:
+    """Run a sequence into a run folder below ``out`` (None: nowhere), print where it stands and how it ended.
+
+    ``as_json``: the end as JSON. Exit code 1 where an input did not come.
+    """
+    from armtempo.cli.state import counted
+    from armtempo.errors import ArmtempoError, LinkError
     from armtempo.robot.sequence_run import cycles, where
     from armtempo.robot.stop_request import Stopped
 
-    shown = Shown(sequence if not isinstance(sequence, str) else None)
+    say = results.teller(as_json)
+    shown = Shown(sequence if not isinstance(sequence, str) else None, say)
     try:
-        end = board.run_sequence(sequence, shown, replace=replace)
+        end = board.run_sequence(sequence, shown, replace=replace, out=out)
     except Stopped:
         shown.close()
-        click.echo(f"stopped {where(board.client.sequence())}")
+        say(f"stopped {where(board.client.sequence())}{counted(board.counters)}")
         raise
+    except LinkError:
+        shown.close()
+        if shown.last is not None:
+            say(f"last heard of {where(shown.last)}")
+        raise
+    finally:
+        if (recorded := board.last_sequence) is not None and out is not None:
+            say(f"recorded in {recorded.path}")
     shown.close()
     if end.ending == "timed_out":
         raise ArmtempoError(
             f"an input did not come in time {where(end)}", "see why, 'armtempo goto' its start, run it again"
         )
-    click.echo(f"{end.ending} after {cycles(end)}")
+    result = _as_json(end, board, recorded.path if recorded else None)
+    results.show(as_json, result, [f"{end.ending} after {cycles(end)}{counted(board.counters)}"])
     return end
+
+
+def _as_json(end: SequenceState, board: Board, folder: Path | None) -> dict[str, Any]:
+    """How it ended, for other programs."""
+    return {
+        "name": end.name,
+        "folder": str(folder) if folder else "",
+        "ending": end.ending,
+        "step": end.step,
+        "cycles": end.cycle,
+        "counters": board.counters,
+    }

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
+from armtempo_shared.messages import RESUME
 
-from armtempo.cli import chosen, options
+from armtempo.cli import chosen, options, results
 from armtempo.errors import LinkError, PortError
 
 _PORT_FREE_S = 5.0
@@ -19,7 +21,8 @@ _LOOK_S = 0.1
 @click.argument("percent", type=click.FloatRange(1, 100))
 @options.port
 @options.log_traffic
-def command(percent: float, port: str | None, log_traffic: Path | None) -> None:
+@options.as_json
+def command(percent: float, port: str | None, log_traffic: Path | None, as_json: bool) -> None:
     """Let what moves go on at PERCENT of its planned speed.
 
     The arm stays on its path; the speed goes over smoothly, in the time in which the motion can brake. Where another
@@ -27,26 +30,40 @@ def command(percent: float, port: str | None, log_traffic: Path | None) -> None:
     """
     from armtempo.robot.speed import permille
 
-    change(port, log_traffic, permille(percent / 100), f"{percent:g} % of the planned speed")
+    asked = Asked("speed", permille(percent / 100), f"{percent:g} % of the planned speed")
+    change(port, log_traffic, asked, as_json)
 
 
-def change(port: str | None, log_traffic: Path | None, rate: int, said: str) -> None:
-    """Ask for a rate in thousandths, through the program that has the port where there is one, and say so."""
+@dataclass(frozen=True)
+class Asked:
+    """A change of speed."""
+
+    what: str
+    """The command."""
+    rate: int
+    """In thousandths of the planned speed, or RESUME."""
+    words: str
+
+
+def change(port: str | None, log_traffic: Path | None, asked: Asked, as_json: bool) -> None:
+    """Ask for a rate, through the program that has the port where there is one, and say so."""
     name = chosen.port(port, others=True)
     limit_s = time.monotonic() + _PORT_FREE_S
     while True:
         try:
-            who = _asked(name, log_traffic, rate)
+            program = _ask(name, log_traffic, asked.rate)
             break
         except PortError:  # the other program is about to answer for the port, or to give it up
             if time.monotonic() > limit_s:
                 raise
             time.sleep(_LOOK_S)
-    click.echo(said + who)
+    percent = None if asked.rate == RESUME else asked.rate / 10
+    values = {"asked": asked.what, "speed_percent": percent, "port": name, "program": program}
+    results.show(as_json, values, [asked.words + (f", through {program}" if program else "")])
 
 
-def _asked(name: str, log_traffic: Path | None, rate: int) -> str:
-    """Ask for the rate; through whom, in words."""
+def _ask(name: str, log_traffic: Path | None, rate: int) -> str | None:
+    """Ask for the rate; through which program, None where over the port itself."""
     from armtempo.robot import shared_board
     from armtempo.robot.speed import change_speed
 
@@ -54,9 +71,9 @@ def _asked(name: str, log_traffic: Path | None, rate: int) -> str:
     if shared is not None:
         with shared:
             shared.speed(rate)
-            return f", through {shared.program}"
+            return shared.program
     with chosen.board(name, log_traffic) as board:
         if not board.status().moving:
             raise LinkError("nothing moves", "'armtempo run --speed' begins at a lower speed")
         change_speed(board.client, rate)
-    return ""
+    return None

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from armtempo.cli import chosen
-from armtempo.robot.board_state import BoardState, JointState
+from armtempo.robot.board_state import BoardState, JointState, SequenceStand
 
 
 def lines(state: BoardState) -> list[str]:
@@ -28,8 +30,21 @@ def motion_lines(state: BoardState) -> list[str]:
     if state.fault:
         found.append(f"fault     {state.fault}; see 'armtempo clear'")
     found += [f"          {line}" for line in joint_lines(state)]
+    if state.sequence:
+        found.append(f"sequence  {_sequence(state.sequence)}")
     found.append(f"link      {_link(state)}")
     return found
+
+
+def _sequence(stand: SequenceStand) -> str:
+    """Which it is, where it stands, what it has counted."""
+    cycles = f"{stand.cycle} whole cycle{'s' * (stand.cycle != 1)}"
+    return f"{stand.name}: {stand.ending}, step {stand.step}, {cycles}{counted(stand.counters)}"
+
+
+def counted(counters: Mapping[str, int]) -> str:
+    """What counters stand at, to go on with; "" without any."""
+    return "".join(f"; {name} {value}" for name, value in counters.items())
 
 
 def _speed(state: BoardState) -> str:

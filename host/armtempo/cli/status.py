@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from armtempo.cli import chosen, options, state
+from armtempo.cli import chosen, options, results, state
 from armtempo.errors import InputError
 
 if TYPE_CHECKING:
@@ -39,7 +38,7 @@ def command(arm_path: Path | None, port: str | None, log_traffic: Path | None, a
             found = board.state()
     found = _named(found, arm_path)
     if as_json:
-        click.echo(json.dumps(found.to_json()))
+        results.show_json(found.to_json())
         return
     for line in state.lines(found):
         click.echo(line)

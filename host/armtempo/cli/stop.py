@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from armtempo.cli import chosen, options
+from armtempo.cli import chosen, options, results
 from armtempo.errors import LinkError, NoAnswerError, PortError
 from armtempo.project import quick_stop
 from armtempo.project.quick_stop import StopAnswer
@@ -78,9 +78,7 @@ def _directly(port: str, log_traffic: Path | None, now: bool, patience_s: float)
 
 def _show(found: BoardState, as_json: bool) -> None:
     if as_json:
-        import json
-
-        click.echo(json.dumps(found.to_json()))
+        results.show_json(found.to_json())
         return
     from armtempo.cli import state
 

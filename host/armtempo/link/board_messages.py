@@ -173,13 +173,28 @@ class Fault:
 
 
 @dataclass(frozen=True)
+class RowBegun:
+    """A row of the sequence that runs has begun."""
+
+    passed: int
+    """How many had, since its start, with this one."""
+    run: int
+    """Of the last motion that it has started; of this row, where it moves."""
+    row: int
+    step: int
+    cycle: int
+    value: int
+    """Of the counter, where the row counts."""
+
+
+@dataclass(frozen=True)
 class Notice:
     """A text from the board program, such as a traceback."""
 
     text: str
 
 
-Event = Sample | Done | Fault | Notice
+Event = Sample | Done | Fault | RowBegun | Notice
 
 
 def state_name(number: int) -> str:
@@ -224,6 +239,8 @@ def decode(entry: tuple[Any, ...], payload: bytes) -> tuple[tuple[Any, ...], Any
 def _event(name: str, values: tuple[Any, ...], tail: Any) -> Event:
     if name == "notice":
         return Notice(tail)
+    if name == "row":
+        return RowBegun(*values)
     kinds: dict[str, type[Sample | Done | Fault]] = {"sample": Sample, "done": Done, "fault": Fault}
     if name not in kinds:
         raise wire.WireError("not an event")

@@ -210,6 +210,20 @@ class Client:
             return board_messages.SequenceState("none", 0, 0, 0, 0, "")
         return board_messages.SequenceState(board_messages.ending_name(ending), code, step, row, cycle, name)
 
+    def counters(self) -> dict[str, int]:
+        """What the counters of the sequence stand at, or those of the last one since the board's start, by name."""
+        found: dict[str, int] = {}
+        try:
+            while True:
+                (count, value), name = self.session.command("counter", (len(found),))
+                if len(found) >= count:
+                    return found
+                found[name] = value
+        except BoardError as error:
+            if error.code != wire.ERROR_CODES["unknown_command"]:
+                raise
+            return found
+
     def home(self, steps: Sequence[int | None]) -> None:
         """Declare the positions of the joints, in steps; None leaves a joint as it is."""
         mask = sum(1 << joint for joint, value in enumerate(steps) if value is not None)

@@ -20,7 +20,7 @@ def refusal(what: str, code: int, joint: int = 255, value: int = 0) -> BoardErro
     where = f" (joint {joint + 1})" if joint < MAX_JOINTS else ""
     if name == "too_fast":
         meaning = _FASTER_JOINT if where else _FASTER_TOGETHER
-    detail = f" [{_words(name, where, value)}]" if value else ""
+    detail = f" [{_words(name, where, value)}]" if value or name == "pin_taken" else ""
     return BoardError(f"{what}: {meaning}{where}{detail}", cure, code)
 
 
@@ -29,4 +29,19 @@ def _words(name: str, where: str, value: int) -> str:
         return f"its numbers reach {value}"
     if name == "too_long":
         return f"it takes {MAX_MOTION_BYTES} bytes at most"
+    if name == "pin_taken":
+        return _pin(value)
     return f"{VALUES[name]}: {value}" if name in VALUES else str(value)
+
+
+def _pin(value: int) -> str:
+    """A pin by its number in the arm record, and what the board takes it for."""
+    from armtempo.model import engine_pins  # reads the board program's table: only where it is needed
+
+    pin = f"P{chr(ord('A') + value // 16)}{value % 16}"
+    uses = engine_pins.uses(pin)
+    return (
+        f"{pin}: {', '.join(uses)}"
+        if uses
+        else f"{pin}: it, or its timer, has another output or input already"
+    )

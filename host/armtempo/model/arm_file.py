@@ -92,10 +92,11 @@ def of_table(top: Table) -> Arm:
 
 def _postures(tables: Table, arm: Arm) -> tuple[ArmPosture, ...]:
     """[posture.NAME]: ``angles_deg``, or a tool pose as in a job."""
-    return tuple(_posture(tables, name, arm) for name in tables.names())
+    return tuple(posture(tables, name, arm) for name in tables.names())
 
 
-def _posture(tables: Table, name: str, arm: Arm) -> ArmPosture:
+def posture(tables: Table, name: str, arm: Arm) -> ArmPosture:
+    """The posture ``name`` of the table [posture]; InputError where it is none that the arm can take."""
     where = f"{tables.file}: posture.{name}"
     table = tables.table(name)
     if problem := named.name_problem(name):

@@ -10,6 +10,7 @@ from typing import Any
 
 from armtempo.model.arm import Arm
 
+_SINGLE = {"ENABLE of the drivers": "ENABLE", "the button": "BUTTON", "the E-stop": "ESTOP"}
 ENGINE_TIMERS = {2: "the step pulses", 5: "the step pulses", 6: "the step pulses"}
 
 
@@ -50,6 +51,20 @@ def taken_pins(arm: Arm) -> dict[str, str]:
             if switch is not None:
                 found[pins["LIMIT"][switch - 1]] = f"limit switch {switch}"
     return {f"P{pin}": use for pin, use in found.items()}
+
+
+def uses(pin: str) -> list[str]:
+    """All that the program can take a pin (``"PE12"``) for, whatever the arm."""
+    pins, name = table(), pin.removeprefix("P")
+    found = [words for words, key in _SINGLE.items() if pins[key] == name]
+    found += ["a LED of the board"] * (name in pins["LEDS"])
+    for number, step in enumerate(pins["STEP"], 1):
+        found += [f"STEP of channel {number}"] * (name == step[0])
+    found += [f"DIR of channel {number}" for number, other in enumerate(pins["DIR"], 1) if other == name]
+    found += [f"encoder {number}" for number, row in enumerate(pins["ENCODER"], 1) if name in row[1:3]]
+    return found + [
+        f"limit switch {number}" for number, other in enumerate(pins["LIMIT"], 1) if other == name
+    ]
 
 
 def taken_timers(arm: Arm) -> dict[int, str]:

@@ -96,12 +96,12 @@ def _bounds(top: Table) -> tuple[float, float] | None:
     return low, high
 
 
-def name_of(top: Table, longest: int = MAX_NAME) -> str:
-    """The ``name`` of a job or sequence, which the board can take for that of a motion."""
-    name = top.text("name")
+def name_of(top: Table, longest: int = MAX_NAME, key: str = "name") -> str:
+    """The ``name`` of a job or sequence, or what else the board is to keep as a name."""
+    name = top.text(key)
     allowed = string.ascii_letters + string.digits + "-_"
     if len(name) > longest or any(letter not in allowed for letter in name):
-        raise top.fail("name", f"at most {longest} of the characters a-z A-Z 0-9 - _")
+        raise top.fail(key, f"at most {longest} of the characters a-z A-Z 0-9 - _")
     return name
 
 

@@ -8,19 +8,12 @@ from pathlib import Path
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
+from armtempo.model.posture import ArmPosture
 
 STOP, FAULT, NEXT = "stop", "fault", "next"
 ON_TIMEOUT = (STOP, FAULT, NEXT)
 """What happens where an input does not come in time: the sequence ends in order, or by a fault, or goes on."""
 FOR_EVER = "for ever"
-
-
-@dataclass(frozen=True)
-class NamedAngles:
-    """Angles of the driven joints (J,), and what the user calls them."""
-
-    name: str
-    angles_deg: tuple[float, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,50 +24,50 @@ class SourceMotion:
     source: Job | Plan
 
 
+@dataclass(frozen=True)
+class Placed:
+    """A step of a sequence file."""
+
+    where: str
+    """File and step, for messages."""
+    step: int
+    """Its number in the sequence's own file, from 1."""
+
+
 @dataclass(frozen=True, eq=False)
-class Goto:
+class Goto(Placed):
     """Move straight to a posture, or to where a motion begins."""
 
-    where: str
-    step: int
-    target: NamedAngles | SourceMotion
+    target: ArmPosture | SourceMotion
 
 
 @dataclass(frozen=True, eq=False)
-class RunMotion:
+class RunMotion(Placed):
     """Run a motion from its beginning."""
 
-    where: str
-    step: int
     motion: SourceMotion
 
 
 @dataclass(frozen=True)
-class SetOutput:
+class SetOutput(Placed):
     """Set an output; ``raw`` as the board takes it, ``words`` as the user wrote it."""
 
-    where: str
-    step: int
     number: int
     raw: int
     words: str
 
 
 @dataclass(frozen=True)
-class Wait:
+class Wait(Placed):
     """Wait for a time."""
 
-    where: str
-    step: int
     wait_s: float
 
 
 @dataclass(frozen=True)
-class WaitInput:
+class WaitInput(Placed):
     """Wait until an input is active, or not; ``timeout_s`` 0: for ever."""
 
-    where: str
-    step: int
     number: int
     active: bool
     timeout_s: float
@@ -83,17 +76,21 @@ class WaitInput:
 
 
 @dataclass(frozen=True)
-class Repeat:
+class Count(Placed):
+    """Add one to a counter."""
+
+    counter: str
+
+
+@dataclass(frozen=True)
+class Repeat(Placed):
     """Steps that come ``times`` times, 0: for ever."""
 
-    where: str
-    step: int
     times: int
     steps: tuple[Step, ...]
 
 
-Step = Goto | RunMotion | SetOutput | Wait | WaitInput | Repeat
-"""``where`` names file and step for messages; ``step`` is the number in the sequence's own file, from 1."""
+Step = Goto | RunMotion | SetOutput | Wait | WaitInput | Count | Repeat
 
 
 @dataclass(frozen=True)
@@ -101,7 +98,7 @@ class Sequence:
     """What the arm is to do, step by step."""
 
     name: str
-    start: NamedAngles | None
+    start: ArmPosture | None
     """Where it begins; None: where its first step that moves says."""
     steps: tuple[Step, ...]
     source: str

@@ -13,14 +13,15 @@ from armtempo.errors import InputError
 from armtempo.formats import toml_table
 from armtempo.formats.spelling import did_you_mean
 from armtempo.formats.toml_table import Table
-from armtempo.model import job_file, trajectory_file
+from armtempo.model import arm_file, job_file, trajectory_file
 from armtempo.model.arm import Arm
+from armtempo.model.posture import ArmPosture
 from armtempo.model.sequence import (
     FOR_EVER,
     ON_TIMEOUT,
     STOP,
+    Count,
     Goto,
-    NamedAngles,
     Repeat,
     RunMotion,
     Sequence,
@@ -35,7 +36,7 @@ LONGEST_NAME = 20
 """Of a sequence: its motions are stored as NAME-1, NAME-2 …, within the board's 24 characters."""
 HOME = "home"
 _MOST_S = MAX_WAIT_MS / 1000
-_KINDS = ("goto", "run", "output", "wait_s", "wait_input", "repeat", "end", "call")
+_KINDS = ("goto", "run", "output", "wait_s", "wait_input", "count", "repeat", "end", "call")
 
 
 def is_sequence(path: Path | str) -> bool:
@@ -64,19 +65,17 @@ def arm_named(path: Path | str) -> Path | None:
     return beside if beside.is_file() else named
 
 
-def _postures(top: Table, arm: Arm) -> dict[str, NamedAngles]:
+def _postures(top: Table, arm: Arm) -> dict[str, ArmPosture]:
     """The arm's postures by name, the arm's home, and those of the sequence itself."""
-    found = {HOME: NamedAngles(HOME, tuple(float(angle) for angle in arm.home_deg))}
-    for posture in arm.postures:
-        if isinstance(posture.where, tuple):
-            found[posture.name] = NamedAngles(posture.name, posture.where)
+    found = {HOME: ArmPosture(HOME, tuple(float(angle) for angle in arm.home_deg))}
+    found.update((posture.name, posture) for posture in arm.postures)
     own = top.table("posture")
-    for name in own.rest() if own else ():
-        table = own.table(name) if own else None
-        if table is None or name in found:
+    if own is None:
+        return found
+    for name in own.names():
+        if name in found:
             raise InputError(f"{top.file}: posture.{name} is there already", "choose another name")
-        found[name] = NamedAngles(name, job_file.angles(table, "angles_deg", arm))
-        table.done()
+        found[name] = arm_file.posture(own, name, arm)
     return found
 
 
@@ -86,7 +85,7 @@ class _Reader:
 
     arm: Arm
     file: Path
-    postures: dict[str, NamedAngles]
+    postures: dict[str, ArmPosture]
     callers: tuple[Path, ...] = ()
     number: int = 0
     """Of the calling step, for all steps of a file that was called; 0: each has its own."""
@@ -143,25 +142,20 @@ class _Reader:
 
     def goto(self, table: Table, step: int) -> list[Step]:
         only(table, "goto")
-        target: NamedAngles | SourceMotion
+        target: ArmPosture | SourceMotion
         if table.has("goto") and str(table.peek("goto")).endswith((".toml", ".json")):
             target = self._motion(table, "goto")
         else:
             target = self.posture(table, "goto")
         return [Goto(_place(table), step, target)]
 
-    def posture(self, table: Table, key: str) -> NamedAngles:
+    def posture(self, table: Table, key: str) -> ArmPosture:
         """A posture by name, or as angles."""
         if not isinstance(table.peek(key), str):
             angles = job_file.angles(table, key, self.arm)
-            return NamedAngles(", ".join(f"{angle:g}" for angle in angles) + "°", angles)
+            return ArmPosture(", ".join(f"{angle:g}" for angle in angles) + "°", angles)
         name = table.text(key)
         if name not in self.postures:
-            if any(posture.name == name for posture in self.arm.postures):
-                raise InputError(
-                    f"{_place(table)}{key} = {name!r}: a tool pose of the arm file; a sequence goes to angles",
-                    f"give its angles_deg ('armtempo goto {name}', then 'armtempo teach --posture' another name)",
-                )
             near = did_you_mean(name, self.postures)
             raise InputError(
                 f"{_place(table)}{key} = {name!r}: there is no such posture{near}",
@@ -210,6 +204,10 @@ class _Reader:
         words = name if active else f"{name} not"
         return [WaitInput(place, step, number, active, timeout_s, then, words)]
 
+    def count(self, table: Table, step: int) -> list[Step]:
+        only(table, "count")
+        return [Count(_place(table), step, job_file.name_of(table, key="count"))]
+
     def call(self, table: Table, step: int) -> list[Step]:
         only(table, "call")
         path = (self.file.parent / table.text("call")).resolve()
@@ -238,6 +236,7 @@ _GETTERS: dict[str, _Getter] = {
     "output": _Reader.output,
     "wait_s": _Reader.wait,
     "wait_input": _Reader.wait_input,
+    "count": _Reader.count,
     "call": _Reader.call,
 }
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from armtempo_shared import sequence as record
-from armtempo_shared.sequence import END, MOVE, REPEAT, WAIT
+from armtempo_shared.sequence import COUNT, END, MOVE, REPEAT, WAIT
 
 from armtempo.errors import InputError
 from armtempo.formats import json_codec
@@ -20,9 +20,10 @@ from armtempo.model.arm import Arm
 from armtempo.splines.trajectory import Trajectory
 
 FORMAT = "armtempo sequence"
-VERSION = 1
-PAUSE_S = 0.07
-"""From the end of a motion to the beginning of the next, on the virtual board: host/docs/sequences.md."""
+VERSION = 2
+PAUSE_S = 0.35
+"""About that from the end of a motion to the beginning of the next, on a board with the program in its firmware, once
+each motion was checked; a virtual board takes 0.07: host/docs/sequences.md."""
 _AGAIN = "plan it again"
 _RULE = "a sequence's plan is replaced by one of a sequence of the same name"
 
@@ -79,6 +80,8 @@ class SequencePlan:
     legs: tuple[Trajectory, ...]
     """Its motions, each once; NAME-1, NAME-2 … on the board."""
     rows: tuple[SequenceRow, ...]
+    counters: tuple[str, ...]
+    """Their names, by their number in the rows."""
     versions: Mapping[str, str]
 
     @property
@@ -153,8 +156,9 @@ class SequencePlan:
             )
         plan: SequencePlan = json_codec.decode(cls, content["sequence"], f"{path}: sequence")
         arm_json.check(plan.arm, f"{path}: arm", _AGAIN)
-        if any(row.op == MOVE and not 0 <= row.number < len(plan.legs) for row in plan.rows):
-            raise InputError(f"{path}: a row names a motion that there is not", _AGAIN)
+        there = {MOVE: len(plan.legs), COUNT: len(plan.counters)}
+        if any(not 0 <= row.number < there.get(row.op, row.number + 1) for row in plan.rows):
+            raise InputError(f"{path}: a row names a motion or counter that there is not", _AGAIN)
         return plan
 
 
@@ -168,8 +172,13 @@ def rows_of(plan: SequencePlan) -> list[tuple[int, ...]]:
     return [(row.op, row.number, row.value, row.amount, row.step) for row in plan.rows]
 
 
-def check_size(rows: int, legs: int, where: str) -> None:
+def check_size(rows: int, legs: int, counters: int, where: str) -> None:
     """Raise InputError where the board takes no sequence as large."""
+    if counters > record.MAX_COUNTERS:
+        raise InputError(
+            f"{where}: {counters} counters; the board keeps {record.MAX_COUNTERS} for a sequence",
+            "count less",
+        )
     if rows > record.MAX_ROWS or legs > record.MAX_MOTIONS:
         raise InputError(
             f"{where}: {rows} rows and {legs} motions; the board takes {record.MAX_ROWS} and {record.MAX_MOTIONS}",

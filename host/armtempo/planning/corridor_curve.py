@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from armtempo.errors import InputError
+from armtempo.errors import InputError, PlanError
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
@@ -37,7 +37,8 @@ def curve(arm: Arm, job: Job, progress: Progress) -> list[CorridorTime]:
     """The job's motion time on the spline, in ever wider corridors, and free.
 
     In mm of the tool where the job has ``corridor_mm``, else in degrees of any joint. The widest corridor is as wide as
-    a path uses that none holds back. With stops there is no motion on the spline itself. Errors as in
+    a path uses that none holds back. With stops there is no motion on the spline
+    itself, nor in the narrowest corridors. Errors as in
     ``planner.plan``; InputError where the path is not free.
     """
     if job.path != "free":
@@ -52,7 +53,12 @@ def curve(arm: Arm, job: Job, progress: Progress) -> list[CorridorTime]:
     widths: list[float | None] = [widest / _FACTOR**power for power in range(_NARROWER, -1, -1)]
     found = []
     for number, width in enumerate([*([] if job.stops else [0.0]), *widths, None], 1):
-        plan = planner.plan(arm, _in(job, unit, width), part(progress, number, whole))
+        try:
+            plan = planner.plan(arm, _in(job, unit, width), part(progress, number, whole))
+        except PlanError:
+            if width is None or not job.stops:
+                raise
+            continue  # the spline does not rest there: a path that does leaves it by more
         found.append(CorridorTime(width, plan.total_s))
     progress(whole, whole)
     return found

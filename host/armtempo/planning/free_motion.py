@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armtempo.arrays import Array
+from armtempo.errors import PlanError
 from armtempo.optimise import interior_point
 from armtempo.optimise.interior_point import Schedule
 from armtempo.optimise.kkt import BandedKkt, Equalities
@@ -291,7 +292,8 @@ class Improver:
 def met(variables: MotionVariables, equalities: Equalities, x: Array, smooth: bool = False) -> Array:
     """``x`` changed so that the equalities hold, with the least third differences of the change.
 
-    With ``smooth`` the least of the angles themselves, whatever they were between the via points.
+    With ``smooth`` the least of the angles themselves, whatever they were between the via points. Raises PlanError
+    where the equalities contradict each other.
     """
     control = np.concatenate([variables.angle_index(joint) for joint in range(variables.joints)])
     starts = np.concatenate([variables.angle_index(joint)[:-3] for joint in range(variables.joints)])
@@ -307,4 +309,11 @@ def met(variables: MotionVariables, equalities: Equalities, x: Array, smooth: bo
         bent = x[window] @ third
         np.add.at(gradient, window, np.outer(bent, third))
     kkt = BandedKkt(variables.places, rows, columns, equalities)
-    return x + kkt.factor(entries).solve(gradient, equalities.residual(x))
+    try:
+        factor = kkt.factor(entries)
+    except np.linalg.LinAlgError:
+        raise PlanError(
+            "no motion was found that meets all via points, rests and dwells",
+            "raise refine, or set it to 'auto'; or bring times and angles closer together in size",
+        ) from None
+    return x + factor.solve(gradient, equalities.residual(x))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,7 +26,7 @@ RAMP = 0.5
 STRAY_MM = 0.2
 """How far the tool may leave its line."""
 LINE_PARTS = (8, 16, 32, 64)
-"""Into so many parts a line is cut, until the tool stays on it."""
+"""Into so many parts a line is cut, until the tool stays on it; then its ramps too, which takes longer."""
 _SHORTER = 0.98
 _TRIES = 6
 _INSIDE_STEPS = 1e-6
@@ -70,6 +71,24 @@ class JogMotion:
     def end_deg(self) -> Array:
         """Where it ends, (J,)."""
         return self.trajectory(self.trajectory.duration_s)
+
+
+def move_of(
+    arm: Arm, joint: int | str | None, axis: str | None, by_deg: float | None, by_mm: float | None
+) -> JogMove:
+    """What is to move: a joint by degrees, or the tool along an axis by mm or about it by degrees.
+
+    Raises InputError where the arguments do not go together, or the arm has no such joint.
+    """
+    ways = [by for by in (by_deg, by_mm) if by is not None]
+    if (joint is None) == (axis is None) or len(ways) != 1 or (joint is not None and by_deg is None):
+        raise InputError(
+            "a jog moves a joint by degrees, or the tool along an axis by mm or about it by degrees",
+            "give joint and by_deg, axis and by_mm, or axis and by_deg",
+        )
+    if joint is not None:
+        return JogMove(ways[0], joint=number_of_joint(arm, joint))
+    return JogMove(ways[0], axis=axis or "", about=by_deg is not None)
 
 
 def plan(name: str, arm: Arm, here_deg: Sequence[float], move: JogMove, speed: float = SPEED) -> JogMotion:
@@ -168,8 +187,8 @@ def _on_line(name: str, followed: FollowedLine, length: float, speed: float) -> 
     """The motion along the line; None where a joint would leave its range, or the tool the line."""
     arm = followed.line.arm
     limits = _line_limits(followed, length, speed)
-    for parts in LINE_PARTS:
-        law = jog_law.law(length, limits, length / parts)
+    for short_ramps, parts in itertools.product((False, True), LINE_PARTS):
+        law = jog_law.law(length, limits, length / parts, short_ramps)
         angles = followed.at(np.clip(law.at_knots, 0.0, length))
         trajectory = _trajectory(name, list(bspline.fit(angles, DEGREE).T), law.time_s)
         if not _within(trajectory, arm):

@@ -57,13 +57,20 @@ class WayLaw:
         return np.asarray(points @ bspline.basis(DEGREE)[0, :-1])
 
 
-def law(length: float, limits: WayLimits, longest: float = math.inf) -> WayLaw:
-    """The law for a way of ``length`` > 0; no interval H of it is longer than ``longest`` of the way."""
+def law(length: float, limits: WayLimits, longest: float = math.inf, short_ramps: bool = False) -> WayLaw:
+    """The law for a way of ``length`` > 0; no interval H of it is longer than ``longest`` of the way.
+
+    ``short_ramps``: no interval h either, for which the speed is lower where it has to be.
+    """
     least = 2 * _RAMP
     speed = limits.speed
+    if short_ramps and speed * limits.ramp_s(speed) > longest:
+        speed = _fitting_speed(longest, limits)
     if least * speed * limits.ramp_s(speed) > length:
         speed = _fitting_speed(length / least, limits)
-    h = limits.ramp_s(speed) if speed == limits.speed else length / (least * speed)
+        h = length / (least * speed)
+    else:
+        h = limits.ramp_s(speed)
     middle_s = length / speed - least * h
     steps_s = [h] * _RAMP + _intervals(middle_s, h, longest / speed) + [h] * _RAMP
     rest = np.zeros(_REST)

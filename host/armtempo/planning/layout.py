@@ -106,17 +106,28 @@ class Layout:
 
 
 def uniform(vias: int, pieces: int, stops: Mapping[int, float]) -> Layout:
-    """As many segments between any two of ``vias`` via points."""
-    return Layout(np.full(vias - 1, pieces), stops)
+    """As many segments between any two of ``vias`` via points, or more where less leaves no freedom."""
+    return Layout(np.maximum(pieces, least_pieces(vias, stops)), stops)
 
 
 def shared_out(shares: Array, segments: int, stops: Mapping[int, float]) -> Layout:
-    """About ``segments`` in all, in proportion to ``shares`` (n,), and at least LEAST_PIECES each."""
+    """About ``segments`` in all, in proportion to ``shares`` (n,), and at least ``least_pieces``."""
     dwells = DWELL_SEGMENTS * sum(dwell > 0.0 for dwell in stops.values())
-    free = max(segments - dwells - LEAST_PIECES * len(shares), 0)
+    least = least_pieces(len(shares) + 1, stops)
+    free = max(segments - dwells - int(least.sum()), 0)
     exact = np.concatenate([[0.0], np.cumsum(shares / shares.sum())]) * free
     knots = np.floor(exact + 0.5).astype(np.intp)
-    return Layout(LEAST_PIECES + knots[1:] - knots[:-1], stops)
+    return Layout(least + knots[1:] - knots[:-1], stops)
+
+
+def least_pieces(vias: int, stops: Mapping[int, float]) -> Index:
+    """Segments between each two of ``vias`` via points at least: (n,).
+
+    A dwell holds the control points of its first segment and of the one behind it. So that none belongs to two
+    dwells, DEGREE segments lie between them.
+    """
+    dwells = np.array([stops.get(via, 0.0) > 0.0 for via in range(vias)])
+    return np.where(dwells[:-1] & dwells[1:], DEGREE, LEAST_PIECES).astype(np.intp)
 
 
 def _derivative(order: int) -> Array:

@@ -8,32 +8,21 @@ import numpy as np
 from armtempo_shared import sequence as record
 
 from armtempo.errors import ArmtempoError, InputError
+from armtempo.model import sequence as kinds
 from armtempo.model.arm import Arm
 from armtempo.model.job import GRADIENT, Job
 from armtempo.model.plan import Plan
-from armtempo.model.sequence import (
-    FAULT,
-    NEXT,
-    Goto,
-    NamedAngles,
-    Repeat,
-    RunMotion,
-    Sequence,
-    SetOutput,
-    SourceMotion,
-    Step,
-    Wait,
-    WaitInput,
-)
+from armtempo.model.posture import ArmPosture
+from armtempo.model.sequence import Sequence, SourceMotion, Step
 from armtempo.model.sequence_plan import SequencePlan, SequenceRow, check_size
-from armtempo.planning import checks, planner
+from armtempo.planning import checks, planner, via_points
 from armtempo.progress import Progress
 from armtempo.splines.trajectory import Trajectory
 
 Angles = tuple[float, ...]
 _REFINE = 16
 """Segments of a straight motion's time axis: within 1 % of its lower bound, and a record that the board checks soon."""
-_THEN = {NEXT: record.NEXT_THEN, FAULT: record.FAULT_THEN}
+_THEN = {kinds.NEXT: record.NEXT_THEN, kinds.FAULT: record.FAULT_THEN}
 _SAME_STEPS = 1 / 128
 """Two angles as near as this are one: the board allows 1/64 step between two motions."""
 
@@ -45,18 +34,30 @@ def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> Sequ
     left to do; PlanError where a motion cannot be planned.
     """
     compiler = _Compiler(arm, progress)
-    here = sequence.start.angles_deg if sequence.start else None
-    rows, _ = compiler.rows(sequence.steps, here, sequence.start.name if sequence.start else "")
+    start = (
+        compiler.posture(sequence.start, f"{sequence.source}: start: ") if sequence.start else _End(None, "")
+    )
+    rows, _ = compiler.rows(sequence.steps, start.angles_deg, start.name)
     if not rows:
         raise InputError(f"{sequence.source}: nothing is left to do", "add a step that moves, sets or waits")
-    check_size(len(rows), len(compiler.legs), sequence.source)
+    check_size(len(rows), len(compiler.legs), len(compiler.counters), sequence.source)
     legs = [replace(leg, name=f"{sequence.name}-{number}") for number, leg in enumerate(compiler.legs, 1)]
-    return SequencePlan(arm, sequence.name, tuple(legs), tuple(rows), planner.versions())
+    return SequencePlan(
+        arm, sequence.name, tuple(legs), tuple(rows), tuple(compiler.counters), planner.versions()
+    )
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where the arm stands, and what the user calls that."""
+
+    angles_deg: Angles
+    name: str
 
 
 @dataclass(frozen=True)
 class _End:
-    """Where rows lead: the angles, None where nothing has moved yet, and what the user calls them."""
+    """The same of where rows lead; None where nothing has moved yet."""
 
     angles_deg: Angles | None
     name: str
@@ -67,6 +68,7 @@ class _Compiler:
     arm: Arm
     progress: Progress | None
     legs: list[Trajectory] = field(default_factory=list)
+    counters: list[str] = field(default_factory=list)
     _known: dict[tuple[object, ...], int] = field(default_factory=dict)
     _plans: dict[int, Trajectory] = field(default_factory=dict)
     _depth: int = 0
@@ -76,18 +78,18 @@ class _Compiler:
         end = _End(here, name)
         found: list[SequenceRow] = []
         for step in steps:
-            if isinstance(step, Repeat):
+            if isinstance(step, kinds.Repeat):
                 rows, end = self._repeat(step, end)
-            elif isinstance(step, Goto):
+            elif isinstance(step, kinds.Goto):
                 rows, end = self._goto(step, end)
-            elif isinstance(step, RunMotion):
+            elif isinstance(step, kinds.RunMotion):
                 rows, end = self._run(step, end)
             else:
-                rows = [_still(step)]
+                rows = [self._still(step)]
             found += rows
         return found, end
 
-    def _repeat(self, step: Repeat, before: _End) -> tuple[list[SequenceRow], _End]:
+    def _repeat(self, step: kinds.Repeat, before: _End) -> tuple[list[SequenceRow], _End]:
         """The first pass stands before the others where it begins elsewhere than they do."""
         outermost = not self._depth
         self._depth += 1
@@ -106,8 +108,8 @@ class _Compiler:
         close = SequenceRow(record.END, 0, int(outermost), 0, step.step, "end of repeat")
         return [*(first if apart else ()), begin, *rows, close], last
 
-    def _goto(self, step: Goto, here: _End) -> tuple[list[SequenceRow], _End]:
-        target = self._posture(step.target)
+    def _goto(self, step: kinds.Goto, here: _End) -> tuple[list[SequenceRow], _End]:
+        target = self._target(step)
         if here.angles_deg is None or here.angles_deg == target.angles_deg:
             return [], _End(target.angles_deg, target.name)
         key = (here.angles_deg, target.angles_deg)
@@ -116,7 +118,7 @@ class _Compiler:
         words = f"goto {target.name}"
         return [_move(self._known[key], step.step, words)], _End(target.angles_deg, target.name)
 
-    def _run(self, step: RunMotion, here: _End) -> tuple[list[SequenceRow], _End]:
+    def _run(self, step: kinds.RunMotion, here: _End) -> tuple[list[SequenceRow], _End]:
         trajectory = self._planned(step.motion, step.where)
         start, end = _angles(trajectory(0.0)), _angles(trajectory(trajectory.duration_s))
         if here.angles_deg is not None and not self._same(here.angles_deg, start):
@@ -132,11 +134,18 @@ class _Compiler:
             end, f"the end of {step.motion.name}"
         )
 
-    def _posture(self, target: NamedAngles | SourceMotion) -> NamedAngles:
-        if isinstance(target, NamedAngles):
-            return target
-        trajectory = self._planned(target, "")
-        return NamedAngles(f"the start of {target.name}", _angles(trajectory(0.0)))
+    def _target(self, step: kinds.Goto) -> _Place:
+        if isinstance(step.target, ArmPosture):
+            return self.posture(step.target, f"{step.where}goto: ")
+        trajectory = self._planned(step.target, "")
+        return _Place(_angles(trajectory(0.0)), f"the start of {step.target.name}")
+
+    def posture(self, posture: ArmPosture, where: str) -> _Place:
+        """Where the arm stands then; PlanError where it cannot."""
+        try:
+            return _Place(_angles(via_points.posture_deg(self.arm, posture)), posture.name)
+        except ArmtempoError as error:
+            raise type(error)(f"{where}{error.problem}", error.hint) from error
 
     def _planned(self, motion: SourceMotion, where: str) -> Trajectory:
         if id(motion) not in self._plans:
@@ -154,12 +163,32 @@ class _Compiler:
         checks.check_held(found, self.arm)
         return found
 
-    def _straight(self, step: Goto, start: Angles, end: Angles) -> Trajectory:
+    def _straight(self, step: kinds.Goto, start: Angles, end: Angles) -> Trajectory:
         job = Job("goto", via_deg=[start, end], optimiser=GRADIENT, refine=_REFINE)
         try:
             return planner.plan(self.arm, job, self.progress).trajectory
         except ArmtempoError as error:
             raise type(error)(f"{step.where}goto: {error.problem}", error.hint) from error
+
+    def _still(self, step: kinds.SetOutput | kinds.Wait | kinds.WaitInput | kinds.Count) -> SequenceRow:
+        """The row of a step that moves nothing."""
+        if isinstance(step, kinds.SetOutput):
+            return SequenceRow(record.OUTPUT, step.number, step.raw, 0, step.step, f"output {step.words}")
+        if isinstance(step, kinds.Wait):
+            return SequenceRow(
+                record.WAIT, 0, 0, round(step.wait_s * 1000), step.step, f"wait {step.wait_s:g} s"
+            )
+        if isinstance(step, kinds.Count):
+            if step.counter not in self.counters:
+                self.counters.append(step.counter)
+            number = self.counters.index(step.counter)
+            return SequenceRow(record.COUNT, number, 0, 0, step.step, f"count {step.counter}")
+        value = int(step.active) | _THEN.get(step.on_timeout, record.STOP_THEN)
+        limit = f", at most {step.timeout_s:g} s, then {step.on_timeout}" if step.timeout_s else ""
+        words = f"wait for input {step.words}{limit}"
+        return SequenceRow(
+            record.WAIT_INPUT, step.number, value, round(step.timeout_s * 1000), step.step, words
+        )
 
     def _add(self, trajectory: Trajectory) -> int:
         self.legs.append(trajectory)
@@ -170,18 +199,6 @@ class _Compiler:
             abs(a - b) * joint.steps_per_deg <= _SAME_STEPS
             for a, b, joint in zip(one, other, self.arm.driven, strict=True)
         )
-
-
-def _still(step: SetOutput | Wait | WaitInput) -> SequenceRow:
-    """The row of a step that moves nothing."""
-    if isinstance(step, SetOutput):
-        return SequenceRow(record.OUTPUT, step.number, step.raw, 0, step.step, f"output {step.words}")
-    if isinstance(step, Wait):
-        return SequenceRow(record.WAIT, 0, 0, round(step.wait_s * 1000), step.step, f"wait {step.wait_s:g} s")
-    value = int(step.active) | _THEN.get(step.on_timeout, record.STOP_THEN)
-    limit = f", at most {step.timeout_s:g} s, then {step.on_timeout}" if step.timeout_s else ""
-    words = f"wait for input {step.words}{limit}"
-    return SequenceRow(record.WAIT_INPUT, step.number, value, round(step.timeout_s * 1000), step.step, words)
 
 
 def _move(leg: int, step: int, words: str) -> SequenceRow:

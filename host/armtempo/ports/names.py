@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 
 from armtempo.errors import InputError
+
+TYPE_CHECKING = False  # as "typing" has it, which takes longer to import than the rest of a stop
+if TYPE_CHECKING:
+    from pathlib import Path
 
 SIM = "sim"
 """The port name that stands for a virtual board; ``sim:FOLDER`` for one whose flash is that folder."""
@@ -28,6 +31,8 @@ def sim_flash(port: str) -> Path | None:
             f"port '{port}' names no folder",
             "write sim:FOLDER to keep the flash there, or sim to keep it nowhere",
         )
+    from pathlib import Path  # here, because a stop does not wait for it
+
     return Path(port[len(SIM) + 1 :])
 
 

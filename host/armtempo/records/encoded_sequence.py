@@ -37,6 +37,6 @@ def of_plan(plan: SequencePlan) -> EncodedSequence:
     """The records of a sequence; InputError or PlanError where the board could not run it."""
     motions = tuple(encoded_motion.of_trajectory(leg, plan.arm) for leg in plan.legs)
     keys = [(motion.name, motion.key.crc) for motion in motions]
-    data = sequence.pack(record_crc(encode.arm_record(plan.arm)), rows_of(plan), keys)
+    data = sequence.pack(record_crc(encode.arm_record(plan.arm)), rows_of(plan), keys, plan.counters)
     sequence_check.check(sequence.SequenceData(data))
     return EncodedSequence(plan, motions, data)

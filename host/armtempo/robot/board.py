@@ -11,8 +11,7 @@ from typing import Self
 
 import numpy as np
 from armtempo_shared.messages import RESUME
-from armtempo_shared.sequence import MAGIC as SEQUENCE
-from numpy.typing import ArrayLike
+from armtempo_shared.sequence import KIND_BYTES, MAGIC
 
 from armtempo.arrays import Array
 from armtempo.errors import InputError, LinkError
@@ -21,13 +20,22 @@ from armtempo.link.board_messages import Hello, SequenceState, Status, StoredMot
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequencePlan
-from armtempo.planning import point_to_point, via_points
-from armtempo.planning.jog import SPEED, JogMove, number_of_joint
+from armtempo.planning.jog import SPEED, move_of
 from armtempo.ports.names import is_sim
 from armtempo.progress import Progress
 from armtempo.records import encoded_motion, encoded_sequence
 from armtempo.records.encoded_motion import EncodedMotion, MotionKey
-from armtempo.robot import arm_state, board_state, goto, homing, jog, recording, sequence_run, stored_motion
+from armtempo.robot import (
+    arm_state,
+    board_state,
+    goto,
+    homing,
+    jog,
+    recording,
+    sequence_recording,
+    sequence_run,
+    stored_motion,
+)
 from armtempo.robot.board_state import BoardState
 from armtempo.robot.by_hand import HandGuided
 from armtempo.robot.jog import HeldJog
@@ -37,10 +45,8 @@ from armtempo.robot.run import Run
 from armtempo.robot.sequence_run import SequenceWatcher
 from armtempo.robot.speed import change_speed, permille
 from armtempo.robot.stop_request import StopRequest, stoppable
-
-Where = Plan | EncodedMotion | SequencePlan | str | ArrayLike
-"""A posture: by its name in the arm file, the driven joints' angles in degrees, (J,), or a motion
-or sequence for its start."""
+from armtempo.robot.where import Where, posture_deg
+from armtempo.runs.sequence_reader import SequenceRun
 
 
 class Board:
@@ -62,6 +68,7 @@ class Board:
         self._stack = stack or ExitStack()
         self._moved = False
         self._last_folder: Path | None = None
+        self._last_sequence: Path | None = None
 
     def close(self) -> None:
         """Free the port; a virtual board ends."""
@@ -149,7 +156,7 @@ class Board:
         InputError where the record is damaged or does not fit the arm.
         """
         data = self.client.fetch(name)
-        if data.startswith(SEQUENCE):
+        if data.startswith(MAGIC[:KIND_BYTES]):
             raise InputError(f"{name!r} is a sequence, not a motion", f"run it with: armtempo run {name}")
         return encoded_motion.of_record(name, data, arm or self._known_arm())
 
@@ -173,7 +180,7 @@ class Board:
         Raises InputError for a posture that does not fit the arm, LinkError where the board is set up for another.
         """
         self.configure(arm)
-        arm_state.home(self.client, arm, None if where is None else self._posture(where))
+        arm_state.home(self.client, arm, None if where is None else posture_deg(where, arm))
 
     def home_to_switches(self, arm: Arm, stop: StopRequest | None = None) -> None:
         """Home the joints that have a limit switch of known angle: they move to it, off it, slowly to it again.
@@ -206,7 +213,8 @@ class Board:
 
         Raises LinkError where the position is unknown, InputError for a posture that does not fit the arm.
         """
-        arm, target_deg = self._known_arm(), self._posture(where)
+        arm = self._known_arm()
+        target_deg = posture_deg(where, arm)
         with self._stoppable(stop) as wanted:
             self._home_virtual_arm(arm)
             goto.go_to(self.client, arm, target_deg, wanted, progress)
@@ -229,7 +237,7 @@ class Board:
         can move that way.
         """
         arm = self._known_arm()
-        move = _jog_move(arm, joint, axis, by_deg, by_mm)
+        move = move_of(arm, joint, axis, by_deg, by_mm)
         with self._stoppable(stop) as wanted:
             self._home_virtual_arm(arm)
             jog.step(self.client, arm, move, speed, wanted)
@@ -251,7 +259,7 @@ class Board:
         arm = self._known_arm()
         by = math.copysign(math.inf, direction)
         along = None if turn or joint is not None else by
-        move = _jog_move(arm, joint, axis, None if along else by, along)
+        move = move_of(arm, joint, axis, None if along else by, along)
         self._home_virtual_arm(arm)
         return HeldJog(self.client, arm, jog.plan(self.client, arm, move, speed))
 
@@ -298,17 +306,35 @@ class Board:
         watcher: SequenceWatcher = lambda _: None,
         stop: StopRequest | None = None,
         replace: bool = False,
+        out: Path | str | None = None,
     ) -> SequenceState:
         """Run a planned sequence, or the stored one of that name, to its end, and say how it ended and where.
 
-        Each of its motions is a run of its own on the board; none is recorded. The arm must be homed and be where the
-        sequence begins, else LinkError or BoardError; the arm of a virtual board is brought there. ``watcher`` gets
-        how it stands. What an input that does not come does is the sequence's affair: an end as ``timed_out``, or
-        BoardError. With Stopped, its end is what ``client.sequence()`` says.
+        Its rows and samples are recorded in a new run folder below ``out``; None: nowhere. The arm must be homed and
+        be where the sequence begins, else LinkError or BoardError; the arm of a virtual board is brought there.
+        ``watcher`` gets how it stands. What an input that does not come does is the sequence's affair: an end as
+        ``timed_out``, or BoardError. With Stopped, its end is what ``client.sequence()`` says.
         """
         with self._stoppable(stop) as wanted:
             key = self._sequence(sequence, wanted, replace)
-            return sequence_run.run(self.client, key, wanted, watcher)
+            if out is None:
+                return sequence_run.run(self.client, key, wanted, watcher)
+            content = (
+                sequence_recording.fetched(self.client, sequence, self._known_arm())
+                if isinstance(sequence, str)
+                else sequence_recording.of_plan(sequence)
+            )
+            with sequence_recording.recorder(self.client, content, Path(out), self.port) as recorder:
+                self._last_sequence = recorder.path
+                return sequence_run.run(self.client, key, wanted, watcher, recorder)
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """What the counters of the sequence that runs stand at, or those of the last one, by name.
+
+        They begin at 0 whenever a sequence starts; the board keeps them until then, or until its power goes.
+        """
+        return self.client.counters()
 
     def _sequence(self, sequence: SequencePlan | str, stop: StopRequest, replace: bool) -> MotionKey:
         """What the board has it as; a virtual arm is brought to its start."""
@@ -336,6 +362,11 @@ class Board:
     def last_run(self) -> Run | None:
         """The last run that this object recorded, however it ended; None before the first."""
         return Run.load(self._last_folder) if self._last_folder else None
+
+    @property
+    def last_sequence(self) -> SequenceRun | None:
+        """The last sequence that this object recorded, however it ended; None before the first."""
+        return SequenceRun.load(self._last_sequence) if self._last_sequence else None
 
     def fetch(self, motion: Plan | EncodedMotion | str | None = None, out: Path | str = "runs") -> Run:
         """The samples that the board keeps of its last run, in a new run folder below ``out``.
@@ -397,19 +428,6 @@ class Board:
         self.configure(arm)
         return arm
 
-    def _posture(self, where: Where) -> Array:
-        if isinstance(where, Plan):
-            return where.trajectory(0.0)
-        if isinstance(where, EncodedMotion):
-            return where.start_deg
-        if isinstance(where, SequencePlan):
-            return point_to_point.posture(
-                where.arm.home_deg if where.start_deg is None else where.start_deg, where.arm
-            )
-        if isinstance(where, str):
-            return via_points.posture_deg(self._known_arm(), self._known_arm().posture(where))
-        return point_to_point.posture(where, self._known_arm())
-
     def _encoded(self, motion: Plan | EncodedMotion | str) -> EncodedMotion:
         """The motion for a board that is set up for its arm."""
         if isinstance(motion, str):
@@ -444,18 +462,3 @@ class Board:
         if is_sim(self.port) and not self._moved:
             arm_state.home_unknown(self.client, arm)
         self._moved = True
-
-
-def _jog_move(
-    arm: Arm, joint: int | str | None, axis: str | None, by_deg: float | None, by_mm: float | None
-) -> JogMove:
-    """What a jog's arguments say; InputError where they do not go together."""
-    ways = [by for by in (by_deg, by_mm) if by is not None]
-    if (joint is None) == (axis is None) or len(ways) != 1 or (joint is not None and by_deg is None):
-        raise InputError(
-            "a jog moves a joint by degrees, or the tool along an axis by mm or about it by degrees",
-            "give joint and by_deg, axis and by_mm, or axis and by_deg",
-        )
-    if joint is not None:
-        return JogMove(ways[0], joint=number_of_joint(arm, joint))
-    return JogMove(ways[0], axis=axis or "", about=by_deg is not None)

@@ -37,6 +37,20 @@ class JointState:
 
 
 @dataclass(frozen=True)
+class SequenceStand:
+    """Where a sequence stands, or where the last one since the board's start ended."""
+
+    name: str
+    ending: str
+    """One of ``armtempo_shared.sequence.ENDINGS``."""
+    step: int
+    """Of the sequence file, from 1."""
+    cycle: int
+    """Finished passes of its outermost repeats."""
+    counters: dict[str, int]
+
+
+@dataclass(frozen=True)
 class BoardState:
     """A board, the arm it is set up for, and where that is."""
 
@@ -76,6 +90,8 @@ class BoardState:
     """Byte sequences that reached the board and were no message."""
     samples_lost: int
     joints: tuple[JointState, ...]
+    sequence: SequenceStand | None
+    """None where none was started since the board's start."""
 
     def to_json(self) -> dict[str, Any]:
         """Plain values."""
@@ -86,7 +102,8 @@ class BoardState:
         """What ``to_json`` gave; LinkError where another version of armtempo gave it."""
         try:
             joints = tuple(JointState(**joint) for joint in values["joints"])
-            return cls(**{**values, "joints": joints})
+            stand = SequenceStand(**values["sequence"]) if values["sequence"] else None
+            return cls(**{**values, "joints": joints, "sequence": stand})
         except (TypeError, KeyError) as error:
             raise LinkError(
                 "the program that has the port is of another version of armtempo", "end it and start it again"
@@ -142,7 +159,15 @@ def read(client: Client, port: str) -> BoardState:
             JointState(f"joint {number}", status.joint_known(number - 1), steps, None, counts, None)
             for number, (steps, counts) in enumerate(pairs, 1)
         ),
+        sequence=_sequence(client),
     )
+
+
+def _sequence(client: Client) -> SequenceStand | None:
+    found = client.sequence()
+    if found.ending == "none":
+        return None
+    return SequenceStand(found.name, found.ending, found.step, found.cycle, client.counters())
 
 
 def _arm_problem(info: Hello) -> str:

@@ -7,10 +7,12 @@ from types import TracebackType
 from typing import Self
 
 import numpy as np
+from armtempo_shared.meanings import BUTTON_NOTICE
 
 from armtempo.arrays import Array
 from armtempo.errors import BoardError, InputError, LinkError
 from armtempo.link import Client
+from armtempo.link.board_messages import Notice
 from armtempo.model.arm import Arm
 from armtempo.robot import arm_state
 
@@ -39,7 +41,15 @@ class HandGuided:
     def __enter__(self) -> Self:
         """Take the current away; the position is unknown to the board until the end."""
         self._client.drivers(False)
+        self.button_pressed()  # what was before does not count
         return self
+
+    def button_pressed(self) -> bool:
+        """Whether the board's button was pressed since this was asked last; it starts nothing meanwhile."""
+        session, pressed = self._client.session, False
+        while (event := session.poll(0.0)) is not None:
+            pressed = pressed or (isinstance(event, Notice) and event.text.startswith(BUTTON_NOTICE))
+        return pressed
 
     def angles_deg(self) -> Array:
         """Where the joints are by their encoders, degrees (J,)."""

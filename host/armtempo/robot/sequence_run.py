@@ -17,6 +17,7 @@ from armtempo.progress import Progress
 from armtempo.records.encoded_motion import MotionKey
 from armtempo.records.encoded_sequence import EncodedSequence
 from armtempo.robot import stored_motion
+from armtempo.robot.sequence_recording import Recorder
 from armtempo.robot.stop_request import StopRequest
 
 LOOK_S = 0.1
@@ -79,12 +80,17 @@ def _legs_of(client: Client, old: StoredMotion) -> dict[str, int]:
 
 
 def run(
-    client: Client, key: MotionKey, stop: StopRequest, watcher: SequenceWatcher = lambda _: None
+    client: Client,
+    key: MotionKey,
+    stop: StopRequest,
+    watcher: SequenceWatcher = lambda _: None,
+    recorder: Recorder | None = None,
 ) -> SequenceState:
     """Start a stored sequence and follow it to its end; a stop request makes the board brake and end it.
 
-    A board that cannot be reached goes on by itself; it is looked for RECONNECT_S long. Raises BoardError where the
-    board refuses to start or a fault ends the sequence, LinkError where it cannot be reached any more.
+    ``recorder`` gets the board's events and the end. A board that cannot be reached goes on by itself; it is looked for
+    RECONNECT_S long. Raises BoardError where the board refuses to start or a fault ends the sequence, LinkError where
+    it cannot be reached any more.
     """
     client.session.stopping = lambda: stop.wanted
     stop.wake = client.session.wake
@@ -92,7 +98,7 @@ def run(
     client.start(key.name, key.crc)
     brake = stored_motion.Brake(client, stop)
     try:
-        end = _follow(client, key.name, brake, watcher)
+        end = _follow(client, key.name, brake, watcher, recorder or Recorder())
     except KeyboardInterrupt:
         stored_motion.send_stop(client, now=True)
         raise
@@ -103,7 +109,9 @@ def run(
     return end
 
 
-def _follow(client: Client, name: str, brake: stored_motion.Brake, watcher: SequenceWatcher) -> SequenceState:
+def _follow(
+    client: Client, name: str, brake: stored_motion.Brake, watcher: SequenceWatcher, recorder: Recorder
+) -> SequenceState:
     before = None
     heard_s = client.session.clock()
     while True:
@@ -111,24 +119,35 @@ def _follow(client: Client, name: str, brake: stored_motion.Brake, watcher: Sequ
             brake()
             state = client.sequence()
             heard_s = client.session.clock()
-            if state != before:
+            if state != before and state.name == name:
                 watcher(state)
-                before = state
             if state.name != name or state.ending == "none":
+                last = f"; it was last heard of {where(before)}" if before and before.name == name else ""
                 raise OtherBoardError(
-                    "the board has started anew during the sequence: positions are unknown",
+                    f"the board has started anew during the sequence: positions are unknown{last}",
                     "bring the arm to its home posture and run 'armtempo home'",
                 )
+            before = state
+            _take_events(client, recorder)
             if state.ending != "running":
+                recorder.end(state)
                 return state
-            client.session.poll(LOOK_S)
-            client.session.events.clear()
         except OtherBoardError:
             raise
         except NoAnswerError as error:
             if client.session.stopping() or client.session.clock() - heard_s > RECONNECT_S:
                 raise
             client.session.reconnect(error)
+
+
+def _take_events(client: Client, recorder: Recorder) -> None:
+    """What the board says within LOOK_S; a stop request ends that early."""
+    until_s = client.session.clock() + LOOK_S
+    while (left_s := until_s - client.session.clock()) > 0:
+        event = client.session.poll(left_s)
+        if event is None:
+            return
+        recorder.take(event)
 
 
 def where(state: SequenceState) -> str:

@@ -16,6 +16,7 @@ from armtempo.errors import RunFolderError
 from armtempo.formats.plain_text import visible
 from armtempo.link.follow import Gap
 from armtempo.runs.run_folder import FORMAT, META, TRAJECTORY, VERSION, JointScale, Repetition
+from armtempo.runs.sequence_folder import FORMAT as SEQUENCE_FORMAT
 
 _LARGEST = 2.0**53
 """Integers beyond this are not exact as doubles."""
@@ -71,7 +72,7 @@ def load(path: Path) -> RunData:
     """
     meta = _meta(path / META)
     try:
-        joints = tuple(_scale(**joint) for joint in meta["joints"])
+        joints = tuple(scale(**joint) for joint in meta["joints"])
         entries = tuple(_entry(entry) for entry in meta["repetitions"])
         meta |= {key: visible(str(meta[key])) for key in ("name", "started")}
     except (KeyError, TypeError, ValueError) as error:
@@ -83,7 +84,8 @@ def load(path: Path) -> RunData:
     return RunData(path, meta, joints, repetitions, entries)
 
 
-def _scale(name: str, steps_per_deg: float, counts_per_deg: float) -> JointScale:
+def scale(name: str, steps_per_deg: float, counts_per_deg: float) -> JointScale:
+    """A joint's scales as run.json has them."""
     return JointScale(visible(str(name)), float(steps_per_deg), float(counts_per_deg))
 
 
@@ -108,6 +110,11 @@ def _meta(path: Path) -> dict[str, Any]:
         raise RunFolderError(
             f"{path}: damaged: {error}", "restore the folder from a copy, or run again"
         ) from error
+    if isinstance(meta, dict) and meta.get("format") == SEQUENCE_FORMAT:
+        raise RunFolderError(
+            f"{path.parent} is the run of a sequence, not of one motion",
+            "'armtempo report' writes its page; read it with SequenceRun.load",
+        )
     if not isinstance(meta, dict) or meta.get("format") != FORMAT:
         raise RunFolderError(
             f"{path}: not the description of an armtempo run",
@@ -123,15 +130,15 @@ def _meta(path: Path) -> dict[str, Any]:
 
 def _samples(path: Path, state: str, joints: tuple[JointScale, ...]) -> RepetitionData:
     try:
-        return _parsed(path, state, joints, _rows(path))
+        return parsed(path, state, joints, whole_lines(path))
     except OSError as error:
         problem = f"missing ({error.strerror})"
     except ValueError as error:
         problem = f"damaged ({error})"
-    return replace(_parsed(path, state, joints, []), problem=problem)
+    return replace(parsed(path, state, joints, []), problem=problem)
 
 
-def _parsed(
+def parsed(
     path: Path, state: str, joints: tuple[JointScale, ...], rows: list[dict[str, str]]
 ) -> RepetitionData:
     """The samples in the rows of a file; ValueError where a value is missing, no number, or impossible."""
@@ -165,7 +172,7 @@ def _parsed(
     )
 
 
-def _rows(path: Path) -> list[dict[str, str]]:
+def whole_lines(path: Path) -> list[dict[str, str]]:
     """The whole lines of a sample file; an incomplete last line is dropped."""
     text = path.read_text(encoding="utf-8")
     whole = text[: text.rfind("\n") + 1]

@@ -122,7 +122,7 @@ class RunFolder:
     joints: tuple[JointScale, ...]
     origin: dict[str, Any] = field(default_factory=dict)
     """Further entries of run.json: port, board, arm, checksum of the motion."""
-    started: str = field(default_factory=lambda: _now())
+    started: str = field(default_factory=lambda: now())
     repetitions: list[Repetition] = field(default_factory=list)
 
     def write(self) -> None:
@@ -130,20 +130,17 @@ class RunFolder:
         meta = {
             "format": FORMAT,
             "version": VERSION,
-            "armtempo": __version__,
-            "name": self.name,
-            "started": self.started,
-            "written": _now(),
+            **written_head(self.name, self.started),
             "joints": [vars(joint) for joint in self.joints],
             "columns": columns(self.joints),
             **self.origin,
             "repetitions": [vars(repetition) for repetition in self.repetitions],
         }
-        replace_text(self.path / META, json.dumps(meta, indent=2, ensure_ascii=False) + "\n")
+        write_meta(self.path, meta)
 
     def write_motion(self, data: bytes) -> None:
         """Keep the record that the board replays; RunFolderError where it cannot be written."""
-        with _writing(self.path / MOTION):
+        with writing(self.path / MOTION):
             (self.path / MOTION).write_bytes(data)
 
     def begin_repetition(self) -> SampleFile:
@@ -161,7 +158,7 @@ class SampleFile:
         self.repetition = repetition
         self._folder = folder
         self._path = folder.path / repetition.file
-        with _writing(self._path):
+        with writing(self._path):
             self._file = self._path.open("x", newline="", encoding="utf-8")
         self._csv = csv.writer(self._file, lineterminator="\n")
         self._line(list(columns(folder.joints)))
@@ -172,7 +169,7 @@ class SampleFile:
         self.repetition.samples += 1
 
     def _line(self, cells: list[str]) -> None:
-        with _writing(self._path):
+        with writing(self._path):
             self._csv.writerow(cells)
             self._file.flush()
 
@@ -186,11 +183,8 @@ class SampleFile:
             self._file.close()
         if self.repetition.state == RUNNING:
             self.repetition.state = INTERRUPTED if kind is KeyboardInterrupt else BROKEN
-        try:
+        with unless(value):
             self._folder.write()
-        except InputError:
-            if value is None:  # else the first error says more
-                raise
 
 
 def new_folder(parent: Path, name: str) -> Path:
@@ -210,7 +204,18 @@ def new_folder(parent: Path, name: str) -> Path:
 
 
 @contextmanager
-def _writing(path: Path) -> Iterator[None]:
+def unless(error: BaseException | None) -> Iterator[None]:
+    """Let an InputError pass, unless there was an error before: that says more."""
+    try:
+        yield
+    except InputError:
+        if error is None:
+            raise
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """RunFolderError where what is done cannot write ``path``."""
     try:
         yield
     except OSError as error:
@@ -220,5 +225,16 @@ def _writing(path: Path) -> Iterator[None]:
         ) from None
 
 
-def _now() -> str:
+def written_head(name: str, started: str) -> dict[str, Any]:
+    """What run.json says of any run, behind its format: by which version, of what, when."""
+    return {"armtempo": __version__, "name": name, "started": started, "written": now()}
+
+
+def write_meta(folder: Path, meta: dict[str, Any]) -> None:
+    """Write run.json into a run folder, whole or not at all."""
+    replace_text(folder / META, json.dumps(meta, indent=2, ensure_ascii=False) + "\n")
+
+
+def now() -> str:
+    """Date and time, UTC."""
     return datetime.now(UTC).isoformat(timespec="seconds")

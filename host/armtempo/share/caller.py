@@ -46,6 +46,11 @@ def ownership(claim: PortClaim) -> Ownership:
         return Ownership.DIED
 
 
+def remember_hanging(number: str) -> None:
+    """The program of this claim was just found to hang; who asks next need not find it out again."""
+    _hung[number] = time.monotonic()
+
+
 class Caller:
     """A connection to the program that has a port; used as a context, or ended by ``close``.
 
@@ -62,7 +67,7 @@ class Caller:
             self.ask("hello", HANGS_S, version=VERSION, token=claim.token)
         except BaseException as error:
             if isinstance(error, NoAnswerError):
-                _hung[claim.number] = time.monotonic()
+                remember_hanging(claim.number)
             self.close()
             raise
 

@@ -1,25 +1,23 @@
 """Who has a port: one file for each port, in a folder that only this user can read.
 
-The folder is ``armtempo`` below ``$XDG_RUNTIME_DIR``, else a private one for temporary files. A program that
-was killed leaves its file behind; nobody answers at its address then.
+The folder is ``armtempo`` below ``$XDG_RUNTIME_DIR``, else a private one for temporary files (``claim_file``). A
+program that was killed leaves its file behind; nobody answers at its address then.
 """
 
 from __future__ import annotations
 
-import json
 import os
-import stat
 import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-VERSION = 1
+from armtempo.share import claim_file
+from armtempo.share.claim_file import VERSION as VERSION
+
 LOCAL_SOCKETS = os.name == "posix"
 """Whether sockets are files of the file system; else they are ports of localhost, and a token is asked for."""
-_LONGEST_SOCKET_PATH = 100
-"""Bytes; an operating system takes 104 to 108."""
 
 
 class PortClaim(NamedTuple):
@@ -59,7 +57,7 @@ class PortClaim(NamedTuple):
     def _write(self, path: Path) -> None:
         aside = path.with_suffix(f".{self.number}")
         with os.fdopen(os.open(aside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
-            json.dump(self._asdict(), file)
+            file.write(claim_file.text(map(str, self)))
         os.replace(aside, path)
 
     def _marker(self, path: Path) -> Path:
@@ -88,8 +86,8 @@ class PortClaim(NamedTuple):
         """Where the claim to this port stands: in the folder for new ones, and wherever an earlier one does."""
         import hashlib
 
-        name = f"{hashlib.sha256(self.name.encode()).hexdigest()[:16]}.json"
-        first, *others = [place / name for place in _folders()]
+        name = hashlib.sha256(self.name.encode()).hexdigest()[:16] + claim_file.SUFFIX
+        first, *others = [Path(place, name) for place in claim_file.folders()]
         return [first, *(path for path in others if path.exists())]
 
 
@@ -113,18 +111,17 @@ def find(name: str, port: str) -> PortClaim | None:
 
 def claims() -> Iterator[PortClaim]:
     """All claims of this user's programs."""
-    for place in _folders():
-        for path in sorted(place.glob("*.json")) if _is_private(place) else []:
-            found = _read(path)
-            if found is not None:
-                yield found
+    for path in claim_file.paths():
+        found = _read(Path(path))
+        if found is not None:
+            yield found
 
 
 def folder() -> Path:
     """Where claims and sockets are, made where it is missing. OSError where it is not this user's alone."""
-    place = next(_folders())
+    place = Path(next(claim_file.folders()))
     place.mkdir(mode=0o700, parents=True, exist_ok=True)
-    if not _is_private(place):
+    if not claim_file.is_private(str(place)):
         raise OSError(None, "is not this user's alone", str(place))
     return place
 
@@ -138,35 +135,10 @@ def program() -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def _folders() -> Iterator[Path]:
-    """The folder for new claims, then one where another program of this user may have put its own."""
-    import tempfile
-
-    user = str(os.getuid()) if hasattr(os, "getuid") else os.environ.get("USERNAME", "")
-    private = Path(tempfile.gettempdir()) / f"armtempo-{user}"
-    runtime = os.environ.get("XDG_RUNTIME_DIR") or (os.environ.get("LOCALAPPDATA") if os.name == "nt" else "")
-    if runtime and Path(runtime).is_dir():
-        wanted = Path(runtime) / "armtempo"
-        if len(os.fsencode(wanted)) + len("/0123456789abcdef.socket") <= _LONGEST_SOCKET_PATH:
-            yield wanted
-    yield private
-
-
-def _is_private(place: Path) -> bool:
-    """Whether the folder is there and this user's alone."""
-    try:
-        found = place.lstat()
-    except OSError:
-        return False
-    if not stat.S_ISDIR(found.st_mode):
-        return False
-    return not hasattr(os, "getuid") or (found.st_uid == os.getuid() and not found.st_mode & 0o077)
-
-
 def _read(path: Path) -> PortClaim | None:
     """The claim in a file; None where it is gone, damaged or of another version."""
     try:
-        found = PortClaim(**json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError):
+        name, port, device, program, pid, number, address, token, version = claim_file.read(str(path))
+        return PortClaim(name, port, device, program, int(pid), number, address, token, int(version))
+    except ValueError:
         return None
-    return found if found.version == VERSION else None

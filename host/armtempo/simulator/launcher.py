@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import os
-import pty
 import shutil
 import subprocess
 import sys
 import time
-import tty
 from pathlib import Path
 from types import TracebackType
 
@@ -21,6 +19,7 @@ INTERPRETER_VARIABLE = "ARMTEMPO_MICROPYTHON"
 _CHOOSE_INTERPRETER = (
     f"set {INTERPRETER_VARIABLE} to a MicroPython that runs here, or unset it to use this Python"
 )
+_MOUNT_PTYS = "in a container or chroot, mount them: mount -t devpts devpts /dev/pts"
 _MAIN = Path(__file__).with_name("main.py")
 _HEAP = "4M"
 _DEPLOYED_BLOCKS = 256
@@ -38,9 +37,9 @@ class VirtualBoard:
         self.flash_dir = flash
         self.log_path = folder.path / "board.log"
         self._folder = folder
-        master, self._slave = pty.openpty()
+        master, self._slave = _pseudo_terminal()
         try:
-            tty.setraw(self._slave)
+            _set_raw(self._slave)
             os.set_blocking(master, False)
             self.port = os.ttyname(self._slave)
             with self.log_path.open("wb") as log:
@@ -118,12 +117,35 @@ class VirtualBoard:
         self._folder.remove()
 
 
+def _pseudo_terminal() -> tuple[int, int]:
+    """Both ends; LinkError where the system has none to give, as in a container without /dev/pts."""
+    import pty
+
+    try:
+        return pty.openpty()
+    except OSError as error:
+        raise LinkError(
+            f"the virtual board gets no pseudo terminal for its serial port: {error}", _MOUNT_PTYS
+        ) from None
+
+
+def _set_raw(terminal: int) -> None:
+    import tty  # of POSIX
+
+    tty.setraw(terminal)
+
+
 def launch(options: LaunchOptions | None = None) -> VirtualBoard:
     """Start a virtual board; use it as a context manager.
 
     Raises InputError where the flash's folder cannot be made, LinkError where the board does not start.
     """
     wanted = options or LaunchOptions()
+    if os.name != "posix":
+        raise LinkError(
+            "a virtual board needs pseudo terminals, which this operating system has not",
+            "run it on Linux or macOS, or in WSL; plans and boards of metal do without",
+        )
     folder = TemporaryFolder()
     flash = Path(wanted.flash_dir).resolve() if wanted.flash_dir else folder.path / "flash"
     try:

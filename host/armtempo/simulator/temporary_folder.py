@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import shutil
 import tempfile
@@ -19,6 +18,8 @@ class TemporaryFolder:
     """
 
     def __init__(self) -> None:
+        import fcntl  # of POSIX, and so are virtual boards
+
         _sweep()
         self.path = Path(tempfile.mkdtemp(prefix=PREFIX))
         unlocked = self.path / "new"
@@ -35,6 +36,8 @@ class TemporaryFolder:
 
 
 def _sweep() -> None:
+    import fcntl
+
     for lock in Path(tempfile.gettempdir()).glob(f"{PREFIX}*/{_LOCK}"):
         try:
             descriptor = os.open(lock, os.O_RDWR)

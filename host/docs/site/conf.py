@@ -31,7 +31,9 @@ nitpicky = True  # a link that leads nowhere is a warning
 nitpick_ignore_regex = [("py:.*", ".*")]  # but not a type of numpy or click in a signature
 
 html_theme = "furo"
-html_title = f"armtempo {release}"
+html_title = f"armtempo {release.partition('+')[0]}"  # without the commit, which makes it two lines
+html_static_path = ["style"]
+html_css_files = ["pages.css"]
 html_extra_path = ["extra"]  # index.html at the top leads to the first page
 html_theme_options = {"navigation_with_keys": True}
 html_show_sourcelink = False

@@ -31,21 +31,29 @@ def merge(trees: Mapping[str, ast.Module], main: str, entries: Collection[str]) 
     done = {module: _Merger(module, tree, inside, core).run() for module, tree in trees.items()}
     merged = {module: ast.Module(body, []) for module, body in done.items() if module not in inside}
     merged[core] = ast.Module(_once([node for module in inside for node in done[module]]), [])
-    while _drop_unused(merged, core):
-        pass
+    merged[core].body = _used_ones(merged, core)
     for module in set(merged) - packages(trees):
         merged[module] = _without_unused(merged[module])
     return merged
 
 
-def _drop_unused(merged: Mapping[str, ast.Module], core: str) -> bool:
-    """Take out of ``core`` what nothing mentions; whether there was something."""
-    nodes = [node for tree in merged.values() for node in ast.walk(tree)]
+def _used_ones(merged: Mapping[str, ast.Module], core: str) -> list[ast.stmt]:
+    """The statements of ``core`` without those that define what nothing else mentions that stays itself."""
+    outside = set[str]().union(*(_mentioned(tree) for module, tree in merged.items() if module != core))
+    kept = [(node, _makes_only(node), _mentioned(node)) for node in merged[core].body]
+    while True:
+        used = outside.union(*(mentioned for _, _, mentioned in kept))
+        fewer = [each for each in kept if not each[1] or each[1] & used]
+        if len(fewer) == len(kept):
+            return [node for node, _, _ in kept]
+        kept = fewer
+
+
+def _mentioned(tree: ast.AST) -> set[str]:
+    """Names that are read, and those of attributes."""
+    nodes = list(ast.walk(tree))
     used = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
-    used |= {node.attr for node in nodes if isinstance(node, ast.Attribute)}
-    body = merged[core].body
-    merged[core].body = [node for node in body if not _makes_only(node) or _makes_only(node) & used]
-    return len(merged[core].body) < len(body)
+    return used | {node.attr for node in nodes if isinstance(node, ast.Attribute)}
 
 
 def _makes_only(node: ast.stmt) -> set[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from dataclasses import dataclass
 
 Function = ast.FunctionDef | ast.Lambda
@@ -54,31 +54,32 @@ def local_names(function: Function) -> set[str]:
     every = [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs]
     found = {argument.arg for argument in (*every, arguments.vararg, arguments.kwarg) if argument}
     if isinstance(function, ast.FunctionDef):
+        outside = set[str]()
         for node in function.body:
-            found |= stored(node)
-        found -= {name for node in ast.walk(function) if isinstance(node, ast.Global) for name in node.names}
+            found |= stored(node, outside)
+        found -= outside
     return found
 
 
-def stored(node: ast.AST) -> set[str]:
-    """Names that a statement binds, but not what functions in it bind."""
+def stored(node: ast.AST, outside: set[str] | None = None) -> set[str]:
+    """Names that a statement binds, but not what functions in it bind; ``outside`` gets those it declares global."""
     found: set[str] = set()
-    for inner in _own(node):
-        if isinstance(inner, ast.Name) and isinstance(inner.ctx, ast.Store):
-            found.add(inner.id)
-        elif isinstance(inner, ast.FunctionDef | ast.ExceptHandler) and inner.name:
+    waiting = [node]
+    while waiting:
+        inner = waiting.pop()
+        if isinstance(inner, ast.Name):
+            if isinstance(inner.ctx, ast.Store):
+                found.add(inner.id)
+            continue
+        if isinstance(inner, ast.FunctionDef | ast.ExceptHandler) and inner.name:
             found.add(inner.name)
         elif isinstance(inner, ast.Import | ast.ImportFrom):
             found |= {alias.asname or alias.name.split(".")[0] for alias in inner.names}
+        elif isinstance(inner, ast.Global) and outside is not None:
+            outside.update(inner.names)
+        if not isinstance(inner, Function):
+            waiting += ast.iter_child_nodes(inner)
     return found
-
-
-def _own(node: ast.AST) -> Iterator[ast.AST]:
-    """The node and what is in it, but not inside of functions in it."""
-    yield node
-    if not isinstance(node, Function):
-        for child in ast.iter_child_nodes(node):
-            yield from _own(child)
 
 
 class Scoped(ast.NodeTransformer):

@@ -5,6 +5,7 @@ firmware_loop, whose stand-ins are used. Records go to a file system in memory t
 """
 
 import gc
+import time
 
 import firmware_loop as loop
 import pyb
@@ -17,6 +18,7 @@ _BEYOND = const(0x20020000)  # 64 KB of the emulator's that the chip has not
 _BLOCKS = const(128)
 _BLOCK = const(512)
 _UART = const(3)
+_LONG_MS = const(10)  # no turn of the loop while something moves takes as long
 
 
 class Blocks:
@@ -45,6 +47,7 @@ class Port:
 
     def __init__(self):
         self._stage = -1
+        self._left_ms = 0
 
     def init(self, flow):
         """Flow control does not matter here."""
@@ -55,6 +58,7 @@ class Port:
         self._look()
         uart = loop.here["uart"]
         got = uart.readinto(memoryview(buffer)[:count]) if uart.any() else 0
+        self._left_ms = time.ticks_ms()
         loop.resume(0)
         return got or 0
 
@@ -68,6 +72,9 @@ class Port:
     def _look(self):
         """Tell of the heap when the program has started, when a motion begins, and when it has ended."""
         moves = loop.moving()
+        spent_ms = time.ticks_diff(time.ticks_ms(), self._left_ms)
+        if moves and spent_ms >= _LONG_MS:  # a motion has begun
+            print("@ start", spent_ms)
         if not moves:
             loop.hold_clock()
         if self._stage < 0:
@@ -90,5 +97,5 @@ def replace(settings):
     blocks = Blocks()
     vfs.VfsFat.mkfs(blocks)
     vfs.mount(vfs.VfsFat(blocks), "/ram")
-    loop.replace(settings, Port)
+    loop.replace(dict(settings, again=True), Port)
     loop.here["uart"] = pyb.UART(_UART, 115200, timeout=0, rxbuf=1024)

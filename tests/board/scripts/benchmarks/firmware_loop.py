@@ -293,9 +293,13 @@ def hold_clock():
 
 
 def start_clock(us):
-    """In the place of the short wait behind the start of the counters: from here on they run."""
+    """In the place of the short wait behind the start of the counters: from here on they run.
+
+    The next start is as this one only where the settings say ``again``, which costs the program a little time.
+    """
     mem32[stm.TIM2 + _PSC] = mem32[stm.TIM5 + _PSC] = here["prescaler"]
-    here["engine"].time = time
+    if not here.get("again"):
+        here["engine"].time = time
     mem32[here["at_compare"]] = id(interrupt)
     mem32[here["at_feed"]] = id(feed)
     pause()

@@ -7,23 +7,8 @@ from app_rig import connected, flash, start, state  # isort: skip  it puts the s
 
 from armtempo_board.app.app import App
 from armtempo_shared import armrecord, engine_memory
+from pin_rows import GRIPPER, PART, PUMP
 
-PUMP = {
-    "pin": 0x30,
-    "timer": 0,
-    "channel": 0,
-    "spare": 0,
-    "prescaler": 0,
-    "period": 0,
-    "low": 1,
-    "high": 0,
-    "safe": 0,
-}
-GRIPPER = {
-    "pin": 0x18, "timer": 10, "channel": 1, "spare": 0, "prescaler": 51, "period": 64614, "low": 1615, "high": 8077,
-    "safe": 7282,
-}  # fmt: skip
-PART = {"pin": 0x31, "active_high": 0, "debounce_ms": 10}
 DOOR = {"pin": 0x32, "active_high": 1, "debounce_ms": 0}
 SAFE = {"D0": 1, "B8": 2333}
 DOWN = {"D1": 1, "D2": 0}

@@ -1,112 +1,24 @@
-"""Sequences: stored, refused before anything moves, run step by step, ended by whatever can end one."""
-
-import gc
-import sys
+"""Sequences that run: step by step, ended by whatever can end one."""
 
 import cases
 import stand_in
-from app_rig import App, connected, flash, start, state
-from armtempo_shared import armrecord, codes, motion, sequence, wire
-
-del sys.modules["armtempo_board.motion.endpoints"]  # the real one
-from armtempo_board.motion import endpoints  # noqa: E402, F401
-
-MOVE, OUTPUT, WAIT, INPUT = sequence.MOVE, sequence.OUTPUT, sequence.WAIT, sequence.WAIT_INPUT
-REPEAT, END = sequence.REPEAT, sequence.END
-ARM_CRC = armrecord.unpack(stand_in.arm())[2]
-ONE_STEP = 1 << 28
-ONE_TICK = 1 << 16
-
-
-class Outputs:
-    """Remembers what was set."""
-
-    def __init__(self, count=2):
-        self.values = [0] * count
-        self.log = []
-
-    def set(self, number, value):
-        self.log.append((number, value))
-        self.values[number] = value
-
-    def safe(self):
-        pass
-
-    def close(self):
-        pass
-
-
-class Inputs:
-    """Levels as a case sets them."""
-
-    count = 1
-
-    def __init__(self):
-        self.levels = 0
-
-    def level(self, number):
-        return self.levels >> number & 1
-
-    def poll(self, now_ms):
-        pass
-
-
-def leg(first, last, arm_crc=ARM_CRC):
-    """A motion of both joints from one step to another."""
-    points = [first * ONE_STEP] * 5 + [(first + last) * ONE_STEP // 2] + [last * ONE_STEP] * 5
-    times = [1000 * ONE_TICK * index for index in range(len(points))]
-    return motion.pack(5, [points, points], [times], 1, 84000, arm_crc)
-
-
-LEGS = {"there": leg(0, 10), "back": leg(10, 0), "on": leg(10, 20)}
-
-
-def ready(rows, legs=LEGS, outputs=2):
-    """A board with these motions and the sequence "seq", homed at 0; app and host."""
-    app, host = connected()
-    app.controller.outputs = Outputs(outputs) if outputs else None
-    app.controller.inputs = Inputs() if outputs else None
-    for name in sorted(legs):
-        assert host.upload(name, legs[name])[-1][0] == "ok"
-    put(host, rows, legs)
-    return app, host
-
-
-def put(host, rows, legs=LEGS, name="seq"):
-    """Store a sequence of rows (op, number, value, amount); MOVE's number is the name of a motion."""
-    names = sorted(legs)
-    numbered = [
-        (row[0], names.index(row[1]) if row[0] == MOVE else row[1], row[2], row[3], step)
-        for step, row in enumerate(rows, 1)
-    ]
-    host.seq = sequence.pack(ARM_CRC, numbered, [(leg, wire.record_crc(legs[leg])) for leg in names])
-    answer = host.upload(name, host.seq)[-1]
-    assert answer[0] == "ok", answer
-
-
-def begin(host, name="seq"):
-    return host.ask("start", (0, wire.record_crc(host.seq)), name)
-
-
-def stands(host):
-    """(ending, code, step, row, cycle) of the sequence."""
-    host.turn(5)
-    kind, fields, name = host.ask("sequence")
-    assert kind == "ok" and name in ("seq", b"seq"), name
-    return (sequence.ENDINGS[fields[0]],) + fields[1:]
-
-
-def arrive(app, host, at):
-    """The leg that is under way ends at these steps."""
-    engine = app.controller.engine
-    assert engine.moving
-    engine.steps = [at, at]
-    engine.finish()
-    host.turn(5)
-
-
-def runs(app):
-    return app.controller.engine.calls.count("start")
+from app_rig import connected, flash, start, state
+from armtempo_shared import armrecord, codes, sequence, wire
+from sequence_rig import (
+    COUNT,
+    END,
+    INPUT,
+    MOVE,
+    OUTPUT,
+    REPEAT,
+    WAIT,
+    arrive,
+    begin,
+    leg,
+    ready,
+    runs,
+    stands,
+)
 
 
 def case_steps_come_one_after_the_other():
@@ -150,6 +62,110 @@ def case_repeats_within_repeats_are_counted():
     host.turn(100)
     assert stands(host)[0] == "finished" and stands(host)[4] == 3
     assert app.controller.outputs.log == [(0, 1), (1, 2), (1, 2)] * 3
+
+
+def counters_of(host):
+    """{name: value} of the counters, and that behind the last there is none."""
+    found = {}
+    count = host.ask("counter", (0,))[1][0]
+    for index in range(count):
+        _, fields, name = host.ask("counter", (index,))
+        assert fields[0] == count
+        found[name] = fields[1]
+    assert host.ask("counter", (count,)) == host.ask("counter", (255,)) == ("ok", (count, 0), "")
+    return found
+
+
+def rows_of(host):
+    """(passed, row, value) of the events of rows; they are taken off."""
+    found = [(fields[0], fields[2], fields[5]) for kind, fields, _ in host.events if kind == "row"]
+    host.events = []
+    return found
+
+
+COUNTING = [(REPEAT, 0, 0, 3), (COUNT, 1, 0, 0), (WAIT, 0, 0, 5000), (END, 0, 1, 0), (COUNT, 0, 0, 0)]
+
+
+def case_counters_count_until_it_begins_anew():
+    _, host = ready(COUNTING, counters=("trays", "parts"))
+    begin(host)
+    assert counters_of(host) == {"trays": 0, "parts": 1}
+    stand_in.Clock.now_ms += 5000
+    host.turn(5)
+    assert counters_of(host) == {"trays": 0, "parts": 2}
+    for _ in range(2):
+        stand_in.Clock.now_ms += 5000
+        host.turn(5)
+    assert stands(host)[0] == "finished"
+    assert counters_of(host) == {"trays": 1, "parts": 3}
+    host.hello(5)
+    assert counters_of(host) == {"trays": 1, "parts": 3}
+    begin(host)
+    assert counters_of(host) == {"trays": 0, "parts": 1}
+
+
+def case_without_counters_there_are_none():
+    _, host = ready([(WAIT, 0, 0, 1)])
+    assert host.ask("counter", (0,))[:2] == ("error", "unknown_command")
+    begin(host)
+    assert counters_of(host) == {}
+
+
+def case_each_row_is_told_when_it_begins():
+    _, host = ready(COUNTING, counters=("trays", "parts"))
+    host.turn()
+    host.events = []
+    begin(host)
+    for _ in range(3):
+        stand_in.Clock.now_ms += 5000
+        host.turn()
+    once = [0, 1, 2, 3]
+    rows = rows_of(host)
+    assert [row for _, row, _ in rows] == once + once[1:] * 2 + [4]
+    assert [passed for passed, _, _ in rows] == list(range(1, len(rows) + 1))
+    assert [value for _, row, value in rows if row == 1] == [1, 2, 3] and rows[-1][2] == 1
+    assert not any(value for _, row, value in rows if row in (0, 2, 3))
+
+
+def case_a_motions_row_is_told_with_its_run():
+    app, host = ready([(MOVE, "there", 0, 0), (WAIT, 0, 0, 10), (MOVE, "back", 0, 0)])
+    host.turn()
+    host.events = []
+    run = host.ask("status")[1][4]
+    begin(host)
+    arrive(app, host, 10)
+    host.turn(20)
+    told = [(fields[1], fields[2]) for kind, fields, _ in host.events if kind == "row"]
+    assert told == [(run + 1, 0), (run + 1, 1), (run + 2, 2)]
+
+
+def case_a_motion_is_checked_once_in_a_run():
+    """Again in the next run; one whose start was refused counts as unchecked."""
+    app, host = ready([(REPEAT, 0, 0, 2), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 1, 0)])
+    engine = app.controller.engine
+    for _ in range(2):
+        engine.calls.clear()
+        begin(host)
+        for at in (10, 0, 10, 0):
+            arrive(app, host, at)
+            assert not engine.judged
+        assert [call for call in engine.calls if call.startswith("load")] == ["load"] * 2 + [
+            "load judged"
+        ] * 2
+    start(host)
+    assert engine.calls[-2:] == ["load", "start"]
+
+
+def case_a_record_that_is_another_now_is_refused_though_it_was_checked():
+    app, host = ready([(REPEAT, 0, 0, 2), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 1, 0)])
+    begin(host)
+    arrive(app, host, 10)
+    with open(flash() + "/there.atm", "r+b") as file:
+        file.seek(100)
+        file.write(b"\x55")
+    arrive(app, host, 0)
+    assert stands(host)[:2] == ("refused", codes.BAD_RECORD), stands(host)
+    assert runs(app) == 2 and not app.controller.engine.judged
 
 
 def case_for_ever_ends_only_by_a_stop():
@@ -342,127 +358,6 @@ def case_the_button_starts_it_as_the_default():
     arrive(app, host, 10)
     arrive(app, host, 0)
     assert stands(host)[0] == "finished"
-
-
-def case_refused_before_anything_moves():
-    there, back, on = (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (MOVE, "on", 0, 0)
-    for rows, refusal in (
-        ([(OUTPUT, 0, 1, 0), there, there], ("leg_elsewhere", 0, 3)),
-        ([there, on, back], ("leg_elsewhere", 0, 3)),
-        ([(REPEAT, 0, 0, 2), there, (END, 0, 0, 0)], ("leg_elsewhere", 0, 3)),
-        ([(OUTPUT, 0, 1, 0), back], ("wrong_start", 0, 10)),
-        ([there, (OUTPUT, 2, 1, 0)], ("no_such_pin", 255, 2)),
-        ([there, (INPUT, 1, 1, 0)], ("no_such_pin", 255, 2)),
-    ):
-        app, host = ready(rows)
-        assert begin(host) == ("error",) + refusal, rows
-        assert runs(app) == 0 and app.controller.outputs.log == [] and state(host) == "idle"
-    app, host = ready([(OUTPUT, 0, 1, 0)], outputs=0)
-    assert begin(host) == ("error", "no_such_pin", 255, 1)
-
-
-def case_a_motion_that_is_gone_or_another_is_named():
-    app, host = ready([(MOVE, "there", 0, 0), (MOVE, "back", 0, 0)])
-    host.ask("remove", (), "there")
-    assert begin(host) == ("error", "leg_missing", 255, 3)
-    host.upload("there", LEGS["on"])
-    assert begin(host) == ("error", "leg_missing", 255, 3)
-    put(host, [(WAIT, 0, 0, 1)], {}, "there")
-    host.seq = sequence.pack(ARM_CRC, [(MOVE, 0, 0, 0, 1)], [("there", wire.record_crc(host.seq))])
-    host.upload("seq", host.seq)
-    assert begin(host) == ("error", "leg_missing", 255, 1)
-    assert runs(app) == 0
-
-
-def case_of_another_arm_it_is_refused():
-    _, host = ready([(WAIT, 0, 0, 1)])
-    host.seq = sequence.pack(ARM_CRC ^ 1, [(WAIT, 0, 0, 1, 1)], [])
-    host.upload("seq", host.seq)
-    assert begin(host)[:2] == ("error", "arm_mismatch")
-    assert host.ask("start", (0, 1), "seq")[:2] == ("error", "bad_checksum")
-
-
-def case_unhomed_it_is_refused():
-    app, host = ready([(WAIT, 0, 0, 1)])
-    app.controller.engine.known = 1
-    assert begin(host) == ("error", "unhomed", 1, 0)
-    assert host.ask("start", (1, wire.record_crc(host.seq)), "seq")[:2] == ("error", "is_sequence")
-
-
-def case_without_room_it_is_refused():
-    app, host = ready([(WAIT, 0, 0, 1)])
-    import armtempo_board.app.sequencer as module
-
-    module.gc = stand_in.Module()
-    module.gc.collect = gc.collect
-    module.gc.mem_free = lambda: 10_000
-    assert begin(host) == ("error", "no_sequence_room", 255, 8000)
-    assert not app.controller.sequence and state(host) == "idle"
-    assert host.ask("sequence")[:2] == ("error", "unknown_command")
-    module.gc.mem_free = lambda: 20_000
-    assert begin(host)[0] == "ok"
-
-
-def case_no_memory_for_it_is_said_so():
-    _, host = ready([(WAIT, 0, 0, 1)])
-
-    def none(*arguments):
-        raise MemoryError
-
-    import armtempo_board.app.sequence_start as module
-
-    module.sequencer, kept = none, module.sequencer
-    assert begin(host)[:2] == ("error", "no_sequence_room")
-    module.sequencer = kept
-    assert host.ask("start", (0, wire.record_crc(host.record)), "feed")[0] == "ok"
-
-
-def case_the_list_tells_motions_and_sequences_apart():
-    _, host = ready([(WAIT, 0, 0, 1)])
-    found = {}
-    for index in range(5):
-        _, fields, name = host.ask("list", (index,))
-        found[name] = fields
-    assert found["seq"] == (5, len(host.seq), wire.record_crc(host.seq), 0, 0, 0, 1)
-    assert found["there"][6] == 0 and found["there"][4] == 2
-
-
-def case_a_sequence_is_stored_whole_or_not_at_all():
-    _, host = ready([(WAIT, 0, 0, 1)])
-    kept = host.seq
-    rows = [(WAIT, 0, 0, 1, 1)]
-    for bad in (
-        sequence.pack(ARM_CRC, [(9, 0, 0, 1, 1)], []),
-        sequence.pack(ARM_CRC, [(MOVE, 0, 0, 0, 1)], []),
-        sequence.pack(ARM_CRC, [(REPEAT, 0, 0, 0, 1)], []),
-        sequence.pack(ARM_CRC, [(END, 0, 0, 0, 1)], []),
-        sequence.pack(ARM_CRC, [(WAIT, 0, 0, 1 << 31, 1)], []),
-        sequence.pack(ARM_CRC, [(WAIT, 0, 0, 1, 0)], []),
-        sequence.pack(ARM_CRC, [(REPEAT, 0, 0, 2, 1)] * 5 + [(END, 0, 0, 0, 1)] * 5, []),
-        sequence.pack(ARM_CRC, [], []),
-        sequence.pack(ARM_CRC, rows, [("", 1)]),
-    ):
-        assert host.upload("seq", bad)[-1][:2] == ("error", "bad_record")
-    assert host.ask("get", (0, 200), "seq")[2] == kept
-    again = App(host.port, flash())
-    assert again.controller.store().is_sequence("seq")
-
-
-def case_a_power_cut_before_the_rename_loses_nothing():
-    _, host = ready([(WAIT, 0, 0, 1)])
-    path = flash() + "/seq.atm"
-    with open(path, "rb") as file:
-        data = file.read()
-    import os
-
-    os.rename(path, path + ".new")
-    App(host.port, flash())
-    with open(path, "rb") as file:
-        assert file.read() == data
-    with open(path + ".new", "wb") as file:
-        file.write(data[:-1])
-    App(host.port, flash())
-    assert "seq.atm.new" not in os.listdir(flash())
 
 
 cases.run(globals())

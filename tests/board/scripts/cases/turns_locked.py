@@ -12,21 +12,9 @@ stand_in.install()
 
 from armtempo_board.app.app import App  # noqa: E402
 from armtempo_shared import messages, wire  # noqa: E402
+from pin_rows import GRIPPER, PART, PUMP  # noqa: E402
 
 TURNS = 2000
-PUMP = {
-    "pin": 0x30,
-    "timer": 0,
-    "channel": 0,
-    "spare": 0,
-    "prescaler": 0,
-    "period": 0,
-    "low": 0,
-    "high": 1,
-    "safe": 0,
-}
-GRIPPER = dict(PUMP, pin=0x18, timer=10, channel=1, prescaler=51, period=64614, low=1615, high=8077)
-PART = {"pin": 0x31, "active_high": 0, "debounce_ms": 5}
 
 
 class Still:

@@ -128,9 +128,10 @@ class Engine:
         self.explode = None
         self.rates = Rates()
         self.ticks = 0
+        self.judged = False
 
     def load(self, motion, rate=1000):
-        self.calls.append("load")
+        self.calls.append("load judged" if self.judged else "load")
         self.rates.wanted = rate
         if self.refusal:
             from armtempo_board.errors import Refused

@@ -7,7 +7,7 @@ import sys
 
 import cases
 import whole_board
-from armtempo_shared import armrecord, wire
+from armtempo_shared import armrecord, meanings, wire
 from virtual_board import machine_state
 
 FLASHES, PROGRAM, HOME, *_ = whole_board.arguments()
@@ -111,6 +111,21 @@ def case_before_homing_nothing_moves(world):
     yield from world.home(HOME)
     yield from unmoved(world)
     yield from moves_when_pressed_anew(world)
+
+
+def case_while_the_arm_is_guided_by_hand_the_button_is_only_told(world):
+    """As the host knows it: a notice that begins so, once for each press, and nothing starts."""
+    yield from ready(world)
+    yield from world.ask("drivers", (0,))
+    notices(world)
+    for _ in range(2):
+        yield from tap(world)
+        yield from world.wait(3 * STEADY_MS)
+    told = notices(world)
+    assert len(told) == 2 and all(text.startswith(meanings.BUTTON_NOTICE) for text in told), told
+    status = yield from world.status()
+    assert status["run"] == 0 and world.steps() == [0, 0, 0], status
+    yield from world.ask("drivers", (1,))
 
 
 def case_while_it_moves_the_button_does_nothing(world):

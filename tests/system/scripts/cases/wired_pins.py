@@ -18,28 +18,14 @@ import struct
 
 from armtempo_board.app import output_setup
 from armtempo_board.app.output_setup import inputs_of, outputs_of
+from pin_rows import GRIPPER, PART, PUMP
 
 SCRATCH = sys.argv[1]
 MS = 84_000
-PUMP = {
-    "pin": 0x30,
-    "timer": 0,
-    "channel": 0,
-    "spare": 0,
-    "prescaler": 0,
-    "period": 0,
-    "low": 1,
-    "high": 0,
-    "safe": 0,
-}
-GRIPPER = dict(
-    PUMP, pin=0x18, timer=10, channel=1, prescaler=51, period=64614, low=1615, high=8077, safe=7282
-)
 HAND = dict(GRIPPER, pin=0x1F, timer=12, channel=2, prescaler=25, period=64614)
 ARM = dict(HAND, pin=0x1E, channel=1, low=8077, high=1615)
 FAN = dict(PUMP, pin=0x48, timer=0)
 TONE = dict(PUMP, pin=0x49, timer=1, channel=1, prescaler=0, period=8399, low=0, high=8400, safe=32768)
-PART = {"pin": 0x31, "active_high": 0, "debounce_ms": 10}
 DOOR = {"pin": 0x33, "active_high": 1, "debounce_ms": 0}
 
 

@@ -1,0 +1,157 @@
+"""The report of a recorded sequence: one page, with how it ended and how well each of its motions was followed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from armtempo.formats.atomic_file import replace_text
+from armtempo.report import html_page
+from armtempo.report.run_report import PAGE
+from armtempo.report.verdict import BAD, GOOD, OPEN, STEPS_OFF, Verdict, VerdictItem
+from armtempo.runs.leg_results import LegResult, results
+from armtempo.runs.sequence_reader import SequenceRun
+
+_LEGS = {
+    "motion": "its number, as in the file NAME-1, NAME-2 … on the board",
+    "what": "",
+    "planned (s)": "how long it takes at 100 % speed",
+    "runs": "how often it was run, as far as the host heard",
+    "whole": "runs of which every sample came, to their end",
+    "joint": "",
+    "command off plan (steps)": "largest difference of the commanded from the planned angle at a sample: half a step "
+    "is rounding",
+    "at the end (steps)": "the same at the end of each whole run",
+    "largest (°)": "largest difference of the measured from the planned angle; – without an encoder",
+    "RMS (°)": "root mean square of these differences over all samples",
+}
+
+
+def write(folder: Path) -> Path:
+    """Write report.html into the folder of a recorded sequence; gives the page. RunFolderError where it is none."""
+    found = SequenceRun.load(folder)
+    path = folder / PAGE
+    replace_text(path, render(found))
+    return path
+
+
+def verdict_of(folder: Path) -> Verdict:
+    """The verdict on a recorded sequence in its folder; RunFolderError where it is none."""
+    found = SequenceRun.load(folder)
+    return verdict(found, results(found))
+
+
+def verdict(found: SequenceRun, legs: tuple[LegResult, ...]) -> Verdict:
+    """What can be told: how it ended, whether everything came, whether the arm was where it was to be."""
+    items = [_ending(found), *_losses(found, legs), *_followed(found, legs)]
+    order = (BAD, OPEN, GOOD)
+    return Verdict(tuple(sorted(items, key=lambda item: order.index(item.state))))
+
+
+def render(found: SequenceRun) -> str:
+    """The page as HTML text."""
+    legs = results(found)
+    told = verdict(found, legs)
+    meta = found.meta
+    sheet = html_page.Page(
+        f"Run of sequence {found.name!r}", f"{meta['started']}, arm {meta.get('arm', 'not known')}"
+    )
+    sheet.verdict(told.state, told.summary, [(item.state, item.text) for item in told.findings])
+    sheet.heading("Its motions")
+    if legs:
+        sheet.table(tuple(_LEGS), [row for leg in legs for row in _rows(found, leg)], explained=_LEGS)
+    else:
+        sheet.note("No motion was recorded.")
+    sheet.heading("How it went")
+    sheet.table(("what", "value"), list(_course(found)))
+    sheet.note("Each row as it passed is in rows.csv, each sample with its row in samples.csv.")
+    return sheet.render()
+
+
+def _ending(found: SequenceRun) -> VerdictItem:
+    ended = found.meta.get("ended") or {}
+    where = f"in step {ended['step']} after {ended['cycle']} whole cycles" if ended else _last(found)
+    if found.state == "finished":
+        return VerdictItem(GOOD, f"finished after {ended['cycle']} whole cycles")
+    if found.state == "stopped":
+        return VerdictItem(OPEN, f"stopped {where}")
+    code = f" ({ended['code']})" if ended.get("code") else ""
+    return VerdictItem(BAD, f"{found.state.replace('_', ' ')}{code} {where}")
+
+
+def _last(found: SequenceRun) -> str:
+    last = found.last
+    if last is None:
+        return "before its first row was heard of"
+    return f"after row {last.row} ({last.words}), step {last.step}, {last.cycle} whole cycles, was heard of"
+
+
+def _losses(found: SequenceRun, legs: tuple[LegResult, ...]) -> Iterator[VerdictItem]:
+    if found.rows_lost:
+        yield VerdictItem(OPEN, f"{found.rows_lost} rows passed without the host hearing of them")
+    cut = sum(leg.runs - leg.whole for leg in legs)
+    if cut:
+        yield VerdictItem(
+            OPEN, f"of {cut} runs of motions not every sample came, or they did not reach their end"
+        )
+
+
+def _followed(found: SequenceRun, legs: tuple[LegResult, ...]) -> Iterator[VerdictItem]:
+    ends = [np.nanmax(leg.end_off_steps) for leg in legs if leg.whole]
+    if ends and max(ends) > STEPS_OFF + 0.5:
+        yield VerdictItem(BAD, f"a motion ended {max(ends):.1f} steps from where it was to end")
+    elif ends:
+        yield VerdictItem(
+            GOOD, f"each of {sum(leg.whole for leg in legs)} whole motions ended on its planned step"
+        )
+    measured = np.array([leg.measured_off_deg for leg in legs])
+    for joint, column in zip(found.joints, measured.T if legs else (), strict=False):
+        if not np.isfinite(column).any():
+            yield VerdictItem(OPEN, f"{joint.name} has no encoder: where it really was is not known")
+        else:
+            yield VerdictItem(
+                GOOD, f"{joint.name} was measured at most {np.nanmax(column):.3f}° from the plan"
+            )
+
+
+def _rows(found: SequenceRun, leg: LegResult) -> Iterator[list[object]]:
+    for index, joint in enumerate(found.joints):
+        yield [
+            leg.number,
+            leg.words,
+            f"{leg.duration_s:.3f}",
+            leg.runs,
+            leg.whole,
+            joint.name,
+            html_page.number(leg.command_off_steps[index], ".2f"),
+            html_page.number(leg.end_off_steps[index], ".2f"),
+            html_page.number(leg.measured_off_deg[index], ".3f"),
+            html_page.number(leg.measured_rms_deg[index], ".3f"),
+        ]
+
+
+def _course(found: SequenceRun) -> Iterator[tuple[str, str]]:
+    ended = found.meta.get("ended") or {}
+    yield "ended", found.state
+    for key in ("step", "cycle"):
+        if key in ended:
+            yield key, str(ended[key])
+    for name, value in (ended.get("counters") or {}).items():
+        yield f"counter {name}", str(value)
+    yield "rows that passed", str(found.last.passed if found.last else 0)
+    if (cycle_s := _cycle_s(found)) is not None:
+        yield "time of a cycle, by the host's clock, median", f"{cycle_s:.3f} s"
+    for key in ("port", "virtual"):
+        if key in found.meta:
+            yield key, str(found.meta[key])
+
+
+def _cycle_s(found: SequenceRun) -> float | None:
+    """From the first row that was heard of in a cycle to that of the next; None where there are less than three."""
+    begins: dict[int, float] = {}
+    for row in found.rows:
+        begins.setdefault(row.cycle, row.time_s)
+    times = [begins[cycle + 1] - begun for cycle, begun in begins.items() if cycle + 1 in begins]
+    return float(np.median(times)) if len(times) > 1 else None

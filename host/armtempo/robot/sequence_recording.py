@@ -1,0 +1,132 @@
+"""A sequence that is recorded while it runs: its rows and samples, as the board tells them, into a run folder."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from armtempo_shared import sequence, wire
+from armtempo_shared.sequence import SequenceData, SequenceError
+
+from armtempo.errors import InputError
+from armtempo.link import Client
+from armtempo.link.board_messages import Event, RowBegun, Sample, SequenceState
+from armtempo.model import arm_json
+from armtempo.model.arm import Arm
+from armtempo.model.sequence_plan import SequencePlan
+from armtempo.records import encoded_sequence, sequence_words
+from armtempo.runs import run_folder, sequence_folder
+from armtempo.runs.sequence_folder import SequenceFolder
+
+ACKNOWLEDGED = 8
+"""The board is told of samples that have arrived, so many at a time."""
+
+
+class Recorder:
+    """Sees a sequence while it runs; this one keeps nothing."""
+
+    path: Path | None = None
+    """The run folder, where there is one."""
+
+    def take(self, event: Event) -> None:
+        """An event has come."""
+
+    def end(self, state: SequenceState) -> None:
+        """It has ended, however."""
+
+
+@dataclass(frozen=True, eq=False)
+class SequenceContent:
+    """What the board is to run: the sequence's record and those of its motions."""
+
+    name: str
+    arm: Arm
+    record: SequenceData
+    legs: tuple[bytes, ...]
+    plan: SequencePlan | None
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """What each row does."""
+        if self.plan is not None:
+            return tuple(row.words for row in self.plan.rows)
+        names = [output.name for output in self.arm.outputs], [one.name for one in self.arm.inputs]
+        return sequence_words.of_record(self.record, *names)
+
+
+def of_plan(plan: SequencePlan) -> SequenceContent:
+    """Of a planned sequence."""
+    encoded = encoded_sequence.of_plan(plan)
+    legs = tuple(motion.data for motion in encoded.motions)
+    return SequenceContent(plan.name, plan.arm, SequenceData(encoded.data), legs, plan)
+
+
+def fetched(client: Client, name: str, arm: Arm) -> SequenceContent:
+    """Of one that the board keeps; InputError where its record is damaged or of another version."""
+    try:
+        record = SequenceData(client.fetch(name))
+    except SequenceError as error:
+        raise InputError(
+            f"sequence {name!r} on the board: {error}", "plan it again and 'armtempo upload --force' it"
+        ) from error
+    legs = tuple(client.fetch(record.motion(index)[0]) for index in range(record.motions))
+    return SequenceContent(name, arm, record, legs, None)
+
+
+@contextmanager
+def recorder(client: Client, content: SequenceContent, parent: Path, port: str) -> Iterator[Recorder]:
+    """Records into a new run folder below ``parent``, for one run."""
+    rows = [content.record.row(index) for index in range(content.record.rows)]
+    path = run_folder.new_folder(parent, content.name)
+    for number, leg in enumerate(content.legs, 1):
+        file = path / sequence_folder.leg_file(number)
+        with run_folder.writing(file):
+            file.write_bytes(leg)
+    if content.plan is not None:
+        content.plan.save(path / sequence_folder.SEQUENCE)
+    else:
+        arm_json.save(content.arm, path / run_folder.ARM)
+    folder = SequenceFolder(
+        path,
+        content.name,
+        run_folder.scales(content.arm),
+        content.words,
+        tuple(row[4] for row in rows),
+        tuple(row[1] + 1 if row[0] == sequence.MOVE else 0 for row in rows),
+        {
+            "arm": content.arm.name,
+            "port": port,
+            "virtual": client.info.virtual,
+            "board": vars(client.info),
+            "motions": [content.record.motion(index)[0] for index in range(content.record.motions)],
+        },
+    )
+    with folder:
+        yield _FolderRecorder(client, folder)
+
+
+class _FolderRecorder(Recorder):
+    def __init__(self, client: Client, folder: SequenceFolder) -> None:
+        self.path = folder.path
+        self._client = client
+        self._folder = folder
+        self._begun_s = client.session.clock()
+        self._run, self._row = 0, -1  # the motion's run that was heard of last, and its row
+        self._kept = 0
+
+    def take(self, event: Event) -> None:
+        if isinstance(event, RowBegun):
+            self._folder.add_row(event, self._client.session.clock() - self._begun_s)
+            if event.row < len(self._folder.motions) and self._folder.motions[event.row]:
+                self._run, self._row = event.run, event.row
+        elif isinstance(event, Sample):
+            self._folder.add_sample(event, self._row if event.run == self._run else None)
+            self._kept += 1
+            if self._kept % ACKNOWLEDGED == 0:
+                self._client.samples(event.index + 1)
+
+    def end(self, state: SequenceState) -> None:
+        code = wire.ERRORS[state.code][0] if state.code in wire.ERRORS else str(state.code or "")
+        self._folder.end(state, code, self._client.counters())

@@ -1,0 +1,33 @@
+"""Where an arm is to go, as people say it: the angles of a posture."""
+
+from __future__ import annotations
+
+from numpy.typing import ArrayLike
+
+from armtempo.arrays import Array
+from armtempo.model.arm import Arm
+from armtempo.model.plan import Plan
+from armtempo.model.sequence_plan import SequencePlan
+from armtempo.planning import point_to_point, via_points
+from armtempo.records.encoded_motion import EncodedMotion
+
+Where = Plan | EncodedMotion | SequencePlan | str | ArrayLike
+"""A posture: by its name in the arm file, the driven joints' angles in degrees, (J,), or a motion
+or sequence for its start."""
+
+
+def posture_deg(where: Where, arm: Arm) -> Array:
+    """The driven joints' angles of a posture, in degrees (J,); a sequence that moves nothing begins at home.
+
+    Raises InputError for a posture that does not fit the arm, or that it has no name for.
+    """
+    if isinstance(where, Plan):
+        return where.trajectory(0.0)
+    if isinstance(where, EncodedMotion):
+        return where.start_deg
+    if isinstance(where, SequencePlan):
+        start_deg = where.arm.home_deg if where.start_deg is None else where.start_deg
+        return point_to_point.posture(start_deg, where.arm)
+    if isinstance(where, str):
+        return via_points.posture_deg(arm, arm.posture(where))
+    return point_to_point.posture(where, arm)

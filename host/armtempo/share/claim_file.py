@@ -1,0 +1,79 @@
+"""The files of claims: where they are, what is in one.
+
+A claim is a text of one field a line, in the order of ``claim.PortClaim``; a line end in a field is escaped. This
+imports little, because ``armtempo stop`` reads claims before all else.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+
+TYPE_CHECKING = False  # as "typing" has it, which takes longer to import than the rest of a stop
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+VERSION = 1
+"""Of the file and of what is said over the socket."""
+SUFFIX = ".claim"
+_LONGEST_SOCKET_PATH = 100
+"""Bytes; an operating system takes 104 to 108."""
+_TEMPORARY = ("/tmp", "/var/tmp")
+
+
+def folders() -> Iterator[str]:
+    """The folder for new claims, then one where another program of this user may have put its own."""
+    runtime = os.environ.get("XDG_RUNTIME_DIR") or (os.environ.get("LOCALAPPDATA") if os.name == "nt" else "")
+    if runtime and os.path.isdir(runtime):
+        wanted = os.path.join(runtime, "armtempo")
+        if len(os.fsencode(wanted)) + len("/0123456789abcdef.socket") <= _LONGEST_SOCKET_PATH:
+            yield wanted
+    user = str(os.getuid()) if hasattr(os, "getuid") else os.environ.get("USERNAME", "")
+    yield os.path.join(_temporary(), f"armtempo-{user}")
+
+
+def is_private(folder: str) -> bool:
+    """Whether the folder is there and this user's alone."""
+    try:
+        found = os.lstat(folder)
+    except OSError:
+        return False
+    if not stat.S_ISDIR(found.st_mode):
+        return False
+    return not hasattr(os, "getuid") or (found.st_uid == os.getuid() and not found.st_mode & 0o077)
+
+
+def paths() -> Iterator[str]:
+    """The files of all claims of this user's programs."""
+    for folder in folders():
+        for name in sorted(os.listdir(folder)) if is_private(folder) else ():
+            if name.endswith(SUFFIX):
+                yield os.path.join(folder, name)
+
+
+def text(fields: Iterable[str]) -> str:
+    """What a file holds."""
+    return "".join(field.encode("unicode_escape").decode() + "\n" for field in fields)
+
+
+def read(path: str) -> list[str]:
+    """The fields in a file; none where it is gone, damaged or of another version."""
+    try:
+        with open(path, "rb") as file:
+            fields = [line.decode("unicode_escape") for line in file.read().split(b"\n")[:-1]]
+    except (OSError, UnicodeError):
+        return []
+    return fields if fields[-1:] == [str(VERSION)] else []
+
+
+def _temporary() -> str:
+    """The folder for temporary files, as ``tempfile`` chooses it, whose import a stop does not wait for."""
+    wanted = [os.environ.get(name, "") for name in ("TMPDIR", "TEMP", "TMP")]
+    if os.name == "posix":
+        wanted += _TEMPORARY
+    for place in wanted:
+        if place and os.path.isdir(place) and os.access(place, os.W_OK | os.X_OK):
+            return os.path.abspath(place)
+    import tempfile
+
+    return tempfile.gettempdir()

@@ -1,0 +1,85 @@
+"""What the chip computes between two motions of a sequence: the figures of host/docs/sequences.md.
+
+    python -m tests.benchmark.sequence_pauses MICROPYTHON [FOLDER]
+
+As firmware_run: MicroPython's own firmware, with the program built in and with the program in compiled files, on QEMU,
+which counts instructions, at 1.3 cycles each. The paper's arm moves between three postures, three times; in the first
+cycle the board checks each motion whole, later only that it is still the same. Printed is how long the loop's turn
+lasts in which one motion gives way to the next: code is imported, the motion checked, the rings are filled. What the
+clock of the virtual board tells (tests/benchmark/sequences.py) comes on top. FOLDER keeps what was built.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+import tempfile
+from pathlib import Path
+
+import armtempo
+from armtempo.errors import ArmtempoError
+from armtempo.model.arm import Arm
+from armtempo.model.sequence import Sequence
+from armtempo.robot.connect import connect
+
+from tests.benchmark import firmware, firmware_run
+
+CYCLES = 3
+LEGS = 3
+SEQUENCE = """
+name = "there-and-back"
+start = "home"
+[[step]]
+repeat = %d
+[[step]]
+goto = [10, -65, 45]
+[[step]]
+goto = [-5, -50, 30]
+[[step]]
+goto = "home"
+[[step]]
+end = "repeat"
+"""
+
+
+def pauses_ms(elf: Path, image: Path, folder: Path) -> list[int]:
+    """How long the turn took that began each motion, ms, in their order; the first does what ``start`` does too."""
+    arm = firmware_run.unwatched(Arm.paper())
+    file = folder / "sequence.toml"
+    file.write_text(SEQUENCE % CYCLES)
+    plan = armtempo.plan_sequence(arm, Sequence.load(file, arm))
+    with firmware_run.running(elf, image) as (port, said):
+        with connect(port) as board:
+            board.home(arm)
+            end = board.run_sequence(plan)
+            assert (end.ending, end.cycle) == ("finished", CYCLES), end
+        text = "".join(said)
+    return [int(found) for found in re.findall(r"@ start (\d+)", text)]
+
+
+def main(micropython: Path, folder: Path) -> None:
+    """Print the figures."""
+    board = firmware_run.define_board(micropython, folder)
+    kinds = (
+        (
+            "in the firmware",
+            firmware_run.build_with_program(micropython, board, folder / "with-program"),
+            False,
+        ),
+        ("files, compiled", firmware.build_at(micropython, board, folder / "stock"), True),
+    )
+    for title, elf, with_library in kinds:
+        try:
+            found = pauses_ms(elf, firmware_run.flash(folder, elf, with_library), folder)
+        except ArmtempoError as error:  # beside the stand-ins its memory may be too short
+            print(f"{title}: {error}")
+            continue
+        print(f"{title}: first cycle {found[:LEGS]} ms, then {found[LEGS:]} ms", flush=True)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 2:
+        main(Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve())
+    else:
+        with tempfile.TemporaryDirectory() as name:
+            main(Path(sys.argv[1]).resolve(), Path(name))

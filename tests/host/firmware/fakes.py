@@ -1,0 +1,43 @@
+"""What stands for compilers, flash tools and a checkout of MicroPython."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from armtempo.cli import main
+from click.testing import CliRunner
+
+MAKE = """#!/bin/sh
+echo "$@" >> "$MAKE_LOG"
+for word in "$@"; do case "$word" in BUILD=*) out="${word#BUILD=}";; esac; done
+[ -n "$MAKE_FAILS" ] && { echo "error: it does not compile"; exit 2; }
+[ -n "$out" ] || exit 0
+for name in firmware0.bin firmware1.bin firmware.dfu firmware.hex firmware.elf; do echo "$name" > "$out/$name"; done
+"""
+GCC = '#!/bin/sh\ncase "$1" in -dump*) echo 13.2.1;; *) exit ${NO_NEWLIB:-0};; esac\n'
+TOOL = '#!/bin/sh\necho "${0##*/} $@" >> "$TOOL_LOG"\n'
+DFU = TOOL + 'case "$1" in --list) printf "$DFU_LIST";; *) exit ${DFU_FAILS:-0};; esac\n'
+ONE = "Found DFU: [0483:df11] ver=2200, devnum=9, alt=1\\nFound DFU: [0483:df11] ver=2200, devnum=9, alt=0\\n"
+BOARD_MAKE = """CMSIS_MCU = STM32F407xx
+ifeq ($(USE_MBOOT),1)
+TEXT0_ADDR = 0x08020000
+else
+TEXT0_ADDR = 0x08000000
+TEXT1_ADDR = 0x08020000
+endif
+"""
+HEADER = '#define MICROPY_HW_BOARD_NAME "F4DISC"\n#define MICROPY_HW_MCU_NAME "STM32F407"\n'
+STM32F4DISC = "ports/stm32/boards/STM32F4DISC"
+HEAD = str(shutil.which("head"))
+MACHINE = "F4DISC with STM32F407"
+
+
+def no_progress(done: float, whole: float) -> None: ...
+
+
+def outcome(*arguments: str | Path) -> tuple[int, str]:
+    """Exit code and what is said of a command."""
+    done = CliRunner().invoke(main, [str(each) for each in arguments])
+    assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
+    return done.exit_code, done.output

@@ -1,0 +1,181 @@
+"""`armtempo flash`: how a firmware gets onto a board, and what is said where it does not."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from armtempo.deploy.firmware import flash, image
+from armtempo.errors import LinkError
+from armtempo.link.program_version import own_crc
+
+from tests.host.firmware.fakes import DFU, MACHINE, ONE, TOOL, no_progress, outcome
+
+
+@pytest.fixture
+def built(tmp_path: Path) -> Path:
+    """A firmware's folder."""
+    folder = tmp_path / "firmware"
+    pieces = (image.Piece("firmware0.bin", 0x08000000), image.Piece("firmware1.bin", 0x08020000))
+    made = image.Image("STM32F4DISC", MACHINE, "1.28.0", "gcc", own_crc(), pieces)
+    folder.mkdir()
+    for piece in pieces:
+        (folder / piece.file).touch()
+    (folder / image.ABOUT).write_bytes(image.about(made))
+    return folder
+
+
+def test_flashing_by_usb_writes_the_vectors_last(
+    built: Path, tools: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tools(dfu_util=DFU)
+    monkeypatch.setenv("DFU_LIST", ONE)
+    code, said = outcome("flash", built)
+    assert (code, "armtempo deploy --port PORT" in said) == (0, True), said
+    assert (tmp_path / "tool.log").read_text().splitlines() == [
+        "dfu-util --list",
+        f"dfu-util -d 0483:df11 -a 0 -s 0x08020000 -D {built}/firmware1.bin",
+        f"dfu-util -d 0483:df11 -a 0 -s 0x08000000:leave -D {built}/firmware0.bin",
+    ]
+
+
+def test_flashing_by_st_link(built: Path, tools: Callable[..., Path], tmp_path: Path) -> None:
+    tools(st_flash=TOOL)
+    assert outcome("flash", built)[0] == 0
+    assert (tmp_path / "tool.log").read_text().splitlines() == [
+        f"st-flash --connect-under-reset write {built}/firmware1.bin 0x08020000",
+        f"st-flash --connect-under-reset --reset write {built}/firmware0.bin 0x08000000",
+    ]
+
+
+class FakeRemote:
+    """A board's prompt: what it is, and what it was told."""
+
+    machine = MACHINE
+    log = ""
+
+    def __init__(self, port: str) -> None:
+        self.told: list[str] = []
+
+    def survey(self) -> FakeRemote:
+        return self
+
+    def run(self, *commands: list[str]) -> str:
+        with Path(self.log).open("a") as file:
+            file.write(f"mpremote {commands[0][0]}\n")
+        return ""
+
+
+@pytest.fixture
+def board(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A board that answers at any port."""
+    monkeypatch.setattr(FakeRemote, "log", str(tmp_path / "tool.log"))
+    monkeypatch.setattr(flash, "Remote", FakeRemote)
+    monkeypatch.setattr(flash, "end_program", lambda port, tell: None)
+
+
+@pytest.mark.usefixtures("board")
+def test_a_board_at_a_port_goes_into_its_bootloader(
+    built: Path, tools: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tools(dfu_util=DFU, st_flash=TOOL)
+    monkeypatch.setenv("DFU_LIST", ONE)
+    assert outcome("flash", built, "--port", "/dev/ttyX")[0] == 0
+    lines = (tmp_path / "tool.log").read_text().splitlines()
+    assert lines[:2] == ["mpremote bootloader", "dfu-util --list"]
+    (tmp_path / "tool.log").unlink()
+    assert outcome("flash", built, "--port", "/dev/ttyX", "--tool", "st-flash")[0] == 0
+    assert "mpremote" not in (tmp_path / "tool.log").read_text()
+
+
+@pytest.mark.usefixtures("board")
+def test_another_board_than_the_firmwares_is_refused(
+    built: Path, tools: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tools(dfu_util=DFU)
+    monkeypatch.setattr(FakeRemote, "machine", "PYBv1.1 with STM32F405RG")
+    code, said = outcome("flash", built, "--port", "/dev/ttyX")
+    assert code == 1
+    assert "is a PYBv1.1 with STM32F405RG, the firmware is for a F4DISC" in said
+    assert not (tmp_path / "tool.log").exists()
+
+
+def test_a_moving_board_is_not_flashed(
+    built: Path, tools: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tools(dfu_util=DFU)
+
+    def moving(port: str, tell: object) -> None:
+        raise LinkError("the board is moving")
+
+    monkeypatch.setattr(flash, "end_program", moving)
+    with pytest.raises(LinkError, match="is moving"):
+        flash.flash(built, "/dev/ttyX", None, print, no_progress)
+
+
+@pytest.mark.parametrize(
+    ("devices", "words"), [("", "no board in its bootloader"), (ONE * 2, "2 boards in their bootloader")]
+)
+def test_no_bootloader_or_more_than_one(
+    devices: str, words: str, built: Path, tools: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tools(dfu_util=DFU)
+    monkeypatch.setenv("DFU_LIST", devices)
+    code, said = outcome("flash", built)
+    assert code == 1
+    assert words in said
+    assert "BOOT0" in said
+
+
+@pytest.mark.parametrize("tool", [None, "dfu-util", "st-flash"])
+def test_missing_flash_tools_are_named(tool: str | None, built: Path, tools: Callable[..., Path]) -> None:
+    tools()
+    code, said = outcome("flash", built, *(["--tool", tool] if tool else []))
+    assert code == 1
+    assert "not installed" in said
+    assert ("apt install dfu-util" in said) == (tool != "st-flash")
+    assert ("apt install stlink-tools" in said) == (tool != "dfu-util")
+
+
+def test_a_flash_tool_that_fails_says_what_to_do(
+    built: Path, tools: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tools(dfu_util=DFU)
+    monkeypatch.setenv("DFU_LIST", ONE)
+    monkeypatch.setenv("DFU_FAILS", "74")
+    code, said = outcome("flash", built)
+    assert code == 1
+    assert "no whole firmware now" in said
+    assert "hint: flash again" in said
+
+
+def test_a_virtual_board_takes_no_firmware(built: Path, tools: Callable[..., Path]) -> None:
+    tools(dfu_util=DFU)
+    assert outcome("flash", built, "--port", "sim")[0] == 2
+
+
+def test_a_folder_that_is_no_firmware_is_refused(
+    built: Path, tools: Callable[..., Path], tmp_path: Path
+) -> None:
+    tools(st_flash=TOOL)
+    for damage, words in (
+        (lambda: (built / "firmware1.bin").unlink(), "is not whole: firmware1.bin"),
+        (lambda: (built / image.ABOUT).write_text(json.dumps({"pieces": []})), "cannot be read"),
+        (lambda: (built / image.ABOUT).unlink(), "holds no firmware"),
+    ):
+        damage()
+        code, said = outcome("flash", built)
+        assert code == 2
+        assert words in said
+    assert not (tmp_path / "tool.log").exists()
+
+
+def test_another_version_in_a_firmware_is_told(built: Path, tools: Callable[..., Path]) -> None:
+    tools(st_flash=TOOL)
+    content = json.loads((built / image.ABOUT).read_text())
+    (built / image.ABOUT).write_text(json.dumps(content | {"program_crc": f"{own_crc() ^ 1:08x}"}))
+    code, said = outcome("flash", built)
+    assert code == 0
+    assert "another version of the program" in said

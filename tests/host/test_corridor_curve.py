@@ -1,0 +1,43 @@
+"""The trade-off of corridor against motion time: wider is never slower, and both ends are the plans without one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+from armtempo.model.job import Job, Stop
+from armtempo.planning import corridor_curve, planner
+
+from tests.host import problems
+
+ARM = problems.make_arm([[50.0, 50.0, 150.0]] * 2)
+JOB = Job("bend", ((0.0, 0.0), (60.0, 10.0), (20.0, 50.0), (80.0, 0.0)), path="free", refine=4, starts=1)
+
+
+@pytest.mark.slow
+def test_it_goes_from_the_spline_to_the_free_path() -> None:
+    steps: list[float] = []
+    found = corridor_curve.curve(ARM, JOB, lambda done, whole: steps.append(done / whole))
+    widths = [each.corridor for each in found]
+    assert widths[0] == 0.0
+    assert widths[-1] is None
+    inner = [float(width or 0.0) for width in widths[1:-1]]
+    assert inner == sorted(inner)
+    times_s = [each.total_s for each in found]
+    assert all(later <= 1.01 * earlier for earlier, later in pairwise(times_s))
+    assert times_s[-1] == pytest.approx(planner.plan(ARM, JOB).total_s, rel=0.01)
+    assert times_s[-1] < 0.995 * times_s[0]
+    assert steps == sorted(steps)
+    assert steps[-1] == 1.0
+
+
+@pytest.mark.slow
+def test_with_a_stop_narrow_corridors_hold_no_motion() -> None:
+    """The spline does not rest there."""
+    job = replace(JOB, via=JOB.via[:3], stops=(Stop(1),))
+    found = corridor_curve.curve(ARM, job, lambda done, whole: None)
+    widths = [each.corridor for each in found]
+    assert widths[-1] is None
+    assert 0.0 not in widths
+    assert 2 <= len(widths) < 9
