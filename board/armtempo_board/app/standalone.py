@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from armtempo_board.app.controller import Controller
 
 _CTRL_C = const(3)
+_ONLY = const(0)
 
 
 class _Nobody:
@@ -76,7 +77,7 @@ def _follow(app: "App", controller: "Controller", watchdog: "Watchdog") -> None:
     while controller.moving():
         app.turn()
         watchdog.feed()
-        if port.readinto(byte) and byte[0] == _CTRL_C and controller.moving():
+        if port.readinto(byte) and byte[_ONLY] == _CTRL_C and controller.moving():
             controller.stop(presses)
             presses = 1
     app.turn()
