@@ -10,6 +10,7 @@ from armtempo_shared import codes
 from micropython import const
 
 from armtempo_board.stepgen import step_generator  # isort: skip  # noqa: F401  nested imports cost stack: the deepest first
+from armtempo_board.motion import engine  # isort: skip  # noqa: F401  and what is deep without that
 
 import armtempo_board
 from armtempo_board import heap

@@ -12,7 +12,7 @@ from armtempo_shared.limits import MAX_JOINTS
 from armtempo_board.memory import Memory
 from armtempo_board.motion.workspace import Workspace
 
-_RESERVE = 25_650  # bytes of heap for the rest
+_RESERVE = 25_760  # bytes of heap for the rest
 _USUAL_JOINTS = 3  # there is heap for their objects before there is memory for larger rings
 _MOST_SAMPLES = 4096  # bytes of the sample buffer at most,
 _LEAST_SAMPLES = 768  # and at least;

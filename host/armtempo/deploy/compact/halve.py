@@ -14,12 +14,16 @@ from armtempo.deploy.compact.scopes import top_names
 _LEAST_FUNCTIONS = 100
 """Of a smaller module the blocks are fewer than what another module takes."""
 
+_FIRST_PERCENT = 24
+"""Of the functions, about so many in the first: so both files of the board program fill their blocks of the flash."""
+
 
 def halve(trees: dict[str, ast.Module], module: str, first: str) -> None:
-    """Put the first half of ``module``, by its functions, into the new module ``first`` of its package.
+    """Put the first part of ``module``, by its functions, into the new module ``first`` of its package.
 
-    What is mentioned of it anywhere else, ``module`` imports from there. A small module stays whole. Raises ValueError
-    where a function changes a name of the module: the other one would not know of it.
+    The first mentions nothing of the second. What is mentioned of it anywhere else, ``module`` imports from there.
+    A small module stays whole. Raises ValueError where a function changes a name of the module: the other one would not
+    know of it.
     """
     package, name = module.rsplit(".", 1)
     body = trees[module].body
@@ -28,7 +32,8 @@ def halve(trees: dict[str, ast.Module], module: str, first: str) -> None:
     counts = [sum(isinstance(node, ast.FunctionDef) for node in ast.walk(top)) for top in body]
     if sum(counts) < _LEAST_FUNCTIONS:
         return
-    cut = next(at for at in range(len(body)) if 2 * sum(counts[:at]) >= sum(counts))
+    cuts = [at for at in range(len(body)) if not _names(body[:at]) & top_names(ast.Module(body[at:], []))]
+    cut = min(cuts, key=lambda at: abs(100 * sum(counts[:at]) - _FIRST_PERCENT * sum(counts)))
     imports = [node for node in body[:cut] if isinstance(node, ast.Import | ast.ImportFrom)]
     early, late = body[len(imports) : cut], body[cut:]
     wanted = _names(late).union(*(_asked_of(name, tree) for tree in trees.values()))
