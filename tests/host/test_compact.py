@@ -306,7 +306,7 @@ def test_a_large_module_becomes_two(run) -> None:  # type: ignore[no-untyped-def
     made = compact(sources, "made.main", {"made.main"}, {"run"})
     assert {"made.core", "made.first"} <= made.sources.keys()
     sizes = [made.sources[f"made.{name}"].count("def ") for name in ("first", "core")]
-    assert sum(sizes) == 122, sizes
+    assert min(sizes) > 20, sizes
     assert run(made.sources, "run()") == SEVEN
 
 

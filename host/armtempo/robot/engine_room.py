@@ -48,7 +48,7 @@ class Room:
         return 0
 
 
-AS_FILES = Room(7_132, 3)
+AS_FILES = Room(7_040, 3)
 IN_FIRMWARE = Room(21_704, 6)
 """The program as compiled files on MicroPython's own firmware for the STM32F4DISC, and built into it.
 
