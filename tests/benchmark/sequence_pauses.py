@@ -17,6 +17,7 @@ import tempfile
 from pathlib import Path
 
 import armtempo
+from armtempo.errors import ArmtempoError
 from armtempo.model.arm import Arm
 from armtempo.model.sequence import Sequence
 from armtempo.robot.connect import connect
@@ -42,7 +43,7 @@ end = "repeat"
 
 
 def pauses_ms(elf: Path, image: Path, folder: Path) -> list[int]:
-    """How long each took, ms, in their order."""
+    """How long the turn took that began each motion, ms, in their order; the first does what ``start`` does too."""
     arm = firmware_run.unwatched(Arm.paper())
     file = folder / "sequence.toml"
     file.write_text(SEQUENCE % CYCLES)
@@ -53,7 +54,7 @@ def pauses_ms(elf: Path, image: Path, folder: Path) -> list[int]:
             end = board.run_sequence(plan)
             assert (end.ending, end.cycle) == ("finished", CYCLES), end
         text = "".join(said)
-    return [int(found) for found in re.findall(r"@ pause (\d+)", text)]
+    return [int(found) for found in re.findall(r"@ start (\d+)", text)]
 
 
 def main(micropython: Path, folder: Path) -> None:
@@ -68,8 +69,12 @@ def main(micropython: Path, folder: Path) -> None:
         ("files, compiled", firmware.build_at(micropython, board, folder / "stock"), True),
     )
     for title, elf, with_library in kinds:
-        found = pauses_ms(elf, firmware_run.flash(folder, elf, with_library), folder)
-        print(f"{title}: first cycle {found[: LEGS - 1]} ms, then {found[LEGS - 1 :]} ms", flush=True)
+        try:
+            found = pauses_ms(elf, firmware_run.flash(folder, elf, with_library), folder)
+        except ArmtempoError as error:  # beside the stand-ins its memory may be too short
+            print(f"{title}: {error}")
+            continue
+        print(f"{title}: first cycle {found[:LEGS]} ms, then {found[LEGS:]} ms", flush=True)
 
 
 if __name__ == "__main__":

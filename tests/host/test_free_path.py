@@ -56,6 +56,7 @@ def test_random_jobs_keep_their_limits_and_pass_their_via_points(seed: int) -> N
         assert search.floor_s <= search.total_s, f"seed {seed}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pieces", [3, 4])
 def test_one_dwell_after_the_other_on_few_pieces(pieces: int) -> None:
     """No control point is held by two dwells, which lie five pieces apart at least."""

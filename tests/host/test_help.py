@@ -71,6 +71,7 @@ def completed(line: str) -> set[str]:
     return set(done.stdout.split())
 
 
+@pytest.mark.slow
 def test_what_the_script_asks_is_answered() -> None:
     assert completed("armtempo st") == {"plain,stop", "plain,status"}
     assert completed("armtempo plan --timing p") == {"plain,per-joint"}

@@ -67,6 +67,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_without_a_board(project: Path) -> None:
     assert said("new", "mine", "--like", "ar4")["joints"][0]["steps_per_deg"] > 0
     (plan,) = said("plan")["plans"]
@@ -151,6 +152,7 @@ def test_speeds_name_the_program_that_was_asked(project: Path, monkeypatch: pyte
     assert said("resume")["speed_percent"] is None
 
 
+@pytest.mark.slow
 def test_the_program_on_a_board(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def deploy(port: str, mpy: bool, tell: Any, progress: Any) -> Hello:
         tell("copied")
@@ -164,6 +166,7 @@ def test_the_program_on_a_board(project: Path, monkeypatch: pytest.MonkeyPatch) 
     assert said("undeploy", "--port", "x") == {"port": "x", "program": None}
 
 
+@pytest.mark.slow
 def test_firmware(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("armtempo.deploy.firmware.flash.flash", lambda *_: None)
     assert said("flash", "folder", "--port", "x") == {"folder": "folder", "port": "x"}

@@ -47,6 +47,7 @@ def test_angles_and_errors_stand_beside_the_bar(monkeypatch: pytest.MonkeyPatch)
     assert all(abs(float(part.split(")")[0]) - 0.9) < 0.1 for part in note.split("(")[1:])
 
 
+@pytest.mark.slow
 def test_without_a_display_the_run_goes_on(capsys: pytest.CaptureFixture[str]) -> None:
     import matplotlib as mpl
 

@@ -58,6 +58,7 @@ OVER = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("arguments", "target"), OVER.values(), ids=list(OVER))
 def test_other_content_needs_force(arguments: tuple[str, ...], target: str) -> None:
     if target in arguments:
@@ -74,6 +75,7 @@ def test_other_content_needs_force(arguments: tuple[str, ...], target: str) -> N
     assert Path(target).read_bytes() == after or "plan" in arguments
 
 
+@pytest.mark.slow
 def test_a_plan_follows_itself_and_no_other_job() -> None:
     assert run(*PLAN, "motion.json").exit_code == 0  # the same job, the same arm
     Path("other.toml").write_text(JOB.replace('"keep"', '"other"'))
@@ -82,6 +84,7 @@ def test_a_plan_follows_itself_and_no_other_job() -> None:
     assert "of the same job" in done.stderr
 
 
+@pytest.mark.slow
 def test_an_altered_trajectory_is_refused_and_kept() -> None:
     text = Path("motion.json").read_text()
     Path("motion.json").write_text(text.replace('"speed_deg_s": 50.0', '"speed_deg_s": 51.0', 1))

@@ -54,6 +54,7 @@ def test_the_descent_knows_how_the_cost_changes(moving: tuple[int, ...]) -> None
         np.testing.assert_allclose(gradient, by_differences, rtol=1e-6, atol=1e-3 * max(map(abs, gradient)))
 
 
+@pytest.mark.slow
 def test_the_solver_finds_its_postures() -> None:
     """Position only: the hand, which the rods keep level, follows from it."""
     for angles in postures(10):

@@ -167,6 +167,7 @@ angles_deg = [40, -60, 40]
 """
 
 
+@pytest.mark.slow
 def test_plans_a_free_path_with_a_stop_and_says_its_starts_and_record() -> None:
     Path("rests.toml").write_text(RESTING)
     result = run("--job", "rests.toml", "--path", "free", "--refine", "auto")

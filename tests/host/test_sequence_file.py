@@ -112,6 +112,7 @@ def test_a_repeat_that_begins_where_it_ends_stands_once(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_repeats_within_repeats(tmp_path: Path) -> None:
     inner = "repeat = 2", 'goto = "a"', 'goto = "b"', 'end = "repeat"'
     plan = planned(tmp_path, 'repeat = "for ever"', *inner, 'goto = "home"', 'end = "repeat"')
@@ -144,6 +145,7 @@ def test_outputs_waits_and_inputs(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_tool_poses_are_solved_when_it_is_planned(tmp_path: Path) -> None:
     """Of the arm file and of the sequence's own; the angles are those of armtempo goto."""
     pose = forward(ARM, (10.0, -55.0, 35.0))[:3, 3]
@@ -336,6 +338,7 @@ def test_the_shipped_arm_is_the_papers_with_a_gripper() -> None:
     assert (ARM.joints, ARM.driver, ARM.safety) == (paper.joints, paper.driver, paper.safety)
 
 
+@pytest.mark.slow
 def test_the_shipped_sequence_plans() -> None:
     sequence = Sequence.load(FOLDER / "sequence.toml", ARM)
     plan = armtempo.plan_sequence(ARM, sequence)

@@ -12,7 +12,7 @@ import pytest
 from armtempo.cli import main
 from armtempo_shared import meanings
 
-pytestmark = pytest.mark.xdist_group("site")  # what they share is made once
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("site")]  # what they share is made once
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted(page.relative_to(ROOT) for page in ROOT.glob("*/docs/*.md"))
@@ -30,7 +30,6 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out / "html"
 
 
-@pytest.mark.slow
 def test_every_page_is_built_and_reached_from_the_first(site: Path) -> None:
     first = (site / "host" / "docs" / "index.html").read_text(encoding="utf-8")
     links = set(re.findall(r'class="reference internal" href="([^"#]+)"', first))

@@ -110,7 +110,7 @@ def test_from_the_command_line(tmp_path: Path) -> None:
             board.home(ARM)
         assert f"recorded in {report}" in said("run", "small.json")
         told = json.loads(said("run", "small", "--arm", str(fitted), "--json").splitlines()[-1])
-    assert (told["ending"], told["cycle"], told["counters"]) == ("finished", 2, {"parts": 2})
+    assert (told["ending"], told["cycles"], told["counters"]) == ("finished", 2, {"parts": 2})
     assert told["folder"].endswith("small-002")
     assert said("report", report).startswith(f"wrote {report}/report.html")
     assert (tmp_path / report / "report.html").is_file()

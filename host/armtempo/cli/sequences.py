@@ -102,7 +102,7 @@ def lines(planned: SequencePlan) -> list[str]:
         found.append(f"cycle (step {cycle.step}, {times}): {_made_of(cycle.share)}")
     if planned.total is not None:
         found.append(f"in all: {_made_of(planned.total)}")
-    found.append(f"pause between two motions: {PAUSE_S:g} s; waits for inputs are not counted")
+    found.append(f"pause between two motions: about {PAUSE_S:g} s; waits for inputs are not counted")
     return found
 
 

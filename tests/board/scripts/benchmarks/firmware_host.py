@@ -47,7 +47,6 @@ class Port:
 
     def __init__(self):
         self._stage = -1
-        self._moved = 0
         self._left_ms = 0
 
     def init(self, flow):
@@ -74,9 +73,8 @@ class Port:
         """Tell of the heap when the program has started, when a motion begins, and when it has ended."""
         moves = loop.moving()
         spent_ms = time.ticks_diff(time.ticks_ms(), self._left_ms)
-        if moves and self._moved and spent_ms >= _LONG_MS:  # one motion of a sequence after the other
-            print("@ pause", spent_ms)
-        self._moved = moves
+        if moves and spent_ms >= _LONG_MS:  # a motion has begun
+            print("@ start", spent_ms)
         if not moves:
             loop.hold_clock()
         if self._stage < 0:
