@@ -52,9 +52,8 @@ def main() -> None:
         over.append(100.0 * (plan.total_s / search.floor_s - 1.0))
         vias.append(len(job.via))
     quantiles = np.quantile(over, (0.1, 0.5, 0.9))
-    print(
-        f"{len(over)} plans, {min(vias)} to {max(vias)} via points: {above} floors above their plan; {too_large} too large"
-    )
+    print(f"{len(over)} plans, {min(vias)} to {max(vias)} via points: {above} floors above their plan")
+    print(f"not planned, as their records are too large: {too_large}")
     print(
         "over the floor: "
         + ", ".join(
