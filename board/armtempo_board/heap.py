@@ -7,11 +7,11 @@ _SEQUENCE = "sequence"  # how the names of the modules begin that only sequences
 _LEAST_HELD = 1_000
 _held: "list[bytearray]" = []
 _NOT_ALWAYS = """
-    pins registers motion_check rate_check override time_law interval_steps cubics endpoints arm_check motion_file
-    engine_memory room armtempo_shared.motion bezier_weights store store_commands command_rows armrecord table
-    program_hash basis output_setup start_up set_up
+    pins registers arm_setup run_start start_check motion_check rate_check override time_law interval_steps
+    cubics endpoints arm_check motion_file engine_memory room armtempo_shared.motion bezier_weights store
+    store_commands command_rows armrecord table program_hash basis output_setup start_up set_up
 """
-"""Modules; the last two are those of the compact form that hold constructors."""
+"""Modules; the last two are those of the compact form that hold what is called at rest only."""
 
 
 def collect_often(often: bool = True) -> None:
@@ -22,6 +22,21 @@ def collect_often(often: bool = True) -> None:
     """
     if hasattr(gc, "threshold"):
         gc.threshold((gc.mem_free() + gc.mem_alloc()) // 64 if often else -1)
+
+
+def overwrite_stack(calls: int, first: int = 0, second: int = 0, third: int = 0) -> None:
+    """Overwrite what ended calls have left on the stack: the collector takes it for references.
+
+    Frames of two sizes, as each has words that it does not write.
+    """
+    if calls:
+        overwrite_stack(calls - 1, first, second, third)
+        _overwrite(calls)
+
+
+def _overwrite(calls: int) -> None:
+    if calls:
+        _overwrite(calls - 1)
 
 
 def hold(*sizes: int) -> None:

@@ -9,7 +9,7 @@ import pytest
 from tests.board import heap_use
 
 PEAK = 82_000
-MOTION = 65_000
+MOTION = 66_500
 MACHINE_CODE = 27_500
 
 

@@ -115,4 +115,4 @@ def test_all_files_that_share_arrays_are_held_together() -> None:
 
 def test_ticks_are_those_of_the_limits() -> None:
     assert constants(BOARD / "hardware" / "isr.py")["SAMPLE_TICKS"] == limits.SAMPLE_TICKS
-    assert constants(BOARD / "motion" / "engine.py")["TICKS_PER_US"] * 1_000_000 == limits.TICK_HZ
+    assert constants(BOARD / "motion" / "engine_parts.py")["TICKS_PER_US"] * 1_000_000 == limits.TICK_HZ

@@ -6,14 +6,12 @@ import ast
 import re
 import sys
 import textwrap
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from armtempo.deploy import program_files
 from armtempo.deploy.compact import Compact, compact
-from armtempo.deploy.compact.order import often_used_first
 
 pytestmark = pytest.mark.xdist_group("compact program")  # which takes seconds to make
 
@@ -237,35 +235,6 @@ def test_what_nothing_uses_is_left_out() -> None:
     assert core.count("def ") == 1
 
 
-@pytest.mark.slow
-def test_the_most_used_names_come_first() -> None:
-    """What gives them their numbers is the first thing in the file, and goes again."""
-    body = ast.parse(program_files.compact_program().sources["armtempo_board.core"]).body
-    first, gone = body[:2]
-    assert isinstance(first, ast.Assign)
-    assert isinstance(first.value, ast.List)
-    assert isinstance(gone, ast.Delete)
-    names = [ast.literal_eval(each) for each in first.value.elts]
-    uses = Counter(node.attr for each in body for node in ast.walk(each) if isinstance(node, ast.Attribute))
-    often = [name for name, _ in uses.most_common(20) if name != "viper"]
-    assert set(often) <= set(names)
-    assert len(names) == 120, "numbers below 128 take a byte; a few are the file's own"
-
-
-def test_the_order_is_that_of_the_number_of_uses() -> None:
-    """Names that are used more than 30 times, down to once; the last ones have no place in the list."""
-    uses = {f"name_{number}": 1 + number // 5 for number in range(155)}
-    lines = [f"    thing.{name} = 0" for name, count in sorted(uses.items()) for _ in range(count)]
-    tree = ast.parse("def function(thing):\n" + "\n".join(lines))
-    often_used_first(tree)
-    first = tree.body[0]
-    assert isinstance(first, ast.Assign)
-    names = ast.literal_eval(first.value)
-    assert len(names) == len(set(names)) == 120
-    counts = [uses[name] for name in names]
-    assert counts == sorted(uses.values(), reverse=True)[:120]
-
-
 def test_a_name_that_is_not_there_is_told() -> None:
     sources = {
         "made": "",
@@ -306,6 +275,9 @@ def test_packages_that_cannot_go_are_told(more: dict[str, str], words: str) -> N
         compact(PACKAGES | more, "made.inner.main", {"made.inner.main"}, {"run"})
 
 
+SEVEN = 7
+
+
 @pytest.mark.slow
 def test_the_board_program_is_mostly_one_module() -> None:
     made = program_files.compact_program()
@@ -315,7 +287,27 @@ def test_the_board_program_is_mostly_one_module() -> None:
     core = made.sources["armtempo_board.core"]
     assert "armtempo_board.program" in made.sources
     assert "armtempo_board.store" in made.sources
-    assert len(core) > sum(len(text) for text in made.sources.values()) / 2.5  # the rest comes and goes
+    first = made.sources["armtempo_board.first"]
+    assert (
+        len(core) + len(first) > sum(len(text) for text in made.sources.values()) / 2.5
+    )  # the rest comes and goes
+
+
+def test_a_large_module_becomes_two(run) -> None:  # type: ignore[no-untyped-def]
+    """What the second and other modules ask of the first is there."""
+    steps = "".join(
+        f"def step_{n}(value):\n    return step_{n - 1}(value) + time()\n\n" for n in range(1, 120)
+    )
+    sources = {
+        "made": "",
+        "made.main": f"from made import steps\n\n\ndef run():\n    return steps.step_119({SEVEN})\n",
+        "made.steps": f"def time():\n    return 0\n\n\ndef step_0(value):\n    return value\n\n\n{steps}",
+    }
+    made = compact(sources, "made.main", {"made.main"}, {"run"})
+    assert {"made.core", "made.first"} <= made.sources.keys()
+    sizes = [made.sources[f"made.{name}"].count("def ") for name in ("first", "core")]
+    assert abs(sizes[0] - sizes[1]) <= 2, sizes
+    assert run(made.sources, "run()") == SEVEN
 
 
 def _frame(label: str) -> str:

@@ -236,6 +236,7 @@ class Commands:
 
     def start(self, row: tuple, length: int) -> int:
         """Start a stored motion."""
+        self.controller.tidy()  # before anything of the command lies where the motion's code is to be
         flags, crc = self.fields(row)
         name = self.text(row, length)
         self.controller.begin(name, flags, crc)

@@ -48,7 +48,7 @@ def main(root: str = ROOT) -> None:
     finally:
         watchdog.leave()
         _attach(port)
-    print("armtempo ended; Ctrl-D starts it again")
+    print("armtempo ended; Ctrl-D restarts it")
 
 
 def _build(port: "pyb.USB_VCP", root: str) -> App:
@@ -101,7 +101,7 @@ def _replay_default() -> None:
     try:
         app.controller.begin(app.controller.store().default(), 0)
     except Refused as refused:
-        app.events.note("button: refused, error %d" % refused.code)
+        app.events.note("button: error %d" % refused.code)
 
 
 def _detach(port: "Any") -> None:

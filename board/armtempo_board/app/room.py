@@ -12,10 +12,10 @@ from armtempo_shared.limits import MAX_JOINTS
 from armtempo_board.memory import Memory
 from armtempo_board.motion.workspace import Workspace
 
-_RESERVE = 28_900  # bytes of heap for the rest
+_RESERVE = 25_650  # bytes of heap for the rest
 _USUAL_JOINTS = 3  # there is heap for their objects before there is memory for larger rings
 _MOST_SAMPLES = 4096  # bytes of the sample buffer at most,
-_LEAST_SAMPLES = 1024  # and at least;
+_LEAST_SAMPLES = 768  # and at least;
 _SAMPLES_SHARE = 48  # between them, this part of the free heap
 _STEP_WORDS = 64
 

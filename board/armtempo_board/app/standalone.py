@@ -4,6 +4,7 @@ import micropython
 import pyb
 from armtempo_shared import codes
 from armtempo_shared.messages import NO_JOINT
+from micropython import const
 
 from armtempo_board.app import program
 from armtempo_board.app.app import App
@@ -15,17 +16,17 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from armtempo_board.app.controller import Controller
 
-_CTRL_C = b"\x03"
+_CTRL_C = const(3)
+_ONLY = const(0)
 
 
 class _Nobody:
     """Takes the place of the serial port, which the REPL uses."""
 
-    def readinto(self, buffer: bytearray, count: int) -> None:
+    def readinto(self, *arguments: object) -> None:
         """Nothing comes."""
 
-    def write(self, buffer: bytearray, start: int, count: int) -> None:
-        """Nothing is taken."""
+    write = readinto  # and nothing is taken
 
 
 def replay(name: str = "", root: str = program.ROOT) -> None:
@@ -34,46 +35,50 @@ def replay(name: str = "", root: str = program.ROOT) -> None:
     Where the position is unknown the arm must stand where the motion begins: calling this declares it.
     Ctrl-C brakes, a second one freezes.
     """
-    app = program.app = program.app or App(_Nobody(), root)
+    nobody = _Nobody()
+    app = program.app = program.app or App(nobody, root)
     controller = app.controller
-    port, app.link.stream = app.link.stream, _Nobody()
+    port, app.link.stream = app.link.stream, nobody
     watchdog = Watchdog()
     micropython.kbd_intr(-1)  # KeyboardInterrupt could come in the midst of anything
     try:
         _begin(controller, name or controller.store().default())
-        _follow(app, watchdog)
-        steps = [controller.engine.commanded(joint) for joint in range(controller.joints)]
-        print("fault: " + _name(controller.fault()) if controller.fault() else "done", "at steps", steps)
+        _follow(app, controller, watchdog)
+        fault = controller.fault()
+        said = "fault: " + _name(fault) if fault else "done"
+        print(said, "at steps", [controller.engine.commanded(joint) for joint in range(controller.joints)])
     except Refused as refused:
-        where = "" if refused.joint == NO_JOINT else "joint %d" % (refused.joint + 1)
+        joint = refused.joint
+        where = "" if joint == NO_JOINT else "joint %d" % (joint + 1)
         print("refused:", _name(refused.code), where, refused.value or "")
     finally:
         controller.halt()
-        micropython.kbd_intr(ord(_CTRL_C))
+        micropython.kbd_intr(_CTRL_C)
         watchdog.leave()
         app.link.stream = port
 
 
 def _begin(controller: "Controller", name: str) -> None:
-    if controller.engine and not controller.fault():
-        motion = controller.load(name)
+    if not controller.fault():
         unknown = controller.everyone() & ~controller.known()
         if unknown:
+            motion = controller.load(name)
             print("taking the posture of the arm as the start of", name)
-            starts = [endpoints.start_offset(motion, joint, 0) for joint in range(controller.joints)]
-            controller.home(unknown, starts)
+            controller.home(
+                unknown, [endpoints.start_offset(motion, joint, 0) for joint in range(controller.joints)]
+            )
     controller.begin(name, 0)
 
 
-def _follow(app: "App", watchdog: "Watchdog") -> None:
+def _follow(app: "App", controller: "Controller", watchdog: "Watchdog") -> None:
     port = pyb.USB_VCP()
     byte = bytearray(1)
     presses = 0
-    while app.controller.moving():
+    while controller.moving():
         app.turn()
         watchdog.feed()
-        if port.readinto(byte) and byte == _CTRL_C and app.controller.moving():
-            app.controller.stop(presses)
+        if port.readinto(byte) and byte[_ONLY] == _CTRL_C and controller.moving():
+            controller.stop(presses)
             presses = 1
     app.turn()
 
@@ -83,4 +88,4 @@ def _name(code: int) -> str:
     for name in dir(codes):
         if getattr(codes, name) == code:
             return name.lower()
-    return str(code)
+    return ""

@@ -1,4 +1,4 @@
-"""From raw samples to samples, kept until they are fetched.
+"""Where the joints stand: samples from raw samples, kept until they are fetched, and snapshots.
 
 The words of a sample are named in ``buffers.py``.
 """
@@ -7,10 +7,11 @@ from array import array
 
 from micropython import const
 
-from armtempo_board.buffers import COMMANDED, TICKS_HIGH, TICKS_LOW
+from armtempo_board.buffers import COMMANDED, PATH_HIGH, PATH_LOW, TICKS_HIGH, TICKS_LOW
 from armtempo_board.hardware import isr
 from armtempo_board.hardware.encoders import EncoderInput, NoEncoder
 from armtempo_board.hardware.sampler import Sampler
+from armtempo_board.motion.clock import MotionClock
 from armtempo_board.motion.joint_drive import JointDrive
 
 TYPE_CHECKING = False
@@ -27,42 +28,50 @@ class Readings:
     def __init__(
         self,
         sampler: Sampler,
+        clock: MotionClock,
         joints: "list[JointDrive]",
         encoders: "list[EncoderInput | NoEncoder]",
         slots: "list[int]",
     ) -> None:
         self._sampler = sampler
+        self._clock = clock
         self._joints = joints
         self._encoders = encoders
         self._slots = slots
         self._override: "Any" = None
+        self._end = array("i", [0] * COMMANDED)  # both times at which the last motion ended, as in a sample
+        self._has_ended = False
         self._size = COMMANDED + 2 * len(joints)
         self._words = array("i", bytearray(4 * _CAPACITY * self._size))
         self._in = self._out = 0
         self.lost = 0
 
-    def clear(self, override: "Any") -> None:
+    def begin(self, override: "Any") -> None:
         """Forget what was not fetched; ``override``: of the motion that comes."""
         self._override = override
+        self._has_ended = False
         self._in = self._out = 0
         self.lost = 0
 
-    def convert(self, epoch: int, now_kiticks: int) -> None:
-        """Convert all raw samples; the counter is at ``epoch`` * 2**32 + ``now_kiticks`` * 1024."""
+    def convert(self) -> None:
+        """Convert all raw samples; the clock has been read a moment ago."""
         sampler = self._sampler
         at = sampler.next_raw()
         while at >= 0:
             if self._in - self._out >= _CAPACITY:
                 self._out += 1
                 self.lost += 1
-            self._convert(at, (self._in & (_CAPACITY - 1)) * self._size, epoch, now_kiticks)
+            self._convert(at, (self._in & (_CAPACITY - 1)) * self._size)
             self._in += 1
             sampler.drop()
             at = sampler.next_raw()
 
-    def _convert(self, at: int, to: int, epoch: int, now_kiticks: int) -> None:
+    def _convert(self, at: int, to: int) -> None:
         raw, words = self._sampler.raw, self._words
-        ahead = isr.word_kiticks(raw, at) - now_kiticks  # a sample may have come since the clock was read
+        epoch = self._clock.epoch
+        ahead = (
+            isr.word_kiticks(raw, at) - self._clock.counter_kiticks
+        )  # it may have come since that was read
         if ahead > _HALF_ROUND_KITICKS:
             epoch -= 1
         elif ahead < -_HALF_ROUND_KITICKS:
@@ -83,9 +92,14 @@ class Readings:
             words[commanded + number] = joint.position(raw[at + isr.RAW_MATCHES + number])
             words[counts + number] = encoder.counts
 
-    def close(self) -> None:
-        """All are converted, no more come: let the override go."""
-        self._override = None
+    def end(self, ticks: int) -> None:
+        """The motion has ended at a time: take what is needed of its override, and let that go."""
+        if self._override:
+            self.convert()
+            _put_ticks(self._end, ticks)
+            self._override.put_path(self._end, 0)
+            self._override = None
+        self._has_ended = True
 
     def next(self, buffer: "array[int]") -> bool:
         """Copy the oldest sample to ``buffer`` and forget it; False where there is none."""
@@ -96,3 +110,34 @@ class Readings:
             buffer[word] = self._words[at + word]
         self._out += 1
         return True
+
+    def commanded(self, joint: int) -> int:
+        """Steps of a joint issued so far, as a position."""
+        while True:
+            matches = self._joints[joint].ring.matches()
+            if not self._sampler.waits():
+                return self._joints[joint].position(matches)
+            self.convert()  # samples come first: they may be older
+
+    def snapshot(self, buffer: "array[int]") -> None:
+        """Write a sample of this moment to ``buffer``; after a motion with the time at which it ended."""
+        if self._has_ended:
+            for word in range(COMMANDED):
+                buffer[word] = self._end[word]
+        else:
+            _put_ticks(buffer, max(self._clock.ticks(), 0))
+        if self._override:
+            self._override.put_path(buffer, 0)
+        count = len(self._joints)
+        for number in range(count):
+            encoder = self._encoders[number]
+            buffer[COMMANDED + number] = self.commanded(number)
+            encoder.update()
+            buffer[COMMANDED + count + number] = encoder.counts
+
+
+def _put_ticks(sample: "array[int]", ticks: int) -> None:
+    """Put the time into a sample; the motion's own time is the same."""
+    low = ticks & 0xFFFFFFFF
+    sample[TICKS_LOW] = sample[PATH_LOW] = low - (1 << 32) if low >> 31 else low
+    sample[TICKS_HIGH] = sample[PATH_HIGH] = ticks >> 32

@@ -30,9 +30,17 @@ _MAIN = f"{PACKAGES[0]}.app.program"
 _STEPGEN, _MOTION = f"{PACKAGES[0]}.stepgen", f"{PACKAGES[0]}.motion"
 _TOGETHER = {
     f"{_STEPGEN}.override": [f"{_STEPGEN}.{name}" for name in ("time_law", "interval_steps", "cubics")],
-    f"{_MOTION}.motion_check": [f"{_MOTION}.rate_check"],
-    f"{_MOTION}.endpoints": [f"{_STEPGEN}.bezier_weights", f"{PACKAGES[1]}.basis"],
+    f"{_MOTION}.motion_check": [f"{_MOTION}.rate_check", f"{_MOTION}.start_check"],
+    f"{_MOTION}.endpoints": [
+        f"{_STEPGEN}.bezier_weights",
+        f"{PACKAGES[1]}.basis",
+        f"{PACKAGES[0]}.app.run_start",
+    ],
     f"{_MOTION}.arm_check": [f"{PACKAGES[1]}.armrecord"],
+    f"{PACKAGES[0]}.app.output_commands": [
+        f"{PACKAGES[0]}.hardware.{name}" for name in ("outputs", "digital_inputs")
+    ],
+    f"{PACKAGES[0]}.app.sequence_start": [f"{PACKAGES[1]}.sequence_check"],
     f"{PACKAGES[0]}.app.room": [f"{PACKAGES[1]}.engine_memory"],
     f"{PACKAGES[0]}.app.command_rows": [f"{PACKAGES[0]}.app.store_commands"],
     f"{PACKAGES[1]}.table": [f"{PACKAGES[1]}.program_hash"],
@@ -42,20 +50,14 @@ _TOGETHER = {
 """Modules that are imported later, with those that come and go with them: each costs memory for names and a table."""
 _AT_REST = {
     "start_up": (
+        "app.arm_state.ArmState.__init__",
         "app.commands.Commands.__init__",
-        "app.commands.Commands.home",
-        "app.controller.Controller._assume",
-        "app.controller.Controller.home",
         "app.events.Events.__init__",
         "hardware.sampler.Sampler.__init__",
-        "hardware.sampler.Sampler.plan",
         "link.frame_reader.FrameReader.__init__",
         "link.serial_link.SerialLink.__init__",
-        "motion.engine.Engine._check",
-        "motion.engine.Engine.home",
-        "motion.joint_drive.JointDrive.load",
+        "motion.engine_parts.EngineParts.home",
         "motion.ring_feeder.RingFeeder.__init__",
-        "stepgen.step_generator.StepGenerator.load",
     ),
     "set_up": (
         "hardware.encoders.EncoderInput.__init__",
@@ -65,8 +67,7 @@ _AT_REST = {
         "hardware.ring.Ring.__init__",
         "hardware.ring.Ring._describe",
         "hardware.sampler.Sampler.configure",
-        "memory.Memory.take",
-        "motion.engine.Engine.__init__",
+        "motion.engine_parts.EngineParts.__init__",
         "motion.following_error.FollowingError.__init__",
         "motion.joint_drive.JointDrive.__init__",
         "motion.readings.Readings.__init__",
@@ -77,7 +78,8 @@ _AT_REST = {
     ),
 }
 """Methods of the board package that are called only when the program starts, and only when it takes an arm; by the
-module that holds them in the compact form."""
+module that holds them in the compact form. What is called when a motion is brought into the rings is not among them:
+most is in memory then."""
 _ARCHITECTURES = {1: "x86", 2: "x64", 3: "armv6", 4: "armv6m", 5: "armv7m", 6: "armv7em", 7: "armv7emsp"}
 """By the number in ``sys.implementation._mpy`` (MicroPython's py/persistentcode.h)."""
 

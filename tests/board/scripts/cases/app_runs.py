@@ -33,20 +33,20 @@ def case_speed_of_what_moves_and_of_the_next_start():
     assert host.ask("status")[1][7] == 500
     start(host)
     engine = app.controller.engine
-    assert engine.rate == 500
+    assert engine.rates.wanted == 500
     for rate in (10, 0, messages.RESUME, 1000):
         assert host.ask("speed", (rate,)) == ("ok", (), b"")
-        assert engine.rate == rate
+        assert engine.rates.wanted == rate
     engine.finish()
     start(host)
-    assert engine.rate == 1000
+    assert engine.rates.wanted == 1000
     engine.finish()
     host.ask("speed", (500,))
     other = stand_in.Host(app, host.port)
     other.ask("hello", (wire.PROTOCOL_VERSION, 99))
     other.record = host.record
     start(other)
-    assert engine.rate == 1000
+    assert engine.rates.wanted == 1000
 
 
 def case_stop_freezes_what_cannot_brake():

@@ -332,10 +332,10 @@ def case_speed_holds_for_the_motions_that_follow():
     assert host.ask("speed", (300,))[0] == "ok"
     host.hello(7)
     arrive(app, host, 10)
-    assert app.controller.engine.rate == 300
+    assert app.controller.engine.rates.wanted == 300
     arrive(app, host, 0)
     begin(host)
-    assert app.controller.engine.rate == 1000
+    assert app.controller.engine.rates.wanted == 1000
     arrive(app, host, 10)
     assert host.ask("speed", (0,))[0] == "ok"
 
@@ -347,7 +347,7 @@ def case_speed_between_motions_is_that_of_the_next():
     assert host.ask("speed", (200,))[0] == "ok"
     stand_in.Clock.now_ms += 5000
     host.turn(5)
-    assert app.controller.engine.rate == 200
+    assert app.controller.engine.rates.wanted == 200
 
 
 def case_the_button_starts_it_as_the_default():

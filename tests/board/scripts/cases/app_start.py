@@ -8,7 +8,7 @@ import stand_in
 
 from app_rig import ROOT  # isort: skip  it puts the stand-ins into place
 
-from armtempo_board.app import controller
+from armtempo_board.app import arm_state
 from armtempo_board.app.app import App
 from armtempo_shared import armrecord, engine_memory, wire
 
@@ -113,17 +113,17 @@ def case_a_record_that_no_longer_fits_is_named():
 
 def case_an_engine_that_cannot_be_made_is_named():
     root = folder_with(stand_in.arm())
-    engine = controller.Engine
+    engine = arm_state.Engine
     for error, problem in ((MemoryError, "no_memory"), (ValueError, "failed")):
 
         def broken(*arguments, error=error):
             raise error
 
-        controller.Engine = broken
+        arm_state.Engine = broken
         try:
             _, _, hello = started(root)
         finally:
-            controller.Engine = engine
+            arm_state.Engine = engine
         assert (hello[1], wire.ERRORS[hello[PROBLEM]][0]) == (0, problem)
 
 

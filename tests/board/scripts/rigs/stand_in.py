@@ -104,6 +104,13 @@ class Workspace:
     joints = 6
 
 
+class Rates:
+    """How fast, and until when."""
+
+    duration_ticks = 84000
+    wanted = 1000
+
+
 class Engine:
     """Moves when told, ends when told; remembers what was asked of it."""
 
@@ -112,7 +119,6 @@ class Engine:
         self.limits = joints
         self.known = 0
         self.moving = False
-        self.finished = False
         self.fault = 0
         self.fault_joint = 255
         self.calls = []
@@ -120,14 +126,13 @@ class Engine:
         self.pending = []
         self.refusal = None
         self.explode = None
-        self.duration_ticks = 84000
+        self.rates = Rates()
         self.ticks = 0
-        self.rate = 1000
         self.judged = False
 
     def load(self, motion, rate=1000):
         self.calls.append("load judged" if self.judged else "load")
-        self.rate = rate
+        self.rates.wanted = rate
         if self.refusal:
             from armtempo_board.errors import Refused
 
@@ -152,7 +157,7 @@ class Engine:
 
     def change_rate(self, rate):
         self.calls.append("rate")
-        self.rate = rate
+        self.rates.wanted = rate
 
     def freeze(self):
         self.calls.append("freeze")
@@ -212,7 +217,6 @@ class Engine:
 
     def finish(self):
         self.moving = False
-        self.finished = True
 
 
 class Port:

@@ -1,0 +1,145 @@
+"""Takes an arm record: judges it, makes the engine for it, or says why not. Imported for that and given up after it.
+
+Step by step, so that never more than one of store, check and engine needs memory. Each step is a function of its own:
+what its frame leaves on the stack would keep its modules in memory.
+"""
+
+import gc
+from array import array
+
+from armtempo_shared import codes
+from armtempo_shared.messages import ARM_RECORD_NAME
+
+from armtempo_board import heap
+from armtempo_board.app.arm_state import NEVER_MS
+from armtempo_board.buffers import COMMANDED
+from armtempo_board.errors import Refused
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from armtempo_board.app.arm_state import ArmState
+    from armtempo_board.motion.arm_check import Record
+
+
+def take_stored(board: "ArmState") -> None:
+    """Take the stored arm record; without one, or where it cannot be used, the board stays unconfigured.
+
+    What stands in the flash never keeps the program from starting: ``arm_problem`` says what is wrong with it.
+    """
+    board.arm_waits = False
+    board.arm_problem = board.arm_value = 0
+    try:
+        _take(board, _judged(board, _stored(board)))
+    except Refused as refused:
+        if refused.code != codes.NOT_FOUND:
+            board.arm_problem, board.arm_value = refused.code, refused.value
+    except Exception as error:
+        _drop_engine(board)
+        board.arm_problem = codes.NO_MEMORY if isinstance(error, MemoryError) else codes.FAILED
+    heap.forget()
+
+
+def take_new(board: "ArmState") -> None:
+    """Take the arm record that was uploaded; Refused where it cannot be, and the one in force stays that."""
+    board.arm_waits = False
+    try:
+        record = _judged(board, _new(board))
+    except Refused:
+        _decide(board, False)
+        raise
+    _decide(board, True)
+    board.arm_problem = board.arm_value = 0
+    try:
+        _take(board, record)
+    except Exception:
+        _drop_engine(board)
+        raise
+    heap.forget()
+
+
+def _stored(board: "ArmState") -> bytes:
+    try:
+        return bytes(board.store().read(ARM_RECORD_NAME))
+    finally:
+        board.forget_store()
+        heap.forget()
+
+
+def _new(board: "ArmState") -> bytes:
+    try:
+        return bytes(board.store().new_arm())
+    finally:
+        board.drop_store()
+        heap.forget()
+
+
+def _decide(board: "ArmState", is_fit: bool) -> None:
+    heap.forget()
+    from armtempo_board.storage import store  # here, so that it can be forgotten
+
+    store.Store(board.root, recover=False).take_arm(is_fit)
+    heap.forget()
+
+
+def _judged(board: "ArmState", data: bytes) -> "Record":
+    """An arm record that can be taken, unpacked; else Refused."""
+    from armtempo_board.motion import arm_check  # here, so that it can be forgotten
+
+    return arm_check.checked(data, board.workspace.words, board.workspace.joints)
+
+
+def _take(board: "ArmState", record: "Record") -> None:
+    head, joints, crc, outputs, inputs = record
+    if crc == board.arm_crc:
+        return
+    all_but_limits, stops = _facts(record)
+    known, steps = 0, []
+    if board.engine and all_but_limits == board.all_but_limits:  # the same arm: it stands where it stood
+        known = board.engine.known
+        steps = [board.engine.commanded(joint) for joint in range(board.joints)]
+    _drop_engine(board)
+    _share_room(board, len(outputs), len(inputs))
+    heap.forget("room", "engine_memory")
+    board.make_engine(head, joints)
+    board.all_but_limits = all_but_limits
+    if known:
+        board.engine.home(known, steps)
+    board.silence_ms = head["link_timeout_ms"] if stops else NEVER_MS
+    board.joints = len(joints)
+    board.arm_crc = crc
+    board.raw = array("i", [0] * (COMMANDED + 2 * board.joints))
+    board.samples.configure(board.joints)
+    if outputs or inputs:
+        from armtempo_board.app import output_setup  # here, so that it can be forgotten
+
+        output_setup.attach(board, outputs, inputs)
+
+
+def _facts(record: "Record") -> "tuple[int, int]":
+    """What makes two records the same arm, and whether it stops where the host is silent."""
+    from armtempo_shared import armrecord  # here, so that it can be forgotten
+
+    head, joints, _, _, _ = record
+    return armrecord.without_limits(head, joints), head["flags"] & armrecord.FLAG_STOP_ON_LINK_LOSS
+
+
+def _share_room(board: "ArmState", outputs: int, inputs: int) -> None:
+    from armtempo_board.app import room  # here, so that it can be forgotten
+
+    room.share(board.workspace, outputs, inputs)
+
+
+def _drop_engine(board: "ArmState") -> None:
+    """Before another takes its place: the heap is to be as it was without one."""
+    if board.engine:
+        board.engine.close()
+    if board.outputs:
+        from armtempo_board.app import output_setup  # here, so that it can be forgotten
+
+        output_setup.detach(board)
+    board.engine = None
+    board.joints = board.arm_crc = 0
+    board.samples.configure(0)
+    board.raw = array("i", [0] * COMMANDED)
+    heap.forget()
+    gc.collect()

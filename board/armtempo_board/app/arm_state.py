@@ -1,0 +1,149 @@
+"""What the board has and knows: its store, its arm and the engine for it, faults. Nothing here moves anything."""
+
+import gc
+import os
+import sys
+from array import array
+
+import machine
+from armtempo_shared import codes
+from armtempo_shared.messages import NO_JOINT
+from micropython import const
+
+from armtempo_board import heap
+from armtempo_board.app.sample_buffer import SampleBuffer
+from armtempo_board.buffers import COMMANDED, pack_offsets, sample_to_wire
+from armtempo_board.errors import Refused
+from armtempo_board.motion.engine import Engine
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
+_BYTES_PER_JOINT = const(8)  # in a sample on the wire
+_BOOT_BYTES = const(4)
+MOTION_CODE_BYTES = const(10_300)
+"""The large pieces of the code that only a motion needs."""
+NEVER_MS = const((1 << 30) - 1)
+
+
+class ArmState:
+    """``root``: the folder of the store. ``fault``: what is pending from the start, 0 for none."""
+
+    def __init__(self, root: str, program_crc: int, fault: int) -> None:
+        from armtempo_shared.table import offset  # here, so that it can be forgotten
+
+        from armtempo_board.app import room
+
+        flags_at = offset("E", "sample", "flags") - offset("E", "sample", "ticks")
+        heap.forget()
+        self.workspace = room.workspace()  # before anything can stand in the way of the largest pieces
+        self.samples = SampleBuffer(room.sample_bytes(), flags_at)
+        self.root = root
+        self._store: "Any" = None
+        self.engine: "Any" = None
+        self.outputs: "Any" = None  # of an arm that has outputs or inputs,
+        self.inputs: "Any" = None  # and these then too,
+        self.rows: "dict[int, Any]" = {}  # and their commands
+        self.sequence: "Any" = None  # the one under way
+        self.program_crc = program_crc
+        self.board_id = _board_id()
+        self.boot = int.from_bytes(os.urandom(_BOOT_BYTES), "little")  # another number after each power-up
+        self.joints = 0
+        self.arm_crc = 0
+        self.all_but_limits = 0  # of the arm record: what makes two of them the same arm
+        self.arm_waits = False  # an arm record has been stored, and is to be taken
+        self.arm_problem = 0  # code: why the stored arm record is not in force (0: it is, or there is none),
+        self.arm_value = 0  # and its value
+        self.silence_ms = NEVER_MS  # of the host, after which a run is stopped
+        self.raw = array("i", [0] * COMMANDED)  # a sample of the arm
+        self.pending = fault
+
+    # the store, which is there only while it is needed: its code takes memory that a motion needs
+
+    def store(self) -> "Any":
+        """The store; an upload that is under way keeps it."""
+        if self._store is None:
+            heap.forget()
+            from armtempo_board.storage import store
+
+            self._store = store.Store(self.root)
+        return self._store
+
+    def forget_store(self) -> None:
+        """Give up an upload that is under way."""
+        if self._store is not None:
+            self._store.abandon()
+            self.drop_store()
+
+    def drop_store(self) -> None:
+        """What stands in the flash of an upload stays."""
+        self._store = None
+
+    def make_engine(self, head: "dict[str, int]", joints: "list[dict[str, int]]") -> None:
+        """For an arm, as ``armrecord.unpack`` gives it; what stays lies beside pieces that a motion's code needs."""
+        gc.collect()
+        heap.hold(MOTION_CODE_BYTES)
+        try:
+            self.engine = Engine(head, joints, self.workspace)
+        except MemoryError:  # rather an arm whose motions may be refused for want of a large piece than none
+            heap.release()
+            gc.collect()
+            self.engine = Engine(head, joints, self.workspace)
+        finally:
+            heap.release()
+
+    # what it knows
+
+    def engine_room(self) -> int:
+        """Bytes of memory that an engine can have (``armtempo_shared.engine_memory``)."""
+        return int(4 * self.workspace.words)
+
+    def engine_joints(self) -> int:
+        """Joints that an engine can have."""
+        return int(self.workspace.joints)
+
+    def check_ready(self) -> None:
+        """Refuses while a fault is pending or no arm is configured."""
+        if self.fault():
+            raise Refused(codes.FAULT_PENDING, self.fault_joint(), self.fault())
+        if not self.engine:
+            raise Refused(codes.UNCONFIGURED)
+
+    def moving(self) -> bool:
+        """Whether steps may still come; a sequence has more to come while it waits."""
+        return self.engine is not None and (self.engine.moving or self.sequence is not None)
+
+    def known(self) -> int:
+        """Bit a joint: its position is known."""
+        return self.engine.known if self.engine else 0
+
+    def everyone(self) -> int:
+        """Bit a joint, all set."""
+        return (1 << self.joints) - 1
+
+    def fault(self) -> int:
+        """Code of the pending fault, 0 for none."""
+        return self.pending or (self.engine.fault if self.engine else 0)
+
+    def fault_joint(self) -> int:
+        """The joint that the fault is about, or NO_JOINT."""
+        return self.engine.fault_joint if self.engine and self.engine.fault else NO_JOINT
+
+    def clear(self) -> None:
+        """Clear what is pending; the cause must be gone."""
+        if self.engine and not self.engine.clear():
+            raise Refused(codes.FAULT_PENDING, self.fault_joint(), self.fault())
+        self.pending = 0
+
+    def put_snapshot(self, target: bytearray, ticks_at: int, joints_at: int) -> int:
+        """Write motion clock, commanded steps and counts of this moment as the wire has them; bytes of the joints."""
+        if not self.engine:
+            return 0
+        self.engine.snapshot(self.raw)
+        sample_to_wire(target, self.raw, pack_offsets(ticks_at, joints_at), self.joints)
+        return _BYTES_PER_JOINT * self.joints
+
+
+def _board_id() -> bytes:
+    return b"".join([b"%02x" % byte for byte in machine.unique_id()]) + b" " + sys.version.encode()

@@ -1,0 +1,50 @@
+"""Before a run: what is asked for is opened, and where a homing motion begins. Given up before anything moves."""
+
+from armtempo_shared import codes
+
+from armtempo_board.buffers import COMMANDED
+from armtempo_board.errors import Refused
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from armtempo_board.app.arm_state import ArmState
+    from armtempo_board.storage.motion_file import MotionFile
+
+
+def opened(board: "ArmState", name: str, crc: "int | None") -> "MotionFile":
+    """The stored motion, checked as far as its head and checksum go, or Refused; ``crc``: see ``Controller.begin``."""
+    motion: MotionFile = board.store().motion(name)
+    if crc is not None and motion.crc != crc:
+        raise Refused(codes.BAD_CHECKSUM)
+    if motion.arm_crc != board.arm_crc:
+        raise Refused(codes.ARM_MISMATCH)
+    if motion.joints != board.joints:
+        raise Refused(codes.WRONG_JOINTS, value=motion.joints)
+    return motion
+
+
+def assume(board: "ArmState", motion: "MotionFile", unknown: int) -> int:
+    """Declare that the joints stand where a homing motion begins; those that are not known to (bit a joint).
+
+    ``unknown``: joints of unknown position.
+    """
+    from armtempo_board.motion import endpoints  # here, so that it can be forgotten
+
+    board.engine.snapshot(board.raw)
+    for joint in range(board.joints):
+        if endpoints.start_offset(motion, joint, board.raw[COMMANDED + joint]):
+            unknown |= 1 << joint
+    starts = [endpoints.start_offset(motion, joint, 0) for joint in range(board.joints)]
+    home(board, unknown, starts)
+    return unknown
+
+
+def home(board: "ArmState", mask: int, steps: "Sequence[int]") -> None:
+    """Declare where the joints of ``mask`` stand; ``steps`` has a number for every joint."""
+    for joint in range(board.joints):
+        row = board.engine.limits[joint]
+        if mask >> joint & 1 and not row["min_steps"] <= steps[joint] <= row["max_steps"]:
+            raise Refused(codes.OUT_OF_RANGE, joint, steps[joint])
+    board.engine.home(mask, steps)

@@ -1,0 +1,46 @@
+"""May a motion start from where the joints stand? Imported for that and given up after it: it needs much memory."""
+
+from armtempo_shared import codes
+
+from armtempo_board import heap
+from armtempo_board.errors import Refused
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from armtempo_shared.motion import MotionHead
+
+    from armtempo_board.motion.joint_drive import JointDrive
+
+_ANY_JOINT = 0
+
+
+def check_start(
+    motion: "MotionHead", joints: "list[JointDrive]", limits: "list[dict[str, int]] | None", known: int
+) -> int:
+    """Duration of the motion, in ticks, or Refused.
+
+    ``limits`` as the engine has them, None for a motion whose splines were checked before; ``known``: bit a joint.
+    """
+    if limits is not None:
+        _check_splines(motion, joints[_ANY_JOINT], limits)
+    heap.forget()
+    return _check_begin(motion, joints, known)
+
+
+def _check_splines(motion: "MotionHead", joint: "JointDrive", limits: "list[dict[str, int]]") -> None:
+    """``joint``: any, as the gap is the same for all; it walks through the motion."""
+    from armtempo_board.motion import motion_check  # here, so that it can be forgotten
+
+    motion_check.check(motion, limits, joint.gap_ticks, joint.generator.subintervals)
+
+
+def _check_begin(motion: "MotionHead", joints: "list[JointDrive]", known: int) -> int:
+    from armtempo_board.motion import endpoints  # here, so that it can be forgotten
+
+    for number, joint in enumerate(joints):
+        if not known >> number & 1:
+            raise Refused(codes.UNHOMED, number)
+        off = endpoints.start_offset(motion, number, joint.position(joint.ring.matches()))
+        if off:
+            raise Refused(codes.WRONG_START, number, off)
+    return endpoints.duration_ticks(motion)
