@@ -181,7 +181,7 @@ def _as_json(end: SequenceState, board: Board, folder: Path | None) -> dict[str,
     """How it ended, for other programs."""
     return {
         "name": end.name,
-        "folder": str(folder) if folder else "",
+        "folder": str(folder) if folder else None,
         "ending": end.ending,
         "step": end.step,
         "cycles": end.cycle,

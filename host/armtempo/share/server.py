@@ -98,6 +98,7 @@ class Server:
             with self._lock:
                 self._connections.add(connection)
             Thread(target=self._serve, args=(connection,), name="armtempo reader", daemon=True).start()
+            connection.start_writing()  # after that: a stop need not wait for a second thread
 
     def _serve(self, connection: _Connection) -> None:
         try:
@@ -120,7 +121,13 @@ class _Connection:
         self._lines: queue.Queue[bytes | None] = queue.Queue(_QUEUE)
         self._dropped = 0
         self._writer = Thread(target=self._write, name="armtempo writer", daemon=True)
-        self._writer.start()
+        self._starting = Lock()
+
+    def start_writing(self) -> None:
+        """Begin to send what waits; once begun, another call does nothing."""
+        with self._starting:
+            if self._writer.ident is None:
+                self._writer.start()
 
     def serve(self) -> None:
         """Answer requests until the caller hangs up or sends what is no message."""
@@ -145,6 +152,7 @@ class _Connection:
 
     def close(self) -> None:
         """End the connection, once what waits is sent, but soon."""
+        self.start_writing()
         with suppress(queue.Full):
             self._lines.put_nowait(None)
         self._writer.join(_FLUSH_S)
