@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 
 
 _OP, _NUMBER, _VALUE, _AMOUNT, _STEP_OF_ROW = const(0), const(1), const(2), const(3), const(4)
-_START_BYTES = const(18_000)  # of heap that the start of a motion takes at most (docs/memory.md)
+_START_BYTES = const(22_000)  # of heap for the start of a motion; some of it in large pieces (docs/memory.md)
 _IDLE = (0, 0, 0, 0, 0)
 _MOST = const(0x3FFFFFFF)  # that a counter reaches; a larger number would take memory
 

@@ -62,10 +62,10 @@ def case_without_room_it_is_refused():
     module.gc = stand_in.Module()
     module.gc.collect = gc.collect
     module.gc.mem_free = lambda: 10_000
-    assert begin(host) == ("error", "no_sequence_room", 255, 8000)
+    assert begin(host) == ("error", "no_sequence_room", 255, 12000)
     assert not app.controller.sequence and state(host) == "idle"
     assert host.ask("sequence")[:2] == ("error", "unknown_command")
-    module.gc.mem_free = lambda: 20_000
+    module.gc.mem_free = lambda: 24_000
     assert begin(host)[0] == "ok"
 
 
