@@ -31,6 +31,8 @@ _IMPORTED_LATER = (
     "armtempo_board.storage.motion_file",
     "armtempo_board.storage.store",
     "armtempo_board.app.room",
+    "armtempo_board.app.arm_setup",
+    "armtempo_board.app.run_start",
     "armtempo_board.app.store_commands",
 )
 _USB_BUFFER = 1024
@@ -104,7 +106,8 @@ class Pipe:
     def start_board(self) -> None:
         """Power up: a new program on the same flash."""
         with board_modules():
-            from armtempo_board.app import store_commands  # noqa: F401  the program imports them when it needs them
+            # the program imports these when it needs them
+            from armtempo_board.app import arm_setup, run_start, store_commands  # noqa: F401
             from armtempo_board.app.app import App
             from armtempo_board.motion import arm_check  # noqa: F401
             from armtempo_board.storage import store  # noqa: F401  the program imports them when it needs them
