@@ -125,11 +125,11 @@ def test_the_boards_button_takes_a_point() -> None:
     """A press is told by a notice; those from before do not count, and other notices are none."""
     with homed() as port, armtempo.connect(port, PAPER) as board:
         board.configure(PAPER)
-        board.client.session.events.append(Notice("button: refused, error 9"))
+        board.client.session.events.append(Notice("button: error 9"))
         with board.by_hand() as guided:
             assert not guided.button_pressed()
             points = TaughtPoints(PAPER, guided.angles_deg)
-            presses = iter([Notice("a traceback"), Notice("button: refused, error 9"), None])
+            presses = iter([Notice("a traceback"), Notice("button: error 9"), None])
 
             class Quiet:
                 """No key is pressed before the button was."""

@@ -106,8 +106,9 @@ class Layout:
 
 
 def uniform(vias: int, pieces: int, stops: Mapping[int, float]) -> Layout:
-    """As many segments between any two of ``vias`` via points, or more where less leaves no freedom."""
-    return Layout(np.maximum(pieces, least_pieces(vias, stops)), stops)
+    """As many segments between any two of ``vias`` via points, but DEGREE at least between two dwells."""
+    least = least_pieces(vias, stops)
+    return Layout(np.where(least == DEGREE, np.maximum(pieces, DEGREE), pieces), stops)
 
 
 def shared_out(shares: Array, segments: int, stops: Mapping[int, float]) -> Layout:

@@ -107,7 +107,7 @@ def case_before_homing_nothing_moves(world):
     world.press()
     yield from unmoved(world)
     told = notices(world)
-    assert told == ["button: refused, error %d" % wire.ERROR_CODES["unhomed"]], told
+    assert told == ["button: error %d" % wire.ERROR_CODES["unhomed"]], told
     yield from world.home(HOME)
     yield from unmoved(world)
     yield from moves_when_pressed_anew(world)
@@ -155,7 +155,7 @@ def case_with_a_fault_pending_nothing_moves(world):
     world.press()
     yield from unmoved(world)
     assert world.led() == "fault"
-    assert notices(world) == ["button: refused, error %d" % wire.ERROR_CODES["fault_pending"]]
+    assert notices(world) == ["button: error %d" % wire.ERROR_CODES["fault_pending"]]
     yield from world.ask("clear")
     yield from unmoved(world)
     assert world.led() == "idle"
@@ -201,7 +201,7 @@ def case_no_default(world):
     yield from ready(world, "")
     yield from tap(world)
     yield from unmoved(world)
-    assert notices(world) == ["button: refused, error %d" % wire.ERROR_CODES["not_found"]]
+    assert notices(world) == ["button: error %d" % wire.ERROR_CODES["not_found"]]
 
 
 def case_default_that_was_removed_or_renamed(world):
@@ -215,7 +215,7 @@ def case_default_that_was_removed_or_renamed(world):
     yield from world.ask("remove", (), "third")
     yield from tap(world)
     yield from unmoved(world, 1)
-    assert notices(world) == ["button: refused, error %d" % wire.ERROR_CODES["not_found"]]
+    assert notices(world) == ["button: error %d" % wire.ERROR_CODES["not_found"]]
     yield from upload(world, "third", data)  # the default is a name: it stands for what has it
     yield from tap(world)
     yield from moved(world, 2)
