@@ -18,7 +18,7 @@ from armtempo.planning import checks, corridor, free_path, lower_bounds
 from armtempo.planning.angle_bounds import of_path
 from armtempo.planning.free_motion import Demand, FreeMotion, Tolerance, through
 from armtempo.planning.free_path import Effort, Shortest
-from armtempo.planning.layout import DEGREE, DWELL_SEGMENTS, LEAST_PIECES, least_pieces
+from armtempo.planning.layout import DEGREE, LEAST_PIECES, uniform
 from armtempo.planning.planned import Planned
 from armtempo.planning.time_parameterization import MIN_DURATION_S
 from armtempo.planning.tool import Tool
@@ -69,9 +69,7 @@ def _most_segments(arm: Arm, job: Job, vias: int) -> int:
     while most > 1 and record.size(DEGREE, joints, shared, most, 1) > MAX_MOTION_BYTES:
         most -= 1
     pieces = job.refine if isinstance(job.refine, int) else LEAST_PIECES
-    stops = {stop.via: stop.dwell_s for stop in job.stops}
-    needed = int(np.maximum(pieces, least_pieces(vias, stops)).sum())
-    needed += DWELL_SEGMENTS * sum(stop.dwell_s > 0.0 for stop in job.stops)
+    needed = uniform(vias, pieces, {stop.via: stop.dwell_s for stop in job.stops}).segments
     if needed > most:
         raise InputError(
             f"job {job.name!r}: a free path through {vias} via points with {pieces} pieces between any two needs "
