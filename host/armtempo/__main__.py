@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _signal  # built in; ``signal`` imports much, in which a Ctrl-C would be a traceback
 import os
 import sys
 
@@ -16,17 +17,14 @@ def _end(*signalled: object) -> None:
 
 def main() -> None:
     """The command; ``armtempo.cli`` takes Ctrl-C over when a subcommand begins."""
+    if (
+        _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler
+    ):  # it may be ignored, in the background
+        _signal.signal(_signal.SIGINT, _end)
     if sys.argv[1:2] == ["stop"]:
         from armtempo.project import quick_stop
 
-        try:
-            quick_stop.send(sys.argv[2:])
-        except KeyboardInterrupt:
-            _end()
-    import signal  # a stop did not wait for it
-
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # it may be ignored, in the background
-        signal.signal(signal.SIGINT, _end)
+        quick_stop.send(sys.argv[2:])
     from armtempo.cli import main as command
 
     command(prog_name="armtempo")
