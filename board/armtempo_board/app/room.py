@@ -9,7 +9,8 @@ import gc
 from armtempo_shared import engine_memory
 from armtempo_shared.limits import MAX_JOINTS
 
-from armtempo_board.memory import Memory
+from armtempo_board import heap
+from armtempo_board.hardware import backup_sram
 from armtempo_board.motion.workspace import Workspace
 
 _RESERVE = 25_760  # bytes of heap for the rest
@@ -22,11 +23,13 @@ _STEP_WORDS = 64
 
 def workspace() -> "Workspace":
     """For the largest arm that fits."""
+    address = backup_sram.find()
+    heap.forget("registers")
     gc.collect()
     free = _free()
     if not free:
-        return Workspace(engine_memory.LARGEST_WORDS, MAX_JOINTS)
-    room = max(free - _RESERVE, 0)
+        return Workspace(engine_memory.LARGEST_WORDS, MAX_JOINTS, address)
+    room = max(free - _RESERVE - (0 if address else 4 * engine_memory.PROCESSOR_WORDS), 0)
     words = max(room - engine_memory.object_bytes(_USUAL_JOINTS), 0) // 4
     words = min(words, engine_memory.LARGEST_WORDS)
     joints = 0
@@ -34,8 +37,10 @@ def workspace() -> "Workspace":
         joints += 1
     while True:
         try:
-            return Workspace(words, joints)
+            return Workspace(words, joints, address)
         except MemoryError:  # the heap has no such blocks
+            if words < 0:
+                raise
             words -= _STEP_WORDS
             gc.collect()
 
@@ -48,14 +53,11 @@ def share(workspace: "Workspace", outputs: int, inputs: int) -> None:
     words = workspace.words - engine_memory.output_bytes(outputs, inputs) // 4
     if workspace.memory.size == words:
         return
-    workspace.memory = Memory([])
-    gc.collect()
-    while not workspace.memory.size:
+    while True:
         try:
-            workspace.memory = Memory(engine_memory.blocks(words))
+            return workspace.make_memory(words)
         except MemoryError:
             words -= _STEP_WORDS
-            gc.collect()
 
 
 def sample_bytes() -> int:

@@ -4,6 +4,7 @@ So a motion takes the same memory whatever its size. Reading allocates nothing; 
 """
 
 import micropython
+import uctypes
 from micropython import const
 
 TYPE_CHECKING = False
@@ -35,7 +36,7 @@ class ControlPoints:
 
     def __init__(self, words: "memoryview") -> None:
         self.words = words
-        self._fresh = memoryview(words)[_FRESH_AT:]
+        self._fresh = uctypes.bytearray_at(uctypes.addressof(words) + 4 * _FRESH_AT, 4 * _FRESH_AT)
         self._stream: "Any" = None
         self._end = 0
         self._degree = 0

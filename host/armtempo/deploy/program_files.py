@@ -41,7 +41,7 @@ _TOGETHER = {
         f"{PACKAGES[0]}.hardware.{name}" for name in ("outputs", "digital_inputs")
     ],
     f"{PACKAGES[0]}.app.sequence_start": [f"{PACKAGES[1]}.sequence_check"],
-    f"{PACKAGES[0]}.app.room": [f"{PACKAGES[1]}.engine_memory"],
+    f"{PACKAGES[0]}.app.room": [f"{PACKAGES[1]}.engine_memory", f"{PACKAGES[0]}.hardware.backup_sram"],
     f"{PACKAGES[0]}.app.command_rows": [f"{PACKAGES[0]}.app.store_commands"],
     f"{PACKAGES[1]}.table": [f"{PACKAGES[1]}.program_hash"],
     f"{PACKAGES[0]}.hardware.registers": [f"{PACKAGES[0]}.hardware.pins"],

@@ -432,6 +432,36 @@ def case_registers_by_the_chips_addresses():
         pass
 
 
+def case_backup_sram_needs_its_clock_and_write_access():
+    """RM0090 5.1.2: a clock for the power interface, DBP, a clock of its own."""
+    rcc, power, memory = stm.RCC, stm.PWR, stm.BKPSRAM
+    last = memory + 4092
+    mem32[last] = 5
+    assert mem32[last] == 0, "without a clock it reads as 0"
+    mem32[rcc + stm.RCC_AHB1ENR] |= 1 << 18
+    before = mem32[last]
+    mem32[last] = before ^ 5
+    assert before and mem32[last] == before, "without write access it keeps what it had"
+    mem32[power + stm.PWR_CR] |= 1 << 8
+    mem32[last] = before ^ 5
+    assert mem32[last] == before, "without a clock the power interface takes nothing"
+    mem32[rcc + stm.RCC_APB1ENR] |= 1 << 28
+    mem32[power + stm.PWR_CR] |= 1 << 8
+    mem32[last] = -5
+    put(memory, 0, 7)
+    assert mem32[last] == mem32[0x40024000 + 4092] == -5 and mem32[memory] == 7
+    mem32[rcc + stm.RCC_AHB1ENR] &= ~(1 << 18)
+    assert mem32[last] == 0
+    mem32[rcc + stm.RCC_AHB1ENR] |= 1 << 18
+    assert mem32[last] == -5 and mem32[memory] == 7, "its content waits for the clock"
+    mem32[power + stm.PWR_CR] &= ~(1 << 8)
+    put(memory, 0, 8)
+    time.sleep_us(1)
+    assert mem32[memory] == 7
+    words = uctypes.struct(last, (uctypes.ARRAY, 1 | uctypes.INT32))
+    assert words[0] == -5 and uctypes.addressof(words) == last
+
+
 for name in cases.wanted(globals()):
     standalone.start(flash=SCRATCH + "/flash")
     globals()[name]()
