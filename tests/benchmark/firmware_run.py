@@ -18,7 +18,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -230,16 +230,19 @@ def _check_steps(board: Board, arm: Arm, angles_deg: Array) -> None:
     assert max(abs(one - two) for one, two in zip(sent, wanted, strict=True)) <= 1, (sent, wanted)
 
 
+def both_ways(micropython: Path, folder: Path) -> Iterator[tuple[str, Path, Path]]:
+    """The program in the firmware, and as compiled files: a title, the firmware's ELF file, the image of its flash."""
+    board = define_board(micropython, folder)
+    elf = build_with_program(micropython, board, folder / "with-program")
+    yield "in the firmware", elf, flash(folder, elf, with_library=False)
+    elf = firmware.build_at(micropython, board, folder / "stock")
+    yield "files, compiled", elf, flash(folder, elf, with_library=True)
+
+
 def main(micropython: Path, folder: Path) -> None:
     """Print the figures."""
-    board = define_board(micropython, folder)
-    kinds = (
-        ("in the firmware", build_with_program(micropython, board, folder / "with-program"), False),
-        ("files, compiled", firmware.build_at(micropython, board, folder / "stock"), True),
-    )
-    for title, elf, with_library in kinds:
+    for title, elf, image in both_ways(micropython, folder):
         print(title, flush=True)
-        image = flash(folder, elf, with_library)
         tell(run(elf, image))
         print(f"    {SIX_JOINTS}, six joints:", flush=True)
         try:
@@ -254,9 +257,11 @@ def tell(found: dict[str, Heap]) -> None:
         print(f"    {stage:<10}in use {heap.used:>7}, largest free block {heap.largest:>7}", flush=True)
 
 
+def start(main: Callable[[Path, Path], None]) -> None:
+    """With the arguments MICROPYTHON [FOLDER]; without FOLDER nothing is kept."""
+    with tempfile.TemporaryDirectory() as name:
+        main(Path(sys.argv[1]).resolve(), Path(sys.argv[2] if len(sys.argv) > 2 else name).resolve())
+
+
 if __name__ == "__main__":
-    if len(sys.argv) > 2:
-        main(Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve())
-    else:
-        with tempfile.TemporaryDirectory() as name:
-            main(Path(sys.argv[1]).resolve(), Path(name))
+    start(main)
