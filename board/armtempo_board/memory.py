@@ -32,16 +32,19 @@ class Memory:
             self._taken[number] = 0
         self._used = 0
 
-    def take_for_processor(self, words: int) -> "Any":
-        """As ``take``, of the memory that the processor alone reaches while it has so many."""
+    def take_for_processor(self, words: int) -> "memoryview[int]":
+        """As ``take``, of the memory that the processor alone reaches while it has so many.
+
+        On MicroPython it is no memoryview, which there is of the heap's words only: it has neither length nor slices.
+        """
         begin = self._used
         if begin + words > self._words:
             return self.take(words)
         self._used += words
-        part = uctypes.struct(self._address + 4 * begin, (uctypes.ARRAY, words | uctypes.INT32))
+        part: "Any" = uctypes.struct(self._address + 4 * begin, (uctypes.ARRAY, words | uctypes.INT32))
         for word in range(words):
             part[word] = 0
-        return part
+        return part  # type: ignore[no-any-return]
 
     def take(self, words: int) -> "memoryview[int]":
         """A part of so many words, signed, all 0, from the first block that has them; MemoryError where none has."""

@@ -10,7 +10,6 @@ from pathlib import Path
 import armtempo
 import numpy as np
 import pytest
-from armtempo.records import encoded_motion
 from armtempo.errors import ArmtempoError, InputError
 from armtempo.kinematics.of_arm import forward
 from armtempo.model import sequence_file
@@ -43,7 +42,7 @@ def written(folder: Path, *steps: str, top: str = "", name: str = "seq") -> Path
     return path
 
 
-def encoded_motion.of_plan(folder: Path, *steps: str, top: str = 'start = "home"') -> SequencePlan:
+def planned(folder: Path, *steps: str, top: str = 'start = "home"') -> SequencePlan:
     """The plan of such a file."""
     return armtempo.plan_sequence(ARM, Sequence.load(written(folder, *steps, top=top), ARM))
 
@@ -59,7 +58,7 @@ def ends(plan: SequencePlan) -> list[tuple[tuple[float, ...], tuple[float, ...]]
 
 
 def test_each_motion_begins_where_the_one_before_it_ends(tmp_path: Path) -> None:
-    plan = encoded_motion.of_plan(tmp_path, 'goto = "a"', 'run = "job.toml"', 'goto = "b"', "goto = [1, -60, 40]")
+    plan = planned(tmp_path, 'goto = "a"', 'run = "job.toml"', 'goto = "b"', "goto = [1, -60, 40]")
     assert words(plan) == ["goto a", "run job", "goto b", "goto 1, -60, 40°"]
     np.testing.assert_allclose(
         ends(plan),
@@ -75,19 +74,19 @@ def test_each_motion_begins_where_the_one_before_it_ends(tmp_path: Path) -> None
 
 
 def test_without_a_start_it_begins_where_its_first_step_leads(tmp_path: Path) -> None:
-    assert encoded_motion.of_plan(tmp_path, 'goto = "a"', 'goto = "b"', top="").start_deg == pytest.approx((1, -60, 40))
-    assert encoded_motion.of_plan(tmp_path, 'run = "job.toml"', top="").start_deg == pytest.approx((1, -60, 40))
-    assert encoded_motion.of_plan(tmp_path, "wait_s = 1", top="").start_deg is None
+    assert planned(tmp_path, 'goto = "a"', 'goto = "b"', top="").start_deg == pytest.approx((1, -60, 40))
+    assert planned(tmp_path, 'run = "job.toml"', top="").start_deg == pytest.approx((1, -60, 40))
+    assert planned(tmp_path, "wait_s = 1", top="").start_deg is None
 
 
 def test_equal_motions_are_planned_and_kept_once(tmp_path: Path) -> None:
-    plan = encoded_motion.of_plan(tmp_path, *['goto = "a"', 'goto = "b"'] * 3)
+    plan = planned(tmp_path, *['goto = "a"', 'goto = "b"'] * 3)
     assert len(plan.legs) == 3
     assert [row.number for row in plan.rows] == [0, 1, 2, 1, 2, 1]
 
 
 def test_the_first_pass_of_a_repeat_may_begin_elsewhere(tmp_path: Path) -> None:
-    plan = encoded_motion.of_plan(tmp_path, "repeat = 3", 'goto = "a"', 'goto = "b"', 'end = "repeat"', 'goto = "home"')
+    plan = planned(tmp_path, "repeat = 3", 'goto = "a"', 'goto = "b"', 'end = "repeat"', 'goto = "home"')
     assert words(plan) == [
         "goto a", "goto b", "repeat 3 times", "goto a", "goto b", "end of repeat", "goto home",
     ]  # fmt: skip
@@ -104,7 +103,7 @@ def test_the_first_pass_of_a_repeat_may_begin_elsewhere(tmp_path: Path) -> None:
 
 def test_a_repeat_that_begins_where_it_ends_stands_once(tmp_path: Path) -> None:
     steps = 'goto = "b"', "repeat = 3", 'goto = "a"', 'goto = "b"', 'end = "repeat"'
-    assert words(encoded_motion.of_plan(tmp_path, *steps)) == [
+    assert words(planned(tmp_path, *steps)) == [
         "goto b",
         "repeat 3 times",
         "goto a",
@@ -116,7 +115,7 @@ def test_a_repeat_that_begins_where_it_ends_stands_once(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_repeats_within_repeats(tmp_path: Path) -> None:
     inner = "repeat = 2", 'goto = "a"', 'goto = "b"', 'end = "repeat"'
-    plan = encoded_motion.of_plan(tmp_path, 'repeat = "for ever"', *inner, 'goto = "home"', 'end = "repeat"')
+    plan = planned(tmp_path, 'repeat = "for ever"', *inner, 'goto = "home"', 'end = "repeat"')
     values = [(row.op, row.value, row.amount) for row in plan.rows if row.op in (record.REPEAT, record.END)]
     assert values == [(5, 0, 0), (5, 0, 1), (6, 0, 0), (6, 1, 0)]
     assert plan.total is None
@@ -125,7 +124,7 @@ def test_repeats_within_repeats(tmp_path: Path) -> None:
 
 
 def test_outputs_waits_and_inputs(tmp_path: Path) -> None:
-    plan = encoded_motion.of_plan(
+    plan = planned(
         tmp_path,
         'output = "gripper"\nto = "closed"\nwait_s = 0.25',
         'output = "gripper"\nto = 180',
@@ -176,7 +175,7 @@ def test_a_tool_pose_that_cannot_be_reached_names_the_step(tmp_path: Path) -> No
 
 def test_a_counter_is_one_by_its_name(tmp_path: Path) -> None:
     written(tmp_path, 'count = "parts"', 'count = "called"', name="other")
-    plan = encoded_motion.of_plan(
+    plan = planned(
         tmp_path,
         "repeat = 2",
         'goto = "a"',
@@ -196,17 +195,17 @@ def test_a_counter_is_one_by_its_name(tmp_path: Path) -> None:
 
 def test_more_counters_than_the_board_keeps_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="9 counters; the board keeps 8"):
-        encoded_motion.of_plan(tmp_path, *(f'count = "c{number}"' for number in range(9)))
+        planned(tmp_path, *(f'count = "c{number}"' for number in range(9)))
 
 
 def test_a_called_sequence_stands_in_its_place(tmp_path: Path) -> None:
     written(tmp_path, 'goto = "b"', 'goto = "a"', name="inner")
-    plan = encoded_motion.of_plan(tmp_path, 'goto = "a"', 'call = "inner.toml"')
+    plan = planned(tmp_path, 'goto = "a"', 'call = "inner.toml"')
     assert [(row.words, row.step) for row in plan.rows] == [("goto a", 1), ("goto b", 2), ("goto a", 2)]
 
 
 def test_goto_leads_to_where_a_motion_begins(tmp_path: Path) -> None:
-    plan = encoded_motion.of_plan(tmp_path, 'goto = "job.toml"', 'run = "job.toml"')
+    plan = planned(tmp_path, 'goto = "job.toml"', 'run = "job.toml"')
     assert words(plan) == ["goto the start of job", "run job"]
 
 
@@ -254,7 +253,7 @@ def test_goto_leads_to_where_a_motion_begins(tmp_path: Path) -> None:
 def test_what_is_wrong_is_named(steps: list[str], said: str, tmp_path: Path) -> None:
     start = 'start = "home"' if steps[0] != "repeat = 2" or "run" not in steps[1] else 'start = "a"'
     with pytest.raises(InputError) as caught:
-        encoded_motion.of_plan(tmp_path, *steps, top=start)
+        planned(tmp_path, *steps, top=start)
     assert re.search(said, str(caught.value)), caught.value
     assert str(tmp_path) in str(caught.value)
 
@@ -262,7 +261,7 @@ def test_what_is_wrong_is_named(steps: list[str], said: str, tmp_path: Path) -> 
 def test_sequences_that_call_each_other_are_refused(tmp_path: Path) -> None:
     written(tmp_path, 'call = "seq.toml"', name="inner")
     with pytest.raises(InputError, match=r"calls itself: seq.toml calls inner.toml calls seq.toml"):
-        encoded_motion.of_plan(tmp_path, 'call = "inner.toml"')
+        planned(tmp_path, 'call = "inner.toml"')
 
 
 @pytest.mark.parametrize(
@@ -277,7 +276,7 @@ def test_sequences_that_call_each_other_are_refused(tmp_path: Path) -> None:
 )
 def test_what_is_wrong_at_its_head_is_named(top: str, said: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=said):
-        encoded_motion.of_plan(tmp_path, "wait_s = 1", top=top)
+        planned(tmp_path, "wait_s = 1", top=top)
 
 
 def test_a_name_that_leaves_no_room_for_the_motions_is_refused(tmp_path: Path) -> None:
@@ -287,7 +286,7 @@ def test_a_name_that_leaves_no_room_for_the_motions_is_refused(tmp_path: Path) -
 
 
 def test_the_file_of_a_plan_holds_all_of_it(tmp_path: Path) -> None:
-    plan = encoded_motion.of_plan(tmp_path, 'goto = "a"', 'output = "gripper"\nto = "open"', "wait_s = 0.5")
+    plan = planned(tmp_path, 'goto = "a"', 'output = "gripper"\nto = "open"', "wait_s = 0.5")
     path = tmp_path / "seq.json"
     plan.save(path)
     again = SequencePlan.load(path)
@@ -307,7 +306,7 @@ def test_the_file_of_a_plan_holds_all_of_it(tmp_path: Path) -> None:
 
 
 def test_a_trajectory_file_is_no_sequence_and_the_other_way_round(tmp_path: Path) -> None:
-    plan = encoded_motion.of_plan(tmp_path, 'goto = "a"')
+    plan = planned(tmp_path, 'goto = "a"')
     plan.save(tmp_path / "seq.json")
     motion = armtempo.plan(ARM, Job.load(tmp_path / "job.toml", ARM))
     motion.save(tmp_path / "j.json")
@@ -321,11 +320,11 @@ def test_a_plan_of_another_arm_is_no_leg(tmp_path: Path) -> None:
     motion = armtempo.plan(Arm.paper(), Job.load(written(tmp_path, "wait_s = 1").parent / "job.toml", ARM))
     motion.save(tmp_path / "j.json")
     with pytest.raises(ArmtempoError, match="another arm"):
-        encoded_motion.of_plan(tmp_path, 'goto = "a"', 'run = "j.json"')
+        planned(tmp_path, 'goto = "a"', 'run = "j.json"')
 
 
 def test_every_damage_of_a_record_is_seen(tmp_path: Path) -> None:
-    data = encoded_sequence.of_plan(encoded_motion.of_plan(tmp_path, 'goto = "a"', "wait_s = 1")).data
+    data = encoded_sequence.of_plan(planned(tmp_path, 'goto = "a"', "wait_s = 1")).data
     record.SequenceData(data)
     for at in range(len(data)):
         for damaged in (data[:at], data[:at] + bytes([data[at] ^ 0x40]) + data[at + 1 :]):

@@ -13,7 +13,7 @@ from armtempo_board import heap
 from armtempo_board.hardware import backup_sram
 from armtempo_board.motion.workspace import Workspace
 
-_RESERVE = 25_760  # bytes of heap for the rest
+_RESERVE = 26_900  # bytes of heap for the rest
 _USUAL_JOINTS = 3  # there is heap for their objects before there is memory for larger rings
 _MOST_SAMPLES = 4096  # bytes of the sample buffer at most,
 _LEAST_SAMPLES = 768  # and at least;
@@ -39,9 +39,9 @@ def workspace() -> "Workspace":
         try:
             return Workspace(words, joints, address)
         except MemoryError:  # the heap has no such blocks
-            if words < 0:
+            if not words:
                 raise
-            words -= _STEP_WORDS
+            words = max(words - _STEP_WORDS, 0)
             gc.collect()
 
 
@@ -50,14 +50,12 @@ def share(workspace: "Workspace", outputs: int, inputs: int) -> None:
 
     What the heap has not in one piece any more, the engine goes without, until the program starts again.
     """
-    words = workspace.words - engine_memory.output_bytes(outputs, inputs) // 4
-    if workspace.memory.size == words:
-        return
-    while True:
+    words = max(workspace.words - engine_memory.output_bytes(outputs, inputs) // 4, 0)
+    while workspace.memory.size != words:
         try:
-            return workspace.make_memory(words)
+            workspace.make_memory(words)
         except MemoryError:
-            words -= _STEP_WORDS
+            words = max(words - _STEP_WORDS, 0)
 
 
 def sample_bytes() -> int:

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 class Workspace:
     """``words`` of memory for rings and step generators, ``joints`` at most: see ``armtempo_shared.engine_memory``.
 
-    ``address``: where its PROCESSOR_WORDS are; 0: in the heap. The interrupts' callbacks belong to it, so they never hold what an engine had before.
+    ``address``: where its PROCESSOR_WORDS are; 0: in the heap. The interrupts' callbacks belong to it, so they never
+    hold what an engine had before.
     """
 
     def __init__(self, words: int, joints: int, address: int = 0) -> None:

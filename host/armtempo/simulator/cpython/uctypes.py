@@ -24,5 +24,6 @@ def bytearray_at(address: int, size: int) -> memoryview:
 def struct(address: int, descriptor: tuple[int, int]) -> memoryview:
     """Of all that it can be elsewhere: so many signed words at an address, ``(ARRAY, count | INT32)``."""
     kind, items = descriptor
-    assert kind == ARRAY and items & ~_COUNT == INT32
+    assert kind == ARRAY
+    assert items & ~_COUNT == INT32
     return bytearray_at(address, 4 * (items & _COUNT)).cast("i")

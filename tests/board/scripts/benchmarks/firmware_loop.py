@@ -337,7 +337,8 @@ def replace(settings, port=Port):
     sys.modules["os"] = Beyond(os, dupterm=nothing, urandom=bytes)
     sys.modules["machine"] = Beyond(machine, unique_id=lambda: b"123456789012")
     sys.modules["stm"] = Chip(
-        BKPSRAM=_BACKUP_SRAM, DMA1=uctypes.addressof(dma), TIM1=still, TIM3=still, TIM4=still, TIM8=still)
+        BKPSRAM=_BACKUP_SRAM, DMA1=uctypes.addressof(dma), TIM1=still, TIM3=still, TIM4=still, TIM8=still
+    )
     sys.modules["time"] = Beyond(time, sleep_us=start_clock)
 
 

@@ -90,8 +90,8 @@ def case_an_engine_takes_what_the_formula_counts():
         spans = [(begin_of(part), 4 * words_of(part)) for each in generators for part in parts_of(each)]
         assert sum([size for _, size in spans]) == 4 * len(rates) * sum(engine_memory.GENERATOR_PARTS)
         inside = sorted([(begin, begin + size // 4) for begin, size in spans if begin >= 0])
-        for one, other in zip(inside, inside[1:]):
-            assert one[1] == other[0]
+        for number in range(1, len(inside)):
+            assert inside[number - 1][1] == inside[number][0]
         assert inside[-1][1] <= engine_memory.PROCESSOR_WORDS
 
 
