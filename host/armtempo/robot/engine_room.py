@@ -54,7 +54,7 @@ IN_FIRMWARE = Room(17_616, 6)
 
 Measured: ``python -m tests.benchmark.room MICROPYTHON``.
 """
-_BUILD = "'armtempo firmware' (board/docs/firmware.md)"
+_BUILD = "see 'armtempo firmware --help'"
 
 
 def check(arm: Arm, info: Hello) -> None:
@@ -89,7 +89,7 @@ def of_arm(arm: Arm, info: Hello | None = None) -> str:
     if AS_FILES.holds_arm(arm):
         return f"{needs}: fits with the program as files or in the firmware"
     if IN_FIRMWARE.holds_arm(arm):
-        return f"{needs}: fits only with the program in the firmware, {_BUILD}"
+        return f"{needs}: fits only with the program in the firmware ({_BUILD})"
     return f"{needs}: too much for an STM32F407"
 
 
@@ -98,7 +98,7 @@ def of_board(info: Hello) -> list[str]:
     room = Room.of_board(info)
     lines = [f"memory for an arm: {room.words()}"]
     if room.size < IN_FIRMWARE.size:
-        lines.append(f"with the program in the firmware, {_BUILD}: {IN_FIRMWARE.words()}")
+        lines.append(f"with the program in the firmware ({_BUILD}): {IN_FIRMWARE.words()}")
     return lines
 
 
@@ -106,7 +106,7 @@ def _or_firmware(arm: Arm, room: Room) -> str:
     """The firmware as a way out, where it is one."""
     if room.size >= IN_FIRMWARE.size or not IN_FIRMWARE.holds_arm(arm):
         return ""
-    return f", or put the program into the board's firmware, where this arm fits: {_BUILD}"
+    return f", or put the program into the board's firmware, where this arm fits ({_BUILD})"
 
 
 def _beside(arm: Arm) -> int:
