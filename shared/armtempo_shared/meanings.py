@@ -60,7 +60,8 @@ _ROWS = (
     (
         "no_room",
         "the engine for this arm does not fit into the board's memory; nothing was changed",
-        "lower its top speeds, drive fewer joints, or put the program into the firmware (see 'armtempo firmware --help')",
+        "lower its top speeds, drive fewer joints, or put the program into the firmware (see 'armtempo firmware "
+        "--help')",
     ),
     (
         "no_memory",

@@ -49,8 +49,8 @@ SAID = {
     "[number of the step in the sequence: 4711]; plan the sequence again with the arm file that the board is set up "
     "for",
     "no_sequence_room": "no: the board has no room to run a sequence of motions for this arm; nothing has moved "
-    "(joint 2) [bytes that are missing: 4711]; put the program into the firmware (see 'armtempo firmware --help'), or let "
-    "the host run the steps (board.run)",
+    "(joint 2) [bytes that are missing: 4711]; put the program into the firmware (see 'armtempo firmware --help'), or "
+    "let the host run the steps (board.run)",
     "too_abrupt": "no: the motion reverses too fast for the step generator (joint 2) [steps/s²: 4711]; lower the "
     "limits",
 }
