@@ -22,8 +22,8 @@ def halve(trees: dict[str, ast.Module], module: str, first: str) -> None:
     """Put the first part of ``module``, by its functions, into the new module ``first`` of its package.
 
     The first mentions nothing of the second. What is mentioned of it anywhere else, ``module`` imports from there.
-    A small module stays whole, and one that can be cut nowhere. Raises ValueError where a function changes a name of the module: the other one would not
-    know of it.
+    A small module stays whole, and one that can be cut nowhere. Raises ValueError where a function changes a name of
+    the module: the other one would not know of it.
     """
     package, name = module.rsplit(".", 1)
     body = trees[module].body
