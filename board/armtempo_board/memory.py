@@ -59,6 +59,11 @@ class Memory:
         raise MemoryError
 
 
+def bytes_behind(part: "Any", first: int, words: int) -> bytearray:
+    """The bytes of a part of so many words, from the word ``first`` on."""
+    return uctypes.bytearray_at(uctypes.addressof(part) + 4 * first, 4 * (words - first))
+
+
 def _zeros(words: int) -> "array[int]":
     """It grows in place: made of a buffer, it would need its size twice."""
     block = array("i")

@@ -4,8 +4,9 @@ So a motion takes the same memory whatever its size. Reading allocates nothing; 
 """
 
 import micropython
-import uctypes
 from micropython import const
+
+from armtempo_board.memory import bytes_behind
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ class ControlPoints:
 
     def __init__(self, words: "memoryview") -> None:
         self.words = words
-        self._fresh = uctypes.bytearray_at(uctypes.addressof(words) + 4 * _FRESH_AT, 4 * _FRESH_AT)
+        self._fresh = bytes_behind(words, _FRESH_AT, WINDOW_WORDS)
         self._stream: "Any" = None
         self._end = 0
         self._degree = 0
