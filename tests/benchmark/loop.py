@@ -4,7 +4,7 @@
 
 MICROPYTHON as for tests/benchmark/firmware.py. The program is built into MicroPython's own firmware for the chip, and
 that is run by QEMU, which counts instructions: so long lasts the motion's time meanwhile, so a ring that the loop comes
-back to too late runs dry as on the chip. What stands in for timers, DMA, USB and encoders: loop_board.c and
+back to too late runs dry as on the chip. What stands in for timers, DMA, USB, encoders, backup SRAM: loop_board.c and
 tests/board/scripts/benchmarks/firmware_loop.py. With ``files`` behind it only the costs of a turn, with the program in
 files; only what stands around it is built in, as its heap is not the program's.
 """
