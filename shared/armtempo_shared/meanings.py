@@ -173,7 +173,8 @@ COMMANDS: "dict[str, str]" = {
     "hello": "Begins a session; `session` is a number that differs between hosts, so that the board knows a "
     "new one. Refused with `protocol` where the versions differ. Answer: who the board is; `joints` and "
     "`arm_crc` are 0 without an arm record; `boot` differs after every start of the program; "
-    "`engine_room`, `engine_joints`: bytes of memory and joints that an engine can have; `arm_problem`: code of "
+    "`engine_room`, `engine_joints`: bytes of heap (beside the chip's backup SRAM) and joints that an engine can have; "
+    "`arm_problem`: code of "
     "what is wrong with the stored arm record, 0 where it is in force or there is none; `arm_value`: its value; the "
     "tail is the unique id in hex and the firmware.",
     "status": "What the board is doing. `known`: bit a joint, its position is known. `run`: number of the "

@@ -14,7 +14,10 @@ from armtempo.records import encode
 
 @dataclass(frozen=True)
 class Room:
-    """Memory for engines: ``size`` bytes, and heap for the objects of so many ``joints``."""
+    """Memory for engines: ``size`` bytes of heap, and heap for the objects of so many ``joints``.
+
+    Beside it the board has memory for step generators, the same on every chip (``engine_memory.PROCESSOR_WORDS``).
+    """
 
     size: int
     joints: int
