@@ -12,7 +12,7 @@ from pathlib import Path
 
 import armtempo
 from armtempo.errors import InputError, LinkError
-from armtempo.link.board_messages import Event, Sample
+from armtempo.link.board_messages import Event, Sample, Status
 from armtempo.robot import jog
 from armtempo.robot.board import Board
 from armtempo.simulator import LaunchOptions, launch
@@ -107,7 +107,7 @@ class HeldJogs:
             yield cls(board, to_board, from_board)
 
     def run(self, case: HeldCase) -> HeldEnd | None:
-        """Do it; None where there is no way to go."""
+        """Do it; None where there is no way to go, or the board answered too late while it was still to be held."""
         board = self._board
         board.home(_ARM, case.start_deg)
         self._beyond = False
@@ -116,6 +116,7 @@ class HeldJogs:
         except InputError:
             return None
         told = case.kind == "release"
+        let_go: Status | None = None
         with suppress(LinkError), held:
             until_s = time.monotonic() + (60.0 if case.kind == "end" else case.held_s)
             while held.hold(0.02) and time.monotonic() < until_s:
@@ -126,6 +127,9 @@ class HeldJogs:
         self._cut(False)
         end = board.status()
         self._look(end.positions.commanded_steps)
+        if let_go is None and not self._beyond:
+            return None
+        let_go = let_go or end
         took_s = (end.ticks - let_go.ticks) / TICK_HZ
         stated_s = jog.rest_s(held.motion, told=told)
         return HeldEnd(took_s, stated_s, not self._beyond, end.state == "idle", end.known == 0b111)
