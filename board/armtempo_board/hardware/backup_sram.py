@@ -1,8 +1,9 @@
 """The backup SRAM of the STM32F405 and F407: 4 KB of memory that MicroPython leaves to programs.
 
 RM0090 2.3 (memory map) and 5.1.2 (battery backup domain). It keeps its content over a reset, which nobody here relies
-on. It is for the processor alone: DMA1's memory port is not connected to its bus (figure 1), so no ring of edge times
+on. It is on the bus of the peripherals (AHB1), not with the memories that DMA is meant to read: no ring of edge times
 lies in it. The processor may take a cycle or two more for an access than to its main memory: not measured on a chip.
+Accesses are aligned, as they must be in the address range of peripherals.
 """
 
 import stm
