@@ -264,14 +264,18 @@ def _read(said: str, scale: float) -> Run:
     ]
     parser = wire.Parser()
     parser.feed(bytes.fromhex("".join(re.findall(r"@ answer (\w+)", said))))
+    ends = []
     for _, number, payload in iter(parser.next, None):
         name, *_ = entry = wire.EVENT_BY_ID[number]
         values, _ = wire.decode(entry, payload)
-        if name == "done":
-            return Run(turns[1:], 0, values[1] / TICK_HZ)
-        if name == "fault":
-            return Run(turns[1:], values[1], values[3] / TICK_HZ)
-    raise AssertionError(said[-2000:])
+        if name == "notice":  # of an exception in the program, behind the fault
+            print(payload.decode())
+        elif name == "done":
+            ends.append(Run(turns[1:], 0, values[1] / TICK_HZ))
+        elif name == "fault":
+            ends.append(Run(turns[1:], values[1], values[3] / TICK_HZ))
+    assert ends, said[-2000:]
+    return ends[0]
 
 
 def _turn(took: int, command: bool, answer: bool, log: str, scale: float) -> Turn:
