@@ -125,7 +125,8 @@ class HeldJogs:
             if let_go.moving:
                 self._let_go(case.kind, held)
         self._cut(False)
-        end = board.status()
+        while (end := board.status()).moving and let_go is None:
+            time.sleep(0.05)
         self._look(end.positions.commanded_steps)
         if let_go is None and not self._beyond:
             return None
