@@ -84,6 +84,11 @@ class HeldEnd:
         return self.took_s <= self.stated_s and self.within and self.rests and self.known
 
 
+def _seconds(since: Status | None, now: Status) -> float:
+    """By the board's clock; 0 where there is no beginning."""
+    return (now.ticks - since.ticks) / TICK_HZ if since else 0.0
+
+
 class HeldJogs:
     """A virtual board behind a cable."""
 
@@ -125,13 +130,13 @@ class HeldJogs:
             if let_go.moving:
                 self._let_go(case.kind, held)
         self._cut(False)
-        end = board.status()
+        stated_s = jog.rest_s(held.motion, told=told)
+        while (end := board.status()).moving and _seconds(let_go, end) <= stated_s:
+            time.sleep(0.01)  # a busy machine's board may be late, by its own clock it is not
         self._look(end.positions.commanded_steps)
         if let_go is None and not self._beyond:
             return None
-        let_go = let_go or end
-        took_s = (end.ticks - let_go.ticks) / TICK_HZ
-        stated_s = jog.rest_s(held.motion, told=told)
+        took_s = _seconds(let_go, end)
         return HeldEnd(took_s, stated_s, not self._beyond, end.state == "idle", end.known == 0b111)
 
     def _let_go(self, kind: str, held: jog.HeldJog) -> None:
