@@ -67,21 +67,6 @@ class Heap:
     largest: int
 
 
-def in_files() -> dict[str, Any]:
-    """Where the stand-ins find in the compact program what they take the place of."""
-    known = program_files.compact_program().functions
-
-    def place(label: str) -> tuple[str, str]:
-        (short,) = {key for key, found in known.items() for one in found if one.label == label}
-        return f"armtempo_board.{short[0]}", short[1]
-
-    return {
-        "engine": "armtempo_board.core",
-        "matches": place("isr.matches"),
-        "set_interval": place("newton.set_interval"),
-    }
-
-
 def define_board(micropython: Path, folder: Path) -> Path:
     """The definition of the emulated board, with the stand-ins as modules of its firmware."""
     source = Path(__file__).with_name("loop_board.c").read_text()
@@ -115,7 +100,7 @@ def flash(folder: Path, elf: Path, with_library: bool) -> Path:
     settings: dict[str, Any] = {
         name: places[name] for name in ("allocated", "at_compare", "at_feed", "feed_ticks", "looks_per_ms")
     }
-    settings |= in_files() if with_library else loop.IN_FIRMWARE
+    settings |= loop.in_files() if with_library else loop.IN_FIRMWARE
     settings |= {
         "prescaler": scale - 1,
         "millisecond": round(loop.CORE_HZ / 1000 / CYCLES * loop._INSTRUCTION_NS * loop.CORE_HZ / 1e9),

@@ -145,7 +145,7 @@ class Board:
             name: places[name]
             for name in ("allocated", "at_compare", "at_feed", "feed_ticks", "looks_per_ms")
         }
-        self._settings |= _in_files() if as_files else IN_FIRMWARE
+        self._settings |= in_files() if as_files else IN_FIRMWARE
 
     def run(self, case: Case, cycles: float) -> Run:
         """Run a motion; a fault may end it."""
@@ -209,19 +209,18 @@ def _compact() -> dict[str, bytes]:
     return files | {"manifest.py": PROBE_MANIFEST.format(firmware.SCRIPTS).encode()}
 
 
-def _in_files() -> dict[str, str | tuple[str, str]]:
-    """As IN_FIRMWARE, by the names of the compact program."""
-    core = "armtempo_board.core"
-    known = program_files.compact_program().functions
-    found: dict[str, str | tuple[str, str]] = {"engine": core}
-    for name in ("isr.matches", "newton.set_interval"):
-        (short,) = {
-            short
-            for (module, short), labels in known.items()
-            for one in labels
-            if (module, one.label) == ("core", name)
+def in_files() -> dict[str, Any]:
+    """As IN_FIRMWARE, by the names of the compact program: the module that defines the function, and its name there."""
+    compact = program_files.compact_program()
+    found: dict[str, Any] = {"engine": "armtempo_board.core"}
+    for label in ("isr.matches", "newton.set_interval"):
+        (place,) = {
+            (f"armtempo_board.{module}", short)
+            for (module, short), functions in compact.functions.items()
+            if label in [function.label for function in functions]
+            and f"\ndef {short}(" in compact.sources[f"armtempo_board.{module}"]
         }
-        found[name.split(".")[1]] = (core, short)
+        found[label.split(".")[1]] = place
     return found
 
 

@@ -346,5 +346,8 @@ def hook():
     """Take the place of two of the program's functions; the settings say where they and the engine are."""
     here["engine"] = sys.modules[here["engine"]]
     for (module, name), function in ((here["matches"], matches), (here["set_interval"], enter)):
-        programs.append(getattr(sys.modules[module], name))
-        setattr(sys.modules[module], name, function)
+        own = getattr(sys.modules[module], name)
+        programs.append(own)
+        for place in (sys.modules[module], here["engine"]):  # the engine's may have imported it from there
+            if getattr(place, name, None) is own:
+                setattr(place, name, function)
