@@ -24,6 +24,8 @@ def find() -> int:
     from armtempo_board.hardware import registers  # here, so that it can be forgotten
 
     registers.apply(registers.BACKUP_SRAM)
+    # DBP acts some bus cycles after it is written (errata ES0182, delay of the backup domain's protection): a line of
+    # Python takes longer, and the test finds out
     begin = int(getattr(stm, "BKPSRAM", _BEGIN))
     for value in (_ONES, _ONES >> 1):
         for word in _PROBED:
