@@ -14,15 +14,16 @@ import json
 import os
 import queue
 import random
-import select
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -39,6 +40,8 @@ AREAS = {
 LEFT_OUT = ("research", "data")
 FIRST = 12
 """Tests that run before the others: most mistakes are noticed by them."""
+LATE_S = 60.0
+"""And twice what the tests took: then a mistake makes them hang."""
 COPIED = (
     "host",
     "board",
@@ -123,6 +126,14 @@ class Copy:
             stderr=subprocess.DEVNULL,
             text=True,
         )
+        self._lines: queue.SimpleQueue[str] = queue.SimpleQueue()
+        threading.Thread(target=self._read, args=(self._server, self._lines), daemon=True).start()
+
+    @staticmethod
+    def _read(program: subprocess.Popen[str], lines: queue.SimpleQueue[str]) -> None:
+        assert program.stdout is not None
+        for line in program.stdout:
+            lines.put(line)
 
     def write(self, path: Path, source: bytes) -> None:
         """A file of the copy."""
@@ -135,22 +146,29 @@ class Copy:
         if not tests:
             return ""
         assert self._server.stdin is not None
-        assert self._server.stdout is not None
         print(json.dumps(tests), file=self._server.stdin, flush=True)
-        found, end_s = "", time.monotonic() + seconds
-        process = 0
+        end_s = time.monotonic() + seconds
+        found, process = "", 0
         while True:
-            ready, _, _ = select.select([self._server.stdout], [], [], max(0.0, end_s - time.monotonic()))
-            if not ready:
-                os.killpg(process, signal.SIGKILL)
-                found, end_s = "time-out", end_s + 60.0
-                continue
-            word, _, rest = self._server.stdout.readline().rstrip("\n").partition(" ")
+            try:
+                line = self._lines.get(timeout=max(0.0, end_s - time.monotonic()))
+            except queue.Empty:
+                self._kill(process)
+                return "time-out"
+            word, _, rest = line.rstrip("\n").partition(" ")
             if word == "end":
                 return found
             if word == "process":
                 process = int(rest)
             found = found or (rest if word == "failed" else "")
+
+    def _kill(self, process: int) -> None:
+        """The tests under way and the program, and start it anew."""
+        self._server.kill()
+        self._server.wait()
+        with suppress(ProcessLookupError):
+            os.killpg(process or self._server.pid, signal.SIGKILL)
+        self._start()
 
     def passes_without(self, test: str, seconds: float) -> bool:
         """Whether a test passes in the copy without a mistake."""
@@ -215,7 +233,7 @@ def main() -> None:
             copy = copies.get()
             tests = concerned.tests(path, mutation.line, known, options.seconds)
             try:
-                return attempt(copy, path, mutation, tests, 60.0 + 5.0 * options.seconds)
+                return attempt(copy, path, mutation, tests, LATE_S + 2.0 * options.seconds)
             finally:
                 copies.put(copy)
 

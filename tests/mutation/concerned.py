@@ -13,6 +13,8 @@ from tests.mutation.executed import Executed
 
 MOST = 14
 """Test files that are run for a file of the host."""
+UNKNOWN_S = 5.0
+"""What a test file is taken to need that was not traced."""
 BY_FOLDER = {
     "board/armtempo_board/stepgen": [
         "test_check",
@@ -47,29 +49,31 @@ SIMULATED = [
 
 
 def tests(path: Path, line: int, executed: Executed, seconds: float) -> list[str]:
-    """Tests that take so many seconds together, in the order to run them; beyond that only those that execute the line.
+    """Tests that take so many seconds together, in the order to run them.
 
-    What runs under MicroPython is not traced: there a case on CPython stands for the same case on MicroPython, and the
-    tests that are listed here by folder come last.
+    After those that execute the line come those that execute its function, the others of their files, and those that
+    import the module. What runs under MicroPython is not traced: there a case on CPython stands for the same case on
+    MicroPython, and the files that are listed here by folder follow.
     """
-    exact, near = _spans(path, line)
-    ordered = [*_executing(exact, executed), *_executing(near, executed)]
-    files = list(dict.fromkeys(test.split("::")[0] for test in ordered))
-    if not str(path).startswith("host/") or "simulator" in path.parts:
-        files = list(dict.fromkeys([*by_folder(path), *files]))
-    elif not ordered:
-        files = by_imports(path)
     by_file: dict[str, list[str]] = {}
     for test in _quickest(executed.seconds, executed):
         by_file.setdefault(test.split("::")[0], []).append(test)
-    ordered += [test for file in files for test in by_file.get(file, ())]
+    exact, near = _spans(path, line)
+    ordered = [*_executing(exact, executed), *_executing(near, executed)]
+    files = [test.split("::")[0] for test in ordered]
+    if not str(path).startswith("host/") or "simulator" in path.parts:
+        files = [*by_folder(path), *files]
+    files += by_imports(path)  # functions that run at import are traced but once
+    ordered += [test for file in dict.fromkeys(files) for test in by_file.get(file, [file])]
+    if str(path).startswith("shared/"):  # they take no time
+        ordered = [*(test for file in SHARED for test in by_file.get(file, [file])), *ordered]
     found: list[str] = []
     total_s = 0.0
     for test in dict.fromkeys(_quicker(test, executed) for test in ordered):
-        total_s += executed.seconds.get(test, 0.0)
-        if total_s > seconds and found:
-            break
-        found.append(test)
+        test_s = executed.seconds.get(test, UNKNOWN_S)
+        if total_s + test_s <= seconds or not found:
+            total_s += test_s
+            found.append(test)
     return found
 
 
@@ -129,10 +133,11 @@ def _naming(names: list[str]) -> dict[str, set[int]]:
     if not names:
         return {}
     word = re.compile(rf"\b({'|'.join(names)})\b")
-    return {
+    named = {
         path: {number for number, text in enumerate(lines, 1) if word.search(text)}
         for path, lines in _sources().items()
     }
+    return {path: lines for path, lines in named.items() if lines}
 
 
 def _inside_functions(tree: ast.Module) -> set[int]:

@@ -16,7 +16,7 @@ from tests.mutation import tracer
 KEPT = ROOT / ".cache" / "executed.jsonl"
 LEFT_OUT = (
     "not micropython-arm and not cut_off and not test_demo and not test_examples and not test_wheel"
-    " and not test_first_hour and not test_recovery and not test_site and not test_speed"
+    " and not test_first_hour and not test_recovery and not test_site and not test_speed and not cpython-engine"
 )
 """The emulator, the slowest, and those that build or install."""
 

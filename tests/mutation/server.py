@@ -6,6 +6,7 @@ failed, or nothing, and "end".
 
 from __future__ import annotations
 
+import compileall
 import json
 import os
 import sys
@@ -25,9 +26,12 @@ class InOrder:
 
     def pytest_collection_modifyitems(self, items: list[Any]) -> None:
         """Files are collected whole."""
-        items[:] = sorted(
-            (item for item in items if item.nodeid in self._place), key=lambda item: self._place[item.nodeid]
-        )
+        place = {item: self._of(item.nodeid) for item in items}
+        items[:] = sorted((item for item in items if place[item] >= 0), key=lambda item: place[item])
+
+    def _of(self, name: str) -> int:
+        """The place of a test, or of its file; -1 where it is not wanted."""
+        return self._place.get(name, self._place.get(name.split("::")[0], -1))
 
     def pytest_runtest_logreport(self, report: Any) -> None:
         """A test."""
@@ -44,6 +48,8 @@ def run(tests: list[str]) -> str:
     """The first that failed, or ""."""
     import pytest
 
+    compileall.compile_dir = lambda *_arguments, **_options: True  # it was done once, for all forks
+
     plugin = InOrder(tests)
     files = list(dict.fromkeys(test.split("::")[0] for test in tests))
     try:
@@ -56,6 +62,8 @@ def run(tests: list[str]) -> str:
 def main() -> None:
     """Until the input ends."""
     sys.path[:1] = [os.getcwd()]  # not this file's folder
+    for folder in ("host", "shared", "board", "tests"):
+        compileall.compile_dir(folder, quiet=2)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         import click  # noqa: F401
