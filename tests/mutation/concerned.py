@@ -45,6 +45,10 @@ SIMULATED = [
     "tests/system/test_virtual_faults.py",
     "tests/board/test_power_cut.py",
     *WHOLE,
+    *[
+        f"tests/system/test_{name}.py"
+        for name in ("wired_pins", "pulses", "mpremote", "run", "samples", "homing", "postures", "jog")
+    ],
 ]
 
 
