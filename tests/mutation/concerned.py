@@ -6,6 +6,7 @@ import ast
 import re
 from collections.abc import Iterable
 from functools import cache
+from itertools import zip_longest
 from pathlib import Path
 
 from tests.interpreters import ROOT
@@ -57,20 +58,21 @@ def tests(path: Path, line: int, executed: Executed, seconds: float) -> list[str
 
     After those that execute the line come those that execute its function, the others of their files, and those that
     import the module. What runs under MicroPython is not traced: there a case on CPython stands for the same case on
-    MicroPython, and the files that are listed here by folder follow.
+    MicroPython, and tests of the files that are listed here by folder come in between.
     """
     by_file: dict[str, list[str]] = {}
     for test in _quickest(executed.seconds, executed):
         by_file.setdefault(test.split("::")[0], []).append(test)
     exact, near = _spans(path, line)
     ordered = [*_executing(exact, executed), *_executing(near, executed)]
-    files = [test.split("::")[0] for test in ordered]
+    files = [*[test.split("::")[0] for test in ordered], *by_imports(path)]
+    if "cli" in path.parts:  # a command is imported when it is called
+        files += by_command(path.stem.strip("_"))
+    others = _in_turn([by_file.get(file, [file]) for file in dict.fromkeys(files)])
     if not str(path).startswith("host/") or "simulator" in path.parts:
-        files = [*by_folder(path), *files]
-    files += by_imports(path)  # functions that run at import are traced but once
-    ordered += [test for file in dict.fromkeys(files) for test in by_file.get(file, [file])]
-    if str(path).startswith("shared/"):  # they take no time
-        ordered = [*(test for file in SHARED for test in by_file.get(file, [file])), *ordered]
+        listed = _in_turn([by_file.get(file, [file]) for file in by_folder(path)])
+        ordered = _in_turn([ordered, listed])
+    ordered += others
     found: list[str] = []
     total_s = 0.0
     for test in dict.fromkeys(_quicker(test, executed) for test in ordered):
@@ -79,6 +81,11 @@ def tests(path: Path, line: int, executed: Executed, seconds: float) -> list[str
             total_s += test_s
             found.append(test)
     return found
+
+
+def _in_turn(lists: list[list[str]]) -> list[str]:
+    """The first of each, then the second of each, and so on."""
+    return [test for each in zip_longest(*lists) for test in each if test is not None]
 
 
 def _executing(lines: dict[str, set[int]], executed: Executed) -> list[str]:
@@ -194,6 +201,13 @@ def by_imports(path: Path) -> list[str]:
     ]
     found.sort(key=lambda module: (distance[module], "system" in module))
     return [module.replace(".", "/") + ".py" for module in found[:MOST]]
+
+
+def by_command(name: str) -> list[str]:
+    """Test files in which the command's name stands in quotes."""
+    found = sorted(ROOT.glob("tests/host/**/test_*.py")) + sorted(ROOT.glob("tests/system/test_*.py"))
+    word = f'"{name.replace("_", "-").removesuffix("-screen")}"'
+    return [str(path.relative_to(ROOT)) for path in found if word in path.read_text(encoding="utf-8")][:MOST]
 
 
 def _module(path: Path) -> str:

@@ -25,13 +25,16 @@ class InOrder:
         self.failed = ""
 
     def pytest_collection_modifyitems(self, items: list[Any]) -> None:
-        """Files are collected whole."""
-        place = {item: self._of(item.nodeid) for item in items}
+        """Files are collected whole. A mistake may give tests other names: then all of that function."""
+        gone = set(self._place) - {item.nodeid for item in items}
+        others = {test.split("[")[0]: self._place[test] for test in gone}
+        place = {
+            item: self._place.get(item.nodeid, others.get(item.nodeid.split("[")[0], -1)) for item in items
+        }
+        for item in items:
+            if place[item] < 0:
+                place[item] = self._place.get(item.nodeid.split("::")[0], -1)
         items[:] = sorted((item for item in items if place[item] >= 0), key=lambda item: place[item])
-
-    def _of(self, name: str) -> int:
-        """The place of a test, or of its file; -1 where it is not wanted."""
-        return self._place.get(name, self._place.get(name.split("::")[0], -1))
 
     def pytest_runtest_logreport(self, report: Any) -> None:
         """A test."""

@@ -398,6 +398,7 @@ def case_watchdog_bites():
     pace.Pace._elapsed_us = lambda self: 0  # no real time comes in
     board = standalone.start()
     watchdog = machine.WDT(timeout=100)
+    assert mem32[0x40003008] == 100 // 8  # IWDG_RLR, in units of 8 ms
     for _ in range(5):
         board.spend(90 * 84_000)
         watchdog.feed()
