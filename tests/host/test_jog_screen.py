@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 import pytest
-from armtempo.cli.jog_screen import JogChoice
+from armtempo.cli.jog_screen import JogChoice, _StopKeys
 
 NAMES = ["waist", "shoulder"]
 
@@ -41,3 +43,28 @@ def test_the_axis_has_the_librarys_name() -> None:
     assert choice.tool_axis == "y"
     choice.press("f", 2)
     assert choice.tool_axis == "tool-y"
+
+
+class Typed:
+    """Keys that were pressed already; then none."""
+
+    def __init__(self, *keys: str) -> None:
+        self._keys = deque(keys)
+
+    def read(self, _seconds: float) -> str:
+        return self._keys.popleft() if self._keys else ""
+
+
+@pytest.mark.parametrize("key", [" ", "q"])
+def test_space_and_what_ends_the_screen_end_a_step(key: str) -> None:
+    with _StopKeys(Typed("x", key)) as stop:  # type: ignore[arg-type]
+        stop._thread.join(10.0)
+    assert stop.request.wanted
+    assert stop.pressed == key
+
+
+def test_other_keys_end_no_step() -> None:
+    with _StopKeys(Typed("x", "s")) as stop:  # type: ignore[arg-type]
+        pass
+    assert not stop.request.wanted
+    assert not stop._thread.is_alive()

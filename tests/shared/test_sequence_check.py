@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+from binascii import crc32
 from dataclasses import dataclass
 
 import pytest
@@ -69,3 +71,11 @@ def test_other_ops_are_refused(op: int) -> None:
 def test_other_files_are_no_sequence(magic: bytes, said: str) -> None:
     with pytest.raises(SequenceError, match=said):
         SequenceData(magic + bytes(60))
+
+
+def test_a_motions_name_is_text() -> None:
+    head = struct.pack("<4sIHBB", sequence.MAGIC, 0, 1, 1, 0)
+    rows = struct.pack("<BBHIH", sequence.MOVE, 0, 0, 0, 1)
+    data = head + rows + struct.pack("<24sI", b"\xff" * 24, 0)
+    with pytest.raises(SequenceError, match="a motion's name"):
+        SequenceData(data + struct.pack("<I", crc32(data))).motion(0)
