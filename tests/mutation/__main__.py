@@ -185,7 +185,10 @@ class Copy:
 
 @dataclass(frozen=True)
 class Tried:
-    """What became of one mistake: noticed, SURVIVED, or BROKEN where the test fails without it too."""
+    """What became of one mistake: noticed, SURVIVED, LATE where the tests did not end, BROKEN where one fails anyway.
+
+    LATE says that the mistake makes a test hang, or that the machine is busy: to be tried again.
+    """
 
     word: str
     test: str
@@ -200,8 +203,8 @@ def attempt(copy: Copy, path: Path, mutation: mutations.Mutation, tests: list[st
     copy.write(path, mutation.of(source))
     test = copy.failing(tests[:FIRST], limit_s) or copy.failing(tests[FIRST:], limit_s)
     copy.write(path, source)
-    word = "noticed" if test else "SURVIVED"
-    if test and test != "time-out" and not copy.passes_without(test, limit_s):
+    word = "LATE" if test == "time-out" else "noticed" if test else "SURVIVED"
+    if word == "noticed" and not copy.passes_without(test, limit_s):
         word = "BROKEN"
     return Tried(word, test, time.monotonic() - begin_s, len(tests))
 
@@ -246,11 +249,10 @@ def main() -> None:
             took = f"[{tried.took_s:.0f} s, {tried.tests} tests]"
             print(f"{number:3} {tried.word:8} {path}:{shown} {took} {tried.test}", flush=True)
             found[tried.word] += 1
-            found["late"] += tried.test == "time-out"
         for _ in range(options.jobs):
             copies.get().close()
     where = f"{options.area}, seed {options.seed}"
-    print(f"{found['noticed']} of {len(wanted)} noticed in {where}; {found['late']} by a time-out")
+    print(f"{found['noticed']} of {len(wanted)} noticed in {where}; {found['LATE']} late")
 
 
 if __name__ == "__main__":
