@@ -250,8 +250,11 @@ def case_encoder_counter_wraps():
 
 def case_pins():
     standalone.start(edge_log=SCRATCH + "/pins")
+    modes = (pyb.Pin.IN, pyb.Pin.OUT_PP, pyb.Pin.OUT_OD, pyb.Pin.AF_PP, pyb.Pin.AF_OD, pyb.Pin.ANALOG)
+    assert modes == (0, 1, 0x11, 2, 0x12, 3)  # as on the chip
     pin = pyb.Pin("PE7", pyb.Pin.OUT_PP, value=1)
     assert pin.value() == 1 and mem32[stm.GPIOE + stm.GPIO_ODR] == 1 << 7
+    assert mem32[stm.GPIOE + stm.GPIO_IDR] == 1 << 7
     mem32[stm.GPIOE + stm.GPIO_BSRR] = 1 << 8 | 1 << (16 + 7)
     assert pin() == 0 and mem32[stm.GPIOE + stm.GPIO_ODR] == 1 << 8
     pin.high()
@@ -427,7 +430,9 @@ def case_registers_by_the_chips_addresses():
     standalone.start()
     mem32[0x40000000 + 0x2C] = -1
     assert mem32[stm.TIM2 + stm.TIM_ARR] == -1
-    assert machine.mem8[stm.TIM2 + stm.TIM_ARR + 3] == 255
+    assert machine.mem8[stm.TIM2 + stm.TIM_ARR] == machine.mem8[stm.TIM2 + stm.TIM_ARR + 3] == 0xFF
+    assert machine.mem16[stm.TIM2 + stm.TIM_ARR] == 0xFFFF
+    assert machine.freq() == (168_000_000, 168_000_000, 42_000_000, 84_000_000)
     try:
         mem32[0x50000000] = 1
         raise AssertionError("no such register")
