@@ -239,6 +239,7 @@ def case_encoder_counter_wraps():
     board = standalone.start()
     timer = pyb.Timer(3, prescaler=0, period=0xFFFF)
     timer.channel(1, pyb.Timer.ENC_AB, pin=pyb.Pin("B4"))
+    assert mem32[stm.TIM3 + stm.TIM_CCMR1] == 0x0101  # both channels are inputs (RM0090 18.4.7)
     timer.counter(0)
     board.timers[3].turn(-3)
     assert timer.counter() == 0xFFFD
@@ -252,6 +253,7 @@ def case_pins():
     standalone.start(edge_log=SCRATCH + "/pins")
     modes = (pyb.Pin.IN, pyb.Pin.OUT_PP, pyb.Pin.OUT_OD, pyb.Pin.AF_PP, pyb.Pin.AF_OD, pyb.Pin.ANALOG)
     assert modes == (0, 1, 0x11, 2, 0x12, 3)  # as on the chip
+    assert (pyb.Pin.AF1_TIM2, pyb.Pin.AF2_TIM5, pyb.Pin.AF3_TIM8) == (1, 2, 3)
     pin = pyb.Pin("PE7", pyb.Pin.OUT_PP, value=1)
     assert pin.value() == 1 and mem32[stm.GPIOE + stm.GPIO_ODR] == 1 << 7
     assert mem32[stm.GPIOE + stm.GPIO_IDR] == 1 << 7
