@@ -2,23 +2,49 @@
 
 from array import array
 
+import uctypes
 from micropython import const
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
 
 _PIECE_WORDS = const(64)
 
 
 class Memory:
-    """``blocks``: so many words of 32 bits each. MemoryError where the heap has one of them not in one piece."""
+    """``blocks``: so many words of 32 bits each. MemoryError where the heap has one of them not in one piece.
 
-    def __init__(self, blocks: "list[int]") -> None:
+    ``address``: where other memory is, of ``words``, that the processor alone reaches.
+    """
+
+    def __init__(self, blocks: "list[int]", address: int = 0, words: int = 0) -> None:
         self._blocks = [_zeros(words) for words in blocks]
         self._taken = [0] * len(blocks)
         self.size = sum(blocks)
+        self._address = address
+        self._words = words
+        self._used = 0
 
     def release(self) -> None:
         """Take all parts back; who has one uses it no more."""
         for number in range(len(self._taken)):
             self._taken[number] = 0
+        self._used = 0
+
+    def take_for_processor(self, words: int) -> "memoryview[int]":
+        """As ``take``, of the memory that the processor alone reaches while it has so many.
+
+        On MicroPython it is no memoryview, which there is of the heap's words only: it has neither length nor slices.
+        """
+        begin = self._used
+        if begin + words > self._words:
+            return self.take(words)
+        self._used += words
+        part: "Any" = uctypes.struct(self._address + 4 * begin, (uctypes.ARRAY, words | uctypes.INT32))
+        for word in range(words):
+            part[word] = 0
+        return part  # type: ignore[no-any-return]
 
     def take(self, words: int) -> "memoryview[int]":
         """A part of so many words, signed, all 0, from the first block that has them; MemoryError where none has."""
@@ -31,6 +57,11 @@ class Memory:
                     block[word] = 0
                 return memoryview(block)[begin:end]
         raise MemoryError
+
+
+def bytes_behind(part: "Any", first: int, words: int) -> bytearray:
+    """The bytes of a part of so many words, from the word ``first`` on."""
+    return uctypes.bytearray_at(uctypes.addressof(part) + 4 * first, 4 * (words - first))
 
 
 def _zeros(words: int) -> "array[int]":

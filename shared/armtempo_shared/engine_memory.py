@@ -2,8 +2,8 @@
 
 The board takes the memory of its engines once, when its program starts, and states in hello how much that is
 (``engine_room``), and for how many joints' objects there is heap besides (``engine_joints``). It consists of blocks,
-because a heap has few large ones. For each joint the engine takes from it a ring of edge times, and what the step
-generator works in.
+because a heap has few large ones. For each joint the engine takes from it a ring of edge times. What the step
+generators work in lies in ``PROCESSOR_WORDS`` besides, as far as it has room there, and the rest in these blocks too.
 """
 
 LONG_MS, SHORT_MS = 3, 2
@@ -11,14 +11,16 @@ LONG_MS, SHORT_MS = 3, 2
 _LEAST_ENTRIES = 64
 _MOST_ENTRIES = 1024
 _SPARE_ENTRIES = 8  # of a ring, that are not overwritten: as in isr.py
-GENERATOR_PARTS = (136, 60, 18, 78, 78, 20, 20, 12, 12)
-"""Words (4 bytes) of a joint's step generator, in the order in which they are taken.
+PROCESSOR_WORDS = 1024
+"""Words (4 bytes) that the processor alone reaches: the chip's backup SRAM, which is no part of MicroPython's heap
+(hardware/backup_sram.py of the board program). So none of them are for rings, which DMA reads."""
+GENERATOR_PARTS = (78, 78, 20, 20, 12, 12, 60, 18, 136)
+"""Words of a joint's step generator, in the order in which they are taken.
 
-The queue of steps, the solver, the law of time; pieces of angle and of time, their control points, their measures.
+Pieces of angle and of time, their control points, their measures; the solver, the law of time, the queue of steps.
 """
-GENERATOR_WORDS = sum(GENERATOR_PARTS)
 _BLOCK_WORDS = 1026  # for a ring of 1024 entries, or two of 512
-LARGEST_WORDS = 6 * GENERATOR_WORDS + 5 * 513 + 257
+LARGEST_WORDS = 6 * sum(GENERATOR_PARTS) - PROCESSOR_WORDS + 5 * 513 + 257 + 2
 """For any arm whose joints' highest step rates sum up to 240 000 steps/s."""
 
 
@@ -37,7 +39,7 @@ def ring_words(rate: int, lasts_ms: int = LONG_MS) -> int:
 
 def words(rates: "list[int]") -> int:
     """Words that the engine takes at least for joints of these highest step rates, in steps/s."""
-    return sum([GENERATOR_WORDS + ring_words(rate, SHORT_MS) for rate in rates])
+    return sum(_parts(rates, SHORT_MS))
 
 
 def object_bytes(joints: int) -> int:
@@ -69,12 +71,9 @@ def fits(rates: "list[int]", room_words: int, beside_bytes: int = 0) -> bool:
 
 
 def _find_place(rates: "list[int]", room_words: int, lasts_ms: int) -> bool:
-    """Whether all parts of the engine find theirs: the largest rings first, each in the first block with room."""
+    """Whether all parts of the engine find theirs, each in the first block with room."""
     free = blocks(room_words)
-    parts = sorted([ring_words(rate, lasts_ms) for rate in rates], reverse=True)
-    for _ in rates:
-        parts.extend(GENERATOR_PARTS)
-    for part in parts:
+    for part in _parts(rates, lasts_ms):
         for number, left in enumerate(free):
             if left >= part:
                 free[number] -= part
@@ -82,3 +81,15 @@ def _find_place(rates: "list[int]", room_words: int, lasts_ms: int) -> bool:
         else:
             return False
     return True
+
+
+def _parts(rates: "list[int]", lasts_ms: int) -> "list[int]":
+    """Words of the parts in the blocks: rings, the largest first, then what of step generators lies nowhere else."""
+    parts = sorted([ring_words(rate, lasts_ms) for rate in rates], reverse=True)
+    left = PROCESSOR_WORDS
+    for part in GENERATOR_PARTS * len(rates):
+        if part <= left:
+            left -= part
+        else:
+            parts.append(part)
+    return parts

@@ -60,7 +60,8 @@ _ROWS = (
     (
         "no_room",
         "the engine for this arm does not fit into the board's memory; nothing was changed",
-        "lower its top speeds, drive fewer joints, or put the program into the firmware (board/docs/firmware.md)",
+        "lower its top speeds, drive fewer joints, or put the program into the firmware (see 'armtempo firmware "
+        "--help')",
     ),
     (
         "no_memory",
@@ -106,7 +107,7 @@ _ROWS = (
     (
         "no_sequence_room",
         "the board has no room to run a sequence of motions for this arm; nothing has moved",
-        "put the program into the firmware (board/docs/firmware.md), or let the host run the steps (board.run)",
+        "put the program into the firmware (see 'armtempo firmware --help'), or let the host run the steps (board.run)",
     ),
     (
         "other_version",
@@ -172,7 +173,8 @@ COMMANDS: "dict[str, str]" = {
     "hello": "Begins a session; `session` is a number that differs between hosts, so that the board knows a "
     "new one. Refused with `protocol` where the versions differ. Answer: who the board is; `joints` and "
     "`arm_crc` are 0 without an arm record; `boot` differs after every start of the program; "
-    "`engine_room`, `engine_joints`: bytes of memory and joints that an engine can have; `arm_problem`: code of "
+    "`engine_room`, `engine_joints`: bytes of heap (beside the chip's backup SRAM) and joints that an engine can have; "
+    "`arm_problem`: code of "
     "what is wrong with the stored arm record, 0 where it is in force or there is none; `arm_value`: its value; the "
     "tail is the unique id in hex and the firmware.",
     "status": "What the board is doing. `known`: bit a joint, its position is known. `run`: number of the "

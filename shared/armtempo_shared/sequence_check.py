@@ -15,26 +15,19 @@ _MOST_AMOUNTS = (0, 0, 0, sequence.MAX_WAIT_MS, sequence.MAX_WAIT_MS, sequence.M
 def check(record: "SequenceRecord") -> None:
     """SequenceError with the row that is not understood: nothing of such a record may be run."""
     depth = 0
+    # of outputs and inputs the arm says how many there are
+    most_numbers = (0, record.motions - 1, 0xFF, 0, 0xFF, 0, 0, record.counters - 1)
     for index in range(record.rows):
         op, number, value, amount, step = record.row(index)
+        depth += (op == sequence.REPEAT) - (op == sequence.END)
         if (
             not sequence.MOVE <= op <= sequence.COUNT
+            or number > most_numbers[op]
             or value > _MOST_VALUES[op]
             or amount > _MOST_AMOUNTS[op]
+            or not step
+            or not 0 <= depth <= sequence.MAX_NESTING
         ):
-            raise SequenceError("row %d" % index)
-        if op == sequence.MOVE:
-            known = number < record.motions
-        elif op == sequence.COUNT:
-            known = number < record.counters
-        elif op in (sequence.OUTPUT, sequence.WAIT_INPUT):
-            known = True  # the arm says how many there are
-        else:
-            known = number == 0
-        if not known or not step:
-            raise SequenceError("row %d" % index)
-        depth += (op == sequence.REPEAT) - (op == sequence.END)
-        if not 0 <= depth <= sequence.MAX_NESTING:
             raise SequenceError("row %d" % index)
     if depth:
         raise SequenceError("a repeat without its end")

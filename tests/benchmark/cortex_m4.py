@@ -64,7 +64,7 @@ ALL = (*COMPILED, subintervals, interval_steps, step_generator)
 class Arrays:
     """In the place of ``armtempo_board.memory.Memory``: every part is an array of its own, as the emulator wants it."""
 
-    def take(self, words: int) -> Any:
+    def take_for_processor(self, words: int) -> Any:
         """So many words."""
         return array("i", bytes(4 * words))
 

@@ -5,7 +5,8 @@
 MICROPYTHON: sources with what board/docs/firmware.md says beside them. The firmware of the STM32F4DISC is built
 twice, without the program and with it, and run by QEMU (7.2 or newer). Changed for that are: no clock is set up, the
 REPL is on a UART, the file system lies elsewhere and is larger, and the heap can be made smaller to find out
-how much is needed. Timers, DMA and pins are registers that mostly do nothing; the heap is the chip's.
+how much is needed. Timers, DMA and pins are registers that mostly do nothing; the heap is the chip's. QEMU has no
+backup SRAM: 4 KB of the memory that its board has beyond the chip's stand for it.
 """
 
 from __future__ import annotations

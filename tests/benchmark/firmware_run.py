@@ -5,8 +5,8 @@
 MICROPYTHON: a checkout as ``armtempo firmware`` takes it. That command builds the firmware with the program; one
 without is built beside it, and gets the compiled files that ``armtempo deploy`` copies. QEMU (7.2 or newer) runs each;
 the host reaches it over TCP, sends the arm, homes it, uploads the motion and runs it, as with any board. What stands
-in for timers, DMA, USB and encoders (loop_board.c, firmware_loop.py and firmware_host.py of tests/board/scripts) is a
-part of both firmwares, so that it takes little of the heap. FOLDER keeps what was built.
+in for timers, DMA, USB, encoders and backup SRAM (loop_board.c, firmware_loop.py, firmware_host.py of
+tests/board/scripts) is a part of both firmwares, so that it takes little of the heap. FOLDER keeps what was built.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -67,21 +67,6 @@ class Heap:
     largest: int
 
 
-def in_files() -> dict[str, Any]:
-    """Where the stand-ins find in the compact program what they take the place of."""
-    known = program_files.compact_program().functions
-
-    def place(label: str) -> tuple[str, str]:
-        (short,) = {key for key, found in known.items() for one in found if one.label == label}
-        return f"armtempo_board.{short[0]}", short[1]
-
-    return {
-        "engine": "armtempo_board.core",
-        "matches": place("isr.matches"),
-        "set_interval": place("newton.set_interval"),
-    }
-
-
 def define_board(micropython: Path, folder: Path) -> Path:
     """The definition of the emulated board, with the stand-ins as modules of its firmware."""
     source = Path(__file__).with_name("loop_board.c").read_text()
@@ -115,7 +100,7 @@ def flash(folder: Path, elf: Path, with_library: bool) -> Path:
     settings: dict[str, Any] = {
         name: places[name] for name in ("allocated", "at_compare", "at_feed", "feed_ticks", "looks_per_ms")
     }
-    settings |= in_files() if with_library else loop.IN_FIRMWARE
+    settings |= loop.in_files() if with_library else loop.IN_FIRMWARE
     settings |= {
         "prescaler": scale - 1,
         "millisecond": round(loop.CORE_HZ / 1000 / CYCLES * loop._INSTRUCTION_NS * loop.CORE_HZ / 1e9),
@@ -230,16 +215,19 @@ def _check_steps(board: Board, arm: Arm, angles_deg: Array) -> None:
     assert max(abs(one - two) for one, two in zip(sent, wanted, strict=True)) <= 1, (sent, wanted)
 
 
+def both_ways(micropython: Path, folder: Path) -> Iterator[tuple[str, Path, Path]]:
+    """The program in the firmware, and as compiled files: a title, the firmware's ELF file, the image of its flash."""
+    board = define_board(micropython, folder)
+    elf = build_with_program(micropython, board, folder / "with-program")
+    yield "in the firmware", elf, flash(folder, elf, with_library=False)
+    elf = firmware.build_at(micropython, board, folder / "stock")
+    yield "files, compiled", elf, flash(folder, elf, with_library=True)
+
+
 def main(micropython: Path, folder: Path) -> None:
     """Print the figures."""
-    board = define_board(micropython, folder)
-    kinds = (
-        ("in the firmware", build_with_program(micropython, board, folder / "with-program"), False),
-        ("files, compiled", firmware.build_at(micropython, board, folder / "stock"), True),
-    )
-    for title, elf, with_library in kinds:
+    for title, elf, image in both_ways(micropython, folder):
         print(title, flush=True)
-        image = flash(folder, elf, with_library)
         tell(run(elf, image))
         print(f"    {SIX_JOINTS}, six joints:", flush=True)
         try:
@@ -254,9 +242,11 @@ def tell(found: dict[str, Heap]) -> None:
         print(f"    {stage:<10}in use {heap.used:>7}, largest free block {heap.largest:>7}", flush=True)
 
 
+def start(main: Callable[[Path, Path], None]) -> None:
+    """With the arguments MICROPYTHON [FOLDER]; without FOLDER nothing is kept."""
+    with tempfile.TemporaryDirectory() as name:
+        main(Path(sys.argv[1]).resolve(), Path(sys.argv[2] if len(sys.argv) > 2 else name).resolve())
+
+
 if __name__ == "__main__":
-    if len(sys.argv) > 2:
-        main(Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve())
-    else:
-        with tempfile.TemporaryDirectory() as name:
-            main(Path(sys.argv[1]).resolve(), Path(name))
+    start(main)

@@ -4,7 +4,7 @@
 
 MICROPYTHON as for tests/benchmark/firmware.py. The program is built into MicroPython's own firmware for the chip, and
 that is run by QEMU, which counts instructions: so long lasts the motion's time meanwhile, so a ring that the loop comes
-back to too late runs dry as on the chip. What stands in for timers, DMA, USB and encoders: loop_board.c and
+back to too late runs dry as on the chip. What stands in for timers, DMA, USB, encoders, backup SRAM: loop_board.c and
 tests/board/scripts/benchmarks/firmware_loop.py. With ``files`` behind it only the costs of a turn, with the program in
 files; only what stands around it is built in, as its heap is not the program's.
 """
@@ -145,7 +145,7 @@ class Board:
             name: places[name]
             for name in ("allocated", "at_compare", "at_feed", "feed_ticks", "looks_per_ms")
         }
-        self._settings |= _in_files() if as_files else IN_FIRMWARE
+        self._settings |= in_files() if as_files else IN_FIRMWARE
 
     def run(self, case: Case, cycles: float) -> Run:
         """Run a motion; a fault may end it."""
@@ -209,19 +209,18 @@ def _compact() -> dict[str, bytes]:
     return files | {"manifest.py": PROBE_MANIFEST.format(firmware.SCRIPTS).encode()}
 
 
-def _in_files() -> dict[str, str | tuple[str, str]]:
-    """As IN_FIRMWARE, by the names of the compact program."""
-    core = "armtempo_board.core"
-    known = program_files.compact_program().functions
-    found: dict[str, str | tuple[str, str]] = {"engine": core}
-    for name in ("isr.matches", "newton.set_interval"):
-        (short,) = {
-            short
-            for (module, short), labels in known.items()
-            for one in labels
-            if (module, one.label) == ("core", name)
+def in_files() -> dict[str, Any]:
+    """As IN_FIRMWARE, by the names of the compact program: the module that defines the function, and its name there."""
+    compact = program_files.compact_program()
+    found: dict[str, Any] = {"engine": "armtempo_board.core"}
+    for label in ("isr.matches", "newton.set_interval"):
+        (place,) = {
+            (f"armtempo_board.{module}", short)
+            for (module, short), functions in compact.functions.items()
+            if label in [function.label for function in functions]
+            and f"\ndef {short}(" in compact.sources[f"armtempo_board.{module}"]
         }
-        found[name.split(".")[1]] = (core, short)
+        found[label.split(".")[1]] = place
     return found
 
 
@@ -264,14 +263,18 @@ def _read(said: str, scale: float) -> Run:
     ]
     parser = wire.Parser()
     parser.feed(bytes.fromhex("".join(re.findall(r"@ answer (\w+)", said))))
+    ends = []
     for _, number, payload in iter(parser.next, None):
         name, *_ = entry = wire.EVENT_BY_ID[number]
         values, _ = wire.decode(entry, payload)
-        if name == "done":
-            return Run(turns[1:], 0, values[1] / TICK_HZ)
-        if name == "fault":
-            return Run(turns[1:], values[1], values[3] / TICK_HZ)
-    raise AssertionError(said[-2000:])
+        if name == "notice":  # of an exception in the program, behind the fault
+            print(payload.decode())
+        elif name == "done":
+            ends.append(Run(turns[1:], 0, values[1] / TICK_HZ))
+        elif name == "fault":
+            ends.append(Run(turns[1:], values[1], values[3] / TICK_HZ))
+    assert ends, said[-2000:]
+    return ends[0]
 
 
 def _turn(took: int, command: bool, answer: bool, log: str, scale: float) -> Turn:

@@ -12,8 +12,6 @@ clock of the virtual board tells (tests/benchmark/sequences.py) comes on top. FO
 from __future__ import annotations
 
 import re
-import sys
-import tempfile
 from pathlib import Path
 
 import armtempo
@@ -22,7 +20,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.sequence import Sequence
 from armtempo.robot.connect import connect
 
-from tests.benchmark import firmware, firmware_run
+from tests.benchmark import firmware_run
 
 CYCLES = 3
 LEGS = 3
@@ -59,18 +57,9 @@ def pauses_ms(elf: Path, image: Path, folder: Path) -> list[int]:
 
 def main(micropython: Path, folder: Path) -> None:
     """Print the figures."""
-    board = firmware_run.define_board(micropython, folder)
-    kinds = (
-        (
-            "in the firmware",
-            firmware_run.build_with_program(micropython, board, folder / "with-program"),
-            False,
-        ),
-        ("files, compiled", firmware.build_at(micropython, board, folder / "stock"), True),
-    )
-    for title, elf, with_library in kinds:
+    for title, elf, image in firmware_run.both_ways(micropython, folder):
         try:
-            found = pauses_ms(elf, firmware_run.flash(folder, elf, with_library), folder)
+            found = pauses_ms(elf, image, folder)
         except ArmtempoError as error:  # beside the stand-ins its memory may be too short
             print(f"{title}: {error}")
             continue
@@ -78,8 +67,4 @@ def main(micropython: Path, folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) > 2:
-        main(Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve())
-    else:
-        with tempfile.TemporaryDirectory() as name:
-            main(Path(sys.argv[1]).resolve(), Path(name))
+    firmware_run.start(main)

@@ -3,7 +3,7 @@
 A program runs a motion on the virtual board in real time. A hundred times each it is stopped by ``armtempo stop`` in
 another process, from the start of that process on (the key press), and by Ctrl-C, from the signal on. The end is
 when the board's answer to the stop has reached the program that looks on: a little after it braked. Beside them
-the least that any command costs here: a Python that starts and ends.
+the least that any command costs here: a Python that starts and ends. A time takes about 3.5 s.
 """
 
 from __future__ import annotations
@@ -95,9 +95,13 @@ def python_starts(times: int) -> list[float]:
 
 
 def show(name: str, seconds: list[float]) -> None:
-    """A line: median and worst in ms."""
+    """A line: median and worst in ms, of how many, and how busy the machine was."""
     ordered = sorted(1000 * value for value in seconds)
-    print(f"{name:<34} median {ordered[len(ordered) // 2]:6.1f} ms   worst {ordered[-1]:6.1f} ms")
+    print(
+        f"{name:<30} median {ordered[len(ordered) // 2]:6.1f} ms   worst {ordered[-1]:6.1f} ms   of {len(ordered)}"
+        f"   load {os.getloadavg()[0]:.1f} on {os.cpu_count()} processors",
+        flush=True,
+    )
 
 
 def main() -> None:
@@ -123,13 +127,12 @@ def main() -> None:
                         [*STOP, board.port], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
                     ),
                 )
+                show("'armtempo stop' to the brake", by_stop)
                 by_key = measure(watch, times, lambda: owner.send_signal(signal.SIGINT))
+                show("Ctrl-C to the brake", by_key)
         finally:
             owner.kill()
             owner.wait()
-    print(f"{times} times each, load {os.getloadavg()[0]:.1f} on {os.cpu_count()} processors")
-    show("'armtempo stop' to the brake", by_stop)
-    show("Ctrl-C to the brake", by_key)
     show("a Python that starts and ends", python_starts(times))
 
 

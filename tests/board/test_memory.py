@@ -8,8 +8,8 @@ import pytest
 
 from tests.board import heap_use
 
-PEAK = 82_000
-MOTION = 66_500
+PEAK = 79_300
+MOTION = 63_800
 MACHINE_CODE = 27_500
 
 

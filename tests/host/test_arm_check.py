@@ -3,41 +3,22 @@
 from __future__ import annotations
 
 import json
-import math
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
-from armtempo.arm_check import Level, check, check_arm, figures, resolution, torque
-from armtempo.cli import main
-from armtempo.kinematics.chain import chains_mm, outline_mm
-from armtempo.model import arm_file, job_file, shipped
-from armtempo.model.arm import Arm, JointModel
-from click.testing import CliRunner, Result
+from armtempo.arm_check import Level, check, check_arm
+from armtempo.model import shipped
+from armtempo.model.arm import Arm
+
+from tests.host.arm_files import changed, run_check
 
 NAMES = tuple(shipped.files())
 STANDS_STILL = "\n[[joint]]\nd_mm = 0\na_mm = 0\nalpha_deg = 0\nrange_deg = [-1, 1]\n"
 
 
-def changed(tmp_path: Path, *changes: tuple[str, str], of: str = shipped.PAPER) -> Path:
-    """A shipped arm file with texts replaced, each once."""
-    text = shipped.files()[of].read_text()
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new, 1)
-    path = tmp_path / "arm.toml"
-    path.write_text(text)
-    return path
-
-
-def run(*arguments: str | Path) -> Result:
-    return CliRunner().invoke(main, ["check", *map(str, arguments)])
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_nothing_looks_wrong_about_the_arms_that_ship(name: str) -> None:
-    result = run("--arm", name)
+    result = run_check("--arm", name)
     assert result.exit_code == 0, result.output
     assert result.output.rstrip().endswith("nothing looks wrong")
     assert all(finding.level is Level.NOTE for finding in check_arm(Arm.load(name)))
@@ -277,14 +258,14 @@ def test_what_the_board_refuses_is_an_error(tmp_path: Path) -> None:
 
 def test_an_unreadable_file_is_a_finding_with_exit_code_1(tmp_path: Path) -> None:
     path = changed(tmp_path, ("gear_ratio = 20.0", "gear_ratio = 1e-308"))
-    result = run("--arm", path)
+    result = run_check("--arm", path)
     assert result.exit_code == 1
     assert "joint[2].motor.gear_ratio = 1e-308 is not allowed" in result.output
     assert "1 error, 0 warnings" in result.output
 
 
 def test_warnings_leave_the_exit_code_0(tmp_path: Path) -> None:
-    result = run("--arm", changed(tmp_path, ("microsteps = 32", "microsteps = 33")))
+    result = run_check("--arm", changed(tmp_path, ("microsteps = 32", "microsteps = 33")))
     assert result.exit_code == 0
     assert "0 errors, 1 warning" in result.output
     assert "nothing looks wrong" not in result.output
@@ -293,20 +274,20 @@ def test_warnings_leave_the_exit_code_0(tmp_path: Path) -> None:
 def test_an_arm_without_motors_is_told_what_is_missing(tmp_path: Path) -> None:
     path = tmp_path / "arm.toml"
     path.write_text('name = "still"\n' + STANDS_STILL.replace("a_mm = 0", "a_mm = 50"))
-    result = run("--arm", path)
+    result = run_check("--arm", path)
     assert result.exit_code == 1
     assert "no joint has a motor" in result.output
 
 
 def test_an_arm_that_is_not_there_is_a_usage_error(tmp_path: Path) -> None:
-    assert run("--arm", tmp_path / "none.toml").exit_code == 2
+    assert run_check("--arm", tmp_path / "none.toml").exit_code == 2
 
 
 def test_json_says_the_same(tmp_path: Path) -> None:
     path = changed(tmp_path, ("microsteps = 32", "microsteps = 33"))
     arm, found = check(path)
     assert arm is not None
-    values = json.loads(run("--arm", path, "--json").output)
+    values = json.loads(run_check("--arm", path, "--json").output)
     assert values["arm"] == "paper-1to5"
     assert values["file"] == str(path)
     assert [finding["what"] for finding in values["findings"]] == [finding.what for finding in found]
@@ -314,129 +295,6 @@ def test_json_says_the_same(tmp_path: Path) -> None:
     assert [joint["name"] for joint in values["joints"]] == ["joint 1", "joint 2", "joint 3"]
     assert values["joints"][1]["steps_per_deg"] == pytest.approx(200 * 8 * 20 / 360)
     path.write_text("name = 3")
-    values = json.loads(run("--arm", path, "--json").output)
+    values = json.loads(run_check("--arm", path, "--json").output)
     assert values["arm"] is None
     assert values["joints"] == []
-
-
-def test_the_longest_lever_is_that_of_the_stretched_arm() -> None:
-    scara = [found.lever_mm for found in resolution.resolutions(Arm.load("scara"))]
-    np.testing.assert_allclose(scara, [228 + 136.5, 136.5, 0], rtol=1e-4, atol=1e-6)
-    lower = resolution.resolutions(Arm.load("community"))[1]
-    assert lower.lever_mm == pytest.approx(
-        120, rel=1e-4
-    )  # the rods keep forearm and hand from turning with it
-
-
-def test_the_torque_margin_is_that_of_the_model() -> None:
-    """Joint 2: inertia and gravity through the gear, torque at 0.71 of the holding torque at the corner speed."""
-    joint = Arm.paper().driven[1]
-    gear, acceleration = 20, math.radians(30)
-    asked = (8.2e-6 + 0.08 / gear**2) * acceleration * gear + 1.5 / gear
-    available = 0.65 / math.sqrt(1 + (math.radians(40) * gear / 30.0) ** 2)
-    assert torque.margin(joint) == pytest.approx(available / asked)
-    assert torque.margin(replace(joint, model=JointModel())) is None
-
-
-def test_gravity_counts_where_the_range_lets_it() -> None:
-    joint = Arm.paper().driven[1]
-    upright = replace(joint, range_deg=(60.0, 100.0), home_deg=90.0)
-    assert torque.gravity_nm(joint) == pytest.approx(1.5 / 20)
-    assert torque.gravity_nm(upright) == pytest.approx(1.5 / 20 * math.cos(math.radians(60)))
-
-
-def test_figures_without_a_load_know_no_infinity(tmp_path: Path) -> None:
-    path = changed(
-        tmp_path, ("rotor_inertia_kg_m2 = 8.2e-6\ninertia_kg_m2 = 0.15", "rotor_inertia_kg_m2 = 0")
-    )
-    found = figures.of(arm_file.read(path))[0]
-    assert found.torque_margin == math.inf
-    assert found.values["torque_margin"] is None
-    assert "inf x" in figures.table([found])[1]
-
-
-def test_the_outline_goes_through_the_frames() -> None:
-    arm = Arm.paper()
-    home = np.array(arm.all_home_deg)
-    outline = outline_mm(arm, home)
-    np.testing.assert_allclose(outline[::2], chains_mm(arm, np.array(arm.home_deg)), atol=1e-9)
-    np.testing.assert_allclose(outline[1], [0, 0, 130])
-
-
-def changed_job(tmp_path: Path, old: str = "", new: str = "") -> Path:
-    text = job_file.default_path().read_text()
-    assert old in text
-    path = tmp_path / "job.toml"
-    path.write_text(text.replace(old, new, 1))
-    return path
-
-
-def test_the_feeding_job_fits(tmp_path: Path) -> None:
-    result = run("--job", changed_job(tmp_path))
-    assert result.exit_code == 0
-    assert "nothing looks wrong" in result.output
-
-
-@pytest.mark.parametrize(
-    ("via", "level", "said"),
-    [
-        (
-            "[[0, -60, 40], [0, -60, 400], [0, -60, 40]]",
-            "error",
-            "within the range of joint 3, -160 to 100",
-        ),
-        (
-            "[[0, -60, 40], [0.01, -50, 40], [0, -60, 40]]",
-            "warning",
-            "joint 1 is to move by 0.01 deg, less than a step",
-        ),
-        ("[[0, -60, 40], [0, -60, 40]]", "error", "all via points are the same"),
-        ("[[0, -60], [0, -50]]", "error", "a list of 3 numbers"),
-    ],
-)
-def test_what_looks_wrong_about_a_job(tmp_path: Path, via: str, level: str, said: str) -> None:
-    path = tmp_path / "job.toml"
-    path.write_text(f'name = "j"\nvia_deg = {via}\n')
-    _, found = check(arm_file.default_path(), path)
-    assert any(said in finding.what and finding.level.value == level for finding in found), found
-    assert run("--job", path).exit_code == (1 if level == "error" else 0)
-
-
-def test_a_job_is_not_looked_at_before_its_arm_is_right(tmp_path: Path) -> None:
-    path = changed(tmp_path, ("channel = 2, steps", "channel = 1, steps"))
-    _, found = check(path, changed_job(tmp_path))
-    assert found[-1].what == "not looked at"
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", NAMES)
-def test_the_picture_shows_home_and_every_driven_joint(name: str) -> None:
-    from armtempo.report.arm_picture import arm_picture
-
-    arm = Arm.load(name)
-    figure = arm_picture(arm)
-    titles = [axis.get_title() for axis in figure.axes if axis.axison]
-    assert titles[:2] == ["home, from the side", "home, from above"]
-    assert [title.split(":")[0] for title in titles[2:]] == [joint.name for joint in arm.driven]
-
-
-@pytest.mark.slow
-def test_the_picture_is_written_once(tmp_path: Path) -> None:
-    path = tmp_path / "arm.png"
-    assert run("--picture", path).exit_code == 0
-    assert path.read_bytes().startswith(b"\x89PNG")
-    path.write_text("mine")
-    result = run("--picture", path)
-    assert result.exit_code == 2
-    assert path.read_text() == "mine"
-    assert run("--picture", path, "--force").exit_code == 0
-    assert path.read_bytes().startswith(b"\x89PNG")
-    assert run("--picture", tmp_path / "arm.txt").exit_code == 2
-
-
-@pytest.mark.slow
-def test_a_dollar_in_a_name_is_no_formula(tmp_path: Path) -> None:
-    path = changed(tmp_path, ('name = "joint 1"', 'name = "$$ \\\\theta"'), ('"paper-1to5"', '"$x^$"'))
-    result = run("--arm", path, "--picture", tmp_path / "arm.svg")
-    assert result.exit_code == 0, result.output
-    assert ">$$ \\theta: " in (tmp_path / "arm.svg").read_text()

@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 from armtempo.deploy import program_files
 from armtempo.deploy.compact import Compact, compact
+from armtempo.deploy.compact.halve import halve
+from armtempo.deploy.compact.scopes import top_names
 
 pytestmark = pytest.mark.xdist_group("compact program")  # which takes seconds to make
 
@@ -235,6 +237,27 @@ def test_what_nothing_uses_is_left_out() -> None:
     assert core.count("def ") == 1
 
 
+def test_what_nothing_uses_is_left_out_of_modules_that_come_later() -> None:
+    """But not what is found by its name at run time, nor in a module that is used as an object."""
+    late = "def {}():\n    return 77\n\ndef {}():\n    return 78\n"
+    sources = {
+        "made": "",
+        "made.main": "import struct\nfrom made import whole\n\ndef run(name):\n    from made import late\n    from "
+        "made.late import other\n    return late.used(), other(), getattr(whole, name), struct.pack('B', 1)\n",
+        "made.late": "def used():\n    return 1\n\ndef other():\n    return 2\n\n"
+        "def found():\n    return 3\n\ndef pack():\n    return 77\n\ndef unused():\n    return pack()\n",
+        "made.whole": late.format("first", "second"),
+    }
+    made = compact(sources, "made.main", {"made.main"}, {"found"}).sources
+    assert [number in made["made.late"] for number in ("return 1", "return 2", "return 3", "77")] == [
+        True,
+        True,
+        True,
+        False,
+    ]
+    assert made["made.whole"].count("def ") == 2
+
+
 def test_a_name_that_is_not_there_is_told() -> None:
     sources = {
         "made": "",
@@ -308,6 +331,48 @@ def test_a_large_module_becomes_two(run) -> None:  # type: ignore[no-untyped-def
     sizes = [made.sources[f"made.{name}"].count("def ") for name in ("first", "core")]
     assert min(sizes) > 20, sizes
     assert run(made.sources, "run()") == SEVEN
+
+
+def _tops(text: str) -> set[str]:
+    """What a module defines by itself."""
+    return top_names(ast.parse(text))
+
+
+def _read(text: str) -> set[str]:
+    return {node.id for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)}
+
+
+def test_the_first_part_mentions_nothing_of_the_second() -> None:
+    """It is carried out before: a name of the second would not be there."""
+    made = program_files.compact_program().sources
+    first, core = made["armtempo_board.first"], made["armtempo_board.core"]
+    assert len(_tops(first)) > 20
+    assert not _read(first) & _tops(core)
+    assert "core" not in _read(first)
+    imports = [node for node in ast.walk(ast.parse(first)) if isinstance(node, ast.ImportFrom)]
+    assert "core" not in [alias.name for node in imports for alias in node.names]
+
+
+@pytest.mark.parametrize(("early", "late"), [(10, 100), (1, 119), (60, 61)])
+def test_the_cut_lies_where_nothing_reaches_over_it(early: int, late: int) -> None:
+    """A function that mentions one behind it stands in the same part."""
+    body = "".join(
+        f"def step_{n}():\n    return {f'step_{late}()' if n == early else n}\n" for n in range(120)
+    )
+    trees = {"made.core": ast.parse(f"{body}last = step_0\n")}
+    halve(trees, "made.core", "first")
+    first, core = (ast.unparse(trees[f"made.{name}"]) for name in ("first", "core"))
+    assert not _read(first) & _tops(core)
+    assert _tops(first) | _tops(core) == {"last", *(f"step_{n}" for n in range(120))}
+    assert f"step_{early}" not in _tops(first) or f"step_{late}" in _tops(first)
+
+
+def test_a_module_that_cannot_be_cut_stays_whole() -> None:
+    body = "".join(f"def step_{n}():\n    return step_{(n + 1) % 120}\n" for n in range(120))
+    trees = {"made.core": ast.parse(body)}
+    halve(trees, "made.core", "first")
+    assert list(trees) == ["made.core"]
+    assert len(trees["made.core"].body) == 120
 
 
 def _frame(label: str) -> str:

@@ -45,10 +45,10 @@ def test_an_arm_with_more_joints_is_sent_to_the_firmware() -> None:
 
 
 def test_a_room_that_is_too_small_is_told_in_bytes() -> None:
-    small = Room(5_000, 3)
+    small = Room(1_800, 3)
     with pytest.raises(InputError) as refused:
         engine_room.check(PAPER, board(small))
-    assert "the board has 5000" in refused.value.problem
+    assert "the board has 1800" in refused.value.problem
     assert "lower its top speeds" in refused.value.hint
 
 
@@ -62,13 +62,13 @@ def test_no_way_out_is_promised_that_is_none() -> None:
 def test_a_board_tells_what_the_firmware_would_give() -> None:
     lines = engine_room.of_board(board(AS_FILES))
     assert len(lines) == 2
-    assert "3 x 30000 steps/s" in lines[0]
+    assert "1 x 240000 steps/s, 2 x 120000 steps/s, 3 x 62000 steps/s" in lines[0]
     assert "6 x 40000 steps/s" in lines[1]
     assert len(engine_room.of_board(board(IN_FIRMWARE))) == 1
 
 
 def test_the_words_name_the_highest_rate_that_fits() -> None:
-    room = Room(8_200, 3)
+    room = Room(5_000, 3)
     (rate,) = [
         int(part.split()[2]) for part in room.words().split(": ")[1].split(", ") if part.startswith("3 x")
     ]
@@ -77,10 +77,10 @@ def test_the_words_name_the_highest_rate_that_fits() -> None:
 
 
 def test_rings_last_3_ms_where_there_is_memory_and_2_where_there_is_not() -> None:
-    rates = [25_000] * 3
+    rates = [60_000] * 3
     assert engine_memory.lasting_ms(rates, IN_FIRMWARE.size // 4) == engine_memory.LONG_MS
     assert engine_memory.lasting_ms(rates, AS_FILES.size // 4) == engine_memory.SHORT_MS
-    assert engine_memory.lasting_ms([60_000] * 3, AS_FILES.size // 4) == 0
+    assert engine_memory.lasting_ms([80_000] * 3, AS_FILES.size // 4) == 0
     for rate in (5_000, 60_000, 240_000):
         entries = engine_memory.ring_words(rate, engine_memory.SHORT_MS) - 1
         assert entries == 1024 or entries / (2 * rate) >= 2e-3

@@ -40,6 +40,15 @@ def test_a_turn_may_keep_its_acceleration() -> None:
     assert both_free == pytest.approx(2 * hold + swing, rel=1e-6)
 
 
+@pytest.mark.parametrize("seed", [3406, 4629, 5963])
+def test_ways_of_a_millionth_of_a_degree_at_1000_deg(seed: int) -> None:
+    """The last digits of such angles are a part of the way; these plans are the fastest there are."""
+    arm, job = problems.random_problem(seed)
+    searches = planner.plan(arm, job).searches
+    assert all(0.0 < search.floor_s < search.total_s for search in searches)
+    assert any(search.floor_s > (1 - 1e-8) * search.total_s for search in searches)
+
+
 def _between_turns(way: float, limits: Limits) -> tuple[float, float]:
     """Time at full acceleration on each side, and of the swing between, by integration."""
     a, swing = limits.acceleration_deg_s2, 2 * limits.acceleration_deg_s2 / limits.jerk_deg_s3

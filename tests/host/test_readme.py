@@ -42,7 +42,7 @@ def names(side: str) -> frozenset[str]:
 def mentioned() -> list[tuple[str, str]]:
     """(side, name) of each call or place in the second column of README's tables of the way and of places."""
     begin = README.index("## The way of the data")
-    rows = [line.split("|") for line in README[begin : README.index("## With a real board")].splitlines()]
+    rows = [line.split("|") for line in README[begin : README.index("## For developers")].splitlines()]
     cells = [row[2] for row in rows if len(row) > 3 and not set(row[1]) <= set("- ")]
     found = []
     for text in re.findall(r"`([^`]+)`", " ".join(cells)):

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import armtempo
 from armtempo.errors import InputError, LinkError
-from armtempo.link.board_messages import Event, Sample
+from armtempo.link.board_messages import Event, Sample, Status
 from armtempo.robot import jog
 from armtempo.robot.board import Board
 from armtempo.simulator import LaunchOptions, launch
@@ -84,6 +84,11 @@ class HeldEnd:
         return self.took_s <= self.stated_s and self.within and self.rests and self.known
 
 
+def _seconds(since: Status | None, now: Status) -> float:
+    """By the board's clock; 0 where there is no beginning."""
+    return (now.ticks - since.ticks) / TICK_HZ if since else 0.0
+
+
 class HeldJogs:
     """A virtual board behind a cable."""
 
@@ -107,7 +112,7 @@ class HeldJogs:
             yield cls(board, to_board, from_board)
 
     def run(self, case: HeldCase) -> HeldEnd | None:
-        """Do it; None where there is no way to go."""
+        """Do it; None where there is no way to go, or the board answered too late while it was still to be held."""
         board = self._board
         board.home(_ARM, case.start_deg)
         self._beyond = False
@@ -116,6 +121,7 @@ class HeldJogs:
         except InputError:
             return None
         told = case.kind == "release"
+        let_go: Status | None = None
         with suppress(LinkError), held:
             until_s = time.monotonic() + (60.0 if case.kind == "end" else case.held_s)
             while held.hold(0.02) and time.monotonic() < until_s:
@@ -124,10 +130,13 @@ class HeldJogs:
             if let_go.moving:
                 self._let_go(case.kind, held)
         self._cut(False)
-        end = board.status()
-        self._look(end.positions.commanded_steps)
-        took_s = (end.ticks - let_go.ticks) / TICK_HZ
         stated_s = jog.rest_s(held.motion, told=told)
+        while (end := board.status()).moving and _seconds(let_go, end) <= stated_s:
+            time.sleep(0.01)  # a busy machine's board may be late, by its own clock it is not
+        self._look(end.positions.commanded_steps)
+        if let_go is None and not self._beyond:
+            return None
+        took_s = _seconds(let_go, end)
         return HeldEnd(took_s, stated_s, not self._beyond, end.state == "idle", end.known == 0b111)
 
     def _let_go(self, kind: str, held: jog.HeldJog) -> None:

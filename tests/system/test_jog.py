@@ -156,14 +156,16 @@ class Terminal:
         import pty
 
         self._master, slave = pty.openpty()
-        self.process = subprocess.Popen(
-            [*commandline.COMMAND, *arguments],
-            cwd=folder,
-            stdin=slave,
-            stdout=slave,
-            stderr=slave,
-            start_new_session=True,
-        )
+        self.errors = folder / "errors.txt"
+        with self.errors.open("w") as errors:
+            self.process = subprocess.Popen(
+                [*commandline.COMMAND, *arguments],
+                cwd=folder,
+                stdin=slave,
+                stdout=slave,
+                stderr=errors,
+                start_new_session=True,
+            )
         os.close(slave)
         self.shown = ""
 
@@ -189,6 +191,11 @@ class Terminal:
     def press(self, keys: str) -> None:
         """Press keys."""
         os.write(self._master, keys.encode())
+
+    def vanish(self) -> int:
+        """The window is closed; the exit code."""
+        os.close(self._master)
+        return self.process.wait(commandline.SLOW_S)
 
     def end(self) -> int:
         """Its exit code."""
@@ -235,6 +242,16 @@ def test_keys_move_the_arm_in_steps_and_while_held(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="pseudo terminals")
+def test_a_terminal_that_vanishes_ends_it_with_the_arm_at_rest(tmp_path: Path) -> None:
+    with homed() as port:
+        screen = Terminal("jog", "--arm", "paper", "--port", port, folder=tmp_path)
+        screen.wait_for("joint 1, step 1°")
+        assert screen.vanish() == 1
+        assert "Traceback" not in screen.errors.read_text()
+        np.testing.assert_allclose(where(port), [0, -60, 40], atol=0.02)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pseudo terminals")
 def test_teach_collects_points_into_a_job_that_plans(tmp_path: Path) -> None:
     with homed() as port:
         arguments = ("teach", "shelf.toml", "--arm", "paper", "--port", port)
@@ -263,7 +280,7 @@ def test_teach_collects_points_into_a_job_that_plans(tmp_path: Path) -> None:
         hand.wait_for("point 1 taken")
         hand.press("q")
         assert hand.end() == 2, hand.shown  # one point is no motion; what was taught is said
-        assert "[[via]]" in hand.shown
+        assert "[[via]]" in hand.errors.read_text()
         assert where(port)[0] == pytest.approx(10.0, abs=0.2)
     done = commandline.run("plan", "--job", "shelf.toml", "--arm", "paper", "-o", "x.json", folder=tmp_path)
     assert done.exit_code == 0, done.errors

@@ -8,10 +8,11 @@ import pytest
 
 from tests import scripted
 
-SCRIPT = Path(__file__).parent / "scripts" / "cases" / "virtual_hardware.py"
+CASES = Path(__file__).parent / "scripts" / "cases"
+SCRIPTS = (CASES / "virtual_hardware.py", CASES / "virtual_flash.py")
 
 
-@pytest.mark.parametrize("case", scripted.cases(SCRIPT), ids=str)
+@pytest.mark.parametrize("case", [case for script in SCRIPTS for case in scripted.cases(script)], ids=str)
 def test_case(case: scripted.Case, tmp_path: Path) -> None:
     (tmp_path / "flash").mkdir()
     case.run(str(tmp_path), heap="")

@@ -9,10 +9,11 @@ import gc
 from armtempo_shared import engine_memory
 from armtempo_shared.limits import MAX_JOINTS
 
-from armtempo_board.memory import Memory
+from armtempo_board import heap
+from armtempo_board.hardware import backup_sram
 from armtempo_board.motion.workspace import Workspace
 
-_RESERVE = 25_760  # bytes of heap for the rest
+_RESERVE = 26_900  # bytes of heap for the rest
 _USUAL_JOINTS = 3  # there is heap for their objects before there is memory for larger rings
 _MOST_SAMPLES = 4096  # bytes of the sample buffer at most,
 _LEAST_SAMPLES = 768  # and at least;
@@ -22,11 +23,13 @@ _STEP_WORDS = 64
 
 def workspace() -> "Workspace":
     """For the largest arm that fits."""
+    address = backup_sram.find()
+    heap.forget("registers")
     gc.collect()
     free = _free()
     if not free:
-        return Workspace(engine_memory.LARGEST_WORDS, MAX_JOINTS)
-    room = max(free - _RESERVE, 0)
+        return Workspace(engine_memory.LARGEST_WORDS, MAX_JOINTS, address)
+    room = max(free - _RESERVE - (0 if address else 4 * engine_memory.PROCESSOR_WORDS), 0)
     words = max(room - engine_memory.object_bytes(_USUAL_JOINTS), 0) // 4
     words = min(words, engine_memory.LARGEST_WORDS)
     joints = 0
@@ -34,9 +37,11 @@ def workspace() -> "Workspace":
         joints += 1
     while True:
         try:
-            return Workspace(words, joints)
+            return Workspace(words, joints, address)
         except MemoryError:  # the heap has no such blocks
-            words -= _STEP_WORDS
+            if not words:
+                raise
+            words = max(words - _STEP_WORDS, 0)
             gc.collect()
 
 
@@ -45,17 +50,12 @@ def share(workspace: "Workspace", outputs: int, inputs: int) -> None:
 
     What the heap has not in one piece any more, the engine goes without, until the program starts again.
     """
-    words = workspace.words - engine_memory.output_bytes(outputs, inputs) // 4
-    if workspace.memory.size == words:
-        return
-    workspace.memory = Memory([])
-    gc.collect()
-    while not workspace.memory.size:
+    words = max(workspace.words - engine_memory.output_bytes(outputs, inputs) // 4, 0)
+    while workspace.memory.size != words:
         try:
-            workspace.memory = Memory(engine_memory.blocks(words))
+            workspace.make_memory(words)
         except MemoryError:
-            words -= _STEP_WORDS
-            gc.collect()
+            words = max(words - _STEP_WORDS, 0)
 
 
 def sample_bytes() -> int:

@@ -51,8 +51,7 @@ class SequenceCommand:
         """Put what it answers among the commands that the board knows."""
         from armtempo_shared.table import rows  # here, so that it can be forgotten
 
-        for asked, (_, _, answer, _, _) in zip(rows("S"), rows("T")):
-            name, number, fields, _, tail = asked
+        for (name, number, fields, _, tail), (_, _, answer, _, _) in zip(rows("S"), rows("T")):
             commands[number] = (getattr(self, name), fields, answer, tail)
 
     def count(self, number: int) -> int:

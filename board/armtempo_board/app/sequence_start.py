@@ -44,36 +44,28 @@ def sequencer(controller: "Runner", name: str, crc: "int | None", rate: int, fla
 
 
 class _Ends:
-    """Where a motion of the sequence begins and ends."""
+    """Where a motion of the sequence begins and ends, and by how much the arm is ``away`` from its beginning."""
 
     def __init__(self, controller: "Runner", record: "SequenceFile", index: int) -> None:
         name, crc = record.motion(index)
         try:
             motion = controller.load(name, crc)
         except Refused as refused:
-            code = codes.LEG_MISSING if refused.code in _MISSING else refused.code
+            is_missing = refused.code in (codes.NOT_FOUND, codes.BAD_CHECKSUM, codes.IS_SEQUENCE)
+            code = codes.LEG_MISSING if is_missing else refused.code
             raise Refused(code, refused.joint, index + 1)
         joints = range(motion.joints)
         self.first = array("q", [endpoints.at_start(motion, joint) for joint in joints])
         self.last = array("q", [endpoints.at_end(motion, joint) for joint in joints])
-        self._away = [
+        self.away = [
             endpoints.start_offset(motion, joint, controller.engine.commanded(joint)) for joint in joints
         ]
-
-    def check_begins_here(self) -> None:
-        """Refused where the arm stands elsewhere."""
-        for joint, away in enumerate(self._away):
-            if away:
-                raise Refused(codes.WRONG_START, joint, away)
 
     def check_follows(self, before: "_Ends", step: int) -> None:
         """Refused where it begins elsewhere than ``before`` ends; 1/64 of a step is rounding."""
         for joint, start in enumerate(self.first):
             if abs(start - before.last[joint]) > 1:
                 raise Refused(codes.LEG_ELSEWHERE, joint, step)
-
-
-_MISSING = (codes.NOT_FOUND, codes.BAD_CHECKSUM, codes.IS_SEQUENCE)
 
 
 def _check_rows(controller: "Runner", record: "SequenceFile", ends: "list[_Ends]") -> None:
@@ -85,7 +77,9 @@ def _check_rows(controller: "Runner", record: "SequenceFile", ends: "list[_Ends]
         op, number, _, _, step = record.row(index)
         if op == sequence.MOVE:
             if last == _NONE:
-                ends[number].check_begins_here()
+                for joint, away in enumerate(ends[number].away):
+                    if away:  # the arm stands elsewhere
+                        raise Refused(codes.WRONG_START, joint, away)
             else:
                 ends[number].check_follows(ends[last], step)
             last = number

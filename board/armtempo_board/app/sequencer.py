@@ -56,7 +56,6 @@ if TYPE_CHECKING:
 
 _OP, _NUMBER, _VALUE, _AMOUNT, _STEP_OF_ROW = const(0), const(1), const(2), const(3), const(4)
 _START_BYTES = const(22_000)  # of heap for the start of a motion; some of it in large pieces (docs/memory.md)
-_IDLE = (0, 0, 0, 0, 0)
 _MOST = const(0x3FFFFFFF)  # that a counter reaches; a larger number would take memory
 
 
@@ -67,7 +66,7 @@ class Sequencer:
         self._controller = controller
         self._record = record
         self._rate = rate  # of the motions' own time, in thousandths
-        self._row: "tuple[int, ...]" = _IDLE  # the one under way
+        self._row: "tuple[int, ...]" = (0, 0, 0, 0, 0)  # the one under way
         self._next = 0  # number of the one behind it
         self._since_ms = time.ticks_ms()  # when it began
         self._first = array("i", [0] * sequence.MAX_NESTING)  # of each repeat that has begun: its first row

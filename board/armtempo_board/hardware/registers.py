@@ -33,6 +33,11 @@ CLOCKS = (
     ("RCC", _AHB1ENR, 0, 1 << 21),  # 7.3.10: DMA1 clock
     ("RCC", _APB1ENR, 0, 1 << 0 | 1 << 3),  # 7.3.13: TIM2 and TIM5 clocks
 )
+BACKUP_SRAM = (  # in the order of 5.1.2
+    ("RCC", _APB1ENR, 0, 1 << 28),  # 7.3.13: power interface clock
+    ("PWR", 0, 0, 1 << 8),  # 5.4.1: DBP: it may be written
+    ("RCC", _AHB1ENR, 0, 1 << 18),  # 7.3.10: its clock
+)
 TIMERS = (
     ("TIM2", CR1, ALL, 0),  # 18.4.1: stopped, counting up
     ("TIM5", CR1, ALL, 0),  # 18.4.1: stopped, counting up

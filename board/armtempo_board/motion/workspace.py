@@ -1,5 +1,7 @@
 """What one engine after the other works in, made once: the heap is as it was when an arm gives way to another."""
 
+import uctypes
+
 from armtempo_board.hardware.sampler import Sampler
 from armtempo_board.memory import Memory
 from armtempo_board.motion.ring_feeder import RingFeeder
@@ -12,17 +14,27 @@ if TYPE_CHECKING:
 class Workspace:
     """``words`` of memory for rings and step generators, ``joints`` at most: see ``armtempo_shared.engine_memory``.
 
-    The interrupts' callbacks belong to it, so they never hold what an engine had before.
+    ``address``: where its PROCESSOR_WORDS are; 0: in the heap. The interrupts' callbacks belong to it, so they never
+    hold what an engine had before.
     """
 
-    def __init__(self, words: int, joints: int) -> None:
-        from armtempo_shared.engine_memory import blocks  # here, so that it can be forgotten
+    def __init__(self, words: int, joints: int, address: int = 0) -> None:
+        from armtempo_shared.engine_memory import PROCESSOR_WORDS  # here, so that it can be forgotten
 
         self.joints = joints
         self.words = words  # as many as can be; ``memory`` has less while outputs and inputs need heap
-        self.memory = Memory(blocks(words))
+        self._own = None if address else Memory([PROCESSOR_WORDS]).take(PROCESSOR_WORDS)
+        self._address = address or uctypes.addressof(self._own)
+        self.make_memory(words)
         self.sampler = Sampler()
         self.feeder = RingFeeder(self.sampler.block)
+
+    def make_memory(self, words: int) -> None:
+        """Blocks of so many words; MemoryError where the heap has none such."""
+        from armtempo_shared.engine_memory import PROCESSOR_WORDS, blocks  # here, so that it can be forgotten
+
+        self.memory = Memory([])  # what was there goes first
+        self.memory = Memory(blocks(words), self._address, PROCESSOR_WORDS)
 
     def rings(self, rates: "list[int]") -> "list[Any]":
         """Take all memory back and out of it, the largest first, the words of a ring for each of these step rates."""

@@ -6,6 +6,8 @@ So a motion takes the same memory whatever its size. Reading allocates nothing; 
 import micropython
 from micropython import const
 
+from armtempo_board.memory import bytes_behind
+
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
@@ -35,7 +37,7 @@ class ControlPoints:
 
     def __init__(self, words: "memoryview") -> None:
         self.words = words
-        self._fresh = memoryview(words)[_FRESH_AT:]
+        self._fresh = bytes_behind(words, _FRESH_AT, WINDOW_WORDS)
         self._stream: "Any" = None
         self._end = 0
         self._degree = 0

@@ -30,12 +30,13 @@ class Subintervals:
 
     def __init__(self, memory: Memory) -> None:
         """``memory``: where its words are taken from (``armtempo_shared.engine_memory`` counts them)."""
-        self.angle = memory.take(PIECES_SIZE)
-        self.time = memory.take(PIECES_SIZE)
-        self._angle_points = ControlPoints(memory.take(WINDOW_WORDS))
-        self._time_points = ControlPoints(memory.take(WINDOW_WORDS))
-        self.angle_measures = memory.take(MEASURES_SIZE)
-        self.time_measures = memory.take(MEASURES_SIZE)
+        take = memory.take_for_processor
+        self.angle = take(PIECES_SIZE)
+        self.time = take(PIECES_SIZE)
+        self._angle_points = ControlPoints(take(WINDOW_WORDS))
+        self._time_points = ControlPoints(take(WINDOW_WORDS))
+        self.angle_measures = take(MEASURES_SIZE)
+        self.time_measures = take(MEASURES_SIZE)
         self.min_ticks = 0
 
     def load(self, motion: "MotionHead", joint: int) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -34,6 +35,7 @@ _AXES = click.Choice(["x", "y", "z", "tool-x", "tool-y", "tool-z"])
     show_default=True,
     help="Percent of the speed limits.",
 )
+@options.gamepad
 @options.arm_of_board
 @options.replace_arm
 @options.port
@@ -45,6 +47,7 @@ def command(
     about: str | None,
     by: float | None,
     speed: float,
+    gamepad: bool,
     arm_path: Path | None,
     replace_arm: bool,
     port: str | None,
@@ -65,6 +68,8 @@ def command(
             "one of --joint, --axis and --about goes with --by",
             "give --joint 2 --by -5, say; or none, for the keys",
         )
+    if given and gamepad:
+        raise InputError("--gamepad goes with the keys of jog", "leave out --by, or --gamepad")
     if not given and as_json:
         raise InputError("the keys of jog give no JSON", "give --joint, --axis or --about, and --by")
     if not given and not keys.is_terminal():
@@ -73,7 +78,7 @@ def command(
     with chosen.board(port, log_traffic, arm) as board:
         prepare(board, chosen.arm_of_board(board, arm), replace_arm)
         if not given:
-            with keys.of_terminal() as pressed:
+            with pressed_keys(board, gamepad) as pressed:
                 screen(board, pressed, speed).loop()
         else:
             along = by if axis else None
@@ -93,6 +98,21 @@ def prepare(board: Board, arm: Arm, replace_arm: bool = False) -> None:
         if not is_sim(board.port):
             raise
         board.home(arm)
+
+
+@contextmanager
+def pressed_keys(board: Board, with_gamepad: bool) -> Iterator[Keys]:
+    """The keys of the terminal, and of a gamepad where that is wanted."""
+    from armtempo.cli import gamepad, keys
+
+    assert board.arm is not None  # it was configured
+    with keys.of_terminal() as pressed:
+        if not with_gamepad:
+            yield pressed
+            return
+        with gamepad.beside(pressed, len(board.arm.driven)) as both:
+            click.echo(gamepad.HELP)
+            yield both
 
 
 def screen(

@@ -6,6 +6,7 @@ import os
 import select
 import sys
 import time
+from contextlib import suppress
 from types import TracebackType
 from typing import Any, Protocol, Self
 
@@ -80,7 +81,8 @@ class PosixKeys:
     ) -> None:
         import termios
 
-        termios.tcsetattr(self._fd, termios.TCSAFLUSH, self._before)
+        with suppress(termios.error):  # the terminal is gone
+            termios.tcsetattr(self._fd, termios.TCSAFLUSH, self._before)
 
     def read(self, timeout_s: float) -> str:
         """See Keys."""

@@ -65,6 +65,9 @@ replace_arm = click.option(
     is_flag=True,
     help="Set the board up for this arm if it is set up for another one; then its position is unknown.",
 )
+gamepad = click.option(
+    "--gamepad", is_flag=True, help="Take a gamepad beside the keys (needs the extra 'gamepad')."
+)
 job = click.option(
     "--job",
     "job_path",

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 @click.option(
     "--replace", "replace_old", is_flag=True, help="Replace the posture, or the job file, of that name."
 )
+@options.gamepad
 @options.arm_of_board
 @options.port
 @options.log_traffic
@@ -33,6 +34,7 @@ def command(
     name: str | None,
     by_hand: bool,
     replace_old: bool,
+    gamepad: bool,
     arm_path: Path | None,
     port: str | None,
     log_traffic: Path | None,
@@ -47,6 +49,8 @@ def command(
         raise InputError(
             "teach makes a job or a posture", "give JOB.toml, or --posture NAME without --by-hand"
         )
+    if gamepad and (by_hand or name is not None):
+        raise InputError("--gamepad goes with the keys of teach JOB.toml", "leave it out")
     if name is not None:
         file = _own_arm_file(arm_path, name)
         arm = chosen.load_arm(arm_path)
@@ -62,7 +66,7 @@ def command(
         named = chosen.named_arm(arm_path)
         with chosen.board(port, log_traffic, named) as board:
             jog.prepare(board, chosen.arm_of_board(board, named))
-            _write_job(board, job_file, by_hand)
+            _write_job(board, job_file, by_hand, gamepad)
 
 
 def _own_arm_file(arm_path: Path | None, name: str) -> Path:
@@ -97,7 +101,7 @@ def _write_posture(board: Board, file: Path, name: str, replace_old: bool) -> No
     click.echo(f"{file}: posture {name!r}: {words}")
 
 
-def _write_job(board: Board, file: Path, by_hand: bool) -> None:
+def _write_job(board: Board, file: Path, by_hand: bool, gamepad: bool) -> None:
     """Collect the points and write them; where that fails they are told."""
     from armtempo.cli.teach_points import TaughtPoints
 
@@ -105,7 +109,7 @@ def _write_job(board: Board, file: Path, by_hand: bool) -> None:
     assert arm is not None  # it was configured
     points = TaughtPoints(arm, board.posture_deg)
     try:
-        with keys.of_terminal() as pressed:
+        with jog.pressed_keys(board, gamepad) as pressed:
             if by_hand:
                 _guide(board, pressed, points)
             else:

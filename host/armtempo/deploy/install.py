@@ -92,8 +92,8 @@ def end_program(port: str, tell: Tell) -> None:
         raise InputError(
             "a virtual board of --port sim needs no deployment",
             (
-                "for one that does: 'armtempo virtual-board --deployed --flash FOLDER', then --port with what "
-                "that prints"
+                "for one that does, where MicroPython is installed ('micropython'): 'armtempo virtual-board "
+                "--deployed --flash FOLDER', then --port with what that prints"
             ),
         )
     with ExitStack() as stack:

@@ -40,8 +40,9 @@ _TOGETHER = {
     f"{PACKAGES[0]}.app.output_commands": [
         f"{PACKAGES[0]}.hardware.{name}" for name in ("outputs", "digital_inputs")
     ],
+    f"{PACKAGES[0]}.app.sequencer": [f"{PACKAGES[0]}.app.sequence_command"],
     f"{PACKAGES[0]}.app.sequence_start": [f"{PACKAGES[1]}.sequence_check"],
-    f"{PACKAGES[0]}.app.room": [f"{PACKAGES[1]}.engine_memory"],
+    f"{PACKAGES[0]}.app.room": [f"{PACKAGES[1]}.engine_memory", f"{PACKAGES[0]}.hardware.backup_sram"],
     f"{PACKAGES[0]}.app.command_rows": [f"{PACKAGES[0]}.app.store_commands"],
     f"{PACKAGES[1]}.table": [f"{PACKAGES[1]}.program_hash"],
     f"{PACKAGES[0]}.hardware.registers": [f"{PACKAGES[0]}.hardware.pins"],
@@ -67,6 +68,9 @@ _AT_REST = {
         "hardware.ring.Ring.__init__",
         "hardware.ring.Ring._describe",
         "hardware.sampler.Sampler.configure",
+        "memory.Memory.release",
+        "memory.Memory.take",
+        "memory.Memory.take_for_processor",
         "motion.engine_parts.EngineParts.__init__",
         "motion.following_error.FollowingError.__init__",
         "motion.joint_drive.JointDrive.__init__",

@@ -85,4 +85,6 @@ def _room(state: BoardState) -> Item:
     text = f"{state.free_heap} bytes of heap, {state.free_flash} of flash"
     if state.free_heap >= _LEAST_HEAP:
         return Item("free", text)
-    return Item("free", text, Condition.NOTE, "a firmware that has the program: board/docs/firmware.md")
+    return Item(
+        "free", text, Condition.NOTE, "a firmware that has the program: see 'armtempo firmware --help'"
+    )

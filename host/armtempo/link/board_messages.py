@@ -31,7 +31,7 @@ class Hello:
     program_crc: int
     boot: int
     engine_room: int
-    """Bytes of memory that the engine for an arm can have (``armtempo_shared.engine_memory``)."""
+    """Bytes of heap that the engine for an arm can have (``armtempo_shared.engine_memory``)."""
     engine_joints: int
     """Joints that an engine can have."""
     arm_problem: int

@@ -43,6 +43,9 @@ def of_path(angle_points_deg: Array, degree: int, limits: Sequence[Limits], abou
     along the path keeps the limits of all in less.
     """
     found = []
+    angle_points_deg = (
+        angle_points_deg - angle_points_deg[0]
+    )  # exact where the way is short: then it counts most
     for joint, limit in enumerate(limits):
         reached = turns(angle_points_deg[:, joint], degree)
         found.append(Floor(_ROUNDED * rest_to_rest.floor_s(reached, limit, from_rest=degree == 5), "rests"))

@@ -13,6 +13,8 @@ import numpy as np
 from armtempo.arrays import Array
 from armtempo.model.arm import Limits
 
+_ROUNDING = 8 * float(np.finfo(float).eps)
+"""A way may be shorter by this part of the largest angle: what is at an angle is there as far as its digits go."""
 _LEAST_SHARE = 0.05
 """A way on which the joints hardly move counts as one that takes this part of the mean."""
 
@@ -24,7 +26,7 @@ def floor_s(angles_deg: Array, limits: Limits, from_rest: bool = True, to_rest: 
     at the others it is free, since a joint may turn under full acceleration.
     """
     to_rest = from_rest if to_rest is None else to_rest
-    distances = np.abs(np.diff(angles_deg))
+    distances = np.maximum(np.abs(np.diff(angles_deg)) - _ROUNDING * float(np.max(np.abs(angles_deg))), 0.0)
     last = len(distances) - 1
     return sum(
         _stretch_s(float(distance), limits, from_rest and number == 0, to_rest and number == last)

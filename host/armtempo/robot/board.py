@@ -14,14 +14,13 @@ from armtempo_shared.messages import RESUME
 from armtempo_shared.sequence import KIND_BYTES, MAGIC
 
 from armtempo.arrays import Array
-from armtempo.errors import InputError, LinkError
+from armtempo.errors import InputError
 from armtempo.link import Client
 from armtempo.link.board_messages import Hello, SequenceState, Status, StoredMotion
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequencePlan
 from armtempo.planning.jog import SPEED, move_of
-from armtempo.ports.names import is_sim
 from armtempo.progress import Progress
 from armtempo.records import encoded_motion, encoded_sequence
 from armtempo.records.encoded_motion import EncodedMotion, MotionKey
@@ -44,6 +43,7 @@ from armtempo.robot.recording import Watcher
 from armtempo.robot.run import Run
 from armtempo.robot.sequence_run import SequenceWatcher
 from armtempo.robot.speed import change_speed, permille
+from armtempo.robot.start_position import StartPosition
 from armtempo.robot.stop_request import StopRequest, stoppable
 from armtempo.robot.where import Where, posture_deg
 from armtempo.runs.sequence_reader import SequenceRun
@@ -66,7 +66,7 @@ class Board:
         self.stops: list[StopRequest] = []
         """The stop requests of what this object has under way."""
         self._stack = stack or ExitStack()
-        self._moved = False
+        self._start = StartPosition(client, port)
         self._last_folder: Path | None = None
         self._last_sequence: Path | None = None
 
@@ -189,7 +189,7 @@ class Board:
         """
         self.configure(arm)
         with self._stoppable(stop) as wanted:
-            self._moved = True
+            self._start.moved = True
             homing.home_to_switches(self.client, arm, wanted)
 
     def posture_deg(self) -> Array:
@@ -216,7 +216,7 @@ class Board:
         arm = self._known_arm()
         target_deg = posture_deg(where, arm)
         with self._stoppable(stop) as wanted:
-            self._home_virtual_arm(arm)
+            self._start.home_virtual_arm(arm)
             goto.go_to(self.client, arm, target_deg, wanted, progress)
 
     def jog(
@@ -239,7 +239,7 @@ class Board:
         arm = self._known_arm()
         move = move_of(arm, joint, axis, by_deg, by_mm)
         with self._stoppable(stop) as wanted:
-            self._home_virtual_arm(arm)
+            self._start.home_virtual_arm(arm)
             jog.step(self.client, arm, move, speed, wanted)
         return self.posture_deg()
 
@@ -260,7 +260,7 @@ class Board:
         by = math.copysign(math.inf, direction)
         along = None if turn or joint is not None else by
         move = move_of(arm, joint, axis, None if along else by, along)
-        self._home_virtual_arm(arm)
+        self._start.home_virtual_arm(arm)
         return HeldJog(self.client, arm, jog.plan(self.client, arm, move, speed))
 
     def by_hand(self) -> HandGuided:
@@ -343,19 +343,16 @@ class Board:
             if found is None or not found.sequence:
                 raise InputError(f"the board has no sequence {sequence!r}", "see 'armtempo list'")
             if self.arm is not None:
-                self._home_virtual_arm(self.arm)
+                self._start.home_virtual_arm(self.arm)
             return MotionKey(found.name, found.crc)
         key = self.upload_sequence(sequence, replace=replace)
-        start_deg = sequence.start_deg
-        if is_sim(self.port):
-            self._home_virtual_arm(sequence.arm)
-            if start_deg is not None:
-                goto.go_to(self.client, sequence.arm, np.array(start_deg), stop)
-        elif start_deg is not None and not arm_state.is_at(self.client, sequence.arm, np.array(start_deg)):
-            raise LinkError(
-                f"the arm does not stand where sequence {sequence.name!r} begins",
-                "bring it there with 'armtempo goto' and the sequence's file",
-            )
+        self._start.take(
+            sequence.arm,
+            None if sequence.start_deg is None else np.array(sequence.start_deg),
+            f"sequence {sequence.name!r}",
+            "bring it there with 'armtempo goto' and the sequence's file",
+            stop,
+        )
         return key
 
     @property
@@ -448,17 +445,5 @@ class Board:
     def _bring_to_start(self, motion: EncodedMotion, stop: StopRequest) -> None:
         """Store the motion; bring a virtual arm to its start, and refuse where a real one is elsewhere."""
         stored_motion.store(self.client, motion.name, motion.data)
-        if is_sim(self.port):
-            self._home_virtual_arm(motion.arm)
-            goto.go_to(self.client, motion.arm, motion.start_deg, stop)
-        elif not arm_state.is_at(self.client, motion.arm, motion.start_deg):
-            raise LinkError(
-                f"the arm does not stand where {motion.name!r} begins",
-                "bring it there with 'armtempo goto'",
-            )
-
-    def _home_virtual_arm(self, arm: Arm) -> None:
-        """A virtual arm that has not moved yet stands at home: nobody needs to look."""
-        if is_sim(self.port) and not self._moved:
-            arm_state.home_unknown(self.client, arm)
-        self._moved = True
+        advice = "bring it there with 'armtempo goto'"
+        self._start.take(motion.arm, motion.start_deg, repr(motion.name), advice, stop)

@@ -14,7 +14,10 @@ from armtempo.records import encode
 
 @dataclass(frozen=True)
 class Room:
-    """Memory for engines: ``size`` bytes, and heap for the objects of so many ``joints``."""
+    """Memory for engines: ``size`` bytes of heap, and heap for the objects of so many ``joints``.
+
+    Beside it the board has memory for step generators, the same on every chip (``engine_memory.PROCESSOR_WORDS``).
+    """
 
     size: int
     joints: int
@@ -48,13 +51,13 @@ class Room:
         return 0
 
 
-AS_FILES = Room(7_040, 3)
-IN_FIRMWARE = Room(21_704, 6)
+AS_FILES = Room(5_324, 3)
+IN_FIRMWARE = Room(17_616, 6)
 """The program as compiled files on MicroPython's own firmware for the STM32F4DISC, and built into it.
 
 Measured: ``python -m tests.benchmark.room MICROPYTHON``.
 """
-_BUILD = "'armtempo firmware' (board/docs/firmware.md)"
+_BUILD = "see 'armtempo firmware --help'"
 
 
 def check(arm: Arm, info: Hello) -> None:
@@ -89,7 +92,7 @@ def of_arm(arm: Arm, info: Hello | None = None) -> str:
     if AS_FILES.holds_arm(arm):
         return f"{needs}: fits with the program as files or in the firmware"
     if IN_FIRMWARE.holds_arm(arm):
-        return f"{needs}: fits only with the program in the firmware, {_BUILD}"
+        return f"{needs}: fits only with the program in the firmware ({_BUILD})"
     return f"{needs}: too much for an STM32F407"
 
 
@@ -98,7 +101,7 @@ def of_board(info: Hello) -> list[str]:
     room = Room.of_board(info)
     lines = [f"memory for an arm: {room.words()}"]
     if room.size < IN_FIRMWARE.size:
-        lines.append(f"with the program in the firmware, {_BUILD}: {IN_FIRMWARE.words()}")
+        lines.append(f"with the program in the firmware ({_BUILD}): {IN_FIRMWARE.words()}")
     return lines
 
 
@@ -106,7 +109,7 @@ def _or_firmware(arm: Arm, room: Room) -> str:
     """The firmware as a way out, where it is one."""
     if room.size >= IN_FIRMWARE.size or not IN_FIRMWARE.holds_arm(arm):
         return ""
-    return f", or put the program into the board's firmware, where this arm fits: {_BUILD}"
+    return f", or put the program into the board's firmware, where this arm fits ({_BUILD})"
 
 
 def _beside(arm: Arm) -> int:

@@ -57,7 +57,7 @@ def compact(
     whole = used_whole(trees)
     fold(trees, whole)
     join(trees, {flat[home]: [flat[module] for module in modules] for home, modules in together.items()})
-    merged = merge(trees, flat[main], {flat[entry] for entry in entries})
+    merged = merge(trees, flat[main], {flat[entry] for entry in entries}, keep)
     core = f"{main.split('.', 1)[0]}.{CORE}"
     apart = {
         target: set_up_methods(merged[core], {_in_core(name) for name in names})

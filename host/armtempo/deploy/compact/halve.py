@@ -14,7 +14,7 @@ from armtempo.deploy.compact.scopes import top_names
 _LEAST_FUNCTIONS = 100
 """Of a smaller module the blocks are fewer than what another module takes."""
 
-_FIRST_PERCENT = 24
+_FIRST_PERCENT = 25
 """Of the functions, about so many in the first: so both files of the board program fill their blocks of the flash."""
 
 
@@ -22,8 +22,8 @@ def halve(trees: dict[str, ast.Module], module: str, first: str) -> None:
     """Put the first part of ``module``, by its functions, into the new module ``first`` of its package.
 
     The first mentions nothing of the second. What is mentioned of it anywhere else, ``module`` imports from there.
-    A small module stays whole. Raises ValueError where a function changes a name of the module: the other one would not
-    know of it.
+    A small module stays whole, and one that can be cut nowhere. Raises ValueError where a function changes a name of
+    the module: the other one would not know of it.
     """
     package, name = module.rsplit(".", 1)
     body = trees[module].body
@@ -36,6 +36,8 @@ def halve(trees: dict[str, ast.Module], module: str, first: str) -> None:
     cut = min(cuts, key=lambda at: abs(100 * sum(counts[:at]) - _FIRST_PERCENT * sum(counts)))
     imports = [node for node in body[:cut] if isinstance(node, ast.Import | ast.ImportFrom)]
     early, late = body[len(imports) : cut], body[cut:]
+    if not early or not late:
+        return
     wanted = _names(late).union(*(_asked_of(name, tree) for tree in trees.values()))
     shared = [ast.alias(each) for each in sorted(top_names(ast.Module(early, [])) & wanted)]
     trees[f"{package}.{first}"] = ast.Module([*_used(imports, early), *early], [])

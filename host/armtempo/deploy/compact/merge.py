@@ -18,12 +18,15 @@ from armtempo.deploy.compact.scopes import (
 CORE = "core"
 
 
-def merge(trees: Mapping[str, ast.Module], main: str, entries: Collection[str]) -> dict[str, ast.Module]:
-    """The modules of the smaller program; ``trees`` is used up.
+def merge(
+    trees: Mapping[str, ast.Module], main: str, entries: Collection[str], keep: Collection[str]
+) -> dict[str, ast.Module]:
+    """The modules of the smaller program, without what nothing in it mentions; ``trees`` is used up.
 
     What ``main`` imports at the head of a module, directly or through others, becomes the module ``core`` of
     its package, each name behind that of its module. Packages, ``entries``, modules that a function imports and
-    modules of which more than names is used stay as they are. Raises ValueError where a name has no meaning.
+    modules of which more than names is used stay as they are. ``keep``: names that are used from outside or found at
+    run time. Raises ValueError where a name has no meaning.
     """
     apart = {*entries, *packages(trees), *_imported_later(trees), *used_whole(trees)}
     inside = {module: top_names(trees[module]) for module in _in_order(trees, main) if module not in apart}
@@ -31,16 +34,18 @@ def merge(trees: Mapping[str, ast.Module], main: str, entries: Collection[str]) 
     done = {module: _Merger(module, tree, inside, core).run() for module, tree in trees.items()}
     merged = {module: ast.Module(body, []) for module, body in done.items() if module not in inside}
     merged[core] = ast.Module(_once([node for module in inside for node in done[module]]), [])
-    merged[core].body = _used_ones(merged, core)
+    whole = {*entries, *packages(trees), *used_whole(trees)}
+    for module in [core, *(module for module in merged if module not in whole)]:
+        merged[module].body = _used_ones(merged, module, set(keep))
     for module in set(merged) - packages(trees):
         merged[module] = _without_unused(merged[module])
     return merged
 
 
-def _used_ones(merged: Mapping[str, ast.Module], core: str) -> list[ast.stmt]:
-    """The statements of ``core`` without those that define what nothing else mentions that stays itself."""
-    outside = set[str]().union(*(_mentioned(tree) for module, tree in merged.items() if module != core))
-    kept = [(node, _makes_only(node), _mentioned(node)) for node in merged[core].body]
+def _used_ones(merged: Mapping[str, ast.Module], one: str, keep: set[str]) -> list[ast.stmt]:
+    """The statements of a module without those that define what nothing else mentions that stays itself."""
+    outside = keep.union(*(_mentioned(tree) for module, tree in merged.items() if module != one))
+    kept = [(node, _makes_only(node), _mentioned(node)) for node in merged[one].body]
     while True:
         used = outside.union(*(mentioned for _, _, mentioned in kept))
         fewer = [each for each in kept if not each[1] or each[1] & used]
@@ -50,10 +55,13 @@ def _used_ones(merged: Mapping[str, ast.Module], core: str) -> list[ast.stmt]:
 
 
 def _mentioned(tree: ast.AST) -> set[str]:
-    """Names that are read, and those of attributes."""
+    """Names that are read or imported from the program, and those of attributes but of ``struct``."""
     nodes = list(ast.walk(tree))
     used = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
-    return used | {node.attr for node in nodes if isinstance(node, ast.Attribute)}
+    used |= {alias.name for node in nodes if isinstance(node, ast.ImportFrom) for alias in node.names}
+    return used | {
+        node.attr for node in nodes if isinstance(node, ast.Attribute) and ast.unparse(node.value) != "struct"
+    }
 
 
 def _makes_only(node: ast.stmt) -> set[str]:

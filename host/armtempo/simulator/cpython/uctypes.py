@@ -1,9 +1,13 @@
-"""Stands in for MicroPython's ``uctypes`` under CPython: addresses of buffers, and buffers at addresses."""
+"""Stands in for MicroPython's ``uctypes`` under CPython: addresses of buffers, buffers and words at addresses."""
 
 from __future__ import annotations
 
 import ctypes
 from typing import Any
+
+ARRAY = -1 << 30
+INT32 = 5 << 26
+_COUNT = (1 << 26) - 1
 
 
 def addressof(buffer: Any) -> int:
@@ -15,3 +19,11 @@ def addressof(buffer: Any) -> int:
 def bytearray_at(address: int, size: int) -> memoryview:
     """The memory at an address."""
     return memoryview((ctypes.c_ubyte * size).from_address(address)).cast("B")
+
+
+def struct(address: int, descriptor: tuple[int, int]) -> memoryview:
+    """Of all that it can be elsewhere: so many signed words at an address, ``(ARRAY, count | INT32)``."""
+    kind, items = descriptor
+    assert kind == ARRAY
+    assert items & ~_COUNT == INT32
+    return bytearray_at(address, 4 * (items & _COUNT)).cast("i")

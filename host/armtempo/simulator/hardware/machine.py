@@ -19,14 +19,15 @@ class _Memory:
     def __getitem__(self, where):
         machine_state.board.call()
         shift = 8 * (where & 3)
-        value = memory.words[memory.word_at(where)] >> shift & self._mask
+        words, at = memory.place(where)
+        value = words[at] >> shift & self._mask
         return value - (1 << 32) if value >> 31 else value
 
     def __setitem__(self, where, value):
-        at = memory.word_at(where)
+        words, at = memory.place(where)
         shift = 8 * (where & 3)
-        kept = memory.words[at] & ~(self._mask << shift)
-        memory.words[at] = (kept | (value & self._mask) << shift) & memory.MASK
+        kept = words[at] & ~(self._mask << shift)
+        words[at] = (kept | (value & self._mask) << shift) & memory.MASK
         machine_state.board.wrote()
 
 

@@ -7,6 +7,7 @@ from virtual_board.chip import memory as _memory
 
 for _name in _memory.BLOCKS:
     globals()[_name] = _memory.address(_name)
+BKPSRAM = _memory.backup_base  # as NVIC_IPR not in MicroPython's table
 
 _OFFSETS = {
     "TIM_": "CR1 CR2 SMCR DIER SR EGR CCMR1 CCMR2 CCER CNT PSC ARR RCR CCR1 CCR2 CCR3 CCR4 BDTR DCR DMAR OR",

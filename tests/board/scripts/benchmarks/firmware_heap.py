@@ -12,11 +12,14 @@ from binascii import hexlify
 
 import machine
 import pyb
+import stm
 from micropython import mem_info
 
 FRAMES = "/flash/frames"
 TURNS = 20
 """Turns of the program's loop between two frames, and at the end."""
+BACKUP_SRAM = 0x2002F000
+"""Memory of the emulator's that the chip has not, in the place of the backup SRAM that the emulator has not."""
 STARTS_US = 50
 """What the engine waits for after it has let the counters run."""
 _STAGE = 0x8000  # in the place of a frame's length, with the length of a stage's name, which follows
@@ -102,6 +105,7 @@ def nothing(*arguments):
 def replace():
     """Put the port, and what the emulator has not, into place."""
     sys.modules["pyb"] = Beyond(pyb, USB_VCP=Port)
+    sys.modules["stm"] = Beyond(stm, BKPSRAM=BACKUP_SRAM)
     sys.modules["time"] = Beyond(time, sleep_us=wait)
     sys.modules["os"] = Beyond(os, dupterm=nothing, urandom=bytes)
     sys.modules["machine"] = Beyond(machine, unique_id=lambda: b"123456789012")

@@ -14,8 +14,8 @@ import vfs
 from micropython import const, mem_info
 
 ROOT = "/ram/armtempo"
-_BEYOND = const(0x20020000)  # 64 KB of the emulator's that the chip has not
-_BLOCKS = const(128)
+_BEYOND = const(0x20020000)  # 60 KB of the emulator's that the chip has not
+_BLOCKS = const(120)
 _BLOCK = const(512)
 _UART = const(3)
 _LONG_MS = const(10)  # no turn of the loop while something moves takes as long

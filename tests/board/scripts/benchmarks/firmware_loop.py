@@ -26,6 +26,7 @@ _PSC = const(0x28)
 _EVERY_MS = const(50)  # a command that often while something moves
 _BEFORE, _BEHIND = const(20), const(40)  # turns between two commands, and at the end
 _LOGGED = const(100)
+_BACKUP_SRAM = const(0x2002F000)  # memory of the emulator's that the chip has not, for what it has not
 
 dma = array("I", bytes(4 * 64))
 unmoved = array("I", bytes(4 * 24))  # the encoders' timers
@@ -335,7 +336,9 @@ def replace(settings, port=Port):
     sys.modules["pyb"] = Beyond(pyb, USB_VCP=port, Timer=Timer)
     sys.modules["os"] = Beyond(os, dupterm=nothing, urandom=bytes)
     sys.modules["machine"] = Beyond(machine, unique_id=lambda: b"123456789012")
-    sys.modules["stm"] = Chip(DMA1=uctypes.addressof(dma), TIM1=still, TIM3=still, TIM4=still, TIM8=still)
+    sys.modules["stm"] = Chip(
+        BKPSRAM=_BACKUP_SRAM, DMA1=uctypes.addressof(dma), TIM1=still, TIM3=still, TIM4=still, TIM8=still
+    )
     sys.modules["time"] = Beyond(time, sleep_us=start_clock)
 
 
@@ -343,5 +346,8 @@ def hook():
     """Take the place of two of the program's functions; the settings say where they and the engine are."""
     here["engine"] = sys.modules[here["engine"]]
     for (module, name), function in ((here["matches"], matches), (here["set_interval"], enter)):
-        programs.append(getattr(sys.modules[module], name))
-        setattr(sys.modules[module], name, function)
+        own = getattr(sys.modules[module], name)
+        programs.append(own)
+        for place in (sys.modules[module], here["engine"]):  # the engine's may have imported it from there
+            if getattr(place, name, None) is own:
+                setattr(place, name, function)

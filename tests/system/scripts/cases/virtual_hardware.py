@@ -17,7 +17,6 @@ from virtual_board.chip.reset import Reset
 from virtual_board.firmware.external_interrupts import set_level
 
 # isort: split
-import os
 import struct
 import time
 from array import array
@@ -320,85 +319,6 @@ def case_usb_buffers():
     assert port.write(b"x") is None
 
 
-def case_flash_is_as_big_as_the_chips():
-    os.mkdir("data")
-    free = os.statvfs("/flash")[3]
-    assert 180 < free <= 190
-    with open("/flash/data/big", "wb") as file:
-        try:
-            for _ in range(400):
-                file.write(bytes(512))
-            raise AssertionError("flash has no end")
-        except OSError as error:
-            assert error.args[0] == 28
-    assert os.statvfs("/flash")[3] == 0
-    os.remove("data/big")
-    assert os.statvfs("/flash")[3] == free
-    assert os.listdir("/flash") == ["data"] and os.listdir("/") == ["flash"]
-    assert [entry[0] for entry in os.ilistdir()] == ["data"]
-    os.rmdir("data")
-    try:
-        os.stat("/elsewhere")
-        raise AssertionError("outside the flash")
-    except OSError as error:
-        assert error.args[0] == 2
-
-
-def write_aside(name, data, synced=True):
-    """Write a file and rename it into its place."""
-    with open(name + ".new", "wb") as file:
-        file.write(data)
-    if synced:
-        os.sync()
-    os.rename(name + ".new", name)
-
-
-def case_power_cuts():
-    operations = 5  # open, write, close, removal of the old one, rename
-    states = []
-    for cut in range(1, operations + 2):
-        standalone.start(flash=SCRATCH)
-        for name in list(os.listdir()):
-            if name.startswith("file"):
-                os.remove(name)
-        write_aside("file", b"old")
-        standalone.start(flash=SCRATCH, power_cut_at=cut)
-        try:
-            write_aside("file", b"newer")
-            whole = True
-        except Reset as reset:
-            assert reset.cause == machine.PWRON_RESET
-            whole = False
-        assert whole == (cut > operations)
-        state = {}
-        for name in os.listdir():
-            if name.startswith("file"):
-                with open(name, "rb") as file:
-                    state[name] = file.read()
-        states.append(sorted(state.items()))
-    aside = [("file", b"old"), ("file.new", b"")]
-    wanted = [[("file", b"old")], aside, aside, [("file", b"old"), ("file.new", b"newer")],
-              [("file.new", b"newer")], [("file", b"newer")]]  # fmt: skip
-    assert states == wanted, states
-
-
-def case_what_is_not_synced_is_lost_with_the_power():
-    """Whatever its name is by then; what was synced lasts, and so does what others had before."""
-    for synced in (True, False):
-        standalone.start(flash=SCRATCH)
-        write_aside("file", b"old")
-        standalone.start(flash=SCRATCH, power_cut_at=6)
-        write_aside("file", b"newer", synced)
-        try:
-            os.mkdir("folder")  # here the power fails
-            raise AssertionError("no power cut")
-        except Reset:
-            pass
-        with open("file", "rb") as file:
-            assert file.read() == (b"newer" if synced else b""), synced
-        os.remove("file")
-
-
 def case_watchdog_bites():
     pace.Pace._elapsed_us = lambda self: 0  # no real time comes in
     board = standalone.start()
@@ -440,6 +360,36 @@ def case_registers_by_the_chips_addresses():
         raise AssertionError("no such register")
     except ValueError:
         pass
+
+
+def case_backup_sram_needs_its_clock_and_write_access():
+    """RM0090 5.1.2: a clock for the power interface, DBP, a clock of its own."""
+    rcc, power, memory = stm.RCC, stm.PWR, stm.BKPSRAM
+    last = memory + 4092
+    mem32[last] = 5
+    assert mem32[last] == 0, "without a clock it reads as 0"
+    mem32[rcc + stm.RCC_AHB1ENR] |= 1 << 18
+    before = mem32[last]
+    mem32[last] = before ^ 5
+    assert before and mem32[last] == before, "without write access it keeps what it had"
+    mem32[power + stm.PWR_CR] |= 1 << 8
+    mem32[last] = before ^ 5
+    assert mem32[last] == before, "without a clock the power interface takes nothing"
+    mem32[rcc + stm.RCC_APB1ENR] |= 1 << 28
+    mem32[power + stm.PWR_CR] |= 1 << 8
+    mem32[last] = -5
+    put(memory, 0, 7)
+    assert mem32[last] == mem32[0x40024000 + 4092] == -5 and mem32[memory] == 7
+    mem32[rcc + stm.RCC_AHB1ENR] &= ~(1 << 18)
+    assert mem32[last] == 0
+    mem32[rcc + stm.RCC_AHB1ENR] |= 1 << 18
+    assert mem32[last] == -5 and mem32[memory] == 7, "its content waits for the clock"
+    mem32[power + stm.PWR_CR] &= ~(1 << 8)
+    put(memory, 0, 8)
+    time.sleep_us(1)
+    assert mem32[memory] == 7
+    words = uctypes.struct(last, (uctypes.ARRAY, 1 | uctypes.INT32))
+    assert words[0] == -5 and uctypes.addressof(words) == last
 
 
 for name in cases.wanted(globals()):

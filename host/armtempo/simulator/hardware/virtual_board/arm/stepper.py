@@ -15,7 +15,7 @@ swings fast; each step sees the mean of what was commanded in it, so a pulse cou
 
 from math import asin, ceil, cos, pi, sin, sqrt
 
-from virtual_board.arm.motors import IdealMotor
+from virtual_board.arm.ideal_motor import IdealMotor
 from virtual_board.arm.noise import Noise
 
 _DT_TICKS = 84_000

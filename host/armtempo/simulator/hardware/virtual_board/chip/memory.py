@@ -25,22 +25,27 @@ BLOCK_WORDS = 64
 BLOCK_BYTES = 4 * BLOCK_WORDS
 SIZE = BLOCK_BYTES * len(BLOCKS)
 MASK = 0xFFFFFFFF
+BACKUP_WORDS = 1024
+_BACKUP_ON_CHIP = 0x40024000
 
 
-def _memory():
+def _memory(size):
     """(bytearray, the same memory as 32-bit words)."""
     if sys.implementation.name == "micropython":
         from array import array
 
-        cells = array("I", [0] * (SIZE // 4))
-        return uctypes.bytearray_at(uctypes.addressof(cells), SIZE), cells
-    raw = bytearray(SIZE)
+        cells = array("I", [0] * (size // 4))
+        return uctypes.bytearray_at(uctypes.addressof(cells), size), cells
+    raw = bytearray(size)
     return raw, memoryview(raw).cast("I")
 
 
-raw, words = _memory()
-raw_seen, seen = _memory()
+raw, words = _memory(SIZE)
+raw_seen, seen = _memory(SIZE)
 base = uctypes.addressof(words)
+raw_backup, backup = _memory(4 * BACKUP_WORDS)
+"""The backup SRAM: no register, so it is not looked at when the program writes."""
+backup_base = uctypes.addressof(backup)
 
 objects = {}
 """Buffers whose address the program has asked for, by the low 32 bits of it: what a DMA stream can reach."""
@@ -57,7 +62,7 @@ def address(name):
 
 
 def word_at(where):
-    """Word index behind an address; ValueError where the virtual board has no register."""
+    """Word index of the register behind an address; ValueError where the virtual board has no register."""
     offset = where - base
     if 0 <= offset < SIZE:
         return offset >> 2
@@ -65,6 +70,14 @@ def word_at(where):
         if 0 <= where - start < BLOCK_BYTES:
             return block * BLOCK_WORDS + (where - start >> 2)
     raise ValueError("the virtual board has no register at 0x%x" % where)
+
+
+def place(where):
+    """(words, index) of the register or the memory behind an address; ValueError as above."""
+    for begin in (backup_base, _BACKUP_ON_CHIP):
+        if 0 <= where - begin < 4 * BACKUP_WORDS:
+            return backup, where - begin >> 2
+    return words, word_at(where)
 
 
 def word_at_low(where):

@@ -7,7 +7,7 @@ on the way, each a little late, as on the chip.
 
 import sys
 
-from virtual_board.chip import dma, gpio, memory, timer_registers, timers
+from virtual_board.chip import backup_sram, dma, gpio, memory, timer_registers, timers
 
 TICKS_PER_MS = 84_000
 TICKS_PER_US = 84
@@ -38,6 +38,7 @@ class Chip:
         self.dma_preload = dma_preload
         self.dma = dma.Controller()
         self.pins = gpio.Pins()
+        self.backup = backup_sram.BackupSram()
         self.timers = {}
         for number, bits, rate in ((2, 32, 1), (5, 32, 1), (1, 16, 2), (8, 16, 2), (3, 16, 1), (4, 16, 1),
                                    (6, 16, 1), (7, 16, 1), (9, 16, 2), (10, 16, 2), (11, 16, 2),
@@ -75,12 +76,16 @@ class Chip:
     def sync(self, everything=False):
         """Look at the registers that the program has written since the last look."""
         blocks = range(len(memory.BLOCKS)) if everything else memory.changed_blocks()
+        if not self.backup.is_open:
+            self.backup.undo()
         if not blocks:
             return
         names = [memory.BLOCKS[block] for block in blocks]
         if "RCC" in names:
             names = memory.BLOCKS
         self._sync_pins(names)
+        if "PWR" in names:
+            self.backup.sync()
         if "DMA1" in names or "RCC" in names:
             rcc = memory.words[memory.index("RCC") + 12]
             self.dma.sync((rcc >> 21) & 1)

@@ -1,0 +1,120 @@
+"""The memory for engines: what it hands out, and whether that is what host and board count with."""
+
+import random
+import sys
+
+import cases
+from virtual_board import standalone
+
+# isort: split
+import stm
+import uctypes
+from armtempo_board.app import room
+from armtempo_board.hardware import backup_sram, registers
+from armtempo_board.memory import Memory
+from armtempo_board.motion.workspace import Workspace
+from armtempo_board.stepgen.step_generator import StepGenerator
+from armtempo_shared import engine_memory
+from machine import mem32
+
+SEED = 5
+LARGE = 3 * 1026
+
+
+def begin_of(part):
+    """Its place in the backup SRAM, in words; -1 where it is not there."""
+    word = (uctypes.addressof(part) - stm.BKPSRAM) // 4
+    return word if 0 <= word < engine_memory.PROCESSOR_WORDS else -1
+
+
+def parts_of(generator):
+    """All words of a step generator."""
+    now = generator.subintervals
+    windows = [points.words for points in (now._angle_points, now._time_points)]
+    own = [generator._solver, generator._law_words, generator.queue]
+    return [now.angle, now.time] + windows + [now.angle_measures, now.time_measures] + own
+
+
+def case_the_backup_sram_is_found():
+    standalone.start()
+    assert backup_sram.find() == stm.BKPSRAM
+    assert Workspace(LARGE, 6, stm.BKPSRAM).memory.take_for_processor(engine_memory.PROCESSOR_WORDS)
+
+
+def case_a_memory_that_keeps_nothing_is_not_used():
+    """Without any of its three bits nothing is kept; then the words come from the heap."""
+    rows = registers.BACKUP_SRAM
+    for missing in range(len(rows)):
+        standalone.start()
+        registers.BACKUP_SRAM = rows[:missing] + rows[missing + 1 :]
+        assert backup_sram.find() == 0
+    registers.BACKUP_SRAM = rows
+    memory = Workspace(LARGE, 6).memory
+    part = memory.take_for_processor(engine_memory.PROCESSOR_WORDS)
+    assert begin_of(part) == -1
+    assert memory.take(1026) is not None, "it is no part of the blocks"
+
+
+def case_parts_lie_one_behind_the_other_and_are_0():
+    standalone.start()
+    address = backup_sram.find()
+    memory = Memory([100], address, 50)
+    first, second = memory.take_for_processor(20), memory.take_for_processor(30)
+    assert (begin_of(first), begin_of(second)) == (0, 20)
+    assert begin_of(memory.take_for_processor(1)) == -1, "what has no room there comes from the blocks"
+    for word in range(20):
+        assert first[word] == 0
+    first[19], second[0] = -(1 << 31), (1 << 31) - 1
+    assert (first[19], second[0]) == (-(1 << 31), (1 << 31) - 1), "words are signed"
+    assert (mem32[address + 76], mem32[address + 80]) == (first[19], second[0])
+    memory.release()
+    again = memory.take_for_processor(20)
+    assert begin_of(again) == 0 and again[19] == 0
+
+
+def case_an_engine_takes_what_the_formula_counts():
+    """As many words as it says are enough, as far as blocks go; rings never lie where DMA does not reach."""
+    print("seed", SEED)
+    random.seed(SEED)
+    standalone.start()
+    address = backup_sram.find()
+    for _ in range(12):
+        rates = [random.randrange(1, 240_001) for _ in range(random.randrange(1, 7))]
+        words = engine_memory.words(rates)
+        while not engine_memory.fits(rates, words):
+            words += 1
+        workspace = Workspace(words, 6, address)
+        rings = workspace.rings(rates)
+        generators = [StepGenerator(workspace.memory) for _ in rates]
+        assert [begin_of(ring) for ring in rings] == [-1] * len(rings)
+        spans = [(begin_of(part), 4 * words_of(part)) for each in generators for part in parts_of(each)]
+        assert sum([size for _, size in spans]) == 4 * len(rates) * sum(engine_memory.GENERATOR_PARTS)
+        inside = sorted([(begin, begin + size // 4) for begin, size in spans if begin >= 0])
+        for number in range(1, len(inside)):
+            assert inside[number - 1][1] == inside[number][0]
+        assert inside[-1][1] <= engine_memory.PROCESSOR_WORDS
+
+
+def words_of(part):
+    """How many it has."""
+    if sys.implementation.name == "micropython" and isinstance(part, uctypes.struct):
+        return uctypes.sizeof(part) // 4
+    return len(part)
+
+
+def case_without_it_there_is_less_for_arms():
+    """The words that no other memory has come out of the heap that arms have."""
+    before = room._free
+    room._free = lambda: 40_000
+    try:
+        standalone.start()
+        with_it = room.workspace().words
+        backup_sram.find, find = lambda: 0, backup_sram.find
+        without = room.workspace().words
+        backup_sram.find = find
+    finally:
+        room._free = before
+    assert with_it - without == engine_memory.PROCESSOR_WORDS
+
+
+cases.run(globals())
