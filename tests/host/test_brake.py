@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from armtempo.errors import InputError
+from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
-from armtempo.planning import brake_time, planner
+from armtempo.planning import brake_time, planner, point_to_point
 
 from tests.host import problems
 
@@ -42,3 +44,11 @@ def test_braking_keeps_its_limits_and_no_shorter_time_does(name: str) -> None:
     _, shorter = braked_excess(plan, 0.8 * found)
     assert shorter > 1.0
     assert 0.01 < found < 4 * plan.trajectory.duration_s
+
+
+def test_a_motion_beyond_its_limits_has_no_brake_time() -> None:
+    arm = Arm.paper()
+    motion = point_to_point.straight("go", [0.0, -60.0, 40.0], [40.0, -50.0, 50.0], arm)
+    tight = [replace(joint.limits, jerk_deg_s3=joint.limits.jerk_deg_s3 / 2) for joint in arm.driven]
+    with pytest.raises(InputError, match="beyond the arm's acceleration or jerk limits"):
+        brake_time.brake_time_s(motion, tight)

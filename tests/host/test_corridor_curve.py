@@ -8,6 +8,8 @@ from itertools import pairwise
 import pytest
 from armtempo.model.job import Job, Stop
 from armtempo.planning import corridor_curve, planner
+from armtempo.planning.corridor_curve import CorridorTime
+from armtempo.report import corridor_plot
 
 from tests.host import problems
 
@@ -41,3 +43,11 @@ def test_with_a_stop_narrow_corridors_hold_no_motion() -> None:
     assert widths[-1] is None
     assert 0.0 not in widths
     assert 2 <= len(widths) < 9
+
+
+def test_the_curve_names_both_its_ends() -> None:
+    points = [CorridorTime(0.0, 4.0), CorridorTime(1.0, 3.0), CorridorTime(2.0, 2.8), CorridorTime(None, 2.5)]
+    axes = corridor_plot.figure(points, "deg", "bend").axes[0]
+    found = {line.get_label(): list(line.get_ydata()) for line in axes.get_lines()}
+    assert found == {"in a corridor": [3.0, 2.8], "on the spline": [4.0, 4.0], "free": [2.5, 2.5]}
+    assert corridor_plot.csv(points, "deg").splitlines()[1:] == ["0.0,4.0", "1.0,3.0", "2.0,2.8", ",2.5"]

@@ -84,3 +84,14 @@ def test_rings_last_3_ms_where_there_is_memory_and_2_where_there_is_not() -> Non
     for rate in (5_000, 60_000, 240_000):
         entries = engine_memory.ring_words(rate, engine_memory.SHORT_MS) - 1
         assert entries == 1024 or entries / (2 * rate) >= 2e-3
+
+
+def test_the_largest_rings_find_their_places_first() -> None:
+    """Else the small joint's would stand in the only block that has room for the large one's."""
+    assert engine_memory.lasting_ms([5_000, 240_000], 1960) == engine_memory.LONG_MS
+
+
+def test_a_block_holds_a_ring_of_1024_entries_or_two_of_512() -> None:
+    assert engine_memory.blocks(3000) == [1026, 1026, 948]
+    assert engine_memory.ring_words(240_000) == 1024 + 1
+    assert 2 * engine_memory.ring_words(48_000) == 1026

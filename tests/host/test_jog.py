@@ -209,6 +209,14 @@ def test_what_is_no_jog_is_refused(move: JogMove, speed: float, said: str) -> No
         jog.plan("x", PAPER, [0.0, -60.0, 40.0], move, speed)
 
 
+@pytest.mark.parametrize(
+    ("start", "said"), [([0.0, -60.0], "3 angles, not 2"), ([0.0, -60.0, 400.0], "outside of its range")]
+)
+def test_the_tool_moves_from_a_posture_of_the_arm_only(start: list[float], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        jog.plan("x", PAPER, start, JogMove(1.0, axis="x"), 0.25)
+
+
 def test_joints_have_numbers_and_names() -> None:
     named = replace(PAPER, joints=tuple(replace(j, name=f"j{n}") for n, j in enumerate(PAPER.joints, 1)))
     assert (

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 from armtempo.kinematics import chain
-from armtempo.report import arm_figure, drawing, html_page, plots
+from armtempo.report import arm_figure, drawing, html_page, plan_section, plots
 from armtempo.research.bench import result_plot
 from armtempo.research.bench.cases import Case, Trial
 from armtempo.research.bench.result_table import rows
@@ -95,3 +95,9 @@ def test_figures_are_no_larger_than_they_must_be() -> None:
     paths = re.findall(r' d="([^"]*)"', figure("searches"))
     assert paths
     assert not any(re.search(r"\.\d{3}", path) for path in paths)
+
+
+def test_per_joint_timing_has_a_section() -> None:
+    sheet = html_page.Page("feed")
+    plan_section.timing(sheet, shipped_plan())
+    assert "<h2>Per-joint timing</h2>" in sheet.render()

@@ -11,7 +11,7 @@ from armtempo.cli import state
 from armtempo.errors import InputError, LinkError
 from armtempo.formats import toml_table
 from armtempo.link.transport import SerialTransport
-from armtempo.robot import board_state
+from armtempo.robot import board_state, speed
 from armtempo.robot.board import Board
 
 from tests.host.linked import ready
@@ -59,3 +59,14 @@ def test_a_misspelt_key_is_guessed() -> None:
         table.done()
     assert caught.value.problem == "x.toml: lenght: unknown key"
     assert caught.value.hint == "did you mean 'length'? known here: length"
+
+
+def test_a_board_that_takes_nothing_is_not_waited_for_forever() -> None:
+    assert SerialTransport("loop://")._serial.write_timeout == 2.0
+
+
+def test_a_speed_is_1_to_100_percent() -> None:
+    assert [speed.permille(fraction) for fraction in (0.01, 1.0)] == [10, 1000]
+    for fraction in (0.009, 1.001):
+        with pytest.raises(InputError, match="it must be from 1 to 100 %"):
+            speed.permille(fraction)

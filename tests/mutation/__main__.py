@@ -9,17 +9,26 @@ concern the file until the first that fails, and lists what went unnoticed. The 
 from __future__ import annotations
 
 import argparse
+import itertools
+import json
 import os
+import queue
 import random
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 
-from tests.interpreters import AVAILABLE, ROOT
-from tests.mutation import concerned, mutations
+from tests.interpreters import ROOT
+from tests.mutation import concerned, executed, mutations, server
 
 SIMULATOR = "host/armtempo/simulator"
 AREAS = {
@@ -29,6 +38,10 @@ AREAS = {
     "simulator": (SIMULATOR, ""),
 }
 LEFT_OUT = ("research", "data")
+FIRST = 12
+"""Tests that run before the others: most mistakes are noticed by them."""
+LATE_S = 60.0
+"""And twice what the tests took: then a mistake makes them hang."""
 COPIED = (
     "host",
     "board",
@@ -89,27 +102,111 @@ def copy_to(folder: Path) -> None:
             (folder / ".cache" / "micropython" / path.name).symlink_to(path)
 
 
-def noticed(folder: Path, tests: list[str], without: str, seconds: float) -> str:
-    """The first test that fails in the copy, "time-out", or "" where none does."""
-    path = os.pathsep.join(str(folder / name) for name in ("host", "shared", "board"))
-    command = [sys.executable, "-m", "pytest", "-q", "-x", "--no-header", "-p", "no:cacheprovider", *tests]
-    command += ["-k", without]
-    environment = {**os.environ, "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
-    try:
-        done = subprocess.run(
-            command, cwd=folder, env=environment, capture_output=True, text=True, timeout=seconds, check=False
+class Copy:
+    """A copy of the checkout, and a program that runs tests in it."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._times = itertools.count(
+            2_000_000_000
+        )  # byte code is told by time and size: no two states share a time
+        self._passed: dict[str, bool] = {}
+        copy_to(folder)
+        path = os.pathsep.join(str(folder / name) for name in ("host", "shared", "board"))
+        self._environment = {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"}
+        self._start()
+
+    def _start(self) -> None:
+        self._server = subprocess.Popen(
+            [sys.executable, str(Path(server.__file__))],
+            cwd=self.folder,
+            env=self._environment,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
         )
-    except subprocess.TimeoutExpired:
-        return "time-out"
-    if done.returncode in (0, 5):
-        return ""
-    failed = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
-    return (failed or [done.stdout[-300:] + done.stderr[-300:]])[0][:200]
+        self._lines: queue.SimpleQueue[str] = queue.SimpleQueue()
+        threading.Thread(target=self._read, args=(self._server, self._lines), daemon=True).start()
+
+    @staticmethod
+    def _read(program: subprocess.Popen[str], lines: queue.SimpleQueue[str]) -> None:
+        assert program.stdout is not None
+        for line in program.stdout:
+            lines.put(line)
+
+    def write(self, path: Path, source: bytes) -> None:
+        """A file of the copy."""
+        (self.folder / path).write_bytes(source)
+        time_s = next(self._times)
+        os.utime(self.folder / path, (time_s, time_s))
+
+    def failing(self, tests: list[str], seconds: float) -> str:
+        """The first of the tests that fails, "time-out", or "" where none does."""
+        if not tests:
+            return ""
+        assert self._server.stdin is not None
+        print(json.dumps(tests), file=self._server.stdin, flush=True)
+        end_s = time.monotonic() + seconds
+        found, process = "", 0
+        while True:
+            try:
+                line = self._lines.get(timeout=max(0.0, end_s - time.monotonic()))
+            except queue.Empty:
+                self._kill(process)
+                return "time-out"
+            word, _, rest = line.rstrip("\n").partition(" ")
+            if word == "end":
+                return found
+            if word == "process":
+                process = int(rest)
+            found = found or (rest if word == "failed" else "")
+
+    def _kill(self, process: int) -> None:
+        """The tests under way and the program, and start it anew."""
+        self._server.kill()
+        self._server.wait()
+        with suppress(ProcessLookupError):
+            os.killpg(process or self._server.pid, signal.SIGKILL)
+        self._start()
+
+    def passes_without(self, test: str, seconds: float) -> bool:
+        """Whether a test passes in the copy without a mistake."""
+        if test not in self._passed:
+            self._passed[test] = "::" not in test or not self.failing([test], seconds)
+        return self._passed[test]
+
+    def close(self) -> None:
+        """End the program."""
+        assert self._server.stdin is not None
+        self._server.stdin.close()
+        self._server.wait()
 
 
-def _test_in(result: str) -> str:
-    """The test that a line of pytest's summary is about."""
-    return result.removeprefix("FAILED ").split(" - ")[0]
+@dataclass(frozen=True)
+class Tried:
+    """What became of one mistake: noticed, SURVIVED, LATE where the tests did not end, BROKEN where one fails anyway.
+
+    LATE says that the mistake makes a test hang, or that the machine is busy: to be tried again.
+    """
+
+    word: str
+    test: str
+    took_s: float
+    tests: int
+
+
+def attempt(copy: Copy, path: Path, mutation: mutations.Mutation, tests: list[str], limit_s: float) -> Tried:
+    """Make a mistake in the copy, run the tests, and take it back; the quickest tests by themselves first."""
+    source = (copy.folder / path).read_bytes()
+    begin_s = time.monotonic()
+    copy.write(path, mutation.of(source))
+    test = copy.failing(tests[:FIRST], limit_s) or copy.failing(tests[FIRST:], limit_s)
+    copy.write(path, source)
+    word = "LATE" if test == "time-out" else "noticed" if test else "SURVIVED"
+    if word == "noticed" and not copy.passes_without(test, limit_s):
+        word = "BROKEN"
+    return Tried(word, test, time.monotonic() - begin_s, len(tests))
 
 
 def main() -> None:
@@ -121,31 +218,41 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=30)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--first", type=int, default=0, help="number of the first mistake to try")
-    parser.add_argument("--seconds", type=float, default=600.0, help="for the tests of one mistake")
+    parser.add_argument("--only", type=int, nargs="+", help="numbers of the mistakes to try")
+    parser.add_argument("--seconds", type=float, default=60.0, help="of tests for one mistake")
+    parser.add_argument("--jobs", type=int, default=2, help="mistakes that are tried at the same time")
     options = parser.parse_args()
-    found = late = 0
-    on_board = options.area in ("board", "simulator") and "micropython" in AVAILABLE
-    without = concerned.WITHOUT_CPYTHON if on_board else concerned.WITHOUT
-    wanted = chosen(options.area, options.count, options.seed)
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        copy_to(folder)
-        for number, (path, mutation) in list(enumerate(wanted))[options.first :]:
-            source = (folder / path).read_bytes()
-            (folder / path).write_bytes(mutation.of(source))
-            begin_s = time.monotonic()
-            tests = concerned.tests(path)
-            result = noticed(folder, tests, without, options.seconds) if tests else ""
-            (folder / path).write_bytes(source)
-            word = "noticed " if result else "SURVIVED"
-            if result.startswith("FAILED ") and noticed(folder, [_test_in(result)], without, options.seconds):
-                word = "BROKEN  "  # the test fails without the mistake too: it says nothing
-            found += word == "noticed "
-            late += result == "time-out"
-            took_s = time.monotonic() - begin_s
-            print(f"{number:3} {word} {path}:{mutation.shown(source)} [{took_s:.0f} s] {result}", flush=True)
-    tried = len(wanted) - options.first
-    print(f"{found} of {tried} noticed in {options.area}, seed {options.seed}; {late} by a time-out")
+    known = executed.load()
+    wanted = list(enumerate(chosen(options.area, options.count, options.seed)))[options.first :]
+    if options.only:
+        wanted = [each for each in wanted if each[0] in options.only]
+    found: Counter[str] = Counter()
+    with tempfile.TemporaryDirectory() as name, ThreadPoolExecutor(options.jobs) as pool:
+        copies: queue.SimpleQueue[Copy] = queue.SimpleQueue()
+        for number in range(options.jobs):
+            copies.put(Copy(Path(name) / str(number)))
+
+        def one(path: Path, mutation: mutations.Mutation) -> Tried:
+            copy = copies.get()
+            tests = concerned.tests(path, mutation.line, known, options.seconds)
+            try:
+                return attempt(copy, path, mutation, tests, LATE_S + 2.0 * options.seconds)
+            finally:
+                copies.put(copy)
+
+        running = [
+            (number, path, mutation, pool.submit(one, path, mutation)) for number, (path, mutation) in wanted
+        ]
+        for number, path, mutation, future in running:
+            tried = future.result()
+            shown = mutation.shown((ROOT / path).read_bytes())
+            took = f"[{tried.took_s:.0f} s, {tried.tests} tests]"
+            print(f"{number:3} {tried.word:8} {path}:{shown} {took} {tried.test}", flush=True)
+            found[tried.word] += 1
+        for _ in range(options.jobs):
+            copies.get().close()
+    where = f"{options.area}, seed {options.seed}"
+    print(f"{found['noticed']} of {len(wanted)} noticed in {where}; {found['LATE']} late")
 
 
 if __name__ == "__main__":

@@ -1,18 +1,21 @@
-"""The tests that concern a source file, quickest and nearest first."""
+"""The tests that concern a line: those that execute it, quickest first, then what else may notice a mistake there."""
 
 from __future__ import annotations
 
 import ast
+import re
+from collections.abc import Iterable
 from functools import cache
+from itertools import zip_longest
 from pathlib import Path
 
 from tests.interpreters import ROOT
+from tests.mutation.executed import Executed
 
-WITHOUT = "not micropython-arm and not cut_off and not demo and not examples and not wheel"
-WITHOUT_CPYTHON = f"{WITHOUT} and not cpython"
-"""For code that runs on MicroPython: one interpreter is enough to notice."""
 MOST = 14
 """Test files that are run for a file of the host."""
+UNKNOWN_S = 5.0
+"""What a test file is taken to need that was not traced."""
 BY_FOLDER = {
     "board/armtempo_board/stepgen": [
         "test_check",
@@ -43,24 +46,143 @@ SIMULATED = [
     "tests/system/test_virtual_faults.py",
     "tests/board/test_power_cut.py",
     *WHOLE,
+    *[
+        f"tests/system/test_{name}.py"
+        for name in ("wired_pins", "pulses", "mpremote", "run", "samples", "homing", "postures", "jog")
+    ],
 ]
 
 
-def tests(path: Path) -> list[str]:
-    """Paths of test files, relative to the checkout."""
+def tests(path: Path, line: int, executed: Executed, seconds: float) -> list[str]:
+    """Tests that take so many seconds together, in the order to run them.
+
+    After those that execute the line come those that execute its function, the others of their files, and those that
+    import the module. What runs under MicroPython is not traced: there a case on CPython stands for the same case on
+    MicroPython, and tests of the files that are listed here by folder come in between.
+    """
+    by_file: dict[str, list[str]] = {}
+    for test in _quickest(executed.seconds, executed):
+        by_file.setdefault(test.split("::")[0], []).append(test)
+    exact, near = _spans(path, line)
+    ordered = [*_executing(exact, executed), *_executing(near, executed)]
+    files = [*[test.split("::")[0] for test in ordered], *by_imports(path)]
+    if "cli" in path.parts:  # a command is imported when it is called
+        files += by_command(path.stem.strip("_"))
+    others = _in_turn([by_file.get(file, [file]) for file in dict.fromkeys(files)])
+    if not str(path).startswith("host/") or "simulator" in path.parts:
+        listed = _in_turn([by_file.get(file, [file]) for file in by_folder(path)])
+        ordered = _in_turn([ordered, listed])
+    ordered += others
+    if str(path).startswith("shared/"):  # its own tests take no time
+        ordered = [*(test for file in SHARED for test in by_file.get(file, [file])), *ordered]
+    found: list[str] = []
+    total_s = 0.0
+    if "cpython" not in path.parts:
+        ordered = [_quicker(test, executed) for test in ordered]
+    for test in dict.fromkeys(ordered):
+        test_s = executed.seconds.get(test, UNKNOWN_S)
+        if total_s + test_s <= seconds or not found:
+            total_s += test_s
+            found.append(test)
+    return found
+
+
+def _in_turn(lists: list[list[str]]) -> list[str]:
+    """The first of each, then the second of each, and so on."""
+    return [test for each in zip_longest(*lists) for test in each if test is not None]
+
+
+def _executing(lines: dict[str, set[int]], executed: Executed) -> list[str]:
+    """Tests that execute any of the lines, then the others of a file whose fixtures do; quickest first."""
+    found = [
+        name
+        for name, files in executed.lines.items()
+        if name and any(wanted & files.get(path, set()) for path, wanted in lines.items())
+    ]
+    made = tuple(f"{name}::" for name in found if "::" not in name)
+    shared = [test for test in executed.seconds if made and test.startswith(made)]
+    own = [name for name in found if "::" in name]
+    return list(dict.fromkeys([*_quickest(own, executed), *_quickest(shared, executed)]))
+
+
+def _quickest(names: Iterable[str], executed: Executed) -> list[str]:
+    return sorted(names, key=lambda test: executed.seconds.get(_quicker(test, executed), 0.0))
+
+
+def _quicker(test: str, executed: Executed) -> str:
+    """The same case on MicroPython where there is one: it takes less time, and one interpreter is enough."""
+    twin = re.sub(r"\[cpython\b", "[micropython", test)
+    return twin if twin in executed.seconds else test
+
+
+@cache
+def _spans(path: Path, line: int) -> tuple[dict[str, set[int]], dict[str, set[int]]]:
+    """The lines of the statement, and those of the function around it; of a constant, the lines that name it."""
+    tree = ast.parse((ROOT / path).read_text(encoding="utf-8"))
+    statement, function = _innermost(tree, line)
+    first, last = statement.lineno, statement.end_lineno or statement.lineno
+    body = getattr(statement, "body", None)
+    if body:
+        last = max(first, body[0].lineno - 1)
+    own = {str(path): set(range(first, last + 1))}
+    if function is not None:
+        return own, {str(path): set(range(function.body[0].lineno, (function.end_lineno or 0) + 1))}
+    names = [node for node in ast.walk(statement) if isinstance(node, ast.Name)]
+    targets = [node.id for node in names if isinstance(node.ctx, ast.Store)]
+    return _naming(targets), {str(path): _inside_functions(tree)}
+
+
+def _innermost(tree: ast.Module, line: int) -> tuple[ast.stmt, ast.FunctionDef | None]:
+    statement: ast.stmt = tree.body[0]
+    function = None
+    for node in ast.walk(tree):  # outer ones first
+        if isinstance(node, ast.stmt) and node.lineno <= line <= (node.end_lineno or 0):
+            statement = node
+            if isinstance(node, ast.FunctionDef) and node.body[0].lineno <= line:
+                function = node
+    return statement, function
+
+
+def _naming(names: list[str]) -> dict[str, set[int]]:
+    """Lines of the sources in which one of the names stands."""
+    if not names:
+        return {}
+    word = re.compile(rf"\b({'|'.join(names)})\b")
+    named = {
+        path: {number for number, text in enumerate(lines, 1) if word.search(text)}
+        for path, lines in _sources().items()
+    }
+    return {path: lines for path, lines in named.items() if lines}
+
+
+def _inside_functions(tree: ast.Module) -> set[int]:
+    return {
+        line
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef)
+        for line in range(node.body[0].lineno, (node.end_lineno or 0) + 1)
+    }
+
+
+@cache
+def _sources() -> dict[str, list[str]]:
+    """Lines of every source file, by its path."""
+    return {
+        str(path.relative_to(ROOT)): path.read_text(encoding="utf-8").splitlines()
+        for folder in ("host/armtempo", "shared/armtempo_shared", "board/armtempo_board")
+        for path in sorted((ROOT / folder).rglob("*.py"))
+    }
+
+
+def by_folder(path: Path) -> list[str]:
+    """Test files for code that runs under MicroPython."""
     name = str(path)
     if name.startswith("host/armtempo/simulator"):
         return SIMULATED
-    if name.startswith("host/armtempo/cli/"):  # the command is imported when it is called
-        return list(dict.fromkeys([*by_imports(path), *by_command(path.stem.strip("_"))]))
-    if name.startswith("host/"):
-        return by_imports(path)
     if name.startswith("shared/"):
-        nearest = [test for test in by_imports(path) if test not in SHARED][: MOST - len(SHARED)]
-        return [*SHARED, *nearest, "tests/board/test_check.py", "tests/board/test_app.py"]
-    folder = str(path.parent)
-    found = [f"tests/board/{test}.py" for test in BY_FOLDER[folder]]
-    if folder.split("/")[-1] in ("app", "link", "storage"):
+        return [*SHARED, "tests/board/test_check.py", "tests/board/test_app.py"]
+    found = [f"tests/board/{test}.py" for test in BY_FOLDER[str(path.parent)]]
+    if path.parent.name in ("app", "link", "storage"):
         found += [*IN_PROCESS, "tests/board/test_fuzz.py"]
     return found + WHOLE
 
@@ -88,7 +210,7 @@ def by_imports(path: Path) -> list[str]:
 def by_command(name: str) -> list[str]:
     """Test files in which the command's name stands in quotes."""
     found = sorted(ROOT.glob("tests/host/**/test_*.py")) + sorted(ROOT.glob("tests/system/test_*.py"))
-    word = f'"{name.replace("_", "-")}"'
+    word = f'"{name.replace("_", "-").removesuffix("-screen")}"'
     return [str(path.relative_to(ROOT)) for path in found if word in path.read_text(encoding="utf-8")][:MOST]
 
 

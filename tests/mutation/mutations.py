@@ -139,6 +139,22 @@ def _holds_text(part: ast.AST) -> bool:
     )
 
 
+def _never_runs(node: ast.stmt) -> bool:
+    """What is there for the type checker or the command line alone, and methods that only subclasses have."""
+    match node:
+        case ast.If(test=ast.Name(id="TYPE_CHECKING")):
+            return True
+        case ast.If(test=ast.Compare(left=ast.Name(id="__name__"))):
+            return True
+        case ast.Assign(targets=[ast.Name(id="__all__")]):
+            return True
+        case ast.Raise(
+            exc=ast.Name(id="NotImplementedError") | ast.Call(func=ast.Name(id="NotImplementedError"))
+        ):
+            return True
+    return False
+
+
 def _running(node: ast.AST) -> Iterator[ast.AST]:
     """The nodes that do something: no imports, annotations, decorators, messages, blocks for the type checker."""
     yield node
@@ -146,8 +162,7 @@ def _running(node: ast.AST) -> Iterator[ast.AST]:
         if name in ("annotation", "returns", "decorator_list", "msg", "exc", "type_params"):
             continue
         for child in value if isinstance(value, list) else [value]:
-            is_typing = isinstance(child, ast.If) and isinstance(child.test, ast.Name)
-            if is_typing and child.test.id == "TYPE_CHECKING":
+            if isinstance(child, ast.stmt) and _never_runs(child):
                 continue
             if isinstance(child, ast.AST) and not isinstance(
                 child, ast.Import | ast.ImportFrom | ast.JoinedStr

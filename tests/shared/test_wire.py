@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from armtempo_shared import wire
+from armtempo_shared import table, wire
 
 from tests import interpreters
 
@@ -91,6 +91,12 @@ def test_decode_refuses_what_does_not_fit() -> None:
         wire.decode(wire.COMMAND["status"], b"x")
     with pytest.raises(wire.WireError, match="text"):
         wire.decode(wire.COMMAND["remove"], b"\xff\xfe")
+
+
+def test_a_field_that_there_is_not_has_no_offset() -> None:
+    assert table.offset("C", "hello", "session") == 1
+    with pytest.raises(KeyError):
+        table.offset("C", "hello", "nothing")
 
 
 def test_record_crc_names_a_record() -> None:

@@ -56,6 +56,8 @@ def test_a_full_flash_is_said(bare: VirtualBoard, tmp_path: Path) -> None:
 def test_code_errors_and_platform(bare: VirtualBoard) -> None:
     assert mpremote(bare, "exec", "import sys; print(sys.platform)") == "pyboard\n"
     assert "STM32F407" in mpremote(bare, "exec", "import sys; print(sys.implementation._machine)")
+    code = "f = open('t', 'w'); print(1, 2, file=f); f.close(); print(__name__, open('t').read())"
+    assert mpremote(bare, "exec", code) == "__main__ 1 2\n\n"
     error = mpremote(bare, "exec", "print('before'); 1 / 0", code=1)
     assert error.startswith("before\n")
     assert error.rstrip().endswith("ZeroDivisionError: divide by zero")

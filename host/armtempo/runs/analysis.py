@@ -66,7 +66,7 @@ def curves(repetitions: Sequence[RepetitionData], trajectory: Trajectory) -> Cur
     times: Array = np.arange(count, dtype=np.float64) * SAMPLE_S
     measured = np.any([~np.isnan(one.angle_deg).all(axis=0) for one in repetitions], axis=0)
     paths = [stretched.path_times(one, times) for one in repetitions]
-    path_s = max(paths, key=lambda path: float(path[-1])) if len(paths) > 1 else paths[0]
+    path_s = max(paths, key=lambda path: float(path[-1]))
     each = np.stack(
         [
             of_curves(_on_grid(one, count, measured), SAMPLE_S, one.state == COMPLETE)

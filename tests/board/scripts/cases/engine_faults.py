@@ -309,6 +309,8 @@ def case_start_failed():
     assert rig.engine.fault == codes.START_FAILED
     assert not rig.engine.moving
     assert rig.stepped() == [0, 0, 0] == rig.commanded()
+    rig.board.spend(TICK_HZ)
+    assert rig.stepped() == [0, 0, 0]  # the counter that runs makes no steps
 
 
 def case_refusals():

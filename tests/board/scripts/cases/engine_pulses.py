@@ -1,7 +1,10 @@
 """Pulses on the pins are those that were computed: to the tick, none lost, none added."""
 
+from array import array
+
 import cases
-from armtempo_board.buffers import COMMANDED
+from armtempo_board.buffers import COMMANDED, PATH_HIGH, PATH_LOW, TICKS_HIGH, TICKS_LOW
+from armtempo_board.motion import readings
 from engine_rig import TICK_HZ, Motion, Rig, Steps, arm
 
 
@@ -29,6 +32,15 @@ def check_samples(rig, motion):
                 position += steps.at(place)[1]
                 steps.go_on(place)
             assert sample[COMMANDED + joint] == position, (number, joint, sample, position)
+
+
+def case_a_sample_has_times_beyond_32_bits():
+    """From 51.1 s on."""
+    sample = array("i", [0] * COMMANDED)
+    for ticks in (5, (1 << 31) + 5, (3 << 32) + 5, (3 << 32) + (1 << 31) + 5):
+        readings._put_ticks(sample, ticks)
+        for low, high in ((TICKS_LOW, TICKS_HIGH), (PATH_LOW, PATH_HIGH)):
+            assert (sample[low] & 0xFFFFFFFF) + (sample[high] << 32) == ticks, ticks
 
 
 def case_three_joints():

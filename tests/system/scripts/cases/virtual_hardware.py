@@ -8,6 +8,7 @@ import sys
 import cases
 from virtual_board import (  # replaces time, os, uctypes, micropython; so before everything else
     machine_state,
+    pace,
     standalone,
 )
 from virtual_board.chip.flash import real_open
@@ -237,6 +238,7 @@ def case_encoder_counter_wraps():
     board = standalone.start()
     timer = pyb.Timer(3, prescaler=0, period=0xFFFF)
     timer.channel(1, pyb.Timer.ENC_AB, pin=pyb.Pin("B4"))
+    assert mem32[stm.TIM3 + stm.TIM_CCMR1] == 0x0101  # both channels are inputs (RM0090 18.4.7)
     timer.counter(0)
     board.timers[3].turn(-3)
     assert timer.counter() == 0xFFFD
@@ -248,8 +250,12 @@ def case_encoder_counter_wraps():
 
 def case_pins():
     standalone.start(edge_log=SCRATCH + "/pins")
+    modes = (pyb.Pin.IN, pyb.Pin.OUT_PP, pyb.Pin.OUT_OD, pyb.Pin.AF_PP, pyb.Pin.AF_OD, pyb.Pin.ANALOG)
+    assert modes == (0, 1, 0x11, 2, 0x12, 3)  # as on the chip
+    assert (pyb.Pin.AF1_TIM2, pyb.Pin.AF2_TIM5, pyb.Pin.AF3_TIM8) == (1, 2, 3)
     pin = pyb.Pin("PE7", pyb.Pin.OUT_PP, value=1)
     assert pin.value() == 1 and mem32[stm.GPIOE + stm.GPIO_ODR] == 1 << 7
+    assert mem32[stm.GPIOE + stm.GPIO_IDR] == 1 << 7
     mem32[stm.GPIOE + stm.GPIO_BSRR] = 1 << 8 | 1 << (16 + 7)
     assert pin() == 0 and mem32[stm.GPIOE + stm.GPIO_ODR] == 1 << 8
     pin.high()
@@ -314,8 +320,10 @@ def case_usb_buffers():
 
 
 def case_watchdog_bites():
+    pace.Pace._elapsed_us = lambda self: 0  # no real time comes in
     board = standalone.start()
     watchdog = machine.WDT(timeout=100)
+    assert mem32[0x40003008] == 100 // 8  # IWDG_RLR, in units of 8 ms
     for _ in range(5):
         board.spend(90 * 84_000)
         watchdog.feed()
@@ -344,7 +352,9 @@ def case_registers_by_the_chips_addresses():
     standalone.start()
     mem32[0x40000000 + 0x2C] = -1
     assert mem32[stm.TIM2 + stm.TIM_ARR] == -1
-    assert machine.mem8[stm.TIM2 + stm.TIM_ARR + 3] == 255
+    assert machine.mem8[stm.TIM2 + stm.TIM_ARR] == machine.mem8[stm.TIM2 + stm.TIM_ARR + 3] == 0xFF
+    assert machine.mem16[stm.TIM2 + stm.TIM_ARR] == 0xFFFF
+    assert machine.freq() == (168_000_000, 168_000_000, 42_000_000, 84_000_000)
     try:
         mem32[0x50000000] = 1
         raise AssertionError("no such register")

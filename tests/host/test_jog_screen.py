@@ -1,0 +1,70 @@
+"""What the keys of ``armtempo jog`` choose, without a terminal or a board."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import pytest
+from armtempo.cli.jog_screen import JogChoice, _StopKeys
+
+NAMES = ["waist", "shoulder"]
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ("", "waist, step 1°, 25 %"),
+        ("2", "shoulder, step 1°, 25 %"),
+        ("3", "waist, step 1°, 25 %"),  # there is no third joint
+        ("s", "waist, step 10°, 25 %"),
+        ("ss", "waist, step 0.1°, 25 %"),
+        ("h", "waist, held, 25 %"),
+        ("hs", "waist, step 10°, 25 %"),
+        ("y", "tool along y, step 1 mm, 25 %"),
+        ("Zf", "tool about tool's z, step 1°, 25 %"),
+        ("z1", "waist, step 1°, 25 %"),
+        (">", "waist, step 1°, 50 %"),
+        (">" * 9, "waist, step 1°, 100 %"),
+        ("<" * 9, "waist, step 1°, 1 %"),
+    ],
+)
+def test_keys_choose_what_moves(keys: str, said: str) -> None:
+    choice = JogChoice()
+    for key in keys:
+        assert choice.press(key, len(NAMES)) is (key != "3")
+    assert choice.words(NAMES) == said
+    assert not choice.press("+", len(NAMES))
+
+
+def test_the_axis_has_the_librarys_name() -> None:
+    choice = JogChoice()
+    assert choice.tool_axis is None
+    choice.press("Y", 2)
+    assert choice.tool_axis == "y"
+    choice.press("f", 2)
+    assert choice.tool_axis == "tool-y"
+
+
+class Typed:
+    """Keys that were pressed already; then none."""
+
+    def __init__(self, *keys: str) -> None:
+        self._keys = deque(keys)
+
+    def read(self, _seconds: float) -> str:
+        return self._keys.popleft() if self._keys else ""
+
+
+@pytest.mark.parametrize("key", [" ", "q"])
+def test_space_and_what_ends_the_screen_end_a_step(key: str) -> None:
+    with _StopKeys(Typed("x", key)) as stop:  # type: ignore[arg-type]
+        stop._thread.join(10.0)
+    assert stop.request.wanted
+    assert stop.pressed == key
+
+
+def test_other_keys_end_no_step() -> None:
+    with _StopKeys(Typed("x", "s")) as stop:  # type: ignore[arg-type]
+        pass
+    assert not stop.request.wanted
+    assert not stop._thread.is_alive()
