@@ -21,7 +21,7 @@ Pieces of angle and of time, their control points, their measures; the solver, t
 """
 _BLOCK_WORDS = 1026  # for a ring of 1024 entries, or two of 512
 LARGEST_WORDS = 6 * sum(GENERATOR_PARTS) - PROCESSOR_WORDS + 5 * 513 + 257 + 2
-"""For any arm whose joints' highest step rates sum up to 240 000 steps/s."""
+"""For arms whose joints' highest step rates sum up to 240 000 steps/s, some with rings of SHORT_MS only."""
 
 
 def ring_words(rate: int, lasts_ms: int = LONG_MS) -> int:
