@@ -9,7 +9,7 @@ import pytest
 from tests import interpreters
 
 SCRIPT = Path(__file__).parent / "scripts" / "cases" / "fuzz.py"
-FRAMES = {"cpython": 300_000, "micropython": 50_000, "micropython-arm": 10_000}
+FRAMES = {"cpython": 100_000, "micropython": 50_000, "micropython-arm": 10_000}
 SEED = 20261121
 
 

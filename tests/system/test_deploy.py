@@ -17,7 +17,7 @@ from tests import interpreters
 from tests.system import commandline
 from tests.system.boards import armtempo, small_plan
 
-SOURCES_BLOCKS = 800
+SOURCES_BLOCKS = 1200
 """A flash in which the sources have room; the chip takes compiled files."""
 INTERPRETERS = [name for name in interpreters.AVAILABLE if name != "micropython-arm"]
 

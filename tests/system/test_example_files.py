@@ -33,6 +33,9 @@ def test_example(name: str, tmp_path: Path) -> None:
         code = "\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "code")
         script = tmp_path / "notebook.py"
         script.write_text(f"import matplotlib\nmatplotlib.use('Agg')\n{code}", encoding="utf-8")
+    elif "repeat=3" in (text := script.read_text(encoding="utf-8")):  # takes time and shows nothing new here
+        script = tmp_path / name
+        script.write_text(text.replace("repeat=3", "repeat=1"), encoding="utf-8")
     command = [sys.executable, str(script), *ARGUMENTS.get(name, [])]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -4,8 +4,10 @@ from array import array
 
 import cases
 from armtempo_board.buffers import COMMANDED, PATH_HIGH, PATH_LOW, TICKS_HIGH, TICKS_LOW
+from engine_rig import TICK_HZ, Motion, Rig, Steps, arm  # simulated hardware; before what needs any
+
+# isort: split
 from armtempo_board.motion import readings
-from engine_rig import TICK_HZ, Motion, Rig, Steps, arm
 
 
 def check(rig, motion, first=(0,)):
