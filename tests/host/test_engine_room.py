@@ -64,6 +64,7 @@ def test_a_board_tells_what_the_firmware_would_give() -> None:
     assert len(lines) == 2
     assert "1 x 240000 steps/s, 2 x 120000 steps/s, 3 x 62000 steps/s" in lines[0]
     assert "6 x 40000 steps/s" in lines[1]
+    assert "sequences" in lines[1]
     assert len(engine_room.of_board(board(IN_FIRMWARE))) == 1
 
 

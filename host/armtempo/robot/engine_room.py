@@ -101,7 +101,9 @@ def of_board(info: Hello) -> list[str]:
     room = Room.of_board(info)
     lines = [f"memory for an arm: {room.words()}"]
     if room.size < IN_FIRMWARE.size:
-        lines.append(f"with the program in the firmware ({_BUILD}): {IN_FIRMWARE.words()}")
+        lines.append(
+            f"with the program in the firmware ({_BUILD}): {IN_FIRMWARE.words()}, and room for sequences"
+        )
     return lines
 
 
