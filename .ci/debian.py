@@ -1,11 +1,23 @@
-"""Debian packages without installing them: downloaded through lists of our own, unpacked into a folder."""
+"""Debian packages without installing them: downloaded and unpacked into a folder.
+
+The files that ``debian.lock`` names come first. Where the archive has others by now, they come through package lists
+of our own; a mirror may offer none that is whole for days.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import re
 import shutil
 import subprocess
+import sys
+import time
+import urllib.request
 from pathlib import Path
+
+LOCK = Path(__file__).with_name("debian.lock")
+WAITS_S = (5, 20, 60)
+"""Before each further try: an archive may be out of reach for a moment."""
 
 SUITE = "trixie"
 KEYRING = "/usr/share/keyrings/debian-archive-keyring.gpg"
@@ -37,9 +49,10 @@ def archive_address() -> str:
 
 
 class Archive:
-    """Debian 13 packages of one architecture, seen through lists of our own."""
+    """Debian 13 packages of one architecture."""
 
     def __init__(self, architecture: str, cache: Path) -> None:
+        self._architecture = architecture
         self.folder = cache / f"apt-{architecture}"
         lists = self.folder / "lists"
         for folder in (lists / "partial", self.folder / "cache" / "archives" / "partial"):
@@ -64,19 +77,53 @@ class Archive:
             if key.startswith("Dir::") and not value.startswith("/"):
                 value = str(self.folder / value)
             self.options += ["-o", f"{key}={value}"]
-        self._run("apt-get", *self.options, "-q", "update")
+
+    def unpack(self, packages: list[str], root: Path) -> None:
+        """Download the packages and unpack them below ``root``; Missing where they cannot be had."""
+        for old in self.folder.glob("*.deb"):
+            old.unlink()
+        for wait_s in (*WAITS_S, 0):
+            try:
+                self._download(packages)
+                break
+            except Missing as reason:
+                if not wait_s:
+                    raise
+                print(f"{reason}; again in {wait_s} s", file=sys.stderr)
+                time.sleep(wait_s)
+        root.mkdir(parents=True, exist_ok=True)
+        for package in self.folder.glob("*.deb"):
+            self._run("dpkg", "-x", str(package), str(root))
+
+    def _download(self, packages: list[str]) -> None:
+        try:
+            for package in packages:
+                self._download_locked(package)
+        except Missing as reason:
+            print(f"{reason}: the archive's list is asked", file=sys.stderr)
+            for file in self.folder.glob("*.deb"):
+                file.unlink()
+            self._run("apt-get", *self.options, "-q", "update")
+            self._run("apt-get", *self.options, "-q", "download", *packages)
+
+    def _download_locked(self, package: str) -> None:
+        """The file that the lock names for the package; Missing where the archive has no such file or another."""
+        wanted = re.compile(rf"(\w{{64}}) (pool/\S+/({re.escape(package)}_\S+_{self._architecture}\.deb))")
+        found = [match for match in map(wanted.fullmatch, LOCK.read_text().splitlines()) if match]
+        if not found:
+            raise Missing(f"{LOCK.name} names no {package} for {self._architecture}")
+        sha256, path, name = found[0].groups()
+        try:
+            with urllib.request.urlopen(f"{archive_address().rstrip('/')}/{path}", timeout=60) as answer:
+                data = answer.read()
+        except (OSError, ValueError) as reason:
+            raise Missing(f"{name}: {reason}") from reason
+        if hashlib.sha256(data).hexdigest() != sha256:
+            raise Missing(f"{name} is not the file that {LOCK.name} names")
+        (self.folder / name).write_bytes(data)
 
     def _run(self, *command: str) -> None:
         done = subprocess.run(command, cwd=self.folder, capture_output=True, text=True)
         if done.returncode:
-            tail = (done.stderr or done.stdout).strip().splitlines()[-1:]
-            raise Missing(f"{command[0]} failed: {' '.join(tail)}")
-
-    def unpack(self, packages: list[str], root: Path) -> None:
-        """Download the packages and unpack them below ``root``."""
-        for old in self.folder.glob("*.deb"):
-            old.unlink()
-        self._run("apt-get", *self.options, "-q", "download", *packages)
-        root.mkdir(parents=True, exist_ok=True)
-        for package in self.folder.glob("*.deb"):
-            self._run("dpkg", "-x", str(package), str(root))
+            said = [line for line in done.stderr.splitlines() if line.startswith(("E:", "W:"))]
+            raise Missing(f"{command[0]} failed: {' '.join(said[-2:]) or done.stderr.strip()}")
