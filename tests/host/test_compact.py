@@ -178,6 +178,44 @@ def test_modules_that_belong_together_become_one(run) -> None:  # type: ignore[n
         compact(texts, "made.main", {"made.main"}, {"total"}, {"made.late": ["made.other"]})
 
 
+def test_in_a_class_a_name_is_the_module_s_until_it_is_assigned(run) -> None:  # type: ignore[no-untyped-def]
+    text = """
+        def doubled(length):
+            return 2 * length
+
+        class Square:
+            doubled = staticmethod(doubled)
+            twice = doubled
+
+        def total():
+            return Square().doubled(3) + Square.twice(4)
+    """
+    sources = {"made": "", "made.main": textwrap.dedent(text)}
+    made = compact(sources, "made.main", {"made.main"}, {"total"})
+    assert "doubled" not in made.sources["made.core"]
+    assert run(made.sources, "total()") == run(sources, "total()") == 14
+
+
+def test_a_class_that_would_read_its_own_instead_of_the_module_s_is_refused() -> None:
+    text = """
+        def doubled(length):
+            return 2 * length
+
+        def tripled(length):
+            return 3 * length
+
+        class Square:
+            twice = staticmethod(tripled)
+            aside = staticmethod(doubled)
+
+        def total():
+            return Square().twice(3) + Square.aside(4)
+    """
+    sources = {"made": "", "made.main": textwrap.dedent(text)}
+    with pytest.raises(ValueError, match="doubled has the short name"):
+        compact(sources, "made.main", {"made.main"}, {"total"})
+
+
 def test_methods_that_are_called_at_rest_are_imported_for_the_call(run) -> None:  # type: ignore[no-untyped-def]
     sources = {module: textwrap.dedent(text) for module, text in SOURCES.items()}
     at_rest = {"rarely": ["made.shapes.Square.__init__"]}
@@ -342,6 +380,7 @@ def _read(text: str) -> set[str]:
     return {node.id for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)}
 
 
+@pytest.mark.slow
 def test_the_first_part_mentions_nothing_of_the_second() -> None:
     """It is carried out before: a name of the second would not be there."""
     made = program_files.compact_program().sources

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from armtempo.deploy import changes, package, program_files
+from armtempo.deploy import changes, package, program_files, remote
 from armtempo.deploy.remote import Remote, Survey
 from armtempo.errors import InputError, LinkError, MissingPackageError
 from armtempo.link.program_version import PACKAGES, own_crc, package_folder
@@ -62,6 +62,18 @@ def test_compiled_files_fit_the_smallest_board() -> None:
     assert {path.rsplit(".", 1)[1] for path in library} == {"mpy"}
     assert "too small for the sources" in told[0]
     assert all(data[:2] == b"M\x06" for data in library.values())
+
+
+@pytest.mark.slow
+def test_the_program_fits_again_where_it_is_and_the_flash_is_full() -> None:
+    library = changes.choose(BOARD, True, quiet)
+    on_it = {**library, program_files.STAMP_PATH: program_files.stamp(), **program_files.start_files()}
+    files = {path: (len(data), changes.digest(data)) for path, data in on_it.items()}
+    assert changes.choose(replace(BOARD, files=files, free_blocks=0), True, quiet) == library
+    another = {**files, "/flash/main.py": (600, "")}  # it will be kept aside
+    with pytest.raises(LinkError, match="the board has room for"):
+        changes.choose(replace(BOARD, files=another, free_blocks=0), True, quiet)
+    changes.choose(replace(BOARD, files=another, free_blocks=1), True, quiet)
 
 
 @pytest.mark.slow
@@ -187,3 +199,11 @@ def test_a_board_that_does_not_let_mpremote_in_is_tried_once_more(
         with pytest.raises(LinkError, match=said[-1]):
             Remote("P").run(["exec", "pass"])
     assert calls == tries
+
+
+def test_a_process_that_is_no_longer_wanted_is_ended_and_waited_for() -> None:
+    with remote._process(["help"]) as process:
+        pass
+    assert process.returncode is not None
+    assert process.stdout
+    assert process.stdout.closed

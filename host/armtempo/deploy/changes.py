@@ -18,7 +18,7 @@ LEAST_HEAP = 83_500
 _SOURCES_HEAP = 160_000
 """The same for sources, which the board compiles."""
 _RESERVE_BLOCKS = 8
-"""For folders, the arm's record and a motion."""
+"""For folders, the arm's record and a motion, where the program comes for the first time."""
 
 NO_PINS = (
     "its chip has 64 pins, and none of the ports D and E, on which the program has DIR, ENABLE, E-stop, limit "
@@ -152,10 +152,13 @@ def _needed(found: Survey, library: Mapping[str, bytes]) -> int:
         len(data)
         for data in (*library.values(), *program_files.start_files().values(), program_files.stamp())
     ]
-    return sum(-(-size // found.block_size) for size in sizes) + _RESERVE_BLOCKS
+    reserve = 0 if ours(found) else _RESERVE_BLOCKS
+    return sum(-(-size // found.block_size) for size in sizes) + reserve
 
 
 def _room(found: Survey) -> int:
     """Blocks that are free once our old files are gone."""
+    start_files = {path: digest(data) for path, data in program_files.start_files().items()}
     old = [found.files[path][0] for path in ours(found)]
+    old += [size for path, (size, held) in found.files.items() if start_files.get(path) == held]
     return found.free_blocks + sum(-(-size // found.block_size) for size in old)

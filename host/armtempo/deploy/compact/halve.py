@@ -32,7 +32,9 @@ def halve(trees: dict[str, ast.Module], module: str, first: str) -> None:
     counts = [sum(isinstance(node, ast.FunctionDef) for node in ast.walk(top)) for top in body]
     if sum(counts) < _LEAST_FUNCTIONS:
         return
-    cuts = [at for at in range(len(body)) if not _names(body[:at]) & top_names(ast.Module(body[at:], []))]
+    read = [_names([top]) for top in body]
+    made = [top_names(ast.Module([top], [])) for top in body]
+    cuts = [at for at in range(len(body)) if not set().union(*read[:at]) & set().union(*made[at:])]
     cut = min(cuts, key=lambda at: abs(100 * sum(counts[:at]) - _FIRST_PERCENT * sum(counts)))
     imports = [node for node in body[:cut] if isinstance(node, ast.Import | ast.ImportFrom)]
     early, late = body[len(imports) : cut], body[cut:]

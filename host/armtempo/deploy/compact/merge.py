@@ -35,17 +35,19 @@ def merge(
     merged = {module: ast.Module(body, []) for module, body in done.items() if module not in inside}
     merged[core] = ast.Module(_once([node for module in inside for node in done[module]]), [])
     whole = {*entries, *packages(trees), *used_whole(trees)}
+    mentioned = {module: _mentioned(tree) for module, tree in merged.items()}
     for module in [core, *(module for module in merged if module not in whole)]:
-        merged[module].body = _used_ones(merged, module, set(keep))
+        outside = set(keep).union(*(names for other, names in mentioned.items() if other != module))
+        merged[module].body = _used_ones(merged[module], outside)
+        mentioned[module] = _mentioned(merged[module])
     for module in set(merged) - packages(trees):
         merged[module] = _without_unused(merged[module])
     return merged
 
 
-def _used_ones(merged: Mapping[str, ast.Module], one: str, keep: set[str]) -> list[ast.stmt]:
-    """The statements of a module without those that define what nothing else mentions that stays itself."""
-    outside = keep.union(*(_mentioned(tree) for module, tree in merged.items() if module != one))
-    kept = [(node, _makes_only(node), _mentioned(node)) for node in merged[one].body]
+def _used_ones(tree: ast.Module, outside: set[str]) -> list[ast.stmt]:
+    """The statements of a module without those that define what is not mentioned ``outside`` nor in one that stays."""
+    kept = [(node, _makes_only(node), _mentioned(node)) for node in tree.body]
     while True:
         used = outside.union(*(mentioned for _, _, mentioned in kept))
         fewer = [each for each in kept if not each[1] or each[1] & used]

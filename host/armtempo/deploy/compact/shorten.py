@@ -113,12 +113,35 @@ class _Renamer(Scoped):
         self._top = imported(tree.body, names.own)
         self._inside = imported_inside(tree, names.own)
         self._of_class: set[str] = set()
+        self._assigned: set[str] = set()  # of these, those that have a value where the visit has come to
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
-        """Names of functions' own cost nothing."""
+        """Names of functions' own cost nothing.
+
+        ValueError where a class reads a name of the module whose short one is that of what it has assigned: it would
+        get its own.
+        """
         if not self.hides(node.id):
-            names = self._names.attributes if self.at_top() and node.id in self._of_class else self._own
-            node.id = names.get(node.id, node.id)
+            reads = isinstance(node.ctx, ast.Load)
+            variables = self._assigned if reads else self._of_class
+            own = self.at_top() and node.id in variables
+            names = self._names.attributes if own else self._own
+            short = names.get(node.id, node.id)
+            if reads and not own and self.at_top() and short in self._short_ones():
+                raise ValueError(f"{node.id} has the short name of what its class assigns: read it elsewhere")
+            node.id = short
+        return node
+
+    def _short_ones(self) -> set[str]:
+        return {self._names.attributes.get(name, name) for name in self._assigned}
+
+    def visit_Assign(self, node: ast.Assign) -> ast.AST:
+        """The value comes first: in a class, a name may still be the module's there."""
+        node.value = self.visit(node.value)
+        names = [target.id for target in node.targets if isinstance(target, ast.Name)]
+        node.targets = [self.visit(target) for target in node.targets]
+        if self.at_top():
+            self._assigned.update(self._of_class.intersection(names))
         return node
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
@@ -144,7 +167,7 @@ class _Renamer(Scoped):
         node.name = self._own.get(node.name, node.name)
         self._of_class = class_variables(node)
         self.generic_visit(node)
-        self._of_class = set()
+        self._of_class, self._assigned = set(), set()
         return node
 
     def visit_Global(self, node: ast.Global) -> ast.AST:
