@@ -3,9 +3,12 @@
 import gc
 import sys
 
+OFTEN = 64
+SELDOM = 16  # where memory is not short and time is: a collection takes 5 ms
 _SEQUENCE = "sequence"  # how the names of the modules begin that only sequences need
 _LEAST_HELD = 1_000
 _held: "list[bytearray]" = []
+_keeps = False
 _NOT_ALWAYS = """
     pins registers arm_setup run_start start_check motion_check rate_check override time_law interval_steps
     cubics endpoints arm_check motion_file engine_memory room backup_sram armtempo_shared.motion bezier_weights store
@@ -14,34 +17,32 @@ _NOT_ALWAYS = """
 """Modules; the last two are those of the compact form that hold what is called at rest only."""
 
 
-def collect_often(often: bool = True) -> None:
-    """Whether the heap is collected long before it is full, which keeps large blocks free.
+def keep_code(keeps: bool) -> None:
+    """Whether code stays that has been loaded, as a motion begins sooner then; where memory is not short.
 
-    Not while a motion runs: what MicroPython allocates for a call is freed at its end, but counts.
+    ``forget``, ``tidy`` and ``hold`` do nothing then, and the heap is collected seldom. Not while a motion runs.
+    """
+    global _keeps
+    _keeps = keeps
+    collect_often()
+
+
+def collect_often(parts: int = OFTEN) -> None:
+    """Collect the heap whenever one of so many parts of it was given out, which keeps large blocks free; 0: when full.
+
+    That is for a motion that runs: what MicroPython allocates for a call is freed at its end, but counts.
     Collections would come every few turns of the loop, and take longer than the rings last.
     """
     if hasattr(gc, "threshold"):
-        gc.threshold((gc.mem_free() + gc.mem_alloc()) // 64 if often else -1)
-
-
-def overwrite_stack(calls: int, first: int = 0, second: int = 0, third: int = 0) -> None:
-    """Overwrite what ended calls have left on the stack: the collector takes it for references.
-
-    Frames of two sizes, as each has words that it does not write.
-    """
-    if calls:
-        overwrite_stack(calls - 1, first, second, third)
-        _overwrite(calls)
-
-
-def _overwrite(calls: int) -> None:
-    if calls:
-        _overwrite(calls - 1)
+        parts = min(parts, SELDOM) if _keeps else parts
+        gc.threshold((gc.mem_free() + gc.mem_alloc()) // parts if parts else -1)
 
 
 def hold(*sizes: int) -> None:
     """Keep pieces of the heap free of what stays, for the code that a motion needs; as large as there are, at most."""
     release()
+    if _keeps:
+        return
     for size in sizes:
         while size >= _LEAST_HELD:
             try:
@@ -56,6 +57,13 @@ def release() -> None:
     _held.clear()
 
 
+def tidy() -> None:
+    """Free the modules that only set-up, the start of a motion or a motion needs, and what nothing refers to."""
+    if not _keeps:
+        forget()
+        gc.collect()
+
+
 def forget(*names: str) -> None:
     """Give up the modules of these names, or all that only set-up, the start of a motion or a motion needs.
 
@@ -65,6 +73,8 @@ def forget(*names: str) -> None:
     They are imported inside of functions, never at the head of a module that stays, and never while a motion runs.
     What a motion needs is held by its engine until it ends.
     """
+    if _keeps:
+        return
     given_up = names or _NOT_ALWAYS.split()
     for module in list(sys.modules):
         if module.startswith("armtempo_"):

@@ -6,8 +6,10 @@ because a heap has few large ones. For each joint the engine takes from it a rin
 generators work in lies in ``PROCESSOR_WORDS`` besides, as far as it has room there, and the rest in these blocks too.
 """
 
-LONG_MS, SHORT_MS = 3, 2
-"""So long a full ring lasts: where there is memory for it, and where there is not (board/docs/evaluator.md)."""
+LASTING_MS = (12, 6, 3, 2)
+"""So long a full ring lasts: the first for which there is memory. Long ones are filled less often, which is what the
+interrupt spends most on (board/docs/evaluator.md)."""
+SHORT_MS = LASTING_MS[-1]
 _LEAST_ENTRIES = 64
 _MOST_ENTRIES = 1024
 _SPARE_ENTRIES = 8  # of a ring, that are not overwritten: as in isr.py
@@ -20,11 +22,14 @@ GENERATOR_PARTS = (78, 78, 20, 20, 12, 12, 60, 18, 136)
 Pieces of angle and of time, their control points, their measures; the solver, the law of time, the queue of steps.
 """
 _BLOCK_WORDS = 1026  # for a ring of 1024 entries, or two of 512
-LARGEST_WORDS = 6 * sum(GENERATOR_PARTS) - PROCESSOR_WORDS + 5 * 513 + 257 + 2
-"""For arms whose joints' highest step rates sum up to 240 000 steps/s, some with rings of SHORT_MS only."""
+LARGEST_WORDS = 6 * sum(GENERATOR_PARTS) - PROCESSOR_WORDS + 1025 + 513 + 257 + 129 + 2 * 65 + 14
+"""For arms whose joints' highest step rates sum up to 240 000 steps/s; some have rings of SHORT_MS then.
+
+Where there is so much, there is heap for outputs and inputs too. The last words are left over at the ends of blocks.
+"""
 
 
-def ring_words(rate: int, lasts_ms: int = LONG_MS) -> int:
+def ring_words(rate: int, lasts_ms: int) -> int:
     """Words of the ring of a joint of at most ``rate`` steps/s: one more than its entries, which are a power of two.
 
     A full ring lasts ``lasts_ms``, or has 1024 entries. The interrupt that fills it comes every 0.5 ms; nothing is
@@ -58,16 +63,17 @@ def blocks(room_words: int) -> "list[int]":
 
 
 def lasting_ms(rates: "list[int]", room_words: int) -> int:
-    """How long the rings can last in a room of so many words: LONG_MS, SHORT_MS, or 0 where the engine does not fit."""
-    for lasts_ms in (LONG_MS, SHORT_MS):
+    """How long the rings can last in a room of so many words, one of LASTING_MS; 0 where the engine does not fit."""
+    for lasts_ms in LASTING_MS:
         if _find_place(rates, room_words, lasts_ms):
             return lasts_ms
     return 0
 
 
 def fits(rates: "list[int]", room_words: int, beside_bytes: int = 0) -> bool:
-    """Whether the engine fits; ``beside_bytes``: what else comes out of the room."""
-    return lasting_ms(rates, room_words - beside_bytes // 4) > 0
+    """Whether the engine fits; ``beside_bytes``: what outputs and inputs take of a smaller room than the largest."""
+    left = room_words if room_words >= LARGEST_WORDS else room_words - beside_bytes // 4
+    return lasting_ms(rates, left) > 0
 
 
 def _find_place(rates: "list[int]", room_words: int, lasts_ms: int) -> bool:

@@ -50,9 +50,10 @@ LINE = 800
 """Instructions of a line of bytecode. Counted on the 32-bit Arm interpreter under an emulator (all executed
 instructions of a run less those of the compiled functions, per line): 770 in the cruise, 770 in the shipped motion."""
 
+NATIVE = ("queue_steps", "begin")
 NATIVE_LINE = 12
-"""Instructions of a line of ``queue_steps``. It is compiled, but calls other functions, so it runs on CPython here: its
-machine code over its lines. A call in it takes CALL more."""
+"""Instructions of a line of these. They are compiled, but call other functions, so they run on CPython here: machine
+code of the first over its lines. A call in them takes CALL more."""
 
 CALL = 250
 """Instructions of calling one compiled function from another (see board/docs/hardware.md)."""
@@ -90,7 +91,7 @@ class Count:
         def call(*arguments: Any) -> Any:
             if not self.on:
                 return original(*arguments)
-            if sys._getframe(1).f_code.co_name == "queue_steps":
+            if sys._getframe(1).f_code.co_name in NATIVE:
                 self.native += CALL
             if not self.verify:
                 return self.machine.run(name, *arguments)
@@ -152,7 +153,7 @@ class Count:
         if "armtempo_board" not in code.co_filename or code.co_name in ("write", "waits"):
             return None
         if event == "line":
-            if code.co_name == "queue_steps":
+            if code.co_name in NATIVE:
                 self.native += NATIVE_LINE
             else:
                 self.lines[code.co_name] += 1

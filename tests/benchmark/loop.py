@@ -42,6 +42,12 @@ RATES = (5_000, 10_000, 20_000, 33_000, 50_000, 70_000, 100_000, 130_000, 160_00
 JOINTS = (1, 3)
 AT_LIMITS = ((240_000, 1), (120_000, 2), (80_000, 3), (25_000, 3), (2_000, 6), (8_000, 6), (20_000, 6))
 """Rates of each joint, and joints: at the limits that hello states, and where many start together."""
+SIX = (
+    (40_000, 6, 0.5, 1.2),
+    (20_000, 6, 1.0, 2.2),
+    (40_000, 6, 1.0, 2.2),
+    (40_000, 6, 2.0, 4.2),
+)  # as ``cruise`` takes them
 WORST_CYCLES = 3.0
 RAMP_S, WHOLE_S = 0.5, 1.2
 MILLION = (333_000, 3, 1.0, 2.4)  # steps/s in sum; as ``cruise`` takes them
@@ -51,6 +57,8 @@ PROBE_MANIFEST = """
 include("$(PORT_DIR)/boards/manifest.py")
 module("firmware_loop.py", base_path="{}", opt=3)
 """
+OWN = 6_000
+"""Bytes of heap for what stands in for hardware, given beside the chip's: the stack does not need them."""
 COMMANDS = 60  # status and samples in turn, one every 50 ms
 IN_FIRMWARE = {
     "engine": "armtempo_board.motion.engine",
@@ -165,7 +173,7 @@ class Board:
                 _compile(self._folder / "program", tree / "lib")
             image = firmware.make_image(tree, "" if self._as_files else PROBE)
             cut = Path(name) / "cut"
-            cut.write_bytes(bytes(4))
+            cut.write_bytes(struct.pack("<i", -OWN))
             said = firmware.emulate(self._elf, image, cut, "-icount", f"shift={_SHIFT}")
         return _read(said, scale / _INSTRUCTION_NS)
 
@@ -256,7 +264,7 @@ def _write(tree: Path, case: Case, settings: dict[str, Any], module: str) -> Non
 
 
 def _read(said: str, scale: float) -> Run:
-    """``scale``: instructions a tick."""
+    """``scale``: instructions a tick. The turns in which the motion begins and ends are left out."""
     lines = re.findall(r"^@ turn (\d+) (\d) (\d)((?: \d+)*)$", said, re.MULTILINE)
     turns = [
         _turn(int(took), command == "1", answer == "1", log, scale) for took, command, answer, log in lines
@@ -270,9 +278,9 @@ def _read(said: str, scale: float) -> Run:
         if name == "notice":  # of an exception in the program, behind the fault
             print(payload.decode())
         elif name == "done":
-            ends.append(Run(turns[1:], 0, values[1] / TICK_HZ))
+            ends.append(Run(turns[1:-1], 0, values[1] / TICK_HZ))
         elif name == "fault":
-            ends.append(Run(turns[1:], values[1], values[3] / TICK_HZ))
+            ends.append(Run(turns[1:-1], values[1], values[3] / TICK_HZ))
     assert ends, said[-2000:]
     return ends[0]
 
@@ -348,6 +356,12 @@ def _at_limits(board: Board) -> None:
         for rate, joints in AT_LIMITS:
             run = board.run(cruise(rate, joints), cycles)
             print(f"    {cycles} cycles, joints {joints}, {rate} steps/s: {_end(run)}", flush=True)
+        for rate, joints, ramp_s, whole_s in SIX:
+            run = board.run(cruise(rate, joints, ramp_s, whole_s), cycles)
+            print(
+                f"    {cycles} cycles, joints {joints}, {rate} steps/s, ramp {ramp_s}: {_end(run)}",
+                flush=True,
+            )
 
 
 def _turns(run: Run | None, cycles: float) -> str:

@@ -28,7 +28,7 @@ def test_steps_are_where_the_spline_says(name: str, tmp_path: Path) -> None:
     record = motions.NAMED[name]()
     verdicts, steps = walking.walk(QUICK, tmp_path, [record])
     assert verdicts == ["None"]
-    walking.verify(record, steps[0])
+    assert walking.verify(record, steps[0]) <= 0.77  # half a tick is the rounding
 
 
 @pytest.mark.parametrize("beyond", [-1e-4, -1e-6, 1e-6, 3e-5, 1e-4, 2e-4, 1e-3, 0.1])

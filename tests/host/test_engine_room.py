@@ -1,12 +1,15 @@
 """What is said of the memory for an arm: on a board, and before there is one."""
 
+from itertools import combinations_with_replacement
+
 import pytest
 from armtempo import Arm
 from armtempo.errors import InputError
 from armtempo.link.board_messages import Hello
 from armtempo.robot import engine_room
 from armtempo.robot.engine_room import AS_FILES, IN_FIRMWARE, Room
-from armtempo_shared import engine_memory
+from armtempo_shared import engine_memory, limits
+from armtempo_shared.engine_memory import SHORT_MS
 
 PAPER = Arm.paper()
 
@@ -77,22 +80,57 @@ def test_the_words_name_the_highest_rate_that_fits() -> None:
     assert not room.holds([rate + 1000] * 3)
 
 
-def test_rings_last_3_ms_where_there_is_memory_and_2_where_there_is_not() -> None:
-    rates = [60_000] * 3
-    assert engine_memory.lasting_ms(rates, IN_FIRMWARE.size // 4) == engine_memory.LONG_MS
-    assert engine_memory.lasting_ms(rates, AS_FILES.size // 4) == engine_memory.SHORT_MS
-    assert engine_memory.lasting_ms([80_000] * 3, AS_FILES.size // 4) == 0
-    for rate in (5_000, 60_000, 240_000):
-        entries = engine_memory.ring_words(rate, engine_memory.SHORT_MS) - 1
-        assert entries == 1024 or entries / (2 * rate) >= 2e-3
+def test_rings_last_as_long_as_there_is_memory_for() -> None:
+    for rates, in_firmware, as_files in (
+        ([5_000] * 3, 12, 12),
+        ([20_000] * 3, 12, 6),
+        ([60_000] * 3, 12, 2),
+        ([80_000] * 3, 12, 0),
+        ([20_000] * 6, 6, 0),
+        ([40_000] * 6, 3, 0),
+    ):
+        assert engine_memory.lasting_ms(rates, IN_FIRMWARE.size // 4) == in_firmware
+        assert engine_memory.lasting_ms(rates, AS_FILES.size // 4) == as_files
+    for lasts_ms in engine_memory.LASTING_MS:
+        for rate in (5_000, 60_000, 240_000):
+            entries = engine_memory.ring_words(rate, lasts_ms) - 1
+            assert entries == 1024 or entries / (2 * rate) >= lasts_ms / 1000
 
 
 def test_the_largest_rings_find_their_places_first() -> None:
     """Else the small joint's would stand in the only block that has room for the large one's."""
-    assert engine_memory.lasting_ms([5_000, 240_000], 1960) == engine_memory.LONG_MS
+    assert engine_memory.lasting_ms([5_000, 240_000], 1960) == 12
 
 
 def test_a_block_holds_a_ring_of_1024_entries_or_two_of_512() -> None:
     assert engine_memory.blocks(3000) == [1026, 1026, 948]
-    assert engine_memory.ring_words(240_000) == 1024 + 1
-    assert 2 * engine_memory.ring_words(48_000) == 1026
+    assert engine_memory.ring_words(240_000, 3) == 1024 + 1
+    assert 2 * engine_memory.ring_words(48_000, 3) == 1026
+
+
+def test_every_arm_fits_the_largest_memory() -> None:
+    """Of the joints that a ring is as large for, the slowest each."""
+    slowest = [1] + [
+        rate
+        for rate in range(2, limits.MAX_STEP_RATE + 1)
+        if engine_memory.ring_words(rate, SHORT_MS) > engine_memory.ring_words(rate - 1, SHORT_MS)
+    ]
+    arms = [
+        list(rates)
+        for joints in range(1, limits.MAX_JOINTS + 1)
+        for rates in combinations_with_replacement(slowest, joints)
+        if sum(rates) <= limits.MAX_STEP_RATE_SUM
+    ]
+    assert len(arms) > 200
+    most = max(map(engine_memory.words, arms))
+    assert most == engine_memory.words([1, 1, *slowest[1:]])
+    assert all(engine_memory.fits(rates, engine_memory.LARGEST_WORDS) for rates in arms)
+    assert not all(engine_memory.fits(rates, engine_memory.LARGEST_WORDS - 1) for rates in arms)
+
+
+def test_outputs_and_inputs_take_of_a_smaller_memory_only() -> None:
+    rates = [40_000] * 6
+    outputs = engine_memory.output_bytes(8, 8)
+    assert engine_memory.fits(rates, engine_memory.LARGEST_WORDS, outputs)
+    assert engine_memory.fits(rates, engine_memory.LARGEST_WORDS - 1)
+    assert not engine_memory.fits(rates, engine_memory.LARGEST_WORDS - 1, outputs)

@@ -59,10 +59,9 @@ def test_an_arm_without_has_the_bytes_that_it_always_had() -> None:
 
 
 def test_a_program_from_before_refuses_what_it_does_not_know() -> None:
-    """It takes version 2 only, and the record with outputs is none."""
-    assert (
-        armrecord.pack(*made(1), *wired(1, 0))[4] == armrecord.VERSION_WITH_OUTPUTS != armrecord.VERSION == 2
-    )
+    """It takes version 2 only, and the record with outputs is of version 3."""
+    assert armrecord.pack(*made(1))[4] == 2
+    assert armrecord.pack(*made(1), *wired(1, 0))[4] == 3
 
 
 @pytest.mark.parametrize(("place", "count"), [(0, 9), (0, 2), (1, 9), (1, 0), (0, 0)])

@@ -73,6 +73,15 @@ def test_other_files_are_no_sequence(magic: bytes, said: str) -> None:
         SequenceData(magic + bytes(60))
 
 
+def test_a_record_ends_where_its_header_says() -> None:
+    """Also one whose checksum holds for what is too much."""
+    data = sequence.pack(0, [(sequence.WAIT, 0, 0, 100, 1)], [])
+    SequenceData(data)
+    longer = data[:-4] + bytes(9)
+    with pytest.raises(SequenceError, match="length does not fit the header"):
+        SequenceData(longer + struct.pack("<I", crc32(longer)))
+
+
 def test_a_motions_name_is_text() -> None:
     head = struct.pack("<4sIHBB", sequence.MAGIC, 0, 1, 1, 0)
     rows = struct.pack("<BBHIH", sequence.MOVE, 0, 0, 0, 1)

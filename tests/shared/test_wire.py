@@ -65,6 +65,12 @@ def test_any_lost_or_doubled_byte_is_noticed() -> None:
         assert doubled == [(1, 2, b"payload")] * harmless + [(9, 9, b"next")], at
 
 
+def test_a_frame_right_behind_a_stray_start_byte_is_found() -> None:
+    """With it the frame's own first bytes make a length that is possible."""
+    first, second = wire.frame(1, 2, b""), wire.frame(2, 3, bytes(200))
+    assert frames(first[:1] + first + second) == [(1, 2, b""), (2, 3, bytes(200))]
+
+
 def test_bad_counts_stretches_once() -> None:
     parser = wire.Parser()
     parser.feed(b"xyz" + wire.frame(1, 2, b"") + b"\xa5\xff\xffq" + wire.frame(1, 3, b"") + b"z")

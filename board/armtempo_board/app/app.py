@@ -24,7 +24,6 @@ from armtempo_board.link.serial_link import SerialLink
 
 _EXTRA_SERVICES_PER_TURN = const(3)  # of the engine, while something moves
 _SPARE_BYTES = const(1024)  # kept for telling of a failure: a traceback, and its end for the host
-_CALLS = const(12)  # about as deep as a command goes
 _MOST_FAILURES = const(10)  # turns of the loop that fail one after the other; then the program gives up
 
 
@@ -69,8 +68,6 @@ class App:
         if link.poll():
             controller.refill()
             self.commands.act()
-            if not controller.moving():
-                heap.overwrite_stack(_CALLS)
         if controller.engine:
             controller.service(time.ticks_diff(time.ticks_ms(), link.heard_ms))
             self.events.note_fault(controller.fault())

@@ -81,9 +81,13 @@ class ArmState:
         self._store = None
 
     def make_engine(self, head: "dict[str, int]", joints: "list[dict[str, int]]") -> None:
-        """For an arm, as ``armrecord.unpack`` gives it; what stays lies beside pieces that a motion's code needs."""
+        """For an arm, as ``armrecord.unpack`` gives it.
+
+        Where memory is short, what stays lies beside pieces that a motion's code needs.
+        """
         gc.collect()
-        heap.hold(MOTION_CODE_BYTES)
+        if self.workspace.is_short:
+            heap.hold(MOTION_CODE_BYTES)
         try:
             self.engine = Engine(head, joints, self.workspace)
         except MemoryError:  # rather an arm whose motions may be refused for want of a large piece than none

@@ -142,8 +142,7 @@ class Controller(ArmState):
     def tidy(self) -> None:
         """Free what only the last commands needed: what comes then lies close to what stays."""
         self.forget_store()
-        heap.forget()
-        gc.collect()
+        heap.tidy()
 
     def begin(self, name: str, flags: int, crc: "int | None" = None) -> None:
         """Start a stored motion or sequence, or refuse. ``crc``: of the record that the host means; None: there is no
@@ -189,7 +188,8 @@ class Controller(ArmState):
     def _make_room(self) -> None:
         """Keep pieces for the code that a motion needs, before anything that its start needs can lie in them."""
         self.tidy()
-        heap.hold(*_PIECES_BYTES)
+        if self.workspace.is_short:
+            heap.hold(*_PIECES_BYTES)
 
     def begin_motion(self, name: str, crc: "int | None", rate: int, flags: int = 0, unknown: int = 0) -> None:
         """Start a stored motion at ``rate`` thousandths of its speed, or refuse.
@@ -197,6 +197,7 @@ class Controller(ArmState):
         ``flags``, ``crc`` as for ``begin``; ``unknown``: joints of unknown position.
         """
         homing = bool(flags & START_HOMING)
+        heap.collect_often(heap.OFTEN if self.workspace.is_short else heap.SELDOM)
         self._make_room()
         try:
             motion = self._opened(name, crc)
@@ -206,6 +207,7 @@ class Controller(ArmState):
             self.engine.load(motion, rate)
         except Refused:
             self._withdraw_assumed()
+            heap.collect_often()
             raise
         finally:
             heap.release()
@@ -215,9 +217,8 @@ class Controller(ArmState):
         self.run_number += 1
         self._braking = False
         self._can_brake = motion.brake_ticks > 0
-        heap.forget()
-        gc.collect()
-        heap.collect_often(False)
+        heap.tidy()
+        heap.collect_often(0)
         self._running = True
         self._held = flags & START_HELD
         self.hold()

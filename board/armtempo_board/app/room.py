@@ -13,7 +13,7 @@ from armtempo_board import heap
 from armtempo_board.hardware import backup_sram
 from armtempo_board.motion.workspace import Workspace
 
-_RESERVE = 26_900  # bytes of heap for the rest
+_RESERVE = 26_600  # bytes of heap for the rest
 _USUAL_JOINTS = 3  # there is heap for their objects before there is memory for larger rings
 _MOST_SAMPLES = 4096  # bytes of the sample buffer at most,
 _LEAST_SAMPLES = 768  # and at least;
@@ -46,11 +46,13 @@ def workspace() -> "Workspace":
 
 
 def share(workspace: "Workspace", outputs: int, inputs: int) -> None:
-    """Leave heap for so many outputs and inputs, out of the engine's memory, which nobody uses now.
+    """Where memory is short, leave heap for so many outputs and inputs, out of the engine's, which nobody uses now.
 
     What the heap has not in one piece any more, the engine goes without, until the program starts again.
     """
-    words = max(workspace.words - engine_memory.output_bytes(outputs, inputs) // 4, 0)
+    words = workspace.words
+    if workspace.is_short:
+        words = max(words - engine_memory.output_bytes(outputs, inputs) // 4, 0)
     while workspace.memory.size != words:
         try:
             workspace.make_memory(words)

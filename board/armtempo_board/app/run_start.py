@@ -1,5 +1,7 @@
 """Before a run: what is asked for is opened, and where a homing motion begins. Given up before anything moves."""
 
+import gc
+
 from armtempo_shared import codes
 
 from armtempo_board.buffers import COMMANDED
@@ -15,7 +17,9 @@ if TYPE_CHECKING:
 
 def opened(board: "ArmState", name: str, crc: "int | None") -> "MotionFile":
     """The stored motion, checked as far as its head and checksum go, or Refused; ``crc``: see ``Controller.begin``."""
-    motion: MotionFile = board.store().motion(name)
+    store = board.store()
+    gc.collect()  # what stays while it runs is to lie low
+    motion: MotionFile = store.motion(name)
     if crc is not None and motion.crc != crc:
         raise Refused(codes.BAD_CHECKSUM)
     if motion.arm_crc != board.arm_crc:

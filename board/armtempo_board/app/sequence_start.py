@@ -3,8 +3,6 @@
 Imported for that and given up before anything moves.
 """
 
-from array import array
-
 from armtempo_shared import codes, sequence
 from armtempo_shared.motion import MotionError
 from armtempo_shared.sequence import SequenceError
@@ -55,8 +53,8 @@ class _Ends:
             code = codes.LEG_MISSING if is_missing else refused.code
             raise Refused(code, refused.joint, index + 1)
         joints = range(motion.joints)
-        self.first = array("q", [endpoints.at_start(motion, joint) for joint in joints])
-        self.last = array("q", [endpoints.at_end(motion, joint) for joint in joints])
+        self.first = [endpoints.at_start(motion, joint) for joint in joints]
+        self.last = [endpoints.at_end(motion, joint) for joint in joints]
         self.away = [
             endpoints.start_offset(motion, joint, controller.engine.commanded(joint)) for joint in joints
         ]

@@ -42,19 +42,20 @@ if TYPE_CHECKING:
         pending: int
         run_number: int
         arm_crc: int
+        workspace: Any
 
         def store(self) -> Any: ...
 
         def load(self, name: str, crc: "int | None" = None) -> MotionFile: ...
 
-        def forget_store(self) -> None: ...
+        def tidy(self) -> None: ...
 
         def begin_motion(self, name: str, crc: "int | None", rate: int) -> None: ...
 
         def fault(self) -> int: ...
 
 
-_OP, _NUMBER, _VALUE, _AMOUNT, _STEP_OF_ROW = const(0), const(1), const(2), const(3), const(4)
+_AMOUNT, _STEP_OF_ROW = const(3), const(4)  # of a row
 _START_BYTES = const(22_000)  # of heap for the start of a motion; some of it in large pieces (docs/memory.md)
 _MOST = const(0x3FFFFFFF)  # that a counter reaches; a larger number would take memory
 
@@ -68,7 +69,6 @@ class Sequencer:
         self._rate = rate  # of the motions' own time, in thousandths
         self._row: "tuple[int, ...]" = (0, 0, 0, 0, 0)  # the one under way
         self._next = 0  # number of the one behind it
-        self._since_ms = time.ticks_ms()  # when it began
         self._first = array("i", [0] * sequence.MAX_NESTING)  # of each repeat that has begun: its first row
         self._left = array("i", [0] * sequence.MAX_NESTING)  # passes left, 0: for ever
         self._depth = 0
@@ -83,14 +83,13 @@ class Sequencer:
     def begin(self) -> None:
         """From the next turn on; Refused where the heap has no room for a motion beside this."""
         controller = self._controller
-        controller.forget_store()
-        heap.forget()
-        gc.collect()
+        controller.tidy()
         free = gc.mem_free() if hasattr(gc, "mem_free") else _START_BYTES
         if free < _START_BYTES:
             controller.sequence = None
             heap.forget()
             raise Refused(codes.NO_SEQUENCE_ROOM, value=_START_BYTES - free)
+        heap.keep_code(not controller.workspace.is_short)
         self._command.attach(controller.rows)
 
     def change_rate(self, rate: int) -> None:
@@ -129,7 +128,7 @@ class Sequencer:
         self.told[ROW] = self._next
         self.told[VALUE] = 0
         self._next += 1
-        self._since_ms = time.ticks_ms()
+        self._since_ms = time.ticks_ms()  # the row's begin
         op, number, value, _, _ = self._row
         if op == sequence.MOVE:
             self._move(number)
@@ -199,3 +198,4 @@ class Sequencer:
         self.told[ENDING] = ending
         self.told[CODE] = code
         self._controller.sequence = None
+        heap.keep_code(False)

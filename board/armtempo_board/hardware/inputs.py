@@ -116,7 +116,8 @@ class Inputs:
     @micropython.viper
     def freeze(self) -> object:
         """Stop all outputs now; interrupts call it too."""
-        self._trip(isr.SOFTWARE_LINE)
+        trip = self._trip
+        trip(isr.SOFTWARE_LINE)
 
     @micropython.viper
     def _trip(self, line: int) -> object:

@@ -17,6 +17,8 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from array import array
 
+NOT_FED = const(-(1 << 22))
+"""Instead of a time in Ki ticks: the interrupt does not write to the ring."""
 _FAR_KITICKS = const(1 << 20)
 _FIRST_FED = const(1)  # entry that the stream begins with: entry 0 goes into the compare register by hand
 
@@ -65,17 +67,9 @@ class Ring:
         """Entries that have matched since the stream was started."""
         return isr.matches(self.state, stm.DMA1)
 
-    def room(self) -> int:
-        """Entries of an empty ring."""
-        return self.entries - isr.SPARE_ENTRIES
-
     def written(self) -> int:
         """Entries written since the stream was started."""
         return self.state[isr.WRITTEN]
-
-    def fed(self) -> int:
-        """Whether the interrupt writes to the ring; it stops that where the ring has run out of entries."""
-        return self.state[isr.FED]
 
     def feed(self, on: int) -> int:
         """Let the interrupt write to the ring, or not; returns what was before."""
@@ -85,9 +79,9 @@ class Ring:
             mem32[stm.TIM6] = 1  # CR1: it stops while no ring is fed
         return before
 
-    def last_kiticks(self) -> int:
-        """Ki ticks (1024 ticks) from now to the last entry."""
-        return isr.kiticks_until(self.timer, self.state, isr.LAST_TIME)
+    def fed_kiticks(self) -> int:
+        """Ki ticks (1024 ticks) from now to the last entry; NOT_FED where the interrupt does not write to the ring."""
+        return isr.kiticks_until(self.timer, self.state, isr.LAST_TIME) if self.state[isr.FED] else NOT_FED
 
     def stop(self) -> None:
         """Switch the stream off, ready to be filled from entry 0."""

@@ -169,15 +169,16 @@ class Engine(EngineParts):
         if rates.end_moves and self._sampler.quiet():
             self._sampler.end_at(rates.duration_ticks)
             rates.end_moves = False
+        joints = self._joints
         for _ in range(_ROUNDS):
             can_queue_more = False
-            for number in range(len(self._joints)):
-                joint = self._joints[number]
+            for joint in joints:
                 fault = joint.refill(now_kiticks)
                 if fault:
-                    self._fail(fault, number)
+                    self._fail(fault, joints.index(joint))
                     return False
-                can_queue_more = can_queue_more or joint.can_queue_more
+                if joint.can_queue_more:
+                    can_queue_more = True
             if not can_queue_more:
                 break
             now_kiticks = self._clock.kiticks()

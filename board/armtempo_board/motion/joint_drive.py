@@ -12,7 +12,7 @@ from micropython import const
 from pyb import Pin
 
 from armtempo_board.hardware import isr
-from armtempo_board.hardware.ring import Ring
+from armtempo_board.hardware.ring import NOT_FED, Ring
 from armtempo_board.hardware.sampler import Sampler
 from armtempo_board.memory import Memory
 from armtempo_board.stepgen.step_generator import StepGenerator
@@ -26,7 +26,7 @@ LOOKAHEAD_KITICKS = const(4096)
 
 _GUARD_KITICKS = const(16)  # 195 us: a turn of DIR is queued only behind an edge that is further away
 _OVERDUE_KITICKS = const(-164)  # 2 ms ago: the interrupt that fills the rings comes no more
-_REFILL_KITICKS = const(256)  # 3 ms between two looks at a queue that goes on far enough
+_REFILL_KITICKS = const(512)  # 6 ms between two looks at a queue that is full or goes on far enough, at most
 _NEVER_KITICKS = const(1 << 29)
 _TURN_SLACK_TICKS = const(8400)  # 100 us: how late the interrupt that turns DIR may come
 _TURNS = const(8)
@@ -107,7 +107,8 @@ class JointDrive:
 
     def ahead_kiticks(self) -> int:
         """How far ahead steps are in the ring, rounded up."""
-        return self.ring.last_kiticks() + 1 if self.ring.fed() else 0
+        ahead_kiticks = self.ring.fed_kiticks()
+        return 0 if ahead_kiticks == NOT_FED else ahead_kiticks + 1
 
     def refill(self, now_kiticks: int) -> int:
         """Keep the queue filled; code of a fault, or 0."""
@@ -117,13 +118,16 @@ class JointDrive:
         generator = self.generator
         until_kiticks = now_kiticks + LOOKAHEAD_KITICKS
         self.can_queue_more = generator.prepare(until_kiticks)
-        if not self.ring.fed():
+        ahead_kiticks = self.ring.fed_kiticks()
+        if ahead_kiticks == NOT_FED:
             return self._restart(now_kiticks) if self._sampler.quiet() else 0
-        ahead_kiticks = self.ring.last_kiticks()
         if generator.at_turn and not generator.waits() and ahead_kiticks > _GUARD_KITICKS and self._turn():
             self.can_queue_more = True
-        elif generator.latest_kiticks() > until_kiticks:
-            self._next_refill_kiticks = now_kiticks + _REFILL_KITICKS
+        elif not self.can_queue_more:  # the queue is full, or goes on far enough
+            wait_kiticks = generator.latest_kiticks() - now_kiticks >> 3
+            if wait_kiticks > _REFILL_KITICKS:
+                wait_kiticks = _REFILL_KITICKS
+            self._next_refill_kiticks = now_kiticks + wait_kiticks
         return codes.INTERNAL if ahead_kiticks < _OVERDUE_KITICKS else 0
 
     def _turn(self) -> bool:
@@ -160,7 +164,7 @@ class JointDrive:
             return 0
         if ring.written():
             self.empty()
-        if not generator.write(ring.words, ring.entries - 1, 0, ring.room()):
+        if not generator.write(ring.words, ring.entries - 1, 0, ring.entries - isr.SPARE_ENTRIES):
             return 0
         return codes.UNDERRUN if ring.run(generator.queue) else 0
 

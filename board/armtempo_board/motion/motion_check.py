@@ -21,7 +21,7 @@ from micropython import const
 from armtempo_board.errors import Refused
 from armtempo_board.motion import rate_check
 from armtempo_board.stepgen import subdivision
-from armtempo_board.stepgen.bezier import BIAS, HIGH, LAST_HIGH
+from armtempo_board.stepgen.bezier import BIAS, HIGH, LAST_HIGH, LAST_LOW, LOW
 from armtempo_board.stepgen.subdivision import (
     DIFFERENCE_BIAS,
     FIRST_DIFFERENCE,
@@ -72,11 +72,11 @@ def _check_joint(interval: "Subintervals", judge: "Judge", joint: int) -> None:
     while measured := interval.measure():
         code = judge.verdict(measured)
         if code == _SPLIT:
-            interval.split()
+            interval.go_on(subdivision.SPLIT)
         elif code:
             raise Refused(code, joint, judge.value)
         else:
-            interval.skip()
+            interval.go_on(subdivision.SKIP)
 
 
 def _check_numbers(motion: "MotionHead", joint: int) -> None:
@@ -121,12 +121,13 @@ class Judge:
         self._high = row["max_steps"] + BIAS
         limit = min(row["max_rate"], MAX_STEP_RATE + MAX_STEP_RATE // 100)
         self._mantissa, self._exponent = rate_check.scaled(limit)
-        self.value = 0
 
     def verdict(self, measured: int) -> int:
         """A code, _PASS, or _SPLIT where halves have to be looked at; ``measured``: what ``measure`` gave."""
         interval = self._interval
-        for position in (interval.start(), interval.end()):
+        angle = interval.angle
+        for high, low in ((HIGH, LOW), (LAST_HIGH, LAST_LOW)):
+            position = angle[high] + (angle[low] >> 27)
             if not self._low <= position <= self._high:
                 self.value = position - BIAS
                 return codes.OUT_OF_RANGE
@@ -136,7 +137,8 @@ class Judge:
 
     def _is_short(self) -> bool:
         time = self._interval.time
-        return time[LAST_HIGH] - time[HIGH] < 2 and self._interval.ticks() <= _SHORT_TICKS
+        high = time[LAST_HIGH] - time[HIGH]
+        return high < 2 and (high << _HIGH_TICKS_BITS) + (time[LAST_LOW] - time[LOW] >> 16) <= _SHORT_TICKS
 
     def _range(self) -> int:
         """All points of the hull within the joint's range prove it for the subinterval."""

@@ -19,10 +19,14 @@ class Workspace:
     """
 
     def __init__(self, words: int, joints: int, address: int = 0) -> None:
-        from armtempo_shared.engine_memory import PROCESSOR_WORDS  # here, so that it can be forgotten
+        from armtempo_shared.engine_memory import (  # here, so that it can be forgotten
+            LARGEST_WORDS,
+            PROCESSOR_WORDS,
+        )
 
         self.joints = joints
         self.words = words  # as many as can be; ``memory`` has less while outputs and inputs need heap
+        self.is_short = words < LARGEST_WORDS  # the heap has not enough for every arm
         self._own = None if address else Memory([PROCESSOR_WORDS]).take(PROCESSOR_WORDS)
         self._address = address or uctypes.addressof(self._own)
         self.make_memory(words)

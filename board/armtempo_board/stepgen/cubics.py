@@ -64,9 +64,9 @@ def cubics_fit(steps: int, solver: ptr32, queue: ptr32) -> int:
     The Hermite cubic through the first and the end node misses the middle one by D in time and by E / (4 steps) in
     slope. Its fourth derivative alone makes each of the two D / 16 wrong at most, its fifth E / 26. D / 16 + E / 16 <=
     1/8 tick is asked, which leaves a factor of four for what is not constant about them. The rounding of the third
-    difference (see ``put_cubics``) is allowed a tenth of a tick; where groups of 16 steps are possible it is far below.
+    difference (see ``put_cubics``), in groups of G steps 0.004 steps**3 / G**2 units, is allowed an eighth of a tick.
     """
-    # The slopes with one exponent, and log2 of the steps, rounded up
+    # Log2 of the steps, rounded up, and the slopes with one exponent
     power = 0
     while (1 << power) < steps:
         power += 1
@@ -80,14 +80,20 @@ def cubics_fit(steps: int, solver: ptr32, queue: ptr32) -> int:
     start = solver[_FIRST_MANTISSA] >> (solver[_FIRST_EXPONENT] - exponent)
     middle = solver[_MIDDLE_MANTISSA] >> (solver[_MIDDLE_EXPONENT] - exponent)
     end = solver[_END_MANTISSA] >> (solver[_END_EXPONENT] - exponent)
-    # The slopes differ by a quarter at most, and by no more than the third difference can hold
+    # The slopes differ by a quarter at most
     off = start - end
     if off < 0:
         off = 0 - off
     if off > start >> 2:
         return 0
-    if 3 * power > exponent + 5 and (exponent < 8 or off > steps << (exponent - 8)):
-        return 0
+    # and groups are long enough for the third difference: the second derivative is greatest at an end
+    group = (3 * power - exponent - 4) >> 1
+    if group > 0:
+        first = 2 * middle - start - end
+        if first < 0:
+            first = 0 - first
+        if group > 4 or (off + 3 * first) >> 1 > 3 * steps << (exponent - 2 - 2 * group):
+            return 0
     # steps * slope at the three nodes, in units of the nodes' times
     up = 15 - power
     down = exponent - power - queue[_TIME_SCALE]

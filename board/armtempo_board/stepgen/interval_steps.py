@@ -4,7 +4,7 @@ import micropython
 from micropython import const
 
 from armtempo_board.stepgen.cubics import cubics_fit, put_cubics
-from armtempo_board.stepgen.newton import solve
+from armtempo_board.stepgen.newton import set_interval, solve
 from armtempo_board.stepgen.time_law import scale_slope, to_real_time
 
 _MOST_STEPS = const(1024)  # of a cubic
@@ -49,10 +49,56 @@ _END_NODE = const(44)
 _END_MANTISSA = const(45)
 _END_EXPONENT = const(46)
 _END_DELAY = const(47)
+_TARGET = const(20)
+_RANGE = const(22)
+_TIME_OFFSET = const(23)
 # of a node
 _NODE_TIME = const(0)
 _NODE_DELAY = const(3)
 _NODE_WORDS = const(8)
+# as in subintervals.py: arrays of a subinterval
+_ANGLE = const(0)
+_TIME = const(1)
+_ANGLE_MEASURES = const(2)
+_TIME_MEASURES = const(3)
+# as in bezier.py: words of a piece
+_HIGH = const(0)
+_LOW = const(6)
+_LAST_HIGH = const(5)
+_LAST_LOW = const(11)
+_BIAS = const(1 << 28)
+# as in subdivision.py: measures of a piece
+_SCALE = const(0)
+
+
+@micropython.viper
+def begin(solver: object, queue: object, arrays: object, position: int, at_start: int) -> int:
+    """Take up the steps of a subinterval, ready to be solved; returns how many, below 0 where they go down.
+
+    ``arrays``: those of the subinterval (subintervals.py). ``position`` (+ bezier.BIAS):
+    where the steps so far lead; ``at_start``: 1 where all steps come at its start.
+    """
+    words = ptr32(queue)  # type: ignore[arg-type]
+    nodes = ptr32(solver)  # type: ignore[arg-type]
+    angle = ptr32(arrays[_ANGLE])  # type: ignore[index]
+    time = ptr32(arrays[_TIME])  # type: ignore[index]
+    measures = ptr32(arrays[_TIME_MEASURES])  # type: ignore[index]
+    steps = angle[_LAST_HIGH] + (angle[_LAST_LOW] >> 27) - position
+    heading = 1 if steps > 0 else -1
+    scale = measures[_SCALE] - 12
+    words[_TIME_SCALE] = scale
+    nodes[_TIME_OFFSET] = time[_LOW] >> (16 - scale)
+    words[_LAST_STEP] = heading * steps - 1
+    words[_REACHED] = 0
+    words[_SINGLE_STEPS] = 0
+    words[_MODE] = words[_MODE] & _BY_LAW
+    if at_start:
+        nodes[_RANGE] = 0
+        words[_MODE] = words[_MODE] | _AT_START
+    else:
+        nodes[_TARGET] = 2 * (position - angle[_HIGH]) + heading + _BIAS
+        set_interval(solver, arrays[_ANGLE], arrays[_ANGLE_MEASURES], arrays[_TIME_MEASURES])  # type: ignore[index]
+    return steps
 
 
 @micropython.viper
@@ -122,7 +168,7 @@ def queue_steps(solver: object, queue: object, budget: int, law: object) -> obje
                     held_back = 1
                 put_cubics(length, solver, queue, held_back)
                 words[_HELD_BACK] = held_back
-                if verdict == 2 and length + length > size and size < _MOST_STEPS:
+                if verdict == 2 and length + length > size and size <= _MOST_STEPS >> 1:
                     words[_CUBIC_STEPS] = size + size
             else:
                 words[_SINGLE_STEPS] = _SINGLY

@@ -89,6 +89,11 @@ class JointLaw:
 
     def __init__(self, words: "memoryview[int]") -> None:
         self._words = words
+        # compiled functions that only a motion needs: a method around each would cost more than its call
+        self.to_real_time = time_law.to_real_time
+        self.scale_slope = time_law.scale_slope
+        self.begin = interval_steps.begin
+        self.queue_steps = interval_steps.queue_steps
 
     def take(self, law: "array[int]", high: int) -> int:
         """Follow a law; the rest as ``count_from``."""
@@ -104,42 +109,22 @@ class JointLaw:
         law = self._words
         if high < law[START_HIGH]:
             real = law[REAL_START_HIGH] - _stretched(law[START_HIGH] + 1 - high, law[BEFORE]) - 1
-        elif high < law[END_HIGH] or law[AFTER] == 0:
+        elif high < law[END_HIGH] or not law[AFTER]:
             real = law[REAL_START_HIGH] + high - law[START_HIGH] - 1
         else:
             real = law[REAL_END_HIGH] + _stretched(high - law[END_HIGH], law[AFTER]) - 1
         law[MOTION_HIGH] = high
         law[REAL_HIGH] = real
-        return int(real)
-
-    def motion_high(self) -> int:
-        """What the motion's times count from."""
-        return int(self._words[MOTION_HIGH])
-
-    def start_high(self) -> int:
-        """Where in real time the ramp begins."""
-        return int(self._words[REAL_START_HIGH])
+        return real
 
     def is_past(self, high: int) -> bool:
         """Whether a time of the motion lies behind a ramp's end, at which it stands still."""
-        return bool(self._words[AFTER] == 0 and high > self._words[END_HIGH])
-
-    def to_real_time(self, solver: "memoryview[int]", place: int, scale: int) -> bool:
-        """Move the time of a node (see ``time_law.to_real_time``); False: it never comes."""
-        return bool(time_law.to_real_time(self._words, solver, place, scale))
-
-    def scale_slope(self, solver: "memoryview[int]", place: int) -> None:
-        """Move the slope of a node (see ``time_law.scale_slope``)."""
-        time_law.scale_slope(solver, place)
-
-    def queue_steps(self, solver: "memoryview[int]", queue: "memoryview[int]", nodes: int) -> None:
-        """Queue the steps of a subinterval (see ``interval_steps.queue_steps``)."""
-        interval_steps.queue_steps(solver, queue, nodes, self._words)
+        return not self._words[AFTER] and high > self._words[END_HIGH]
 
 
 def _stretched(time: int, rate: int) -> int:
     """How long a time of the motion takes at a constant rate, in thousandths; 0 at rest. Small integers."""
-    if rate == 0:
+    if not rate:
         return 0
     whole = time // rate
     return PERMILLE * whole + PERMILLE * (time - whole * rate) // rate

@@ -9,34 +9,8 @@ from micropython import const
 
 from armtempo_board.memory import Memory
 from armtempo_board.stepgen import newton, step_queue, subdivision
-from armtempo_board.stepgen.bezier import BIAS, HIGH, LOW
-from armtempo_board.stepgen.newton import (
-    FIRST_NODE,
-    HELD_NODE,
-    NODE_DELAY,
-    NODE_EXPONENT,
-    NODE_MANTISSA,
-    solve,
-)
-from armtempo_board.stepgen.step_queue import (
-    AT_START,
-    BY_LAW,
-    HALTED,
-    HELD_BACK,
-    IN,
-    INTERVAL_HIGH,
-    LAST_STEP,
-    LATEST_KITICKS,
-    MODE,
-    REACHED,
-    SINGLE_STEPS,
-    STEPS,
-    TIME_SCALE,
-    emit,
-    holds_steps,
-    put_single,
-)
-from armtempo_board.stepgen.subdivision import END, NOT_YET, SCALE
+from armtempo_board.stepgen.newton import solve
+from armtempo_board.stepgen.step_queue import emit, has_room, holds_steps, put_single
 from armtempo_board.stepgen.subintervals import Subintervals
 
 TYPE_CHECKING = False
@@ -46,10 +20,47 @@ if TYPE_CHECKING:
 
     from armtempo_shared.motion import MotionHead
 
-_ITEMS_PER_CALL = const(2)  # put into the queue by one call of ``prepare`` at most,
-_SEARCHES = const(4)  # and so many times a part of the motion looked at for each: bounds its time
-_NODES = const(12)  # solved in one call
-_CLEARED = (STEPS, LATEST_KITICKS, REACHED, LAST_STEP, MODE, HELD_BACK, HALTED)
+_PARTS_PER_CALL = const(4)  # of the motion that one call of ``prepare`` looks at: bounds its time
+_NODES = const(12)  # solved for one of them
+# as in step_queue.py: words of the queue
+_STEPS = const(11)
+_TIME_SCALE = const(14)
+_PULSE = const(17)
+_HEAD = const(18)
+_IN = const(20)
+_OUT = const(21)
+_LATEST_KITICKS = const(22)
+_REACHED = const(23)
+_LAST_STEP = const(24)
+_CUBIC_STEPS = const(25)
+_SLOW_TICKS = const(26)
+_INTERVAL_HIGH = const(27)
+_MODE = const(28)
+_SINGLE_STEPS = const(29)
+_HELD_BACK = const(30)
+_HALTED = const(31)
+# of MODE
+_BY_LAW = const(1)
+_AT_START = const(2)
+# as in newton.py: words of the solver
+_FIRST_NODE = const(28)
+_HELD_NODE = const(52)
+# of a node
+_NODE_MANTISSA = const(1)
+_NODE_EXPONENT = const(2)
+_NODE_DELAY = const(3)
+# as in bezier.py: words of a piece
+_HIGH = const(0)
+_LOW = const(6)
+_BIAS = const(1 << 28)
+# as in time_law.py: words of the law
+_REAL_START_HIGH = const(4)
+_MOTION_HIGH = const(14)
+# as in subdivision.py: what was found
+_NOT_YET = const(0)
+_END = const(3)
+
+_CLEARED = (_STEPS, _LATEST_KITICKS, _REACHED, _LAST_STEP, _MODE, _HELD_BACK, _HALTED)
 _FIRST_CUBIC_STEPS = const(16)  # tried first in a motion
 _LAW_WORDS = const(18)  # as in time_law.py
 _FAR = const(1 << 16)  # in 4096 ticks: longer than any subinterval and gap, and a small integer in ticks
@@ -83,7 +94,7 @@ class StepGenerator:
         self._held_queued = False  # the last step in the queue was held back before
         self._held_high = self._held_ticks = 0  # its time in the motion's own
         self._interval_in = 0
-        self._found = NOT_YET  # what is known of the next subinterval
+        self._found = _NOT_YET  # what is known of the next subinterval
 
     def load(
         self, motion: "MotionHead", joint: int, position_steps: int, pulse_ticks: int, gap_ticks: int
@@ -99,22 +110,23 @@ class StepGenerator:
         self.subintervals.load(motion, joint)
         self.subintervals.min_ticks = gap_ticks >> 3
         queue = self.queue
-        queue[step_queue.PULSE] = pulse_ticks
-        queue[step_queue.OUT] = queue[IN]
-        queue[step_queue.SLOW_TICKS] = 4 * gap_ticks
-        queue[step_queue.CUBIC_STEPS] = _FIRST_CUBIC_STEPS
+        queue[_PULSE] = pulse_ticks
+        queue[_OUT] = queue[_IN]
+        queue[_SLOW_TICKS] = 4 * gap_ticks
+        queue[_CUBIC_STEPS] = _FIRST_CUBIC_STEPS
         for word in _CLEARED:
             queue[word] = 0
-        queue[INTERVAL_HIGH] = BIAS
+        queue[_INTERVAL_HIGH] = _BIAS
         self._gap_ticks = gap_ticks
-        self._position = position_steps + BIAS
+        self._position = position_steps + _BIAS
         self.direction = 1
         self.at_turn = self.ended = self.halted = self._is_last_law = False
         self._held = self._first_waits = self._held_queued = False
-        self._found = NOT_YET
+        self._found = _NOT_YET
         while not holds_steps(queue) and not self.ended:
-            if not self._prepare() and self.at_turn:
+            if self.at_turn:
                 self.turn()
+            self.prepare(0)
 
     def close(self) -> None:
         """The motion is read no further; what only a motion needs is let go."""
@@ -128,12 +140,15 @@ class StepGenerator:
         limited time. At a turn it ends.
         """
         queue = self.queue
-        queue[step_queue.UNTIL_KITICKS] = until_kiticks
-        for _ in range(_ITEMS_PER_CALL):
-            if not step_queue.has_room(queue):
+        for _ in range(_PARTS_PER_CALL):
+            if not has_room(queue, until_kiticks) or self.at_turn or self.halted or self.ended:
                 return False
-            if not self._prepare() and (self.at_turn or self.halted or self.ended):
-                return False
+            if self._first_waits:
+                self._queue_first()
+            elif queue[_REACHED] < queue[_LAST_STEP]:
+                self._queue_more()
+            else:
+                self._next_interval()
         return True
 
     def write(self, ring: "array[int] | memoryview[int]", mask: int, head: int, room: int) -> int:
@@ -142,17 +157,18 @@ class StepGenerator:
         ``ring``: array('I') of ``mask`` + 1 entries, ``head`` even. Returns how many were written.
         """
         queue = self.queue
-        queue[step_queue.HEAD] = head
+        queue[_HEAD] = head
         emit(room, ring, queue, mask)
-        return int(queue[step_queue.HEAD] - head)
+        return int(queue[_HEAD] - head)
 
     def latest_kiticks(self) -> int:
         """Time of the last step in the queue."""
-        return int(self.queue[LATEST_KITICKS])
+        latest_kiticks: int = self.queue[_LATEST_KITICKS]
+        return latest_kiticks
 
     def waits(self) -> bool:
         """Whether steps wait in the queue."""
-        return bool(holds_steps(self.queue))
+        return holds_steps(self.queue) != 0
 
     def turn(self) -> None:
         """Let the steps in the other direction come."""
@@ -169,13 +185,13 @@ class StepGenerator:
         """
         queue = self.queue
         high = self._high()
-        queue[MODE] |= BY_LAW
-        queue[INTERVAL_HIGH] = self._law.take(law, high)
-        start_kiticks = _kiticks(self._law.start_high(), 0)
-        reached = queue[REACHED]
-        if queue[LATEST_KITICKS] >= start_kiticks and holds_steps(queue):
+        queue[_MODE] |= _BY_LAW
+        queue[_INTERVAL_HIGH] = self._law.take(law, high)
+        start_kiticks = _kiticks(self._law_words[_REAL_START_HIGH], 0)
+        reached = queue[_REACHED]
+        if queue[_LATEST_KITICKS] >= start_kiticks and holds_steps(queue):
             if self._held_queued:
-                step_queue.withdraw(queue, queue[IN] - 1 & 0xFFFF, start_kiticks)
+                step_queue.withdraw(queue, queue[_IN] - 1 & 0xFFFF, start_kiticks)
                 self._held = True
             else:
                 reached -= step_queue.withdraw(queue, self._interval_in, start_kiticks)
@@ -185,10 +201,10 @@ class StepGenerator:
         if reached < 0:
             reached = 0
             self._first_waits = True
-        queue[REACHED] = reached
+        queue[_REACHED] = reached
         # what was written last may have followed the law before, so no cubic begins there
-        queue[SINGLE_STEPS] = max(queue[SINGLE_STEPS], 1)
-        if self._first_waits or reached < queue[LAST_STEP]:
+        queue[_SINGLE_STEPS] = max(queue[_SINGLE_STEPS], 1)
+        if self._first_waits or reached < queue[_LAST_STEP]:
             self._solve(reached)
         self.halted = False
         self.finish(is_last)
@@ -207,69 +223,40 @@ class StepGenerator:
         if self._held:
             return _kiticks(self._held_high, self._held_ticks)
         if self._first_waits:
-            return _kiticks(self.queue[INTERVAL_HIGH], self._ticks())
-        return _kiticks(self.queue[INTERVAL_HIGH] if self._has_more() else self.subintervals.time[HIGH], 0)
-
-    def _prepare(self) -> bool:
-        """Put the next steps into the queue. False: at a turn, at the end, or not found yet."""
-        before = self.queue[IN]
-        for _ in range(_SEARCHES):
-            if self.at_turn or self.halted or self.ended:
-                return False
-            if self._first_waits:
-                self._queue_first()
-            elif self._has_more():
-                self._queue_more()
-            else:
-                self._next_interval()
-            if self.queue[IN] != before:
-                return True
-        return False
+            return _kiticks(self.queue[_INTERVAL_HIGH], self._ticks())
+        has_more = self.queue[_REACHED] < self.queue[_LAST_STEP]
+        return _kiticks(self.queue[_INTERVAL_HIGH] if has_more else self.subintervals.time[_HIGH], 0)
 
     def _next_interval(self) -> None:
         now = self.subintervals
-        if self._found == NOT_YET:
+        if self._found == _NOT_YET:
             self._found = now.search(self._position)
         found = self._found
-        is_past = self.queue[MODE] & BY_LAW and self._law.is_past(now.time[HIGH])
-        if found == END or is_past:
+        is_past = self.queue[_MODE] & _BY_LAW and self._law.is_past(now.time[_HIGH])
+        if found == _END or is_past:
             if self._held:
                 self._queue_held()
-            elif found == END:
+            elif found == _END:
                 self.ended = True
             else:
                 self._halt()
-        elif self._held and self._since_held(now.time[HIGH], now.time[LOW] >> 16) > self._gap_ticks:
+        elif self._held and self._since_held(now.time[_HIGH], now.time[_LOW] >> 16) > self._gap_ticks:
             self._queue_held()
-        elif found != NOT_YET:
-            self._found = NOT_YET
+        elif found != _NOT_YET:
+            self._found = _NOT_YET
             self._begin_interval(found == subdivision.AT_START)
 
     def _begin_interval(self, at_start: bool) -> None:
         """Take up the steps of the subinterval that was found, and solve the first."""
-        now = self.subintervals
-        solver = self._solver
-        steps = now.end() - self._position
-        heading = 1 if steps > 0 else -1
         queue = self.queue
-        scale = now.time_measures[SCALE] - 12
-        queue[TIME_SCALE] = scale
-        queue[INTERVAL_HIGH] = now.time[HIGH]
-        if queue[MODE] & BY_LAW:
-            queue[INTERVAL_HIGH] = self._law.count_from(now.time[HIGH])
-        solver[newton.TIME_OFFSET] = now.time[LOW] >> (16 - scale)
-        if at_start:
-            solver[newton.RANGE] = 0
-        else:
-            solver[newton.TARGET] = 2 * (self._position - now.angle[HIGH]) + heading + BIAS
-            newton.set_interval(solver, now.angle, now.angle_measures, now.time_measures)
+        now = self.subintervals
+        high = now.time[_HIGH]
+        queue[_INTERVAL_HIGH] = self._law.count_from(high) if queue[_MODE] & _BY_LAW else high
+        steps = self._law.begin(self._solver, queue, now.arrays, self._position, at_start)
         self._position += steps
-        self._heading = heading
-        queue[LAST_STEP] = steps * heading - 1
-        queue[REACHED] = queue[SINGLE_STEPS] = 0
-        queue[MODE] = queue[MODE] & BY_LAW | (AT_START if at_start else 0)
+        self._heading = 1 if steps > 0 else -1
         self._first_waits = True
-        self._interval_in = queue[IN]
+        self._interval_in = queue[_IN]
         self._solve(0)
 
     def _solve(self, index: int) -> None:
@@ -279,10 +266,10 @@ class StepGenerator:
         solve(solver, index, 0)
         self._first_ticks = self._node_ticks()
         self._first_comes = True
-        if queue[MODE] & BY_LAW:
-            comes = self._law.to_real_time(solver, FIRST_NODE, queue[TIME_SCALE])
-            if comes and queue[MODE] < AT_START:
-                self._law.scale_slope(solver, FIRST_NODE)
+        if queue[_MODE] & _BY_LAW:
+            comes = self._law.to_real_time(self._law_words, solver, _FIRST_NODE, queue[_TIME_SCALE])
+            if comes and queue[_MODE] < _AT_START:
+                self._law.scale_slope(solver, _FIRST_NODE)
             self._first_comes = comes
 
     def _queue_first(self) -> None:
@@ -299,39 +286,31 @@ class StepGenerator:
             self.at_turn = True
         else:
             self._first_waits = False
-            self._queue_single()
-
-    def _has_more(self) -> bool:
-        """Whether the subinterval has more steps."""
-        return self.queue[REACHED] < self.queue[LAST_STEP]
+            if self.queue[_LAST_STEP] == 0 and self._is_slow():
+                self._hold_back()
+            else:
+                self._held_queued = False
+                put_single(self.queue, self.queue[_INTERVAL_HIGH], self._ticks())
 
     def _queue_more(self) -> None:
         """The next steps of the subinterval."""
         queue = self.queue
         self._held_queued = False
-        self._law.queue_steps(self._solver, queue, _NODES)
-        if queue[HELD_BACK]:
-            queue[HELD_BACK] = 0
-            if queue[MODE] & BY_LAW:  # its node is in real time
-                solve(self._solver, queue[LAST_STEP], 0)
+        self._law.queue_steps(self._solver, queue, _NODES, self._law_words)
+        if queue[_HELD_BACK]:
+            queue[_HELD_BACK] = 0
+            if queue[_MODE] & _BY_LAW:  # its node is in real time
+                solve(self._solver, queue[_LAST_STEP], 0)
             self._first_ticks = self._node_ticks()
             self._hold_back()
-        if queue[HALTED]:
-            queue[HALTED] = 0
+        if queue[_HALTED]:
+            queue[_HALTED] = 0
             self._halt()
 
     def _halt(self) -> None:
         """By the law nothing comes any more: the end, or until another law."""
         self.halted = True
         self.finish(self._is_last_law)
-
-    def _queue_single(self) -> None:
-        """Queue the step at the first node, or hold it back."""
-        if self.queue[LAST_STEP] == 0 and self._is_slow():
-            self._hold_back()
-        else:
-            self._held_queued = False
-            put_single(self.queue, self.queue[INTERVAL_HIGH], self._ticks())
 
     def _hold_back(self) -> None:
         """Hold back the step at the first node."""
@@ -345,19 +324,19 @@ class StepGenerator:
         Acceleration near standstill is at most 0.16 steps / gap**2 (see motion_check.py), so a joint that takes less
         than 12 gaps for a step is not back within a gap; held against 4 of them.
         """
-        ticks = self._solver[FIRST_NODE + NODE_MANTISSA] >> self._solver[FIRST_NODE + NODE_EXPONENT]
-        return self.queue[MODE] >= AT_START or ticks > self.queue[step_queue.SLOW_TICKS]
+        ticks = self._solver[_FIRST_NODE + _NODE_MANTISSA] >> self._solver[_FIRST_NODE + _NODE_EXPONENT]
+        return self.queue[_MODE] >= _AT_START or ticks > self.queue[_SLOW_TICKS]
 
     def _queue_held(self) -> None:
         """Queue the step that was held back, if by the law it comes."""
         high, ticks = self._held_high, self._held_ticks
-        if self.queue[MODE] & BY_LAW:
+        if self.queue[_MODE] & _BY_LAW:
             solver, law = self._solver, self._law
-            before = law.motion_high()
+            before = self._law_words[_MOTION_HIGH]
             high = law.count_from(high)
-            solver[HELD_NODE] = ticks
-            comes = law.to_real_time(solver, HELD_NODE, 0)
-            ticks = solver[HELD_NODE] + solver[HELD_NODE + NODE_DELAY]
+            solver[_HELD_NODE] = ticks
+            comes = law.to_real_time(self._law_words, solver, _HELD_NODE, 0)
+            ticks = solver[_HELD_NODE] + solver[_HELD_NODE + _NODE_DELAY]
             law.count_from(before)
             if not comes:
                 self._halt()
@@ -365,7 +344,7 @@ class StepGenerator:
         self._held = False
         self._held_queued = True
         put_single(self.queue, high, ticks)
-        self._interval_in = self.queue[IN]
+        self._interval_in = self.queue[_IN]
 
     def _since_held(self, high: int, ticks: int) -> int:
         """Ticks of the motion's time from the step held back to another; any large number where it is far."""
@@ -376,18 +355,22 @@ class StepGenerator:
 
     def _high(self) -> int:
         """What the motion's times of the subinterval count from."""
-        return int(self._law.motion_high() if self.queue[MODE] & BY_LAW else self.queue[INTERVAL_HIGH])
+        high: int = (
+            self._law_words[_MOTION_HIGH] if self.queue[_MODE] & _BY_LAW else self.queue[_INTERVAL_HIGH]
+        )
+        return high
 
     def _node_ticks(self) -> int:
         """Time of the first node in ticks, rounded."""
-        scale = self.queue[TIME_SCALE]
-        return (self._solver[FIRST_NODE] + (1 << (scale - 1))) >> scale
+        scale = self.queue[_TIME_SCALE]
+        return (self._solver[_FIRST_NODE] + (1 << (scale - 1))) >> scale
 
     def _ticks(self) -> int:
         """Real time of the first node in ticks from INTERVAL_HIGH on."""
-        ticks = self._node_ticks()
-        return ticks + self._solver[FIRST_NODE + NODE_DELAY] if self.queue[MODE] & BY_LAW else ticks
+        if self.queue[_MODE] & _BY_LAW:
+            return self._node_ticks() + self._solver[_FIRST_NODE + _NODE_DELAY]
+        return self._first_ticks
 
 
 def _kiticks(high: int, ticks: int) -> int:
-    return ((high - BIAS) << 2) + (ticks >> 10)
+    return ((high - _BIAS) << 2) + (ticks >> 10)

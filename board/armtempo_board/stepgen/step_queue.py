@@ -147,6 +147,20 @@ def emit(now: int, ring: ptr32, queue: ptr32, mask: int) -> object:
         left = queue[_LEFT]
         carry = queue[CARRY]
         step = queue[_STEP]
+        # Groups of one step, as they are many where the speed changes: as below, but shorter
+        if queue[GROUP] == 1:
+            while count:
+                count -= 1
+                step = first >> power
+                remainder += first - (step << power)
+                n = remainder >> carry
+                remainder -= n << carry
+                now += n + step
+                first += second
+                second += third
+                ring[_RISE] = (now >> shift) + base
+                ring[_FALL] = ring[_RISE] + pulse
+                ring = ptr32(int(ring) + 8)
         while count:
             # The next group: the time of one of its steps, and the next differences
             if not left:
@@ -210,17 +224,18 @@ def put_single(queue: ptr32, high: int, ticks: int) -> object:
 
 
 @micropython.viper
-def has_room(queue: ptr32) -> int:
-    """1 where the queue has room for two items and does not go on beyond UNTIL_KITICKS, else 0."""
+def has_room(queue: ptr32, until_kiticks: int) -> int:
+    """1 where the queue has room for two items and does not go on beyond a time, the new UNTIL_KITICKS; else 0."""
+    queue[UNTIL_KITICKS] = until_kiticks
     if (queue[IN] - queue[OUT]) & _COUNT_MASK >= _FULL:
         return 0
-    return 1 if queue[LATEST_KITICKS] <= queue[UNTIL_KITICKS] else 0
+    return ((queue[LATEST_KITICKS] - until_kiticks - 1) >> 31) & 1
 
 
 @micropython.viper
 def holds_steps(queue: ptr32) -> int:
-    """1 while steps in the queue have not been written, else 0."""
-    return 1 if queue[STEPS] or queue[IN] != queue[OUT] else 0
+    """Not 0 while steps in the queue have not been written."""
+    return queue[STEPS] | (queue[IN] ^ queue[OUT])
 
 
 @micropython.viper

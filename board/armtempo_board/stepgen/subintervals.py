@@ -17,6 +17,12 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from armtempo_shared.motion import MotionHead
 
+# arrays of a subinterval
+ANGLE = const(0)
+TIME = const(1)
+ANGLE_MEASURES = const(2)
+TIME_MEASURES = const(3)
+
 _START_LEVEL = const(4)
 
 
@@ -24,8 +30,9 @@ class Subintervals:
     """Walks through a joint's motion.
 
     ``angle`` and ``time`` begin with the Bezier points of the subinterval (bezier.py); ``angle_measures`` and
-    ``time_measures`` are what was measured of them (subdivision.py). ``min_ticks``: a subinterval no longer than
-    this that comes back to the position where it began is passed over.
+    ``time_measures`` are what was measured of them (subdivision.py); ``arrays`` holds all four, in the order of the
+    words above. ``min_ticks``: a subinterval no longer than this that comes back to the position where it began is
+    passed over.
     """
 
     def __init__(self, memory: Memory) -> None:
@@ -37,6 +44,7 @@ class Subintervals:
         self._time_points = ControlPoints(take(WINDOW_WORDS))
         self.angle_measures = take(MEASURES_SIZE)
         self.time_measures = take(MEASURES_SIZE)
+        self.arrays = self.angle, self.time, self.angle_measures, self.time_measures
         self.min_ticks = 0
 
     def load(self, motion: "MotionHead", joint: int) -> None:
@@ -91,24 +99,6 @@ class Subintervals:
                 break
         return found
 
-    def split(self) -> None:
-        """Go on with its first half."""
-        self.time_measures[subdivision.MOVE] = subdivision.SPLIT
-
-    def skip(self) -> None:
-        """Go on behind it, with one twice as long where the grid allows it."""
-        self.time_measures[subdivision.MOVE] = subdivision.SKIP
-
-    def start(self) -> int:
-        """Position (+ bezier.BIAS) at its start."""
-        return self.angle[bezier.HIGH] + (self.angle[bezier.LOW] >> 27)
-
-    def end(self) -> int:
-        """Position (+ bezier.BIAS) at its end."""
-        return self.angle[bezier.LAST_HIGH] + (self.angle[bezier.LAST_LOW] >> 27)
-
-    def ticks(self) -> int:
-        """Its length, where that is no more than 2**28 ticks."""
-        time = self.time
-        low = time[bezier.LAST_LOW] - time[bezier.LOW]
-        return ((time[bezier.LAST_HIGH] - time[bezier.HIGH]) << 12) + (low >> 16)
+    def go_on(self, move: int) -> None:
+        """With its first half (subdivision.SPLIT), or behind it (SKIP)."""
+        self.time_measures[subdivision.MOVE] = move

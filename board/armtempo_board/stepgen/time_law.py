@@ -214,8 +214,8 @@ def to_real_time(given: object, node: ptr32, place: int, scale: int) -> int:
     motion = law[MOTION_HIGH]
     whole = node[_NODE_TIME] >> scale
     fraction = node[_NODE_TIME] & ((1 << scale) - 1)
-    in_ramp = 0
     anchor = END_HIGH
+    in_ramp = 0
     rate = law[AFTER]
     place = motion - law[END_HIGH]
     if place < 0 - _FAR or (place < _FAR and (place << 12) + whole < law[END_LOW]):

@@ -181,9 +181,7 @@ class Store:
         return self._read(_file_name(name))
 
     def motion(self, name: str) -> MotionFile:
-        """A stored motion, checked as far as its head and checksum go; "" is none."""
-        if not name:
-            raise Refused(codes.NOT_FOUND)
+        """A stored motion, checked as far as its head and checksum go."""
         return self._motion(_motion_file(name))
 
     def is_sequence(self, name: str) -> bool:

@@ -3,6 +3,7 @@
 import cases
 import stand_in
 from app_rig import ROOT, App, connected, start, state
+from armtempo_board.link.serial_link import SerialLink
 from armtempo_shared import wire
 
 
@@ -48,6 +49,29 @@ def case_commands_before_hello_are_refused():
     assert state(host) == "unconfigured"
 
 
+def case_a_new_session_hears_nothing_that_was_meant_for_the_old_one():
+    app, host = connected()
+    start(host)
+    host.port.room = 0
+    app.controller.engine.advance(3)
+    host.turn()
+    assert not app.link.idle()  # samples wait for a host that does not read
+    host.events.clear()
+    host.send("hello", (wire.PROTOCOL_VERSION, 2))
+    host.turn()
+    host.port.room = 1 << 30
+    frames = [wire.EVENT_BY_ID[number][0] for _, number, _ in host.turn()]
+    assert frames == ["ok"], frames
+
+
+def case_without_an_arm_nothing_moves():
+    app = App(stand_in.Port(), ROOT + "armless")
+    host = stand_in.Host(app, app.link.stream)
+    host.hello()
+    for name, values, tail in (("start", (0, 1), "feed"), ("home", (1,), bytes(4)), ("drivers", (1,), b"")):
+        assert host.ask(name, values, tail) == ("error", "unconfigured", 255, 0), name
+
+
 def case_wrong_lengths_are_malformed():
     _, host = connected()
     for name, payload in (("status", b"x"), ("put_data", b"\0\0\0"), ("home", b""), ("samples", bytes(7))):
@@ -69,6 +93,49 @@ def case_half_a_frame_does_not_block_for_long():
     assert state(host) == "idle"
     bad = host.ask("status")[1][10]
     assert bad >= 1
+
+
+def case_a_frame_may_come_in_pieces():
+    """With 40 ms between them: the pause counts from the last byte."""
+    app, host = connected()
+    frame = wire.frame(99, wire.COMMAND["home"][1], wire.encode(wire.COMMAND["home"], (1,), bytes(8)))
+    for byte in frame:
+        host.port.inbox.append(byte)
+        answers = host.turn(40)
+    assert [answer[0] for answer in answers] == [99]
+    assert app.controller.engine.calls.count("home") == 2  # one was the connecting
+    assert host.ask("status")[1][10] == 0
+
+
+def case_what_the_port_took_makes_room():
+    """A piece of an event is enough; what stays behind it comes whole."""
+    port = stand_in.Port()
+    link = SerialLink(port)
+    size = 250
+    port.room = 200
+    for number in range(3):
+        while not link.room(size):
+            assert number == 2
+            assert port.room, "no room for the third, though there are bytes free"
+            link.flush()
+        link.out[link.payload()] = number
+        link.event(0x40, size)
+    port.room = 1000
+    while not link.idle():
+        link.flush()
+    parser = wire.Parser()
+    parser.feed(bytes(port.outbox))
+    for number in range(3):
+        sequence, _, payload = parser.next()
+        assert (sequence, payload[0], len(payload)) == (number, number, size)
+
+
+def case_each_hello_tells_what_is_free_now():
+    app, host = connected()
+    app.controller.free_flash = app.controller.free_heap = -1
+    assert host.hello(session=2)[0] == "ok"
+    assert app.controller.free_flash > 0
+    assert app.controller.free_heap >= 0
 
 
 def case_start_only_when_everything_is_valid():

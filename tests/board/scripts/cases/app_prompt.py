@@ -48,6 +48,16 @@ def case_noise_does_not_open_the_repl():
         assert not app.left(), noise
 
 
+def case_line_ends_alone_do_not_open_the_repl():
+    """A terminal's Enter, before the first frame and behind one."""
+    for clear in (False, True):
+        request = prompt.PromptRequest()
+        if clear:
+            request.clear()
+        assert not any([request.comes(byte, 1000) for byte in b"\r\r\r\r"]), clear
+        assert request.comes(3, 1000)
+
+
 def case_repl_is_reached_right_behind_a_frame():
     """A host program that starts mpremote; the port's buffer may hold both."""
     app, host = connected()

@@ -73,6 +73,19 @@ def case_samples_are_kept_until_acknowledged():
     assert host.ask("samples", (99, 0)) == ("ok", (10, 0), b"")
 
 
+def case_the_next_run_counts_its_samples_from_0():
+    app, host = connected()
+    for _ in range(2):
+        host.events.clear()
+        start(host)
+        app.controller.engine.advance(3)
+        host.turn()
+        assert samples_of(host) == [0, 1, 2, 3]
+        assert host.ask("samples", (0, 0)) == ("ok", (0, 4), b"")
+        app.controller.engine.finish()
+        host.turn()
+
+
 def case_oldest_sample_gives_way_and_is_counted():
     app, host = connected()
     start(host)

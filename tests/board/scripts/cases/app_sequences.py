@@ -3,6 +3,7 @@
 import cases
 import stand_in
 from app_rig import connected, flash, start, state
+from armtempo_board import heap
 from armtempo_shared import armrecord, codes, sequence, wire
 from sequence_rig import (
     COUNT,
@@ -358,6 +359,21 @@ def case_the_button_starts_it_as_the_default():
     arrive(app, host, 10)
     arrive(app, host, 0)
     assert stands(host)[0] == "finished"
+
+
+def case_code_stays_from_the_first_motion_to_the_end_where_memory_is_not_short():
+    for is_short in (False, True):
+        app, host = ready([(MOVE, "there", 0, 0), (MOVE, "back", 0, 0)])
+        app.controller.workspace.is_short = is_short
+        try:
+            begin(host)
+            arrive(app, host, 10)
+            assert heap._keeps is not is_short
+            arrive(app, host, 0)
+            assert stands(host)[0] == "finished"
+        finally:
+            app.controller.workspace.is_short = False
+        assert not heap._keeps
 
 
 cases.run(globals())

@@ -8,6 +8,7 @@ import stand_in
 
 from app_rig import ROOT  # isort: skip  it puts the stand-ins into place
 
+from armtempo_board import heap
 from armtempo_board.app import arm_state
 from armtempo_board.app.app import App
 from armtempo_shared import armrecord, engine_memory, wire
@@ -89,6 +90,7 @@ class Cramped:
     """A board with less memory for engines."""
 
     words = engine_memory.words([1])
+    is_short = True
     joints = 6
 
 
@@ -125,6 +127,49 @@ def case_an_engine_that_cannot_be_made_is_named():
         finally:
             arm_state.Engine = engine
         assert (hello[1], wire.ERRORS[hello[PROBLEM]][0]) == (0, problem)
+
+
+def case_an_engine_gets_the_held_pieces_only_where_it_needs_them():
+    """Where memory is short, it is made beside the pieces that are kept for a motion's code; where there is no room for
+    both, without them.
+    """
+    root = folder_with(stand_in.arm())
+    engine = arm_state.Engine
+    tried = []
+
+    def cramped(*arguments):
+        tried.append(sum([len(piece) for piece in heap._held]))
+        if heap._held:
+            raise MemoryError
+        return engine(*arguments)
+
+    arm_state.Engine = cramped
+    stand_in.Workspace.is_short = True
+    try:
+        app, _, hello = started(root)
+    finally:
+        arm_state.Engine = engine
+        stand_in.Workspace.is_short = False
+    assert app.controller.engine.joints == 2
+    assert tried == [arm_state.MOTION_CODE_BYTES, 0], tried
+    assert (hello[1], hello[PROBLEM]) == (2, 0)
+    assert heap._held == [], "the motion's code finds no room"
+
+
+def case_no_pieces_are_held_where_memory_is_not_short():
+    engine = arm_state.Engine
+    tried = []
+
+    def looked(*arguments):
+        tried.append(len(heap._held))
+        return engine(*arguments)
+
+    arm_state.Engine = looked
+    try:
+        started(folder_with(stand_in.arm()))
+    finally:
+        arm_state.Engine = engine
+    assert tried == [0]
 
 
 def case_a_damaged_motion_is_listed_and_refused():

@@ -1,9 +1,12 @@
 """Motions in the program's store: how they come in, under which names, and what is refused."""
 
+import os
+
 import cases
 import stand_in
 from app_rig import connected, flash, start
-from armtempo_shared import wire
+from armtempo_board.storage import motion_file, store
+from armtempo_shared import motion, wire
 
 
 def case_upload_out_of_order():
@@ -56,6 +59,41 @@ def case_names():
     assert host.ask("get", (0, 9), "food") == ("error", "not_found", 255, 0)
 
 
+class Counted:
+    """A file that knows whether it was closed."""
+
+    open_paths: "list[str]" = []
+
+    def __init__(self, path, mode):
+        self._file = open(path, mode)  # noqa: SIM115  the store closes it
+        self._path = path
+        Counted.open_paths.append(path)
+
+    def __getattr__(self, name):
+        return getattr(self._file, name)
+
+    def close(self):
+        self._file.close()
+        Counted.open_paths.remove(self._path)
+
+
+def case_no_file_stays_open():
+    """Its buffer would take heap until the next collection."""
+    _, host = connected()
+    store.open = Counted
+    for what in (
+        lambda: host.upload("apple", host.record)[-1],
+        lambda: host.ask("set_default", (), "apple"),
+        lambda: host.ask("list", (0,)),
+        lambda: host.ask("get", (0, 90), "apple"),
+        lambda: host.ask("rename", (5,), "applefood"),
+        lambda: host.ask("remove", (), "food"),
+    ):
+        assert what()[0] == "ok"
+        assert Counted.open_paths == []
+    del store.open
+
+
 def case_default_is_one_content_of_its_name():
     app, host = connected()
     other = stand_in.record(stand_in.arm(), segments=9)
@@ -80,6 +118,19 @@ def case_damaged_file_in_flash_is_not_run():
     assert start(host) == ("error", "bad_record", 255, 0)
     assert host.ask("list", (0,)) == ("ok", (1, len(data), 0, 0, 0, 0, 0), "feed")
     assert app.controller.engine.calls.count("load") == 0
+
+
+def case_file_that_ends_before_its_size_is_damaged():
+    """The folder's entry says more than there is to read."""
+    connected()
+    name = flash() + "/feed.atm"
+    size = os.stat(name)[6]
+    for more in (1, 4, 5, 300):
+        try:
+            motion_file.stated_crc(name, size + more)
+        except motion.MotionError:
+            continue
+        raise AssertionError(more)
 
 
 def case_other_limits_keep_the_position_another_arm_does_not():

@@ -167,6 +167,16 @@ def case_estop_behind_a_limit_switch():
     assert (rig.engine.fault, rig.engine.known) == (codes.LIMIT_SWITCH, 0)
 
 
+def case_limit_switch_just_before_another_fault():
+    """Its interrupt came since the turn began that finds the other: what came first is what the host hears of."""
+    rig = Rig([row(channel=0, limit_low=0, limit_active_high=1)])
+    rig.start(Motion(TICK_HZ // 10, Steps((1000, 400, 2000, -1))))
+    rig.run_to(400_000)
+    external_interrupts.set_level("D8", 1)
+    rig.engine._fail(codes.FOLLOWING, 0)
+    stopped_one(rig, codes.LIMIT_SWITCH)
+
+
 def case_underrun_anywhere():
     """The main loop stalls at many moments, for long enough and for not quite long enough."""
     random.seed(SEED)
@@ -191,29 +201,34 @@ def case_written_too_late():
     """The interrupt takes so long that the last edge has passed when new ones are written."""
     motion = Motion(LONG.duration, LONG.joints[0], Steps(), Steps())
     for moment in (-500_000, 9_000_000):
-        rig = Rig([dict(joint, following_counts=0) for joint in arm(3)])
-        rig.start(motion)
-        rig.run_to(moment)
-        with_slow_emit(rig)
-        stopped(rig, codes.UNDERRUN, 0)
-        assert rig.engine.known == 7
+        with_slow_emit(motion, moment)
 
 
-def with_slow_emit(rig):
-    """Run to the end; whatever is written to the first joint's ring takes 30 ms."""
+def with_slow_emit(motion, moment):
+    """From a moment on, whatever is written to the first joint's ring takes 30 ms."""
     from armtempo_board.motion import ring_feeder
 
     emit = ring_feeder.emit
+    slow = []
 
     def slow_emit(*arguments):
         emit(*arguments)
-        if arguments[1] is rig.engine._joints[0].ring.words:
-            rig.board.stand_still(84 * 30_000)
+        for rig in slow:
+            if arguments[1] is rig.engine._joints[0].ring.words:
+                rig.board.stand_still(84 * 30_000)
 
     ring_feeder.emit = slow_emit
+    try:
+        rig = Rig([dict(joint, following_counts=0) for joint in arm(3)])
+    finally:
+        ring_feeder.emit = emit
+    rig.start(motion)
+    rig.run_to(moment)
+    slow.append(rig)
     while rig.engine.moving:
         rig.turn()
-    ring_feeder.emit = emit
+    stopped(rig, codes.UNDERRUN, 0)
+    assert rig.engine.known == 7
 
 
 def case_interrupt_gone():

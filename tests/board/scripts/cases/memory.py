@@ -117,4 +117,35 @@ def case_without_it_there_is_less_for_arms():
     assert with_it - without == engine_memory.PROCESSOR_WORDS
 
 
+def case_outputs_take_of_the_engines_memory_only_where_it_is_short():
+    standalone.start()
+    taken = engine_memory.output_bytes(2, 1) // 4
+    for words, left in ((engine_memory.LARGEST_WORDS, engine_memory.LARGEST_WORDS), (LARGE, LARGE - taken)):
+        workspace = Workspace(words, 6, stm.BKPSRAM)
+        room.share(workspace, 2, 1)
+        assert workspace.memory.size == left
+        room.share(workspace, 0, 0)
+        assert workspace.memory.size == words
+
+
+class Collector:
+    """Takes the place of ``gc``: half of the heap is free, all of it after a collection."""
+
+    free = 48_000
+
+    def collect(self):
+        self.free = 96_000
+
+    def mem_free(self):
+        return self.free
+
+
+def case_samples_take_their_share_of_what_a_collection_leaves():
+    kept, room.gc = room.gc, Collector()
+    try:
+        assert room.sample_bytes() == 96_000 // 48
+    finally:
+        room.gc = kept
+
+
 cases.run(globals())

@@ -5,7 +5,7 @@ from array import array
 import cases
 import uctypes
 import virtual_board.standalone  # noqa: F401
-from armtempo_board.hardware import isr, pins
+from armtempo_board.hardware import isr, pins, registers
 from armtempo_board.stepgen import step_queue
 from armtempo_shared.engine_memory import ring_words
 from engine_rig import Rig, arm
@@ -57,7 +57,7 @@ def ready(entries, made, matched, last, now):
 
 
 def case_when_to_write():
-    """Where a quarter is free and the last rising edge is 390 us to 37 ms ahead; a dry ring is fed no more."""
+    """Where three eighths are free and the last rising edge is 390 us to 37 ms ahead; a dry ring is fed no more."""
     guard, plenty = 32768 + 100, 3145728 + 100
     for entries, made, matched, last, now, hungry, fed in (
         (64, 20, 8, guard, 0, 1, 1),
@@ -69,8 +69,8 @@ def case_when_to_write():
         (64, 20, 8, plenty - 1, 0, 1, 1),
         (64, 20, 8, plenty, 0, 0, 1),
         (64, 20, 20, guard, 0, 0, 0),
-        (64, 56, 8, guard, 0, 1, 1),
-        (64, 57, 8, guard, 0, 0, 1),
+        (64, 48, 8, guard, 0, 1, 1),
+        (64, 49, 8, guard, 0, 0, 1),
         (1024, 5000, 4990, guard, 0, 1, 1),
     ):
         block, state, dma, timer = ready(entries, made, matched, last, now)
@@ -111,14 +111,14 @@ def case_written_and_wrapped():
 
 
 def case_sizes():
-    """A ring lasts at least 3 ms at a joint's highest rate, or is of the largest size."""
+    """A ring lasts as long as asked at a joint's highest rate, or is of the largest size."""
     previous = 64
     for rate in (0, 1, 1796, 1900, 3592, 4100, 8000, 20_000, 34_000, 333_000):
-        entries = ring_words(rate) - 1
+        entries = ring_words(rate, 3) - 1
         assert entries in (64, 128, 256, 512, 1024) and entries >= previous
         assert entries == 1024 or (entries - 8) * 1000 >= 2 * rate * 3, rate
         previous = entries
-    assert [ring_words(rate) for rate in (0, 9_300, 9_600, 333_000)] == [65, 65, 129, 1025]
+    assert [ring_words(rate, 3) for rate in (0, 9_300, 9_600, 333_000)] == [65, 65, 129, 1025]
 
 
 def case_times_across_the_wrap():
@@ -383,6 +383,15 @@ def case_interrupts_wait_while_a_channel_is_armed_or_released():
     assert enabled == [False, False], enabled
     assert disable_irq(), "interrupts stay off"
     enable_irq(True)
+
+
+def case_a_stream_is_off_while_it_is_set_up():
+    """Else it takes nothing of it (RM0090 10.5.5): CR, PAR, M0AR, FCR, and CR again, which does not start it yet."""
+    rows = registers.stream_rows(5, 3, 0x34, 0x20000000)
+    assert [4 * row[1] - (0x10 + 0x18 * 5) for row in rows] == [0x00, 0x08, 0x0C, 0x14, 0x00]
+    assert [row[3] for row in rows[:-1]] == [0, 0x34, 0x20000000, 0]
+    assert rows[-1][3] >> 25 == 3
+    assert not rows[-1][3] & 1
 
 
 cases.run(globals())

@@ -95,8 +95,7 @@ class StepGenerator:
 
     def prepare(self, until):
         """Queue steps as the evaluator's does: the first of a block by itself, the others as cubics."""
-        self.queue[step_queue.UNTIL_KITICKS] = until
-        while not self.ended and not self.at_turn and step_queue.has_room(self.queue):
+        while step_queue.has_room(self.queue, until) and not self.ended and not self.at_turn:
             time, direction = self._steps.at(self._place)
             if direction != self.direction:
                 self.at_turn = True
@@ -128,7 +127,7 @@ class Pulses:
 
     def __init__(self, rig, joint, step, direction):
         self._rig = rig
-        self._row = joint
+        self._inverted = joint["dir_inverted"]
         self._step = rig.board.pins.line(step)
         self._dir = rig.board.pins.line(direction)
         self._step.sinks.append(self)
@@ -165,22 +164,32 @@ class Pulses:
             before ^= 1
 
     def _rise(self, now):
-        assert self._steps, "a step without a motion"
-        planned = self._steps.at(self._place)
-        assert planned, "a step too many"
-        time, direction = planned
-        assert now - self._rig.zero() == time, (now - self._rig.zero(), time, self.rises)
-        assert (self._dir.level ^ self._row["dir_inverted"]) * 2 - 1 == direction, (time, direction)
-        self._steps.go_on(self._place)
-        self.shortest_setup = min(self.shortest_setup, now - self.last_turn)
+        # of every step of every case: no calls
+        steps = self._steps
+        assert steps, "a step without a motion"
+        place = self._place
+        assert place[0] < len(steps.blocks), "a step too many"
+        first, gap, count, direction = steps.blocks[place[0]]
+        time = first + place[1] * gap
+        assert now - self._rig._zero == time, (now - self._rig._zero, time, self.rises)
+        assert (self._dir.level ^ self._inverted) * 2 - 1 == direction, (time, direction)
+        place[1] += 1
+        if place[1] == count:
+            place[0] += 1
+            place[1] = 0
+        setup = now - self.last_turn
+        if setup < self.shortest_setup:
+            self.shortest_setup = setup
         self.last_rise = now
         self.rises += 1
         self.net += direction
 
     def _fall(self, now):
         width = now - self.last_rise
-        self.shortest_pulse = min(self.shortest_pulse, width)
-        self.longest_pulse = max(self.longest_pulse, width)
+        if width < self.shortest_pulse:
+            self.shortest_pulse = width
+        if width > self.longest_pulse:
+            self.longest_pulse = width
         self.last_fall = now
         self.falls += 1
 
@@ -225,7 +234,7 @@ class Evaluator:
 class Rig:
     """A board, an arm, an engine. ``turn_us``: how long the main loop takes."""
 
-    def __init__(self, joints, planned=True, turn_us=200, **head):
+    def __init__(self, joints, planned=True, turn_us=1000, **head):
         self.head = dict(HEAD)
         self.head.update(head)
         self.joints = joints
