@@ -64,6 +64,9 @@ def _excess(
 ) -> float:
     """Largest acceleration or jerk over its limit during changes between ``rates``, over all starts."""
     x = np.linspace(0.0, 1.0, _PHASES + 1)
+    slopes = [
+        np.vstack((np.diff(values, axis=0) / np.diff(time)[:, None], 0.0 * values[:1])) for values in motion
+    ]
     worst = 0.0
     for before, after in rates:
         change = after - before
@@ -72,9 +75,12 @@ def _excess(
         rate2 = change * 60 * x * (1 - x) * (1 - 2 * x) / brake_s**2
         passed = before * x + change * x**4 * (2.5 - 3 * x + x**2)
         at = time[:: _SAMPLES // _STARTS, None] + brake_s * passed
+        place = np.searchsorted(time, at, side="right") - 1  # the same for all joints
+        beyond = at > time[-1]
         for joint, (_, acceleration_limit, jerk_limit) in enumerate(allowed):
             speed, acceleration, jerk = (
-                np.interp(at, time, values[:, joint], right=0.0) for values in motion
+                np.where(beyond, 0.0, values[place, joint] + slope[place, joint] * (at - time[place]))
+                for values, slope in zip(motion, slopes, strict=True)
             )
             changed2 = acceleration * rate**2 + speed * rate1
             changed3 = jerk * rate**3 + 3 * acceleration * rate * rate1 + speed * rate2

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -72,7 +72,7 @@ class LaunchOptions:
     """What the firmware says it was built for."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ProcessOptions:
     """The options of ``main.py``, handed over as one JSON file. Paths are absolute."""
 
@@ -84,27 +84,27 @@ class ProcessOptions:
     """Folders with the board's packages, as if they were deployed; empty: only what the flash has."""
     flash_blocks: int = 190
     """Size of the flash: what an STM32F4DISC's file system has for files."""
-    speed: float = 0.0
+    speed: float
     """Motions run at this multiple of real time; 0: as fast as they can."""
-    edge_log: str | None = None
-    unique_id: str = PREFIX + "0000000000000000"
+    edge_log: str | None
+    unique_id: str
     """24 hex digits."""
     dma_preload: bool = True
     """DMA streams fetch one word ahead, as the chip's do in direct mode (RM0090 10.3.12)."""
-    power_cut_at: int = 0
-    button_ms: float = 0.0
-    sd_card: str | None = None
-    damage: str = ""
+    power_cut_at: int
+    button_ms: float
+    sd_card: str | None
+    damage: str
     """A kind of damage of ``chip/flash.py``."""
-    machine: str = DEFAULT_MACHINE
+    machine: str
     turn_us: int = 1000
     """What a turn of the program's main loop takes on the chip beyond its simulated calls."""
-    arm: dict[str, Any] | None = None
+    arm: dict[str, Any] | None
     """Motors and encoders on the pins; None: ideal ones for the arm record in the flash."""
-    up: str = ""
+    up: str
     """File that is made when the program has started."""
-    seed: int = 0
-    faults: list[InjectedFault] = field(default_factory=list)
+    seed: int
+    faults: list[InjectedFault]
 
     def write(self, path: Path) -> None:
         """Write them for ``main.py``."""

@@ -74,15 +74,18 @@ def parameter(coefficients: Array, time_s: Array) -> tuple[NDArray[np.intp], Arr
     starts = coefficients[:, 0]
     segment = np.clip(np.searchsorted(starts, time_s, side="right") - 1, 0, len(starts) - 1)
     slope = bspline.derivative(coefficients)
-    low, high = np.zeros(time_s.shape), np.ones(time_s.shape)
-    u = np.full(time_s.shape, 0.5)
+    wanted, at = np.ravel(time_s), np.ravel(segment)
+    found, now = np.full(wanted.shape, 0.5), np.full(wanted.shape, 0.5)
+    low, high = np.zeros(wanted.shape), np.ones(wanted.shape)
+    moving = np.arange(len(wanted))  # the others stay where they are, whatever follows
     for _ in range(_NEWTON_STEPS):
-        error = bspline.evaluate(coefficients, segment, u) - time_s
-        low, high = np.where(error <= 0, u, low), np.where(error >= 0, u, high)
-        step = u - error / bspline.evaluate(slope, segment, u)
+        error = bspline.evaluate(coefficients, at, now) - wanted
+        low, high = np.where(error <= 0, now, low), np.where(error >= 0, now, high)
+        step = now - error / bspline.evaluate(slope, at, now)
         step = np.where((step >= low) & (step <= high), step, 0.5 * (low + high))
-        done = np.max(np.abs(step - u), initial=0.0) < 1e-15
-        u = step
-        if done:
+        found[moving] = step
+        if np.max(np.abs(step - now), initial=0.0) < 1e-15:
             break
-    return segment, u
+        moves = step != now
+        moving, wanted, at, now, low, high = (each[moves] for each in (moving, wanted, at, step, low, high))
+    return segment, found.reshape(np.shape(time_s))

@@ -24,6 +24,11 @@ def _print_exception(error: BaseException, file: TextIO = sys.stderr) -> None:
     traceback.print_exception(error, file=file)
 
 
+def _collect() -> int:
+    """Here memory is plenty, and a collection takes long."""
+    return 0
+
+
 def _mem_free() -> int:
     return _HEAP_BYTES
 
@@ -40,6 +45,7 @@ _ADDITIONS: tuple[tuple[Any, str, Any], ...] = (
     (time, "ticks_us", _ticks_us),
     (time, "ticks_diff", _ticks_diff),
     (sys, "print_exception", _print_exception),
+    (gc, "collect", _collect),
     (gc, "mem_free", _mem_free),
     (gc, "mem_alloc", _mem_alloc),
     (gc, "threshold", _threshold),

@@ -13,58 +13,41 @@ import ctypes
 import functools
 from array import array
 from collections.abc import Callable
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 _REACH = 8192  # bytes that can be reached from an address
 _MOST_KEPT = 4096
 
 
-class _Pointer:
-    """Memory seen in words of one width, little endian."""
-
-    __slots__ = ("_words",)
-
-    def __init__(self, words: memoryview) -> None:
-        self._words = words
-
-    def __int__(self) -> int:
-        return ctypes.addressof(ctypes.c_char.from_buffer(self._words.cast("B")))
-
-    def __getitem__(self, index: int) -> int:
-        return int(self._words[index])
-
-    def __setitem__(self, index: int, value: int) -> None:
-        self._words[index] = value & ((1 << 8 * self._words.itemsize) - 1)
+def _address(pointer: Any) -> int:
+    return ctypes.addressof(pointer)
 
 
-class _Pointer32(_Pointer):
-    """The one that loops run on: as quick as it gets."""
+def _caster(cell: type[Any]) -> Callable[[Any], Any]:
+    """A cast to a pointer: an array of ctypes, whose stores wrap, that knows its address.
 
-    __slots__ = ()
-
-    def __getitem__(self, index: int) -> int:
-        return self._words[index]
-
-    def __setitem__(self, index: int, value: int) -> None:
-        if not -0x80000000 <= value <= 0x7FFFFFFF:
-            value = ((value + 0x80000000) & 0xFFFFFFFF) - 0x80000000
-        self._words[index] = value
-
-
-def _caster(kind: type[_Pointer], cell: Literal["B", "H", "i"], width: int) -> Callable[[Any], _Pointer]:
-    """A cast to a pointer. Pointers to addresses and arrays are kept: most calls come with the same ones."""
-    kept: dict[int, _Pointer] = {}
+    Pointers to addresses and arrays are kept: most calls come with the same ones.
+    """
+    width = ctypes.sizeof(cell)
+    kept: dict[int, Any] = {}
     alive: list[Any] = []  # what they point at: another object may take the number of one that is gone
 
-    def cast(target: Any) -> _Pointer:
+    @functools.cache
+    def kind(count: int) -> Any:
+        return type("Pointer", (cell * count,), {"__int__": _address, "__slots__": ()})
+
+    def cast(target: Any) -> Any:
         key = ~target if target.__class__ is int else id(target)
         known = kept.get(key)
         if known is not None:
             return known
-        memory = (ctypes.c_ubyte * _REACH).from_address(target) if key < 0 else target
-        view = memoryview(memory).cast("B")
-        pointer = kind(view[: len(view) // width * width].cast(cell))
+        if key < 0:
+            pointer = kind(_REACH // width).from_address(target)
+        else:
+            view = memoryview(target).cast("B")
+            pointer = kind(len(view) // width)
+            pointer = pointer.from_buffer_copy(view) if view.readonly else pointer.from_buffer(view)
         if key < 0 or isinstance(target, (array, memoryview)):  # a bytearray may want to grow
             if len(kept) >= _MOST_KEPT:
                 kept.clear()
@@ -77,9 +60,9 @@ def _caster(kind: type[_Pointer], cell: Literal["B", "H", "i"], width: int) -> C
 
 
 _CASTS = {
-    "ptr8": _caster(_Pointer, "B", 1),
-    "ptr16": _caster(_Pointer, "H", 2),
-    "ptr32": _caster(_Pointer32, "i", 4),
+    "ptr8": _caster(ctypes.c_uint8),
+    "ptr16": _caster(ctypes.c_uint16),
+    "ptr32": _caster(ctypes.c_int32),
 }
 
 
@@ -96,20 +79,15 @@ def native(function: Function) -> Function:
 def viper(function: Callable[..., Any]) -> Callable[..., Any]:
     """The function with its pointer arguments turned into views of memory."""
     names = function.__code__.co_varnames[: function.__code__.co_argcount]
-    kinds = [_cast_of(function.__annotations__.get(name)) for name in names]
-    places = [(place, kind) for place, kind in enumerate(kinds) if kind is not None]
-
-    @functools.wraps(function)
-    def call(*arguments: Any) -> Any:
-        values = list(arguments)
-        for place, cast in places:
-            values[place] = cast(values[place])
-        return function(*values)
-
-    return call
+    casts = {name: _cast_of(function.__annotations__.get(name)) for name in names}
+    values = [f"cast_{name}({name})" if casts[name] else name for name in names]
+    known = {"function": function, **{f"cast_{name}": cast for name, cast in casts.items()}}
+    # a function of just these arguments: taking and handing on any number of them would cost more than the casts
+    call = eval(f"lambda {', '.join(names)}: function({', '.join(values)})", known)
+    return functools.wraps(function)(call)
 
 
-def _cast_of(annotation: Any) -> Callable[[Any], _Pointer] | None:
+def _cast_of(annotation: Any) -> Callable[[Any], Any] | None:
     return _CASTS.get(getattr(annotation, "__name__", annotation))
 
 

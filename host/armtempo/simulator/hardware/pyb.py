@@ -36,7 +36,6 @@ class Switch:
 
     def __init__(self):
         self._pin = Pin("PA0", Pin.IN)
-        self._extint = None
 
     def value(self):
         """Whether it is pressed."""
@@ -47,7 +46,7 @@ class Switch:
     def callback(self, function):
         """Call ``function()`` when it is pressed."""
         callback = function and (lambda line: function())
-        self._extint = ExtInt(self._pin, ExtInt.IRQ_RISING, Pin.PULL_NONE, callback)
+        ExtInt(self._pin, ExtInt.IRQ_RISING, Pin.PULL_NONE, callback)
 
 
 class Flash:

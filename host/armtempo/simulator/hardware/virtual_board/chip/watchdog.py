@@ -2,7 +2,7 @@
 
 from virtual_board import machine_state
 from virtual_board.chip import memory
-from virtual_board.chip.processor import TICKS_PER_MS, TICKS_PER_US
+from virtual_board.chip.processor import TICKS_PER_MS
 from virtual_board.chip.reset import Reset
 
 _WDT_RESET = 3
@@ -10,11 +10,7 @@ _RLR = 2
 
 
 class WDT:
-    """Resets the board unless ``feed`` is called every ``timeout`` ms; cannot be stopped.
-
-    A program feeds it once a turn of its main loop, so ``feed`` also stands for the time that the turn's own
-    work takes on the chip (option ``turn_us``).
-    """
+    """Resets the board unless ``feed`` is called every ``timeout`` ms; cannot be stopped."""
 
     def __init__(self, id=0, timeout=5000):
         if not 1 <= timeout <= 32000:
@@ -30,7 +26,7 @@ class WDT:
         """Start the time over."""
         board = machine_state.board
         board.watchdog_deadline = board.now + board.watchdog_ticks
-        board.spend(machine_state.options["turn_us"] * TICKS_PER_US)
+        board.call()
 
 
 def _watch():

@@ -8,6 +8,7 @@ back.
 import select
 
 from virtual_board import machine_state
+from virtual_board.chip.processor import TICKS_PER_US
 
 BUFFER = 1024
 _CHUNK = 512
@@ -168,9 +169,13 @@ class USB_VCP:
         return sent
 
     def read(self, size=-1):
-        """What is there, up to ``size``; None where nothing is."""
+        """What is there, up to ``size``; None where nothing is.
+
+        A program looks here once a turn of its main loop, so finding nothing also stands for the time that the turn's
+        own work takes on the chip (option ``turn_us``).
+        """
         if not self._line.received:
-            machine_state.board.call()
+            machine_state.board.spend(machine_state.options["turn_us"] * TICKS_PER_US)
             return None
         there = len(self._line.received)
         return self.recv(there if size < 0 else min(size, there), timeout=0)
