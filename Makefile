@@ -1,6 +1,6 @@
 # make demo: plan the paper's feeding motion and replay it on the virtual board
 # make test: bring the interpreters, run all tests
-# make quick: those that take less than a minute together, for the inner loop of work
+# make quick: those that take about a minute together, for the inner loop of work
 # make check: lint and types
 # make docs: the documentation site, in build/site
 # Each sets up its own environment in .venv; nothing outside the checkout is touched.

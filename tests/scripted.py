@@ -12,22 +12,27 @@ from tests import interpreters
 HEAP = {"cpython": "", "micropython": "16M", "micropython-arm": "6M"}
 
 
+EMULATED = "micropython-arm"
+
+
 @dataclass(frozen=True)
 class Case:
-    """One case of a script on one interpreter."""
+    """One case of a script on one interpreter, or several (their names with a space between) one after the other."""
 
     interpreter: str
     script: Path
     name: str
 
     def __str__(self) -> str:
-        return f"{self.interpreter}-{self.script.stem}-{self.name.removeprefix('case_')}"
+        names = "all" if " " in self.name else self.name.removeprefix("case_")
+        return f"{self.interpreter}-{self.script.stem}-{names}"
 
     def run(self, *arguments: str, **options: float | str) -> None:
         """AssertionError with the script's traceback where the case does not hold; options of ``interpreters.run``."""
         options = {"heap": HEAP[self.interpreter], **options}
-        output = interpreters.run(self.interpreter, self.script, *arguments, self.name, **options)  # type: ignore[arg-type]
-        assert output.splitlines()[-1].split()[:1] == [self.name], output
+        named = self.name.split()
+        output = interpreters.run(self.interpreter, self.script, *arguments, *named, **options)  # type: ignore[arg-type]
+        assert [line.split()[0] for line in output.splitlines() if line.startswith("case_")] == named, output
 
 
 def names(script: Path) -> list[str]:
@@ -41,3 +46,15 @@ def names(script: Path) -> list[str]:
 def cases(*scripts: Path, on: Iterable[str] = interpreters.AVAILABLE) -> list[Case]:
     """All cases of some scripts on some interpreters, for ``pytest.mark.parametrize`` with ``ids=str``."""
     return [Case(name, script, case) for name in on for script in scripts for case in names(script)]
+
+
+def together(found: Iterable[Case]) -> list[Case]:
+    """The cases, those of a script in one process where that is the emulator, which takes long to start.
+
+    The other interpreters run each case by itself; the output of a script ends with the case that did not hold.
+    """
+    kept: dict[tuple[str, Path, str], list[str]] = {}
+    for case in found:
+        alone = "" if case.interpreter == EMULATED else case.name
+        kept.setdefault((case.interpreter, case.script, alone), []).append(case.name)
+    return [Case(name, script, " ".join(named)) for (name, script, _), named in kept.items()]

@@ -38,8 +38,10 @@ def tree_of(kind: type[Exception] = errors.ArmtempoError) -> Iterator[str]:
 def in_source(text: str, file: str) -> Iterator[ErrorMessage]:
     """All errors that a module makes, raised there or not."""
     kinds = set(tree_of()) - MADE_FROM_PARTS
+    if not any(kind in text for kind in kinds):
+        return
     for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.Call) and (name := ast.unparse(node.func).split(".")[-1]) in kinds:
+        if isinstance(node, ast.Call) and (name := _last_name(node.func)) in kinds:
             given = {word.arg: word.value for word in node.keywords}
             arguments = dict(zip(("problem", "hint"), node.args, strict=False)) | given
             hint = _words(arguments["hint"]) if "hint" in arguments else None
@@ -54,6 +56,11 @@ def in_host() -> list[ErrorMessage]:
         if "hardware" not in path.parts
         for message in in_source(path.read_text(encoding="utf-8"), str(path.relative_to(HOST)))
     ]
+
+
+def _last_name(node: ast.expr) -> str:
+    """``C`` of ``a.b.C``; nothing of what has no name."""
+    return node.attr if isinstance(node, ast.Attribute) else getattr(node, "id", "")
 
 
 def _words(node: ast.expr | None) -> str:

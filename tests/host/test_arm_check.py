@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from armtempo.arm_check import Level, check, check_arm
+from armtempo.arm_check import Level, check, check_arm, drives
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 
@@ -298,3 +299,10 @@ def test_json_says_the_same(tmp_path: Path) -> None:
     values = json.loads(run_check("--arm", path, "--json").output)
     assert values["arm"] is None
     assert values["joints"] == []
+
+
+def test_a_range_of_hardly_a_step_names_its_joint() -> None:
+    joint = replace(Arm.paper().driven[1], range_deg=(0.0, 0.001))
+    (found,) = drives._range(joint)
+    assert found.where == joint.name
+    assert found.what.startswith("its whole range, 0 to 0.001 deg, is 0.0")

@@ -11,7 +11,6 @@ import sys
 import time
 from pathlib import Path
 
-import distributed
 import numpy as np
 import pytest
 from armtempo.cli import main
@@ -84,6 +83,8 @@ def test_processes_give_the_same_numbers(
 def test_a_cluster_of_two_workers_gives_the_same_numbers(
     tmp_path: Path, runs: dict[cases.Case, cases.Trial], problem: cases.Problem
 ) -> None:
+    import distributed  # takes long, and every process that collects the tests would do it
+
     with distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None) as cluster:
         more = ["--algorithms", "acs,ga,pso", "--scheduler", cluster.scheduler_address, "--no-plot"]
         done = CliRunner().invoke(main, ["bench", *SMALL, *more, "--out", str(tmp_path)])

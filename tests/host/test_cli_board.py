@@ -76,6 +76,7 @@ def test_store_commands(run: Run, file: str) -> None:
     assert "stored" in run("upload", file, "--default").output
     listing = run("list").output
     assert "small *" in listing
+    assert [line.split()[:2] for line in listing.splitlines()[-2:]] == [["from", "joint"], ["to", "joint"]]
     assert "small-2" in run("rename", "small", "small-2").output
     shown = run("show", "small-2").output
     assert "from joint 1 0.00° (0 steps), joint 2 -60.00° (-5333 steps), joint 3 40.00° (" in shown

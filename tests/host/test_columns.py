@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from armtempo.arm_check.finding import Finding, Level
 from armtempo.cli import show
 from armtempo.formats.text_table import aligned
 from armtempo.model.plan import Plan
@@ -58,6 +59,14 @@ def test_a_plan_of_joints_with_long_names(made: Plan) -> None:
     assert [row[: len(joint.name) + 1] for row, joint in zip(rows, made.arm.driven, strict=True)] == [
         f"{joint.name} " for joint in made.arm.driven
     ]
+
+
+def test_a_plan_tells_of_coarse_steps(made: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
+    coarse = Finding(Level.WARNING, "waist", "a step is 1.8°", "use more microsteps")
+    monkeypatch.setattr(text_summary, "coarse_steps", lambda arm: [coarse])
+    assert (
+        text_summary.lines(made)[-1] == f"{Level.WARNING.value}: waist: a step is 1.8°; use more microsteps"
+    )
 
 
 def test_results_and_times_of_joints_with_long_names(made: Plan) -> None:

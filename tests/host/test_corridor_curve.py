@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from math import comb
 
+import numpy as np
 import pytest
+from armtempo.model.arm import Arm
 from armtempo.model.job import Job, Stop
-from armtempo.planning import corridor_curve, planner
+from armtempo.planning import corridor, corridor_curve, planner
 from armtempo.planning.corridor_curve import CorridorTime
+from armtempo.planning.tool import Tool
 from armtempo.report import corridor_plot
 
 from tests.host import problems
@@ -51,3 +55,22 @@ def test_the_curve_names_both_its_ends() -> None:
     found = {line.get_label(): list(line.get_ydata()) for line in axes.get_lines()}
     assert found == {"in a corridor": [3.0, 2.8], "on the spline": [4.0, 4.0], "free": [2.5, 2.5]}
     assert corridor_plot.csv(points, "deg").splitlines()[1:] == ["0.0,4.0", "1.0,3.0", "2.0,2.8", ",2.5"]
+
+
+@pytest.mark.parametrize("away_deg", [0.003, 0.3, 10.0])
+def test_the_tools_deviation_is_bounded_sharply(away_deg: float) -> None:
+    """Against the distance at many places of random pieces that are farthest apart off their middles and ends."""
+    rng = np.random.default_rng(20261123)
+    posture = np.array([0.0, -60.0, 40.0])
+    through = posture + rng.uniform(-15.0, 15.0, (4, 6, 3))
+    path = through.copy()
+    path[:, 1] += rng.uniform(0.5, 1.0, (4, 3)) * away_deg
+    tool = Tool(Arm.paper(), [0, 1, 2], posture)
+    u = np.linspace(0.0, 1.0, 2001)
+    at = np.array([comb(5, k) * u**k * (1.0 - u) ** (5 - k) for k in range(6)])
+    places = [
+        tool.at(np.einsum("ku,skj->suj", at, pieces).reshape(-1, 3)).position_mm for pieces in (path, through)
+    ]
+    reached = np.linalg.norm(places[0] - places[1], axis=1).max()
+    bound = corridor.tool_deviation_mm(path, through, tool)
+    assert reached <= bound <= reached * (1.0 + 2.0 * corridor.SHARP) + 1e-6

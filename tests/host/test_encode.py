@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from armtempo.errors import InputError, PlanError
 from armtempo.model.arm import Arm, Limits
+from armtempo.planning import checks
 from armtempo.records import encode
 from armtempo.splines.trajectory import JointSpline, Trajectory
 from armtempo_shared import armrecord, limits, motion
@@ -60,6 +61,19 @@ def test_an_encoder_on_the_motor_counts_faster() -> None:
     assert geared.counts_per_step == 2 * joint.counts_per_step
 
 
+def test_a_ratio_that_a_word_cannot_hold_is_refused() -> None:
+    joint = ARM.joints[0]
+    assert joint.encoder
+    for counts, fits in ((2**31 - 1, True), (2**31 + 1, False)):
+        fine = replace(joint, encoder=replace(joint.encoder, counts_per_rev=counts))
+        arm = replace(ARM, joints=(fine, *ARM.joints[1:]))
+        if fits:
+            encode.arm_record(arm)
+        else:
+            with pytest.raises(InputError, match="joint 1: the ratio of encoder counts to steps is too odd"):
+                encode.arm_record(arm)
+
+
 def test_a_speed_in_the_wrong_unit_is_refused_with_the_step_rate() -> None:
     joint = replace(ARM.joints[1], limits=Limits(40_000.0, 30.0, 120.0))
     arm = replace(ARM, joints=(ARM.joints[0], joint, *ARM.joints[2:]))
@@ -100,3 +114,11 @@ def test_numbers_that_the_board_cannot_hold_are_refused_as_it_does() -> None:
             encode.motion_record(made, ARM)
     for made in (spread(span_s * 8 / 5 - 1), spread(most_s - 1, segments=100)):
         encode.motion_record(made, ARM)
+
+
+def test_an_angle_of_more_steps_than_the_board_counts_is_refused() -> None:
+    """It counts below 2**27, here in small segments."""
+    most_deg = 2**27 / max(joint.steps_per_deg for joint in ARM.driven)
+    checks.check_held(spread(1.0, most_deg * 0.999, segments=100), ARM)
+    with pytest.raises(PlanError, match="more steps than the board can count"):
+        checks.check_held(spread(1.0, most_deg * 1.001, segments=100), ARM)

@@ -24,6 +24,7 @@ ARM = Arm.paper()
 def test_csv_is_the_trajectory_at_any_rate_end_included() -> None:
     plan = shipped_plan()
     rows = list(csv.DictReader(exchange.to_csv(plan, 37.0).splitlines()))
+    assert len(rows[0]) == 1 + 3 * len(exchange.CSV_COLUMNS)
     times = np.array([float(row["time_s"]) for row in rows])
     exact = exchange.times_s(plan.trajectory.duration_s, 37.0)
     np.testing.assert_allclose(times, exact, atol=1e-9)
@@ -31,6 +32,13 @@ def test_csv_is_the_trajectory_at_any_rate_end_included() -> None:
     for order, name in enumerate(exchange.CSV_COLUMNS):
         found = np.array([[float(row[f"j{joint}_{name}"]) for joint in (1, 2, 3)] for row in rows])
         np.testing.assert_allclose(found, plan.trajectory(exact, order), atol=2e-5)
+
+
+def test_a_plan_has_a_hundred_points_a_second() -> None:
+    plan = shipped_plan()
+    points = len(exchange.times_s(plan.trajectory.duration_s, 100.0))
+    assert plan.to_csv().count("\n") == 1 + points
+    assert plan.to_ros().count("time_from_start") == points
 
 
 def test_ros_points_are_in_radians_and_in_order() -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -68,8 +70,9 @@ def test_gradients_never_make_it_worse(seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(20))
 def test_every_polished_axis_has_a_bound_near_it(seed: int) -> None:
+    """More of them: tests/benchmark/floors.py."""
     arm, job = problems.random_problem(seed)
     if np.all(np.ptp(job.via, axis=0) == 0):
         return
@@ -155,6 +158,24 @@ def test_bounds_follow_from_the_job() -> None:
     via, limits = uneven()
     box = interval_search.bounds_s(bspline.fit(via, 5), 5, limits)
     assert box[0, 1] / box[1, 0] > 30.0
+
+
+def test_a_search_that_no_bound_holds_back_is_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    via, limits = uneven()
+    boxes: list[np.ndarray] = []
+
+    def once(points: object, limits: object, job: object, box: np.ndarray, *others: object) -> object:
+        boxes.append(box)
+        inside: Any = SimpleNamespace(x=np.sqrt(box[:, 0] * box[:, 1]), value=1.0)
+        return interval_search.Found(inside, np.empty(0))
+
+    monkeypatch.setattr(interval_search, "_once", once)
+    job = Job("uneven", tuple(map(tuple, via.tolist())), optimiser="acs")
+    found = interval_search.search(
+        bspline.fit(via, 5), limits, job, np.random.default_rng(0), lambda done, whole: None
+    )
+    assert len(boxes) == 1
+    assert found.notes == ()
 
 
 @pytest.mark.slow

@@ -128,6 +128,7 @@ def test_a_corridor_of_the_tool_holds_everywhere() -> None:
     )
     away = np.linalg.norm(tool_mm(ARM, here) - tool_mm(ARM, there), axis=1)
     assert 1.0 < away.max() <= 2.0
+    assert plan.total_s < planner.plan(ARM, replace(FEED, path="through")).total_s
 
 
 @pytest.mark.slow

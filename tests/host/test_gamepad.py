@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import itertools
+import os
 import sys
 import time
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import patch
 
 import pytest
 from armtempo.cli import gamepad
@@ -158,6 +160,18 @@ def test_none_is_connected(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(InputError, match="no gamepad is connected"), gamepad.beside(NoKeys(), 3):
         pass
     assert pygame.ended
+
+
+def test_pygame_opens_no_window_and_reads_beside_other_programs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pygame", Pygame(pads=0))
+    with patch.dict(os.environ):
+        for name in [name for name in os.environ if name.startswith(("SDL_", "PYGAME_"))]:
+            del os.environ[name]
+        with pytest.raises(InputError), gamepad.beside(NoKeys(), 3):
+            pass
+        assert os.environ["SDL_VIDEODRIVER"] == "dummy"
+        assert os.environ["SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS"] == "1"
+        assert os.environ["PYGAME_HIDE_SUPPORT_PROMPT"] == "1"
 
 
 def test_without_pygame_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,9 +14,10 @@ from armtempo.model.arm import Arm
 from armtempo.planning import jog, jog_law
 from armtempo.planning.jog import JogMotion, JogMove
 from armtempo.planning.jog_law import WayLimits
+from armtempo.planning.jog_line import FollowedLine
 from armtempo.records import encode
 from armtempo.splines import extremes
-from armtempo.splines.trajectory import JointSpline
+from armtempo.splines.trajectory import JointSpline, Trajectory
 
 PAPER, AR4 = Arm.paper(), Arm.load("ar4")
 ELBOW_DEG = [20.0, 10.0, -20.0, 15.0, 40.0, 30.0]
@@ -183,6 +184,25 @@ def test_a_line_ends_before_a_singular_posture() -> None:
         np.abs(np.diff(motion.trajectory(np.linspace(0, motion.trajectory.duration_s, 400)), axis=0)).max()
         < 2.0
     )
+
+
+@pytest.mark.parametrize(("by", "said"), [(20.0, "cannot follow the line any further"), (INF, "singular")])
+def test_a_line_that_the_joints_cannot_follow_is_made_shorter(
+    by: float, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And says so, where nothing else has ended it before."""
+    lengths: list[float] = []
+    on_line = jog._on_line
+
+    def hindered(name: str, followed: FollowedLine, length: float, speed: float) -> Trajectory | None:
+        lengths.append(length)
+        return on_line(name, followed, length, speed) if len(lengths) > 1 else None
+
+    monkeypatch.setattr(jog, "_on_line", hindered)
+    motion = jog.plan("x", AR4, on_steps(AR4, ELBOW_DEG), JogMove(by, axis="x"))
+    assert len(lengths) == 2
+    assert lengths[1] < lengths[0]
+    assert said in motion.ends
 
 
 @pytest.mark.slow

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from collections import deque
 
+import numpy as np
 import pytest
-from armtempo.cli.jog_screen import JogChoice, _StopKeys
+from armtempo.cli.jog_screen import JogChoice, JogScreen, _StopKeys
+from armtempo.cli.keys import INTERRUPT, WindowsKeys
+from armtempo.model.arm import Arm
 
 NAMES = ["waist", "shoulder"]
 
@@ -54,6 +58,37 @@ class Typed:
     def read(self, _seconds: float) -> str:
         return self._keys.popleft() if self._keys else ""
 
+    def flush(self) -> None:
+        self._keys.clear()
+
+
+class Jogged:
+    """A board that notes what is to move."""
+
+    arm = Arm.paper()
+
+    def __init__(self) -> None:
+        self.moves: list[tuple[object, ...]] = []
+
+    def posture_deg(self) -> np.ndarray:
+        return np.array(self.arm.home_deg)
+
+    def jog(self, *move: object) -> None:
+        """The last of it is the wish to stop."""
+        self.moves.append(move[:-1])
+
+
+def test_a_step_goes_to_the_board_as_it_was_chosen() -> None:
+    board = Jogged()
+    screen = JogScreen(board, Typed())  # type: ignore[arg-type]
+    for key in "+>2s-zf+":
+        screen._act(key)
+    assert board.moves == [
+        (1, 1.0, None, None, 0.25),
+        (2, -10.0, None, None, 0.5),
+        (None, None, "tool-z", 10.0, 0.5),
+    ]
+
 
 @pytest.mark.parametrize("key", [" ", "q"])
 def test_space_and_what_ends_the_screen_end_a_step(key: str) -> None:
@@ -61,6 +96,25 @@ def test_space_and_what_ends_the_screen_end_a_step(key: str) -> None:
         stop._thread.join(10.0)
     assert stop.request.wanted
     assert stop.pressed == key
+
+
+class Console:
+    """Python's ``msvcrt`` with keys that were pressed."""
+
+    def __init__(self, *codes: str) -> None:
+        self._codes = deque(codes)
+
+    def kbhit(self) -> bool:
+        return bool(self._codes)
+
+    def getwch(self) -> str:
+        return self._codes.popleft()
+
+
+def test_keys_of_a_windows_console(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "msvcrt", Console("\xe0", "H", "\x00", "K", "\xe0", "?", "a", "\x03"))
+    keys = WindowsKeys()
+    assert [keys.read(0.0) for _ in range(6)] == ["up", "left", "", "a", INTERRUPT, ""]
 
 
 def test_other_keys_end_no_step() -> None:

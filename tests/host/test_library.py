@@ -8,6 +8,8 @@ import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import armtempo
 import numpy as np
@@ -17,6 +19,8 @@ from armtempo.kinematics import PoseSolver
 from armtempo.kinematics.chain import chains_mm
 from armtempo.link.board_messages import Sample
 from armtempo.model import shipped
+from armtempo.records import encoded_sequence
+from armtempo.robot import sequence_run
 from armtempo.simulator import LaunchOptions, launch
 from numpy.typing import ArrayLike
 
@@ -29,6 +33,21 @@ LAZY = ("numpy", "scipy", "matplotlib", "click", "serial", "armtempo.model", "ar
 def arm() -> armtempo.Arm:
     """The paper's."""
     return armtempo.Arm.paper()
+
+
+def test_the_button_starts_an_uploaded_sequence_only_where_asked(
+    arm: armtempo.Arm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    defaults: list[str] = []
+    client: Any = SimpleNamespace(set_default=defaults.append)
+    monkeypatch.setattr(armtempo.Board, "configure", lambda board, arm: None)
+    monkeypatch.setattr(encoded_sequence, "of_plan", lambda plan: SimpleNamespace(arm=arm))
+    monkeypatch.setattr(sequence_run, "store", lambda *_: SimpleNamespace(name="pick"))
+    board, sequence = armtempo.Board(client, "pipe"), cast(Any, None)
+    board.upload_sequence(sequence)
+    assert defaults == []
+    board.upload_sequence(sequence, default=True)
+    assert defaults == ["pick"]
 
 
 @pytest.fixture(scope="module")

@@ -44,6 +44,19 @@ def test_run_gives_every_sample_once_in_order(tmp_path: Path) -> None:
     assert samples[-1].positions == end.positions
 
 
+def test_between_two_messages_the_caller_has_its_turn(tmp_path: Path) -> None:
+    """Also while messages come without a pause."""
+    follower = started(Pipe(tmp_path / "flash"))
+    turns = 0
+
+    def between() -> None:
+        nonlocal turns
+        turns += 1
+
+    for number, _ in enumerate(follower.samples(between), 1):
+        assert turns >= number
+
+
 @pytest.mark.slow
 def test_repeated_command_acts_once(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
@@ -54,6 +67,19 @@ def test_repeated_command_acts_once(tmp_path: Path) -> None:
     run = board.start("feed", wire.record_crc(data)).run
     assert board.session.repeats == 1
     assert (run, pipe.app.controller.engine.calls.count("start")) == (1, 1)
+
+
+def test_a_frame_that_never_ends_hides_the_answer_behind_it_for_an_instant_only(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, _ = ready(pipe)
+    begun = [wire.frame(9, 0x40, bytes(200))[:5]]
+    send = pipe._send
+    pipe._send = lambda way, frame: send(way, begun.pop() + frame if way == 1 and begun else frame)  # type: ignore[method-assign]
+    before_s = pipe.clock()
+    board.session.command("status")
+    assert not begun
+    assert board.session.repeats == 0
+    assert pipe.clock() - before_s < 0.2
 
 
 @pytest.mark.slow

@@ -81,11 +81,10 @@ def test_a_trajectory_file_with_them_is_refused(tmp_path: Path, name: str) -> No
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [CONTROL[0], CONTROL[-1]])
-def test_they_are_spelt_out_in_a_run_folder(tmp_path: Path, name: str) -> None:
+def test_they_are_spelt_out_in_a_run_folder(tmp_path: Path) -> None:
     path = made_runs.make(tmp_path / "run", repetitions=1, on_board=True)
     meta = json.loads((path / "run.json").read_text())
-    meta["joints"][0]["name"] = meta["name"] = meta["port"] = name
+    meta["joints"][0]["name"] = meta["name"] = meta["port"] = CONTROL[0] + CONTROL[-1]
     (path / "run.json").write_text(json.dumps(meta))
     result = CliRunner().invoke(main, ["report", str(path)])
     assert result.exit_code == 0, result.output

@@ -212,6 +212,22 @@ def test_adaptive_rate_protects_the_best() -> None:
     assert rates == pytest.approx([0.5, 0.5, 2 / 3, 0.0])
 
 
+def test_every_individual_mutates_at_least_so_often(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also the best, whose adaptive rate is 0; and never more often than always."""
+    rates: list[Array] = []
+
+    def mutate(children: object, _rng: np.random.Generator, rate: Array) -> object:
+        rates.append(rate)
+        return children
+
+    monkeypatch.setattr(iaga, "mutate", mutate)
+    task = Task(Bowl(), BOUNDS, np.random.default_rng(2), 8, 3)
+    iaga.search(task, bits=10, k1=1.0, k2=1.0, k3=1.0, k4=1.0, least_mutation=0.125)
+    assert len(rates) == 3
+    assert np.min(rates) == 0.125
+    assert np.max(rates) == 1.0
+
+
 def test_selection_keeps_the_better_half_and_the_memories() -> None:
     bowl = Bowl()
     moved = swarm.Swarm(Task(bowl, BOUNDS, np.random.default_rng(2), 8, 1), 0.2)
@@ -221,6 +237,13 @@ def test_selection_keeps_the_better_half_and_the_memories() -> None:
     order = np.sort(before)
     assert np.array_equal(np.sort(moved.values), np.repeat(order[:4], 2))
     assert any(np.array_equal(places, place) for place in moved.positions)
+
+
+def test_levy_steps_are_those_of_mantegnas_method() -> None:
+    rng = np.random.default_rng(8)
+    top, bottom = rng.standard_normal(9), rng.standard_normal(9)
+    found = levy.levy_steps(np.random.default_rng(8), (9,), 1.5)
+    np.testing.assert_allclose(found, 0.6965745 * top / np.abs(bottom) ** (1 / 1.5), rtol=1e-6)
 
 
 def test_levy_steps_have_the_tail_of_their_index() -> None:

@@ -53,15 +53,21 @@ def test_text_is_escaped() -> None:
     assert not re.search(r"<(script|i|b|c)>", sheet.render())
 
 
+def curves() -> analysis.Curves:
+    """Runs of the shipped plan whose mean is the plan, with a standard error of a tenth of it."""
+    plan = shipped_plan()
+    times = np.linspace(0.0, plan.trajectory.duration_s, 50)
+    mean = np.stack([plan.trajectory(times, order) for order in range(3)])
+    return analysis.Curves(times, mean[None], mean, 0.1 * np.abs(mean), mean, mean, times, np.ones(3, bool))
+
+
 def figure(name: str) -> str:
     """One of the figures as it stands in a page."""
     plan = shipped_plan()
     names = [joint.name for joint in plan.arm.driven]
     limits = [joint.limits for joint in plan.arm.driven if joint.limits]
-    times = np.linspace(0.0, plan.trajectory.duration_s, 50)
-    theory = np.stack([plan.trajectory(times, order) for order in range(3)])
-    measured = np.ones(3, bool)
-    seen = analysis.Curves(times, theory[None], theory, 0.1 * np.abs(theory), theory, theory, times, measured)
+    seen = curves()
+    times, theory = seen.times_s, seen.mean
     runs = [Trial(Case("acs", 10, seed), (), 1, 1.0, ((0, 6.0 + seed),)) for seed in (1, 2)]
     chains = chain.chains_mm(plan.arm, plan.via_deg)
     drawn = {
@@ -88,6 +94,18 @@ def test_every_label_takes_the_colour_of_the_page(name: str) -> None:
     assert len(labels) == svg.count("<text")
     assert [label for label in labels if "fill: currentColor" not in label] == []
     assert re.search(r'aria-label="(joint \d: |x: )?what it shows"', svg)
+
+
+@pytest.mark.slow
+def test_the_band_around_a_mean_is_its_standard_error() -> None:
+    plan, seen = shipped_plan(), curves()
+    drawn = plots.tracking(seen, plan.trajectory, [], [joint.name for joint in plan.arm.driven])
+    (band,) = drawn.axes[0].collections
+    corners = band.get_paths()[0].vertices
+    assert np.ptp(corners[:, 0]) == pytest.approx(seen.times_s[-1])
+    mean, error = seen.mean[0, :, 0], seen.sem[0, :, 0]
+    assert corners[:, 1].min() == pytest.approx(np.min(mean - error))
+    assert corners[:, 1].max() == pytest.approx(np.max(mean + error))
 
 
 def test_figures_are_no_larger_than_they_must_be() -> None:

@@ -83,9 +83,15 @@ def the_page(made: motions.Plans, folder: Path) -> tuple[str, list[Claim]]:
     return sheet.render(claims, made, searched(), runs), claims
 
 
+@pytest.fixture(scope="module")
+def page(made: motions.Plans, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, list[Claim]]:
+    """See ``the_page``."""
+    return the_page(made, tmp_path_factory.mktemp("runs"))
+
+
 @pytest.mark.slow
-def test_the_page_is_whole(made: motions.Plans, tmp_path: Path) -> None:
-    text, claims = the_page(made, tmp_path)
+def test_the_page_is_whole(page: tuple[str, list[Claim]]) -> None:
+    text, claims = page
     for claim in claims:
         assert claim.what in text
         assert claim.found in text
@@ -95,12 +101,12 @@ def test_the_page_is_whole(made: motions.Plans, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_page_in_a_browser(made: motions.Plans, tmp_path: Path) -> None:
+def test_the_page_in_a_browser(page: tuple[str, list[Claim]], tmp_path: Path) -> None:
     browser.needed()
-    page = tmp_path / "paper.html"
-    page.write_text(the_page(made, tmp_path)[0], encoding="utf-8")
+    file = tmp_path / "paper.html"
+    file.write_text(page[0], encoding="utf-8")
     for width, dark in ((1200, False), (500, True)):
-        found = browser.probe(page, tmp_path, width, dark)
+        found = browser.probe(file, tmp_path, width, dark)
         assert found["fetched"] == []
         assert found["overflow"] <= 0
         assert len(found["figures"]) == PARTS

@@ -56,6 +56,7 @@ def test_json_is_one_document_and_quiet_leaves_it_alone() -> None:
 COARSE_JOINT_2 = ("microsteps = 8, gear_ratio = 20.0", "microsteps = 1, gear_ratio = 0.5")
 
 
+@pytest.mark.slow
 def test_coarse_steps_are_told_with_what_to_do() -> None:
     fine = run("--job", "move.toml", "--arm", "paper")
     assert "warning" not in fine.output

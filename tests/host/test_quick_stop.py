@@ -184,6 +184,18 @@ def test_the_folder_for_temporary_files_is_the_one_of_tempfile(
         assert os.path.dirname([*claim_file.folders()][-1]) == wanted.strip()
 
 
+@pytest.mark.parametrize(("missing", "fits"), [(0, True), (1, False)])
+def test_a_socket_has_a_path_that_the_system_takes(
+    missing: int, fits: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With its name; else its folder is another."""
+    folder = f"{tmp_path}/armtempo"
+    longest = len(f"{folder}/0123456789abcdef.socket") - missing
+    monkeypatch.setattr(claim_file, "_LONGEST_SOCKET_PATH", longest)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    assert (folder in claim_file.folders()) == fits
+
+
 def test_nothing_heavy_is_imported_for_it() -> None:
     code = (
         f"import sys; before = set(sys.modules); import armtempo.__main__, armtempo.project.quick_stop as quick; "

@@ -62,6 +62,7 @@ def is_said(quote: str) -> bool:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_what_is_quoted_is_said(page: Path) -> None:
     assert [quote for quote in quotes(page) if not is_said(quote)] == []

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from armtempo.errors import BoardError, LinkError, NoAnswerError, PortError
 from armtempo.link.turns import Turns
+from armtempo.robot.shared_board import SharedBoard
 from armtempo.share import caller, claim
 from armtempo.share.caller import Caller, Ownership, ownership
 from armtempo.share.lines import Message
@@ -42,6 +43,24 @@ def test_a_request_is_answered_and_a_refusal_keeps_its_code(server: Server) -> N
         assert refused.value.hint == "ask again"
         with pytest.raises(LinkError, match="no request 'nonsense'"):
             other.ask("nonsense", 5.0)
+
+
+def test_a_stop_brakes_unless_it_is_to_be_now() -> None:
+    asked: list[object] = []
+
+    def stop(request: Message) -> Message:
+        asked.append((request["now"], request["by"]))
+        return {"moving": True}
+
+    server = Server(claim.new("/dev/p", "/dev/p", "/dev/p"), {"stop": stop})
+    try:
+        with Caller(server.claim) as other:
+            board = SharedBoard(other)
+            assert board.stop()
+            assert board.stop(now=True, by="armtempo stop")
+    finally:
+        server.close()
+    assert asked == [(False, "another program"), (True, "armtempo stop")]
 
 
 @pytest.mark.skipif(os.name != "posix", reason="modes are of POSIX")
@@ -89,6 +108,15 @@ def test_lives_hangs_died(server: Server, monkeypatch: pytest.MonkeyPatch) -> No
         with pytest.raises(NoAnswerError, match="does not answer"):
             Caller(server.claim)
     Path(server.claim.address).unlink()
+
+
+def test_that_a_program_hangs_is_remembered_for_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
+    gone = claim.new("/dev/p", "/dev/p", "/dev/p")
+    assert ownership(gone) is Ownership.DIED
+    caller.remember_hanging(gone.number)
+    assert ownership(gone) is Ownership.HANGS  # it was not asked
+    monkeypatch.setattr(caller, "_REMEMBERED_S", 0.0)
+    assert ownership(gone) is Ownership.DIED
 
 
 def test_who_lost_the_port_uses_it_no_more(server: Server) -> None:

@@ -20,6 +20,8 @@ from armtempo.urdf import rows as dh
 from click.testing import CliRunner
 from numpy.typing import NDArray
 
+pytestmark = pytest.mark.slow
+
 Array = NDArray[np.float64]
 FOLDER = Path(__file__).parents[1] / "data" / "urdf"
 SEED = 20_260_102

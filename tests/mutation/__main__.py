@@ -40,8 +40,9 @@ AREAS = {
 LEFT_OUT = ("research", "data")
 FIRST = 12
 """Tests that run before the others: most mistakes are noticed by them."""
-LATE_S = 60.0
-"""And twice what the tests took: then a mistake makes them hang."""
+LATE_S = 30.0
+"""And four times what a test took when it was traced: then a mistake makes it hang. More on a busy machine."""
+TIME_OUT = "time-out in"
 COPIED = (
     "host",
     "board",
@@ -80,7 +81,8 @@ def chosen(area: str, count: int, seed: int) -> list[tuple[Path, mutations.Mutat
     found: list[tuple[Path, mutations.Mutation]] = []
     for path, line in lines:
         mutation = rng.choice(by_line[path, line])
-        if mutations.parses(mutation.of((ROOT / path).read_bytes())):
+        source = (ROOT / path).read_bytes()
+        if mutation.of(source) != source and mutations.parses(mutation.of(source)):
             found.append((path, mutation))
         if len(found) == count:
             break
@@ -105,8 +107,9 @@ def copy_to(folder: Path) -> None:
 class Copy:
     """A copy of the checkout, and a program that runs tests in it."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, seconds: dict[str, float]) -> None:
         self.folder = folder
+        self._seconds = seconds
         self._times = itertools.count(
             2_000_000_000
         )  # byte code is told by time and size: no two states share a time
@@ -141,39 +144,58 @@ class Copy:
         time_s = next(self._times)
         os.utime(self.folder / path, (time_s, time_s))
 
-    def failing(self, tests: list[str], seconds: float) -> str:
-        """The first of the tests that fails, "time-out", or "" where none does."""
+    def failing(self, tests: list[str]) -> str:
+        """The first of the tests that fails, "time-out" and it where one does not end, or "" where none does."""
         if not tests:
             return ""
         assert self._server.stdin is not None
         print(json.dumps(tests), file=self._server.stdin, flush=True)
-        end_s = time.monotonic() + seconds
-        found, process = "", 0
+        end_s = time.monotonic() + self._limit_s("")
+        found, running, process = "", "", 0
         while True:
             try:
                 line = self._lines.get(timeout=max(0.0, end_s - time.monotonic()))
             except queue.Empty:
                 self._kill(process)
-                return "time-out"
+                return f"{TIME_OUT} {running}"
             word, _, rest = line.rstrip("\n").partition(" ")
             if word == "end":
                 return found
             if word == "process":
                 process = int(rest)
+            if word == "test":
+                running, end_s = rest, time.monotonic() + self._limit_s(rest)
             found = found or (rest if word == "failed" else "")
 
+    def _limit_s(self, test: str) -> float:
+        """What a test may take; "": until the first begins. More where other programs want the processors too."""
+        busy = os.getloadavg()[0] / (2 * (os.cpu_count() or 1))
+        return (LATE_S + 4.0 * self._seconds.get(test, concerned.UNKNOWN_S)) * max(1.0, busy)
+
     def _kill(self, process: int) -> None:
-        """The tests under way and the program, and start it anew."""
+        """The tests under way, the programs that they started, and the server; start it anew."""
         self._server.kill()
         self._server.wait()
         with suppress(ProcessLookupError):
             os.killpg(process or self._server.pid, signal.SIGKILL)
+        for number in self._started():
+            with suppress(ProcessLookupError):
+                os.kill(number, signal.SIGKILL)
         self._start()
 
-    def passes_without(self, test: str, seconds: float) -> bool:
+    def _started(self) -> list[int]:
+        """Processes that know the copy's folder, virtual boards for instance: they have a session of their own."""
+        folder, found = os.fsencode(self.folder) + b"/", []
+        for path in Path("/proc").glob("[0-9]*"):
+            with suppress(OSError):
+                if folder in (path / "environ").read_bytes() + (path / "cmdline").read_bytes():
+                    found.append(int(path.name))
+        return found
+
+    def passes_without(self, test: str) -> bool:
         """Whether a test passes in the copy without a mistake."""
         if test not in self._passed:
-            self._passed[test] = "::" not in test or not self.failing([test], seconds)
+            self._passed[test] = "::" not in test or not self.failing([test])
         return self._passed[test]
 
     def close(self) -> None:
@@ -196,16 +218,21 @@ class Tried:
     tests: int
 
 
-def attempt(copy: Copy, path: Path, mutation: mutations.Mutation, tests: list[str], limit_s: float) -> Tried:
+def attempt(copy: Copy, path: Path, mutation: mutations.Mutation, tests: list[str]) -> Tried:
     """Make a mistake in the copy, run the tests, and take it back; the quickest tests by themselves first."""
     source = (copy.folder / path).read_bytes()
     begin_s = time.monotonic()
-    copy.write(path, mutation.of(source))
-    test = copy.failing(tests[:FIRST], limit_s) or copy.failing(tests[FIRST:], limit_s)
-    copy.write(path, source)
-    word = "LATE" if test == "time-out" else "noticed" if test else "SURVIVED"
-    if word == "noticed" and not copy.passes_without(test, limit_s):
-        word = "BROKEN"
+    word, left = "BROKEN", tests
+    while word == "BROKEN":
+        copy.write(path, mutation.of(source))
+        test = copy.failing(left[:FIRST]) or copy.failing(left[FIRST:])
+        copy.write(path, source)
+        word = "LATE" if test.startswith(TIME_OUT) else "noticed" if test else "SURVIVED"
+        if word == "noticed" and not copy.passes_without(test):
+            word = "BROKEN"
+            if test not in left:
+                break
+            left = left[left.index(test) + 1 :]
     return Tried(word, test, time.monotonic() - begin_s, len(tests))
 
 
@@ -230,13 +257,13 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name, ThreadPoolExecutor(options.jobs) as pool:
         copies: queue.SimpleQueue[Copy] = queue.SimpleQueue()
         for number in range(options.jobs):
-            copies.put(Copy(Path(name) / str(number)))
+            copies.put(Copy(Path(name) / str(number), known.seconds))
 
         def one(path: Path, mutation: mutations.Mutation) -> Tried:
-            copy = copies.get()
             tests = concerned.tests(path, mutation.line, known, options.seconds)
+            copy = copies.get()
             try:
-                return attempt(copy, path, mutation, tests, LATE_S + 2.0 * options.seconds)
+                return attempt(copy, path, mutation, tests)
             finally:
                 copies.put(copy)
 

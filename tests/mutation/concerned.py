@@ -31,6 +31,7 @@ BY_FOLDER = {
     "board/armtempo_board/app": ["test_app", "test_replay"],
     "board/armtempo_board": ["test_app", "test_replay", "test_engine"],
 }
+WORDS = "tests/board/test_words.py::test_repeated_words_are_those_of_their_home"
 WHOLE = ["tests/system/test_whole_board.py"]
 IN_PROCESS = [
     f"tests/host/test_{name}.py" for name in ("greeting", "link", "link_again", "refusal", "link_noise")
@@ -58,7 +59,7 @@ def tests(path: Path, line: int, executed: Executed, seconds: float) -> list[str
 
     After those that execute the line come those that execute its function, the others of their files, and those that
     import the module. What runs under MicroPython is not traced: there a case on CPython stands for the same case on
-    MicroPython, and tests of the files that are listed here by folder come in between.
+    MicroPython. Where that was not traced either, the tests of files that are listed here by folder come in between.
     """
     by_file: dict[str, list[str]] = {}
     for test in _quickest(executed.seconds, executed):
@@ -70,21 +71,24 @@ def tests(path: Path, line: int, executed: Executed, seconds: float) -> list[str
         files += by_command(path.stem.strip("_"))
     others = _in_turn([by_file.get(file, [file]) for file in dict.fromkeys(files)])
     if not str(path).startswith("host/") or "simulator" in path.parts:
-        listed = _in_turn([by_file.get(file, [file]) for file in by_folder(path)])
+        found = [test for file in by_folder(path) for test in by_file.get(file, [file])]
+        listed = _quickest([test for test in found if not _is_traced(test, executed)], executed)
         ordered = _in_turn([ordered, listed])
     ordered += others
+    if path.parts[0] == "board":  # they read sources, and execute none of them
+        ordered = [*(test for test in executed.seconds if test.startswith(f"{WORDS}[")), *ordered]
     if str(path).startswith("shared/"):  # its own tests take no time
         ordered = [*(test for file in SHARED for test in by_file.get(file, [file])), *ordered]
-    found: list[str] = []
+    chosen: list[str] = []
     total_s = 0.0
     if "cpython" not in path.parts:
         ordered = [_quicker(test, executed) for test in ordered]
     for test in dict.fromkeys(ordered):
         test_s = executed.seconds.get(test, UNKNOWN_S)
-        if total_s + test_s <= seconds or not found:
+        if total_s + test_s <= seconds or not chosen:
             total_s += test_s
-            found.append(test)
-    return found
+            chosen.append(test)
+    return chosen
 
 
 def _in_turn(lists: list[list[str]]) -> list[str]:
@@ -106,7 +110,13 @@ def _executing(lines: dict[str, set[int]], executed: Executed) -> list[str]:
 
 
 def _quickest(names: Iterable[str], executed: Executed) -> list[str]:
-    return sorted(names, key=lambda test: executed.seconds.get(_quicker(test, executed), 0.0))
+    return sorted(names, key=lambda test: executed.seconds.get(_quicker(test, executed), UNKNOWN_S))
+
+
+def _is_traced(test: str, executed: Executed) -> bool:
+    """Whether the lines of the board's side are known: by the same case on CPython, or without a board."""
+    twin = re.sub(r"\[micropython\b", "[cpython", test)
+    return twin in executed.lines and ("[cpython" in twin or not test.startswith("tests/system/"))
 
 
 def _quicker(test: str, executed: Executed) -> str:
@@ -180,7 +190,7 @@ def by_folder(path: Path) -> list[str]:
     if name.startswith("host/armtempo/simulator"):
         return SIMULATED
     if name.startswith("shared/"):
-        return [*SHARED, "tests/board/test_check.py", "tests/board/test_app.py"]
+        return [*SHARED, *(f"tests/board/test_{name}.py" for name in ("check", "app", "engine"))]
     found = [f"tests/board/{test}.py" for test in BY_FOLDER[str(path.parent)]]
     if path.parent.name in ("app", "link", "storage"):
         found += [*IN_PROCESS, "tests/board/test_fuzz.py"]

@@ -142,7 +142,7 @@ def _holds_text(part: ast.AST) -> bool:
 def _never_runs(node: ast.stmt) -> bool:
     """What is there for the type checker or the command line alone, and methods that only subclasses have."""
     match node:
-        case ast.If(test=ast.Name(id="TYPE_CHECKING")):
+        case ast.If(test=ast.Name(id="TYPE_CHECKING")) | ast.Assign(targets=[ast.Name(id="TYPE_CHECKING")]):
             return True
         case ast.If(test=ast.Compare(left=ast.Name(id="__name__"))):
             return True

@@ -1,7 +1,7 @@
 """Runs tests in a fork of a process that has imported the large packages already: a program that stands alone.
 
-Each line of the input is a JSON list of tests. The answer: "process" and its number, "failed" and the first test that
-failed, or nothing, and "end".
+Each line of the input is a JSON list of tests. The answer: "process" and its number, "test" and each that begins,
+"failed" and the first test that failed, or nothing, and "end".
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import json
 import os
 import sys
 import warnings
-from typing import Any
+from typing import Any, TextIO
 
 _NOTHING_WRONG = (0, 5)
 """Of pytest's exit codes: all passed, none was found."""
@@ -20,7 +20,8 @@ _NOTHING_WRONG = (0, 5)
 class InOrder:
     """A plugin: exactly these tests, in this order, and which failed first."""
 
-    def __init__(self, tests: list[str]) -> None:
+    def __init__(self, tests: list[str], answers: TextIO) -> None:
+        self._answers = answers
         self._place = {test: place for place, test in enumerate(tests)}
         self.failed = ""
 
@@ -36,6 +37,10 @@ class InOrder:
                 place[item] = self._place.get(item.nodeid.split("::")[0], -1)
         items[:] = sorted((item for item in items if place[item] >= 0), key=lambda item: place[item])
 
+    def pytest_runtest_logstart(self, nodeid: str) -> None:
+        """A test begins."""
+        print("test", nodeid, file=self._answers, flush=True)
+
     def pytest_runtest_logreport(self, report: Any) -> None:
         """A test."""
         if report.failed and not self.failed:
@@ -47,13 +52,13 @@ class InOrder:
             self.failed = report.nodeid
 
 
-def run(tests: list[str]) -> str:
+def run(tests: list[str], answers: TextIO) -> str:
     """The first that failed, or ""."""
     import pytest
 
     compileall.compile_dir = lambda *_arguments, **_options: True  # it was done once, for all forks
 
-    plugin = InOrder(tests)
+    plugin = InOrder(tests, answers)
     files = list(dict.fromkeys(test.split("::")[0] for test in tests))
     try:
         code = int(pytest.main(["-q", "-x", "-p", "no:cacheprovider", *files], plugins=[plugin]))
@@ -82,7 +87,7 @@ def main() -> None:
             os.setsid()
             for descriptor in range(3):
                 os.dup2(nothing, descriptor)
-            print("failed", run(json.loads(line)), file=answers, flush=True)
+            print("failed", run(json.loads(line), answers), file=answers, flush=True)
             os._exit(0)
         print("process", child, file=answers, flush=True)
         os.waitpid(child, 0)

@@ -10,6 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from tests import forked
+
 COMMAND = (sys.executable, "-c", "from armtempo.__main__ import main; main()")
 SLOW_S = 600.0
 """Nothing here takes longer, on however loaded a machine."""
@@ -36,8 +38,11 @@ def run(*arguments: str | Path, folder: Path, **environment: str) -> Ended:
 
 
 def start(*arguments: str | Path, folder: Path, **environment: str) -> subprocess.Popen[str]:
-    """Start in ``folder``, away from the terminal's signals; on a virtual board unless another port is named."""
-    return subprocess.Popen(
+    """Start in ``folder``, away from the terminal's signals; on a virtual board unless another port is named.
+
+    Its large packages are in memory already: see ``forked``.
+    """
+    return forked.Process(
         [*COMMAND, *map(str, arguments)],
         cwd=folder,
         env={**os.environ, "ARMTEMPO_PORT": "sim", **environment},

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -13,7 +11,7 @@ from armtempo.deploy.firmware import frozen
 from armtempo.errors import LinkError
 from armtempo.simulator import LaunchOptions, VirtualBoard, edgelog, launch
 
-from tests import interpreters
+from tests import forked, interpreters
 from tests.system import commandline
 from tests.system.boards import armtempo, small_plan
 
@@ -55,8 +53,7 @@ def test_the_compiled_program_makes_the_same_pulses(tmp_path: Path) -> None:
 
 
 def mpremote(port: str, *arguments: str) -> str:
-    command = [sys.executable, "-m", "mpremote", "connect", port, *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=commandline.SLOW_S)
+    done = forked.run("-m", "mpremote", "connect", port, *arguments, timeout=commandline.SLOW_S)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
+from tests import forked
 from tests.interpreters import ROOT
+from tests.system import commandline
 
 EXAMPLES = ROOT / "host" / "examples"
 LEAVES = {
@@ -36,8 +36,7 @@ def test_example(name: str, tmp_path: Path) -> None:
     elif "repeat=3" in (text := script.read_text(encoding="utf-8")):  # takes time and shows nothing new here
         script = tmp_path / name
         script.write_text(text.replace("repeat=3", "repeat=1"), encoding="utf-8")
-    command = [sys.executable, str(script), *ARGUMENTS.get(name, [])]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    done = forked.run(script, *ARGUMENTS.get(name, []), cwd=tmp_path, timeout=commandline.SLOW_S)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / LEAVES[name]).stat().st_size > 0
 

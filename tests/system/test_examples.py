@@ -8,8 +8,6 @@ from __future__ import annotations
 import re
 import shlex
 import shutil
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,7 +15,7 @@ import pytest
 from armtempo.model import arm_file, job_file
 from armtempo.simulator import LaunchOptions, launch
 
-from tests import interpreters
+from tests import forked, interpreters
 from tests.interpreters import ROOT
 from tests.system import commandline
 from tests.system.boards import small_plan
@@ -86,7 +84,7 @@ def port(tmp_path: Path) -> Iterator[str]:
 
 @pytest.mark.parametrize(("name", "code"), python_blocks(), ids=[name for name, _ in python_blocks()])
 def test_python_example(name: str, code: str, started: Path) -> None:
-    done = subprocess.run([sys.executable, "-c", code], cwd=started, capture_output=True, text=True)
+    done = forked.run("-c", code, cwd=started, timeout=commandline.SLOW_S)
     assert done.returncode == 0, done.stderr
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -19,7 +17,7 @@ from armtempo.simulator import LaunchOptions, edgelog, launch
 from mpremote.transport import TransportError
 from mpremote.transport_serial import SerialTransport
 
-from tests import interpreters
+from tests import forked, interpreters
 from tests.system import boards, commandline
 
 INTERPRETER = interpreters.starter("micropython" if "micropython" in interpreters.AVAILABLE else "cpython")
@@ -44,8 +42,7 @@ def flash(tmp_path: Path) -> Path:
 
 def mpremote(port: str, *arguments: str) -> str:
     """What mpremote prints."""
-    command = [sys.executable, "-m", "mpremote", "connect", port, *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=commandline.SLOW_S)
+    done = forked.run("-m", "mpremote", "connect", port, *arguments, timeout=commandline.SLOW_S)
     assert done.returncode == 0, (done.stdout, done.stderr)
     return done.stdout
 

@@ -8,8 +8,6 @@ from __future__ import annotations
 import re
 import shlex
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,7 +17,7 @@ import pytest
 from armtempo.simulator import LaunchOptions, VirtualBoard, launch
 from armtempo.simulator.launcher import _DEPLOYED_BLOCKS
 
-from tests import interpreters
+from tests import forked, interpreters
 from tests.system import commandline
 from tests.system.boards import armtempo, small_plan
 
@@ -117,10 +115,7 @@ class Bench:
             done = commandline.run(*words[1:], folder=self.folder)
             return done.exit_code, done.output + done.errors
         assert words[0] == "mpremote", command
-        words = [sys.executable, "-m", *words]
-        ended = subprocess.run(
-            words, cwd=self.folder, capture_output=True, text=True, timeout=commandline.SLOW_S, check=False
-        )
+        ended = forked.run("-m", *words, cwd=self.folder, timeout=commandline.SLOW_S)
         return ended.returncode, ended.stdout + ended.stderr
 
     def used_blocks(self) -> int:

@@ -56,6 +56,8 @@ def test_every_row_and_sample_is_recorded(tmp_path: Path) -> None:
     told = sequence_report.verdict(by_file, results(by_file))
     assert told.state != sequence_report.BAD, told.line
     page = sequence_report.write(by_file.path).read_text()
+    assert "rows.csv" in page
+    assert "samples.csv" in page
     assert "finished after 3 whole cycles" in page
     assert "goto pick" in page
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 import serial
-from armtempo.errors import LinkError
+from armtempo.errors import LinkError, RunFolderError
 from armtempo.link.connect import open_board
-from armtempo.simulator import LaunchOptions, launch, launcher
+from armtempo.simulator import LaunchOptions, edgelog, launch, launcher
 
 from tests import interpreters
 from tests.system import commandline
@@ -53,9 +53,27 @@ def test_goes_with_its_context() -> None:
     with launch() as board:
         folder = board.log_path.parent
         assert folder.is_dir()
+        assert os.getsid(board.pid) == board.pid, "Ctrl-C at the terminal is not for it"
     assert not board.running()
+    assert board._process.returncode == 0, "it ends by itself where nobody has its port open"
     assert not folder.exists()
     board.stop()
+
+
+def test_a_board_that_ends_before_its_program_runs_did_not_start() -> None:
+    with launch() as board:
+        board._process.kill()
+        board._process.wait()
+        (board._folder.path / "up").unlink()
+        with pytest.raises(LinkError, match="the virtual board did not start"):
+            board.wait_until_up()
+
+
+def test_a_motion_that_is_not_in_the_edge_log_is_told() -> None:
+    cycle = edgelog.PowerCycle(starts=[100, 200])
+    for number in (-3, 2):
+        with pytest.raises(RunFolderError, match=f"has 2 motions, not one number {number}"):
+            cycle.motion(number)
 
 
 def test_goes_with_its_launcher(tmp_path: Path) -> None:

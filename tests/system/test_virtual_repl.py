@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,7 +10,7 @@ import pytest
 import serial
 from armtempo.simulator import LaunchOptions, VirtualBoard, launch
 
-from tests import interpreters
+from tests import forked, interpreters
 from tests.system import commandline
 
 
@@ -28,8 +26,7 @@ def bare(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[VirtualBoar
 
 def mpremote(board: VirtualBoard, *arguments: str, code: int = 0) -> str:
     """What mpremote prints."""
-    command = [sys.executable, "-m", "mpremote", "connect", board.port, *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=commandline.SLOW_S)
+    done = forked.run("-m", "mpremote", "connect", board.port, *arguments, timeout=commandline.SLOW_S)
     assert done.returncode == code, (done.stdout, done.stderr)
     return done.stdout + done.stderr
 
@@ -82,19 +79,30 @@ def test_friendly_prompt(bare: VirtualBoard) -> None:
         port.write(b"print('be' 'gin')\r")
         port.read_until(b"begin\r\n>>> ")
         port.write(b"\x02")
-        assert b"MicroPython" in port.read_until(b">>> ")
+        assert port.read_until(b">>> ").startswith(b"\r\nMicroPython")  # on a line of its own
         port.write(b"x = 20 + 1\r")
         port.read_until(b">>> ")
-        port.write(b"2 * x\r")
+        port.write(b"2 * xy\x08\r")  # a typing mistake, taken back
         assert port.read_until(b">>> ").endswith(b"42\r\n>>> ")
         port.write(b"for i in range(2):\r  print(i + 7)\r\r")
         assert b"7\r\n8\r\n" in port.read_until(b"8\r\n>>> ")
+        port.write(b"\x01")
+        port.read_until(b"raw REPL; CTRL-B to exit\r\n>")
+        port.write(b"\x02")
+        assert port.read_until(b">>> ").startswith(b"\r\nMicroPython")
+        port.write(b"\x01")
+        port.read_until(b"raw REPL; CTRL-B to exit\r\n>")
+        port.write(b"\x04")
+        assert port.read_until(b"soft reboot\r\n") == b"OK\r\nMPY: sync filesystems\r\nMPY: soft reboot\r\n"
 
 
 def test_hard_reset_clears_the_registers_soft_reset_does_not(bare: VirtualBoard) -> None:
-    code = "import stm, machine as m; print(m.mem32[stm.TIM2 + stm.TIM_ARR], m.reset_cause())"
+    code = "import stm, machine as m; print(m.mem32[stm.TIM2 + stm.TIM_ARR], m.reset_cause(), end=' ')"
+    running = "print([m.mem32[stm.TIM4 + at] for at in (stm.TIM_CR1, stm.TIM_DIER, stm.TIM_CCER)])"
+    code = f"{code}; {running}"
     mpremote(bare, "exec", "import stm; from machine import mem32; mem32[stm.TIM2 + stm.TIM_ARR] = 77")
-    assert mpremote(bare, "soft-reset", "exec", code) == "77 0\n"
+    mpremote(bare, "resume", "exec", "import pyb; pyb.Timer(4, freq=100, callback=lambda timer: None)")
+    assert mpremote(bare, "soft-reset", "exec", code) == "77 0 [0, 0, 0]\n", "only timers that it made stop"
     mpremote(bare, "reset")
     time.sleep(0.5)
-    assert mpremote(bare, "resume", "exec", code) == "-1 2\n"
+    assert mpremote(bare, "resume", "exec", code) == "-1 2 [0, 0, 0]\n"

@@ -46,6 +46,8 @@ INSIDE = {
     "case_exception_anywhere",
 }
 """They reach into the program by the names in its sources."""
+ON_SOURCES = INSIDE.union(*(cases for (name, _), cases in CHOSEN.items() if name == "cpython"))
+"""What MicroPython runs with the sources themselves; with what is made of them, compact and deployed, it runs all."""
 QUICKEST = "micropython" if "micropython" in interpreters.AVAILABLE else "cpython"
 
 
@@ -101,11 +103,20 @@ def play(case: scripted.Case, flashes: Path, tmp_path: Path, program: str = PROG
     case.run(str(copied), program, home, str(FEWER[case.interpreter]))
 
 
-@pytest.mark.parametrize("case", chosen(*interpreters.AVAILABLE), ids=str)
+@pytest.mark.parametrize(
+    "case",
+    [
+        case
+        for case in chosen(*interpreters.AVAILABLE)
+        if case.interpreter != "micropython" or case.name in ON_SOURCES
+    ],
+    ids=str,
+)
 def test_case(case: scripted.Case, flashes: Path, tmp_path: Path) -> None:
     play(case, flashes, tmp_path)
 
 
+@pytest.mark.xdist_group("compact program")  # which takes seconds to make
 @pytest.mark.parametrize("case", [case for case in chosen(QUICKEST) if case.name not in INSIDE], ids=str)
 def test_case_with_the_compact_program(
     case: scripted.Case, flashes: Path, compact: str, tmp_path: Path

@@ -85,6 +85,7 @@ def test_from_the_arm_file_to_the_pins(tmp_path: Path) -> None:
         assert " off " in lines[1]
         assert "closed (95 deg)" in board.said("output", "gripper", "closed")
         assert json.loads(board.said("output", "gripper", "180", "--json"))["value"] == 180.0
+        assert json.loads(board.said("output", "gripper", "20", "--json"))["value"] == 20.0009  # of counts
         assert " on " in board.said("output", "pump", "on")
         assert board.said("output", "fan", "slow").split()[3:6] == ["slow", "(0.25", "duty)"]
         assert [entry["name"] for entry in json.loads(board.said("output", "--json"))] == [

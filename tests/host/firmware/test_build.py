@@ -88,6 +88,11 @@ def test_a_build_makes_a_whole_folder(micropython: Path, tools: Callable[..., Pa
         build.build(micropython, "STM32F4DISC", out, no_progress)
 
 
+def test_a_firmware_in_one_piece_has_no_number() -> None:
+    definition = checkout.BoardDefinition("MINE", Path("MINE"), MACHINE, "", (0x08000000,), 0x08100000)
+    assert build._pieces(definition) == (image.Piece("firmware.bin", 0x08000000),)
+
+
 def test_a_chip_without_the_programs_pins_is_told(
     micropython: Path, tools: Callable[..., Path], tmp_path: Path
 ) -> None:

@@ -6,6 +6,7 @@ from virtual_board import standalone
 # isort: split
 from math import cos, exp, pi, sin, sqrt
 
+from virtual_board.arm import switches
 from virtual_board.arm.noise import Noise
 from virtual_board.arm.stepper import Stepper
 
@@ -191,6 +192,24 @@ def case_blocked_joint_stands_still():
     run(motor, 0, 1000)
     assert motor._x == 0
     assert encoder.counts == 0
+
+
+class Wired:
+    """The board program's table of pins."""
+
+    LIMIT = ("PD8", "PD9")
+
+
+def case_limit_switches_trip_at_and_beyond_their_angles():
+    board = standalone.start()
+    motor = Line()
+    joint = {"limit_low": 0, "low_deg": -8.0, "limit_high": 1, "high_deg": 30.0, "limit_active_high": 1}
+    found = switches.fitted(motor, joint, Wired)
+    for angle_deg, levels in ((-9.0, [1, 0]), (-8.0, [1, 0]), (-7.9, [0, 0]), (29.9, [0, 0]), (30.0, [0, 1])):
+        motor.angle_deg = lambda angle_deg=angle_deg: angle_deg
+        for switch in found:
+            switch.look()
+        assert [board.pins.line(name).read() for name in Wired.LIMIT] == levels, angle_deg
 
 
 def case_noise_is_normal():

@@ -21,15 +21,24 @@ def case_flash_is_as_big_as_the_chips():
     os.mkdir("data")
     free = os.statvfs("/flash")[3]
     assert 180 < free <= 190
-    with open("/flash/data/big", "wb") as file:
+    with open("/flash/data/small", "wb") as small:
+        small.write(bytes(100))
+        with open("/flash/data/big", "wb") as file:
+            try:
+                for _ in range(400):
+                    file.write(bytes(512))
+                raise AssertionError("flash has no end")
+            except OSError as error:
+                assert error.args[0] == 28
+        assert os.statvfs("/flash")[3] == 0
+        small.write(bytes(412))  # its block has room
         try:
-            for _ in range(400):
-                file.write(bytes(512))
-            raise AssertionError("flash has no end")
+            small.write(b"x")
+            raise AssertionError("another block")
         except OSError as error:
             assert error.args[0] == 28
-    assert os.statvfs("/flash")[3] == 0
     os.remove("data/big")
+    os.remove("data/small")
     assert os.statvfs("/flash")[3] == free
     assert os.listdir("/flash") == ["data"] and os.listdir("/") == ["flash"]
     assert [entry[0] for entry in os.ilistdir()] == ["data"]

@@ -7,16 +7,21 @@ import sys
 
 import cases
 from virtual_board import (  # replaces time, os, uctypes, micropython; so before everything else
+    injected_faults,
     machine_state,
     pace,
+    power_cycles,
     standalone,
 )
 from virtual_board.chip.flash import real_open
 from virtual_board.chip.processor import TICKS_PER_US
 from virtual_board.chip.reset import Reset
+from virtual_board.firmware import usb_serial
 from virtual_board.firmware.external_interrupts import set_level
 
 # isort: split
+import io
+import os
 import struct
 import time
 from array import array
@@ -163,6 +168,19 @@ def case_stale_ring_entries_do_not_match():
     assert len(edges(SCRATCH + "/stale")[0][15]) == 2
 
 
+def case_an_entry_that_the_stream_brings_too_late_does_not_match():
+    """It takes a few ticks from the match to the next compare value."""
+    for gap, matches in ((6, 1), (7, 3)):
+        board = standalone.start(edge_log=SCRATCH + "/late")
+        counters()
+        feed(5, 3, stm.TIM2 + stm.TIM_CCR1, array("I", [100 + gap, 5000, 0, 0]))
+        put(stm.TIM2, 13, 100)
+        mem32[stm.TIM2 + stm.TIM_DIER] = 1 << 9
+        mem32[stm.TIM2 + stm.TIM_CR1] |= 1
+        board.spend(84_000)
+        assert len(edges(SCRATCH + "/late")[0][15]) == matches, gap
+
+
 def case_forced_modes_act_at_once():
     standalone.start()
     counters()
@@ -252,13 +270,22 @@ def case_pins():
     standalone.start(edge_log=SCRATCH + "/pins")
     modes = (pyb.Pin.IN, pyb.Pin.OUT_PP, pyb.Pin.OUT_OD, pyb.Pin.AF_PP, pyb.Pin.AF_OD, pyb.Pin.ANALOG)
     assert modes == (0, 1, 0x11, 2, 0x12, 3)  # as on the chip
+    assert (pyb.Pin.PULL_NONE, pyb.Pin.PULL_UP, pyb.Pin.PULL_DOWN) == (0, 1, 2)
     assert (pyb.Pin.AF1_TIM2, pyb.Pin.AF2_TIM5, pyb.Pin.AF3_TIM8) == (1, 2, 3)
     pin = pyb.Pin("PE7", pyb.Pin.OUT_PP, value=1)
     assert pin.value() == 1 and mem32[stm.GPIOE + stm.GPIO_ODR] == 1 << 7
     assert mem32[stm.GPIOE + stm.GPIO_IDR] == 1 << 7
     mem32[stm.GPIOE + stm.GPIO_BSRR] = 1 << 8 | 1 << (16 + 7)
     assert pin() == 0 and mem32[stm.GPIOE + stm.GPIO_ODR] == 1 << 8
+    assert mem32[stm.GPIOE + stm.GPIO_BSRR] == 0  # reads as 0, and acts once
     pin.high()
+    assert mem32[stm.GPIOE + stm.GPIO_ODR] == 1 << 7 | 1 << 8
+    pin.low()
+    assert mem32[stm.GPIOE + stm.GPIO_ODR] == 1 << 8
+    pin.high()
+    pyb.Pin("E3", pyb.Pin.AF_PP, alt=2)
+    pyb.Pin("E3", pyb.Pin.AF_PP, alt=0)
+    assert mem32[stm.GPIOE + stm.GPIO_AFR0] == 0
     pull = pyb.Pin("D8", pyb.Pin.IN, pyb.Pin.PULL_UP)
     assert pull.value() == 1
     set_level("PD8", 0)
@@ -266,7 +293,57 @@ def case_pins():
     set_level("PD8", None)
     assert pull.value() == 1
     found, _ = edges(SCRATCH + "/pins")
-    assert len(found[4 * 16 + 7]) == 3 and len(found[3 * 16 + 8]) == 2
+    assert len(found[4 * 16 + 7]) == 5 and len(found[3 * 16 + 8]) == 2
+
+
+def case_pins_that_the_chip_has_not():
+    standalone.start()
+    for name in ("E16", "PZ9", "LED", "", None):
+        try:
+            pyb.Pin(name)
+        except ValueError as error:
+            assert str(error) == "Pin(%r) doesn't exist" % (name,)
+        else:
+            raise AssertionError(name)
+
+
+class Listener:
+    """Notes the pulses that a pin is said to make."""
+
+    def __init__(self):
+        self.told = []
+
+    def pulses(self, line, pulses, now):
+        self.told.append(pulses)
+
+
+def case_a_pin_that_is_taken_from_its_timer_makes_no_pulses():
+    board = standalone.start()
+    listener = Listener()
+    board.pins.line("D12").pulse_sinks.append(listener)
+    board.pins.line("D13").pulse_sinks.append(listener)
+    timer = pyb.Timer(4, prescaler=0, period=999)
+    timer.channel(1, pyb.Timer.PWM, pin=pyb.Pin("D12"), pulse_width=250)
+    board.spend(1)
+    assert listener.told == [(250, 1000)]
+    pyb.Pin("D12", pyb.Pin.OUT_PP)
+    board.spend(1)
+    assert listener.told == [(250, 1000), (0, 0)]
+
+
+def case_eight_calls_can_wait():
+    """MICROPY_SCHEDULER_DEPTH."""
+    board = standalone.start()
+    called = []
+    for number in range(8):
+        board.schedule(called.append, number)
+    try:
+        board.schedule(called.append, 8)
+        raise AssertionError("one more")
+    except RuntimeError:
+        pass
+    board.spend(1)
+    assert called == list(range(8))
 
 
 def case_step_1_is_low_from_the_first_line_on():
@@ -291,6 +368,12 @@ def case_external_interrupt_within_20_us():
     board.at(at + 50_000, lambda: set_level("PE15", 1))
     board.spend(400_000)
     assert [line for line, _ in seen] == [15]
+    rises = []
+    pyb.ExtInt("PE14", pyb.ExtInt.IRQ_RISING, pyb.Pin.PULL_UP, rises.append)
+    for level in (0, 1, 0):
+        set_level("PE14", level)
+        board.spend(50_000)
+    assert rises == [14]
     assert 0 <= seen[0][1] - at < 20 * TICKS_PER_US
 
 
@@ -311,12 +394,66 @@ def case_usb_buffers():
     line.received.extend(b"hello")
     assert port.any() and port.recv(3, timeout=0) == b"hel"
     buffer = bytearray(8)
-    assert port.readinto(buffer, 8) == 2 and buffer[:2] == b"lo"
+    assert port.readinto(buffer, 1) == 1 and buffer[:2] == b"l\0"
+    assert port.readinto(buffer) == 1 and buffer[:2] == b"o\0"
     assert port.read(5) is None and port.recv(2, timeout=3) == b""
     assert port.send(b"abc") == 3 and bytes(line.sending) == b"abc"
     port.init(flow=pyb.USB_VCP.RTS | pyb.USB_VCP.CTS)
     assert port.write(bytes(2000)) == 1021
     assert port.write(b"x") is None
+    assert line.rts and line.cts
+    port.init(flow=0)
+    assert not line.rts and not line.cts
+
+
+def case_a_program_that_receives_waits_for_what_comes():
+    board = standalone.start()
+    line = machine_state.serial
+    board.at(board.now + 20 * 84_000, lambda: line.received.extend(b"late"))
+    assert pyb.USB_VCP().recv(4, timeout=1000) == b"late"
+
+
+def case_a_program_that_sends_waits_for_room():
+    board = standalone.start()
+    line = machine_state.serial
+    port = pyb.USB_VCP()
+    port.init(flow=pyb.USB_VCP.RTS | pyb.USB_VCP.CTS)
+
+    def take():
+        line.sending = bytearray()
+
+    board.at(board.now + 20 * 84_000, take)
+    assert port.send(bytes(1500), timeout=1000) == 1500
+
+
+class Written(usb_serial.Serial):
+    """The line to a host that has written this already."""
+
+    def __init__(self, data):
+        usb_serial.SilentPort.__init__(self)
+        self._in = io.BytesIO(data)
+        self._chunk = memoryview(bytearray(64))
+
+
+def case_what_the_program_does_not_read_is_lost_unless_the_host_is_held_back():
+    for is_held_back in (0, 1):
+        standalone.start()
+        line = Written(bytes(3000))
+        line.rts = bool(is_held_back)
+        line.pump()
+        taken = line._in.tell()
+        if is_held_back:
+            assert 1023 - 65 < taken == len(line.received) < 1024
+        else:
+            assert taken == 3000 and len(line.received) == 1023
+
+
+def case_a_silenced_board_speaks_again():
+    board = standalone.start()
+    injected_faults._silence(board, {"ms": 2})
+    assert machine_state.serial.silent
+    board.spend(3 * 84_000)
+    assert not machine_state.serial.silent
 
 
 def case_watchdog_bites():
@@ -336,8 +473,37 @@ def case_watchdog_bites():
     assert machine.reset_cause() == machine.WDT_RESET
 
 
+def case_a_timer_that_was_given_up_calls_nobody():
+    board = standalone.start()
+    called = []
+    timer = pyb.Timer(4, freq=1000)
+    timer.channel(1, pyb.Timer.OC_TIMING, callback=called.append)
+    timer.deinit()
+    timer.init(freq=1000)
+    board.spend(5 * 84_000)
+    assert called == []
+
+
+def case_a_soft_reset_starts_python_again():
+    standalone.start()
+    try:
+        machine.soft_reset()
+        raise AssertionError("it went on")
+    except Reset as reset:
+        assert reset.cause == machine.SOFT_RESET
+
+
+def case_after_a_soft_reset_the_prompt_has_the_port_again():
+    standalone.start()
+    os.dupterm(None, 1)
+    assert not machine_state.serial.attached
+    power_cycles._soft_reset()
+    assert machine_state.serial.attached
+
+
 def case_time_passes_in_calls():
     standalone.start()
+    assert time.localtime()[:6] == (2026, 1, 1, 0, 0, 0)
     before = time.ticks_us()
     time.sleep_us(1500)
     assert 1500 <= time.ticks_diff(time.ticks_us(), before) < 102_000
@@ -346,6 +512,72 @@ def case_time_passes_in_calls():
         machine.idle()
     # real time while nothing moves, at most 50 ms at once
     assert 2 <= time.ticks_diff(time.ticks_ms(), before) <= 160
+    pace.Pace._elapsed_us = lambda self: 0
+    before = time.ticks_us()
+    os.sync()
+    assert time.ticks_diff(time.ticks_us(), before) > 0
+
+
+def case_a_host_talks_while_its_input_comes_often():
+    """Twice within 150 ms, and not longer than a second ago; then virtual time need not keep to real time."""
+    standalone.start()
+    kept, line = machine_state.pace, machine_state.serial
+    now = [kept._looked_us]
+    kept._ticks_us = lambda: now[0]
+    heard = []
+    for passed_us, pieces in ((10, 1), (400_000, 1), (100_000, 1), (100_000, 0), (850_000, 0), (100_000, 0)):
+        now[0] += passed_us
+        line.pieces += pieces
+        heard.append(kept._host_talks())
+    assert heard == [False, False, True, True, True, False], heard
+
+
+def case_what_a_host_watches_moves_in_real_time():
+    board = standalone.start()
+    kept, speeds = machine_state.pace, []
+    kept._host_talks = lambda: True
+    kept._keep_pace = speeds.append
+    board.moving = lambda horizon: True
+    kept._millisecond()
+    assert speeds == [1]
+
+
+def case_the_backup_sram_has_4_kb():
+    standalone.start()
+    mem32[stm.RCC + stm.RCC_AHB1ENR] |= 1 << 18
+    assert mem32[0x40024000 + 4092]
+    try:
+        assert mem32[0x40024000 + 4096] is None
+    except ValueError:
+        return
+    raise AssertionError("there is more")
+
+
+def case_the_clock_counts_nanoseconds():
+    standalone.start()
+    before = time.time_ns()
+    time.sleep_us(2_500)
+    assert 2_500_000 <= time.time_ns() - before < 103_000_000
+    assert time.time_ns() // 1_000_000_000 == time.time()
+
+
+def case_an_interrupt_ends_the_wait():
+    pace.Pace._elapsed_us = lambda self: 0
+    standalone.start()
+    pyb.Timer(6, freq=10_000, callback=lambda timer: None)
+    before = time.ticks_us()
+    machine.idle()
+    assert 0 < time.ticks_diff(time.ticks_us(), before) < 200  # and not until the next millisecond
+
+
+def case_timers_of_the_faster_bus_count_twice_as_fast():
+    """TIM1 counts 168 million a second, TIM2 half as many (RM0090 figure 21); a prescaler divides that."""
+    board = standalone.start()
+    slow, fast = (pyb.Timer(number, prescaler=3, period=0xFFFF) for number in (2, 1))
+    before = [timer.counter() for timer in (slow, fast)]
+    board.spend(8000)
+    counted = [timer.counter() - first for timer, first in zip((slow, fast), before)]
+    assert abs(counted[0] - 2000) < 50 and abs(counted[1] - 4000) < 100, counted
 
 
 def case_registers_by_the_chips_addresses():
@@ -354,6 +586,9 @@ def case_registers_by_the_chips_addresses():
     assert mem32[stm.TIM2 + stm.TIM_ARR] == -1
     assert machine.mem8[stm.TIM2 + stm.TIM_ARR] == machine.mem8[stm.TIM2 + stm.TIM_ARR + 3] == 0xFF
     assert machine.mem16[stm.TIM2 + stm.TIM_ARR] == 0xFFFF
+    machine.mem8[stm.TIM2 + stm.TIM_CCR1 + 1] = 0xAB
+    machine.mem16[stm.TIM2 + stm.TIM_CCR1 + 2] = 0x1234
+    assert mem32[stm.TIM2 + stm.TIM_CCR1] == 0x1234AB00
     assert machine.freq() == (168_000_000, 168_000_000, 42_000_000, 84_000_000)
     try:
         mem32[0x50000000] = 1
