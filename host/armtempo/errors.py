@@ -10,6 +10,8 @@
     ├── RunFolderError             a recorded run cannot be read, is not whole, or cannot be written
     └── LinkError                  the board cannot be reached or stopped answering
         ├── PortError              the port is there and cannot be opened
+        │   └── PortInUseError     another program has it
+        ├── PortGivenUpError       the program that had the port, and was asked, has ended
         ├── NoAnswerError          the port is open and the board does not answer in time
         ├── NoProgramError         MicroPython's prompt answers instead of the board program
         ├── DisturbedError         pieces of messages arrive, too few of them whole
@@ -77,6 +79,14 @@ class LinkError(ArmtempoError):
 
 class PortError(LinkError):
     """The port is there, but it cannot be opened."""
+
+
+class PortInUseError(PortError):
+    """Another program has the port."""
+
+
+class PortGivenUpError(LinkError):
+    """The program that had the port has ended, or closed it."""
 
 
 class NoAnswerError(LinkError):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import armtempo
@@ -105,13 +104,12 @@ def test_another_program_changes_the_speed(plan: armtempo.Plan, tmp_path: Path) 
         on_board("run", file, "--speed", "101", code=2)
         on_board("goto", file, "--arm", "paper")
         running = boards.start("run", file, "--speed", "5", "--port", board.port, cwd=tmp_path)
-        limit_s = time.monotonic() + boards.TIMEOUT_S
-        # until the run shares the port, status may be refused
-        while (
-            "at 5 % of the planned speed"
-            not in commandline.run("status", "--port", board.port, folder=tmp_path).output
-        ):
-            assert time.monotonic() < limit_s
+
+        def slow() -> bool:
+            assert running.poll() is None, running.communicate()
+            return "at 5 % of the planned speed" in on_board("status")
+
+        commandline.wait_for(slow, "the run")
         assert "through" in on_board("pause")
         assert "in a pause" in on_board("status")
         on_board("resume")

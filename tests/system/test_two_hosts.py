@@ -6,12 +6,14 @@ import json
 import random
 import signal
 import subprocess
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 from armtempo.cli import main
+from armtempo.link.transport import SerialTransport
 from armtempo.model import arm_file
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
@@ -21,7 +23,7 @@ from armtempo.simulator import LaunchOptions, launch
 from click.testing import CliRunner, Result
 
 from tests.system import commandline
-from tests.system.boards import start
+from tests.system.boards import small_plan, start
 
 SEEDS = (1, 2)
 ORDERS = 30
@@ -168,3 +170,49 @@ def test_a_program_that_died_gives_the_port_free(tmp_path: Path) -> None:
         assert stopped.exit_code == 0, stopped.errors
         stopped.said("has ended without giving up", "may still move")
         assert "state     moving" not in stopped.output
+
+
+def test_a_command_waits_for_one_that_is_about_to_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A port that another program has for a moment: both wait, what needs the port and what would look on."""
+    with launch(LaunchOptions(tmp_path / "flash")) as board:
+        for words in (("clear",), ("status",), ("stop",)):
+            held = SerialTransport(board.port)
+            timer = threading.Timer(0.5, held.close)
+            timer.start()
+            done = commandline.run(*words, "--port", board.port, folder=tmp_path)
+            timer.join()
+            assert done.exit_code == 0, done.errors
+        held = SerialTransport(board.port)
+        try:
+            refused = commandline.run("status", "--port", board.port, folder=tmp_path)
+        finally:
+            held.close()
+        assert refused.exit_code == 1
+        refused.said("is in use by another program")
+
+
+def test_a_run_and_commands_that_only_ask_share_a_port(tmp_path: Path) -> None:
+    """Others look in all the time while a run starts: it gets the port, and they are answered."""
+    small_plan(tmp_path / "small.json")
+    with launch(LaunchOptions(tmp_path / "flash")) as board:
+        assert commandline.run("home", "--arm", "paper", "--port", board.port, folder=tmp_path).exit_code == 0
+        ended = threading.Event()
+        answers: list[commandline.Ended] = []
+
+        def ask() -> None:
+            while not ended.is_set():
+                answers.append(commandline.run("status", "--port", board.port, folder=tmp_path))
+
+        asking = threading.Thread(target=ask)
+        asking.start()
+        try:
+            run = commandline.run("run", "small.json", "--port", board.port, folder=tmp_path)
+        finally:
+            ended.set()
+            asking.join()
+        assert run.exit_code == 0, run.errors
+        assert answers
+        for answer in answers:
+            assert answer.exit_code == 0, answer.errors

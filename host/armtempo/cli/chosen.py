@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ import click
 from armtempo.cli.verbosity import is_quiet
 from armtempo.errors import InputError
 from armtempo.project.settings import ARM, JOB, RUNS, ProjectSettings, nothing_set
+from armtempo.share.claim import PATIENCE_S
 
 if TYPE_CHECKING:
     from armtempo.link.traffic import Sink
@@ -18,6 +20,10 @@ if TYPE_CHECKING:
     from armtempo.model.plan import Plan
     from armtempo.model.sequence_plan import SequencePlan
     from armtempo.robot.board import Board
+    from armtempo.robot.board_state import BoardState
+    from armtempo.robot.shared_board import SharedBoard
+
+_LOOK_S = 0.05
 
 
 def tell(text: str) -> None:
@@ -197,10 +203,70 @@ def board(
     """The board of ``--port``; a virtual one moves ``arm``, and is said to be one; ``sink`` takes the traffic."""
     from armtempo.robot.connect import connect
 
-    found = connect(port, arm, log_traffic=log_traffic, sink=sink, any_program=any_program, tell=tell)
+    return _introduced(
+        connect(port, arm, log_traffic=log_traffic, sink=sink, any_program=any_program, tell=tell)
+    )
+
+
+def board_now(
+    port: str,
+    log_traffic: Path | None = None,
+    arm: Arm | None = None,
+    any_program: bool = False,
+    sink: Sink | None = None,
+) -> Board:
+    """The same without waiting for the port: PortInUseError where another program has it."""
+    from armtempo.robot.connect import connect_now
+
+    return _introduced(
+        connect_now(port, arm, log_traffic=log_traffic, sink=sink, any_program=any_program, tell=tell)
+    )
+
+
+def _introduced(found: Board) -> Board:
     if found.info.virtual:
         tell(f"port {found.port}: {virtual_words(found.port)}")
     return found
+
+
+def shared_or_own(
+    port: str,
+    log_traffic: Path | None = None,
+    arm: Arm | None = None,
+    any_program: bool = False,
+    sink: Sink | None = None,
+) -> SharedBoard | Board:
+    """The board through another program that has ``port``, which is said aloud, else over the port itself.
+
+    A program that opens the port just now answers for it soon; one that ends gives it up.
+    """
+    from armtempo.errors import PortInUseError
+    from armtempo.robot import shared_board
+
+    limit_s = time.monotonic() + PATIENCE_S
+    while True:
+        shared = shared_board.find(port)
+        if shared is not None:
+            tell(f"port {port}: through {shared.program}")
+            return shared
+        try:
+            return board_now(port, log_traffic, arm, any_program, sink)
+        except PortInUseError:
+            if time.monotonic() > limit_s:
+                raise
+            time.sleep(_LOOK_S)
+
+
+def board_state(port: str, log_traffic: Path | None = None) -> BoardState:
+    """What the board says, whoever has the port."""
+    from armtempo.errors import PortGivenUpError
+
+    while True:
+        with shared_or_own(port, log_traffic, any_program=True) as found:
+            try:
+                return found.state()
+            except PortGivenUpError:  # it is free now, or another program's
+                continue
 
 
 def virtual_words(port: str) -> str:

@@ -81,21 +81,9 @@ def _board(port: str | None, arm_path: Path | None) -> list[Item]:
             doctor.Item("board", "not looked at", doctor.Condition.NOTE, "give --port PORT, or --port sim")
         ]
     try:
-        return doctor.examine_board(_named(_state(name), arm_path))
+        return doctor.examine_board(_named(chosen.board_state(name), arm_path))
     except ArmtempoError as error:
         return doctor.examine_board(error)
-
-
-def _state(port: str) -> BoardState:
-    """Through another program where it has the port."""
-    from armtempo.robot import shared_board
-
-    shared = shared_board.find(port)
-    if shared is not None:
-        with shared:
-            return shared.state()
-    with chosen.board(port, any_program=True) as board:
-        return board.state()
 
 
 def _named(state: BoardState, arm_path: Path | None) -> BoardState:

@@ -34,18 +34,15 @@ def command(file: Path | None, port: str | None, log_traffic: Path | None, as_js
     if file is not None:
         _show_file(file, say)
         return
-    from armtempo.robot import shared_board
+    from armtempo.robot.shared_board import SharedBoard
 
     name = chosen.port(port, others=True)
-    shared = shared_board.find(name)
-    if shared is not None:
-        with shared:
-            chosen.tell(f"port {name}: through {shared.program}")
-            for message in shared.watch("traffic"):
+    with chosen.shared_or_own(name, log_traffic, any_program=True, sink=partial(_show, say)) as board:
+        if isinstance(board, SharedBoard):
+            for message in board.watch("traffic"):
                 say(message["time_s"], message["direction"], message["words"])
-        chosen.tell(f"{shared.program} has given up {name}")
-        return
-    with chosen.board(name, log_traffic, any_program=True, sink=partial(_show, say)) as board:
+            chosen.tell(f"{board.program} has given up {name}")
+            return
         while True:
             board.status()
             board.client.session.poll(_EVERY_S)

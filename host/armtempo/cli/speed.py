@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,11 +9,7 @@ import click
 from armtempo_shared.messages import RESUME
 
 from armtempo.cli import chosen, options, results
-from armtempo.errors import LinkError, PortError
-
-_PORT_FREE_S = 5.0
-"""Within this time a program that has just taken the port answers for it."""
-_LOOK_S = 0.1
+from armtempo.errors import LinkError
 
 
 @click.command()
@@ -48,15 +43,7 @@ class Asked:
 def change(port: str | None, log_traffic: Path | None, asked: Asked, as_json: bool) -> None:
     """Ask for a rate, through the program that has the port where there is one, and say so."""
     name = chosen.port(port, others=True)
-    limit_s = time.monotonic() + _PORT_FREE_S
-    while True:
-        try:
-            program = _ask(name, log_traffic, asked.rate)
-            break
-        except PortError:  # the other program is about to answer for the port, or to give it up
-            if time.monotonic() > limit_s:
-                raise
-            time.sleep(_LOOK_S)
+    program = _ask(name, log_traffic, asked.rate)
     percent = None if asked.rate == RESUME else asked.rate / 10
     values = {"asked": asked.what, "speed_percent": percent, "port": name, "program": program}
     results.show(as_json, values, [asked.words + (f", through {program}" if program else "")])
@@ -64,15 +51,13 @@ def change(port: str | None, log_traffic: Path | None, asked: Asked, as_json: bo
 
 def _ask(name: str, log_traffic: Path | None, rate: int) -> str | None:
     """Ask for the rate; through which program, None where over the port itself."""
-    from armtempo.robot import shared_board
+    from armtempo.robot.shared_board import SharedBoard
     from armtempo.robot.speed import change_speed
 
-    shared = shared_board.find(name)
-    if shared is not None:
-        with shared:
-            shared.speed(rate)
-            return shared.program
-    with chosen.board(name, log_traffic) as board:
+    with chosen.shared_or_own(name, log_traffic) as board:
+        if isinstance(board, SharedBoard):
+            board.speed(rate)
+            return board.program
         if not board.status().moving:
             raise LinkError("nothing moves", "'armtempo run --speed' begins at a lower speed")
         change_speed(board.client, rate)

@@ -25,18 +25,8 @@ def command(arm_path: Path | None, port: str | None, log_traffic: Path | None, a
 
     Also while another armtempo program has the port.
     """
-    from armtempo.robot import shared_board
-
     name = chosen.port(port, others=True)
-    shared = shared_board.find(name)
-    if shared is not None:
-        with shared:
-            chosen.tell(f"port {name}: through {shared.program}")
-            found = shared.state()
-    else:
-        with chosen.board(name, log_traffic, any_program=True) as board:
-            found = board.state()
-    found = _named(found, arm_path)
+    found = _named(chosen.board_state(name, log_traffic), arm_path)
     if as_json:
         results.show_json(found.to_json())
         return

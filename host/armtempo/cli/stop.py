@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from armtempo.cli import chosen, options, results
-from armtempo.errors import LinkError, NoAnswerError, PortError
+from armtempo.errors import LinkError, NoAnswerError, PortInUseError
 from armtempo.project import quick_stop
 from armtempo.project.quick_stop import StopAnswer
 from armtempo.robot import shared_board
@@ -34,17 +34,28 @@ def command(now: bool, port: str | None, log_traffic: Path | None, as_json: bool
     answer = quick_stop.take_answer(name, now)
     if answer is not None:
         _tell(name, answer, now)
-    shared = shared_board.find(name)
-    if shared is None:
-        found = None
-    else:
-        with shared:
-            if answer is None:
-                _tell(name, StopAnswer(shared.stop(now, quick_stop.BY), shared.program), now)
-            found = _rest(shared)
-    if found is None:
-        found = _directly(name, log_traffic, now, _PORT_FREE_S if shared or answer else 0.0)
-    _show(found, as_json)
+    _show(_stopped(name, log_traffic, now, told=answer is not None), as_json)
+
+
+def _stopped(name: str, log_traffic: Path | None, now: bool, told: bool) -> BoardState:
+    """Where the arm has come to rest; ``told``: the program that has the port knows already."""
+    limit_s = time.monotonic() + _PORT_FREE_S
+    while True:
+        shared = shared_board.find(name)
+        if shared is not None:
+            with shared:
+                if not told:
+                    _tell(name, StopAnswer(shared.stop(now, quick_stop.BY), shared.program), now)
+                    told = True
+                found = _rest(shared)
+            if found is not None:
+                return found
+        try:
+            return _directly(name, log_traffic, now)
+        except PortInUseError:  # its program answers for it soon, or gives it up
+            if time.monotonic() > limit_s:
+                raise
+            time.sleep(_LOOK_S)
 
 
 def _tell(port: str, answer: StopAnswer, now: bool) -> None:
@@ -62,18 +73,11 @@ def _rest(shared: SharedBoard) -> BoardState | None:
         return None
 
 
-def _directly(port: str, log_traffic: Path | None, now: bool, patience_s: float) -> BoardState:
-    """Stop over the port itself, for which to wait ``patience_s``."""
-    limit_s = time.monotonic() + patience_s
-    while True:
-        try:
-            with chosen.board(port, log_traffic, any_program=True) as board:
-                board.stop(now)
-                return board.state()
-        except PortError:
-            if time.monotonic() > limit_s:
-                raise
-            time.sleep(_LOOK_S)
+def _directly(port: str, log_traffic: Path | None, now: bool) -> BoardState:
+    """Stop over the port itself."""
+    with chosen.board_now(port, log_traffic, any_program=True) as board:
+        board.stop(now)
+        return board.state()
 
 
 def _show(found: BoardState, as_json: bool) -> None:

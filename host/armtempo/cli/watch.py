@@ -23,18 +23,15 @@ def command(port: str | None, log_traffic: Path | None, as_json: bool) -> None:
 
     Where no program has it, the board is asked for its state. Ctrl-C ends it; a motion under way goes on.
     """
-    from armtempo.robot import shared_board
+    from armtempo.robot.shared_board import SharedBoard
 
     name = chosen.port(port, others=True)
-    shared = shared_board.find(name)
-    if shared is not None:
-        with shared:
-            chosen.tell(f"port {name}: through {shared.program}")
-            _show(shared.watch("sample", "status", "event"), as_json)
-        chosen.tell(f"{shared.program} has given up {name}")
-        return
-    with chosen.board(name, log_traffic, any_program=True) as board:
-        _show(_states(board), as_json)
+    with chosen.shared_or_own(name, log_traffic, any_program=True) as board:
+        if isinstance(board, SharedBoard):
+            _show(board.watch("sample", "status", "event"), as_json)
+            chosen.tell(f"{board.program} has given up {name}")
+        else:
+            _show(_states(board), as_json)
 
 
 def _states(board: Any) -> Iterator[dict[str, Any]]:

@@ -11,8 +11,8 @@ from armtempo.cli import chosen
 from armtempo.errors import LinkError
 from armtempo.link.board_messages import Levels
 from armtempo.model.arm import Arm
-from armtempo.robot import shared_board
 from armtempo.robot.outputs import Way
+from armtempo.robot.shared_board import SharedBoard
 
 
 @dataclass(frozen=True)
@@ -31,14 +31,11 @@ class Wired:
 def board(port: str | None, arm_path: Path | None, log_traffic: Path | None) -> Iterator[Wired]:
     """Raises LinkError where the board is set up for another arm than the one that is named."""
     name = chosen.port(port, others=True)
-    shared = shared_board.find(name)
-    if shared is not None:
-        with shared:
-            chosen.tell(f"port {name}: through {shared.program}")
-            yield Wired(shared, _same_arm(shared.state().arm_crc, chosen.named_arm(arm_path)))
-        return
     named = chosen.named_arm(arm_path)
-    with chosen.board(name, log_traffic, named) as found:
+    with chosen.shared_or_own(name, log_traffic, named) as found:
+        if isinstance(found, SharedBoard):
+            yield Wired(found, _same_arm(found.state().arm_crc, named))
+            return
         arm = chosen.arm_of_board(found, named)
         found.configure(arm)
         yield Wired(found.client, arm)

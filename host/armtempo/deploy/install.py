@@ -17,7 +17,7 @@ from armtempo.deploy import program_files
 from armtempo.deploy.changes import Tell, check_suitable, choose, difference, is_complete, last_files, ours
 from armtempo.deploy.remote import RECOVERY, Remote, Survey, each, rename
 from armtempo.errors import InputError, LinkError, NoProgramError, PortError
-from armtempo.link import open_board
+from armtempo.link import open_board, patiently
 from armtempo.link.board_messages import Hello
 from armtempo.ports.names import is_sim
 from armtempo.progress import Progress
@@ -98,7 +98,7 @@ def end_program(port: str, tell: Tell) -> None:
         )
     with ExitStack() as stack:
         try:
-            board = stack.enter_context(open_board(port, any_program=True))
+            board = patiently(lambda: stack.enter_context(open_board(port, any_program=True)))
         except PortError:
             raise
         except NoProgramError:

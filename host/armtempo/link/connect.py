@@ -6,8 +6,9 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
+from typing import TypeVar
 
-from armtempo.errors import BoardError, DisturbedError, LinkError, NoAnswerError, PortError
+from armtempo.errors import BoardError, DisturbedError, LinkError, NoAnswerError, PortError, PortInUseError
 from armtempo.link import diagnose, traffic
 from armtempo.link.client import Client
 from armtempo.link.program_version import own_crc
@@ -19,8 +20,25 @@ from armtempo.share import claim as claims
 from armtempo.share.caller import Ownership, ownership
 from armtempo.share.claim import PortClaim
 
+_Found = TypeVar("_Found")
 _NOISY_TRIES = 10
 """Attempts at ``hello`` where pieces of frames arrive."""
+_LOOK_S = 0.05
+
+
+def patiently(attempt: Callable[[], _Found]) -> _Found:
+    """What ``attempt`` returns, tried again while another program has the port: many only ask something.
+
+    PortInUseError after PATIENCE_S; what else ``attempt`` raises.
+    """
+    limit_s = time.monotonic() + claims.PATIENCE_S
+    while True:
+        try:
+            return attempt()
+        except PortInUseError:
+            if time.monotonic() > limit_s:
+                raise
+            time.sleep(_LOOK_S)
 
 
 @contextmanager
@@ -37,7 +55,8 @@ def open_board(
     ``log_traffic``: file for the traffic log; ``sink`` takes the traffic as well; ``arm``: what a virtual
     board's motors move; ``any_program``: also talk to a board whose program is not the one installed here;
     ``tell`` hears what became of a program that had the port. Raises InputError where there is no such port,
-    LinkError where it is in use, silent or runs something else. A program that has the port and hangs loses it.
+    PortInUseError where another program has it (see ``patiently``), LinkError where it is silent or runs something
+    else. A program that has the port and hangs loses it.
     """
     hanging = _check_owner(port, tell)
     with ExitStack() as stack:
@@ -64,14 +83,14 @@ def open_board(
 
 
 def _check_owner(port: str, tell: Callable[[str], object]) -> PortClaim | None:
-    """The claim of a program that has the port and hangs; PortError where it lives and goes on."""
+    """The claim of a program that has the port and hangs; PortInUseError where it lives and goes on."""
     name = names.same_for_all(port)
     claim = claims.find(name, port) if name else None
     if claim is None:
         return None
     state = ownership(claim)
     if state is Ownership.LIVES:
-        raise PortError(
+        raise PortInUseError(
             f"port {port} is in use by {claim.who}",
             "wait for its end, or end it with 'armtempo stop'; 'armtempo status' and 'watch' look on meanwhile",
         )

@@ -9,7 +9,7 @@ from typing import Protocol
 
 import serial
 
-from armtempo.errors import InputError, LinkError, PortError
+from armtempo.errors import InputError, LinkError, PortError, PortInUseError
 
 BAUD_RATE = 115_200
 """Has no effect over USB; a UART between host and board would use it."""
@@ -37,7 +37,8 @@ class Transport(Protocol):
 class SerialTransport:
     """A transport over pyserial: a device name, or a URL such as ``socket://host:port``.
 
-    Raises InputError where there is no such port, PortError where it is in use, LinkError where it breaks.
+    Raises InputError where there is no such port, PortInUseError where another program has it, PortError where it
+    cannot be opened for another reason, LinkError where it breaks.
     """
 
     def __init__(self, port: str, exclusive: bool = True) -> None:
@@ -103,7 +104,7 @@ def _open_error(port: str, error: Exception) -> PortError | InputError:
     if number in (errno.EISDIR, errno.ENOTTY) or os.strerror(errno.ENOTTY) in text:
         return InputError(f"{port} is not a serial port", f"{_ADVICE}")
     if number in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in text:
-        return PortError(f"port {port} is in use by another program", "close it and try again")
+        return PortInUseError(f"port {port} is in use by another program", "close it and try again")
     if number == errno.EACCES or "PermissionError" in text:
         return PortError(
             f"no permission to open {port}: another program holds it, or your user may not use serial ports",

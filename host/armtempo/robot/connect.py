@@ -35,21 +35,40 @@ def connect(
     gets every byte both ways; ``sink`` takes the same. ``any_program``: also talk to a board whose program is
     not the one installed here. ``tell`` hears what happens to the connection while other calls wait; by default
     the logger "armtempo" does. Until the board is closed other programs on this machine can look in and stop it
-    (``attach``). Raises InputError where there is no such port, or none is named and not exactly one board is
-    there; LinkError where it is in use, silent or runs something else.
+    (``attach``). A port in use is tried again for a few seconds: many programs only ask something.
+
+    Raises InputError where there is no such port, or none is named and not exactly one board is there;
+    PortInUseError where another program keeps it, LinkError where it is silent or runs something else.
     """
     chosen = board_port.choose(port)
     if chosen.source in board_port.UNASKED:
         tell(f"port {chosen.value}: {chosen.source}")
+    return link.patiently(
+        lambda: connect_now(
+            chosen.value, arm, log_traffic=log_traffic, sink=sink, any_program=any_program, tell=tell
+        )
+    )
+
+
+def connect_now(
+    port: str,
+    arm: Arm | None = None,
+    *,
+    log_traffic: Path | None = None,
+    sink: Sink | None = None,
+    any_program: bool = False,
+    tell: Callable[[str], object] = LOG.warning,
+) -> Board:
+    """``connect`` to the port that is named, without waiting; PortInUseError where another program has it."""
     stack = ExitStack()
     taps = _Taps(sink)
-    client = stack.enter_context(link.open_board(chosen.value, log_traffic, taps, arm, any_program, tell))
+    client = stack.enter_context(link.open_board(port, log_traffic, taps, arm, any_program, tell))
     client.session.tell = tell
-    board = Board(client, chosen.value, stack)
+    board = Board(client, port, stack)
     sharing = Sharing(client, board.state, board.stops, lambda: board.arm)
     stack.callback(sharing.close)
     try:
-        sharing.open(chosen.value)
+        sharing.open(port)
         taps.sinks.append(sharing.traffic)
     except OSError as error:
         tell(f"no other program can look in or stop this one: {error}")

@@ -10,7 +10,7 @@ from enum import Enum
 from types import TracebackType
 from typing import Any, Self
 
-from armtempo.errors import BoardError, LinkError, NoAnswerError
+from armtempo.errors import BoardError, LinkError, NoAnswerError, PortGivenUpError
 from armtempo.share import claim as claims
 from armtempo.share.claim import VERSION, PortClaim
 from armtempo.share.lines import LineReader, Message, to_line
@@ -147,7 +147,9 @@ class Caller:
         return message
 
     def _gone(self) -> LinkError:
-        return LinkError(f"{self.claim.who} has given up {self.claim.port}", "try again: the port is free")
+        return PortGivenUpError(
+            f"{self.claim.who} has given up {self.claim.port}", "try again: the port is free"
+        )
 
 
 def _connect(claim: PortClaim) -> socket.socket:

@@ -16,6 +16,9 @@ from typing import NamedTuple
 from armtempo.share import claim_file
 from armtempo.share.claim_file import VERSION as VERSION
 
+PATIENCE_S = 3.0
+"""How long to wait for a port in use: what only asks, as ``status`` does, or was told to end, has it for less."""
+
 LOCAL_SOCKETS = os.name == "posix"
 """Whether sockets are files of the file system; else they are ports of localhost, and a token is asked for."""
 
