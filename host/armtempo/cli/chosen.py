@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -199,31 +200,16 @@ def board(
     arm: Arm | None = None,
     any_program: bool = False,
     sink: Sink | None = None,
+    wait: bool = True,
 ) -> Board:
-    """The board of ``--port``; a virtual one moves ``arm``, and is said to be one; ``sink`` takes the traffic."""
-    from armtempo.robot.connect import connect
+    """The board of ``--port``; a virtual one moves ``arm``, and is said to be one; ``sink`` takes the traffic.
 
-    return _introduced(
-        connect(port, arm, log_traffic=log_traffic, sink=sink, any_program=any_program, tell=tell)
-    )
+    ``wait``: a few seconds for a port that another program has, see ``connect``.
+    """
+    from armtempo.robot import connect
 
-
-def board_now(
-    port: str,
-    log_traffic: Path | None = None,
-    arm: Arm | None = None,
-    any_program: bool = False,
-    sink: Sink | None = None,
-) -> Board:
-    """The same without waiting for the port: PortInUseError where another program has it."""
-    from armtempo.robot.connect import connect_now
-
-    return _introduced(
-        connect_now(port, arm, log_traffic=log_traffic, sink=sink, any_program=any_program, tell=tell)
-    )
-
-
-def _introduced(found: Board) -> Board:
+    opened: Callable[..., Board] = connect.connect if wait else connect.connect_now
+    found = opened(port, arm, log_traffic=log_traffic, sink=sink, any_program=any_program, tell=tell)
     if found.info.virtual:
         tell(f"port {found.port}: {virtual_words(found.port)}")
     return found
@@ -250,7 +236,7 @@ def shared_or_own(
             tell(f"port {port}: through {shared.program}")
             return shared
         try:
-            return board_now(port, log_traffic, arm, any_program, sink)
+            return board(port, log_traffic, arm, any_program, sink, wait=False)
         except PortInUseError:
             if time.monotonic() > limit_s:
                 raise

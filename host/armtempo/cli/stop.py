@@ -75,7 +75,7 @@ def _rest(shared: SharedBoard) -> BoardState | None:
 
 def _directly(port: str, log_traffic: Path | None, now: bool) -> BoardState:
     """Stop over the port itself."""
-    with chosen.board_now(port, log_traffic, any_program=True) as board:
+    with chosen.board(port, log_traffic, any_program=True, wait=False) as board:
         board.stop(now)
         return board.state()
 
