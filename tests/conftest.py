@@ -32,8 +32,10 @@ def own_settings() -> Iterator[None]:
     shutil.rmtree(folder, ignore_errors=True)
 
 
-SLOW = ("micropython-arm", "[cpython-engine", "anywhere]")
+SLOW = ["micropython-arm", "[cpython-engine", "anywhere]"]
 """What in a test's name says that it takes long: the emulator, the engine on CPython, cases of many moments."""
+if "micropython" in interpreters.AVAILABLE:
+    SLOW.append("[cpython-app")  # the same cases as on MicroPython, which starts in less time
 
 
 @pytest.fixture(params=interpreters.AVAILABLE)

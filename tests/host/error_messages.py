@@ -9,6 +9,8 @@ from pathlib import Path
 
 from armtempo import errors
 
+from tests.sources import parsed
+
 HOST = Path(errors.__file__).parent
 MADE_FROM_PARTS = {"MissingPackageError"}
 """Classes that write their own problem and hint."""
@@ -40,7 +42,7 @@ def in_source(text: str, file: str) -> Iterator[ErrorMessage]:
     kinds = set(tree_of()) - MADE_FROM_PARTS
     if not any(kind in text for kind in kinds):
         return
-    for node in ast.walk(ast.parse(text)):
+    for node in ast.walk(parsed(text)):
         if isinstance(node, ast.Call) and (name := _last_name(node.func)) in kinds:
             given = {word.arg: word.value for word in node.keywords}
             arguments = dict(zip(("problem", "hint"), node.args, strict=False)) | given

@@ -14,6 +14,7 @@ from armtempo.link.refusal import refusal
 from armtempo_shared import codes, wire
 from click.testing import CliRunner, Result
 
+from tests import sources
 from tests.host.error_messages import ErrorMessage, in_host, in_source
 
 TAKES_DASHES = ("goto", "home", "fk", "output")
@@ -27,6 +28,7 @@ def has_hint(message: ErrorMessage) -> bool:
     return bool(hint) and not hint.endswith(".") and (hint.startswith("{") or " " in hint or ":" in hint)
 
 
+@sources.TOGETHER
 def test_every_error_of_the_host_says_what_to_do_next() -> None:
     lacking = [
         f"{message.file}:{message.line}: {message.kind}({message.problem!r})"

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from armtempo import arm_check
+from armtempo import arm_check, simulator
 from armtempo.errors import InputError
 from armtempo.model import arm_json, engine_pins, pin_use
 from armtempo.model.arm import Arm
@@ -20,6 +21,7 @@ from armtempo_shared import armrecord
 from tests.host import wired_arms
 from tests.host.wired_arms import ALL, DOOR, FAN, GRIPPER, PART, PUMP
 
+GPIO = Path(simulator.__file__).parent / "hardware" / "virtual_board" / "chip" / "gpio.py"
 HARDWARE_PAGE = Path(__file__).parents[2] / "board" / "docs" / "hardware.md"
 
 
@@ -35,6 +37,24 @@ def test_what_the_file_says(arm: Arm) -> None:
     assert (pump.active, pump.safe, fan.frequency_hz) == ("low", 0.0, 20_000.0)
     assert arm.inputs == (Input("part", "PD1", "low", 10), Input("door", "PD3", "high", 0))
     assert (arm.output("fan"), arm.input("door")) == (2, 1)
+
+
+ALTERNATE = {
+    1: 1,
+    **dict.fromkeys((3, 4), 2),
+    **dict.fromkeys((8, 9, 10, 11), 3),
+    **dict.fromkeys((12, 13, 14), 9),
+}
+"""A pin's alternate function that leads to a timer (data sheet DS8626, table 9)."""
+
+
+def test_the_virtual_board_leads_the_same_timers_to_the_same_pins() -> None:
+    (table,) = re.findall(r"^TIMER_PINS = (\{.*?^\})", GPIO.read_text(), re.MULTILINE | re.DOTALL)
+    simulated = ast.literal_eval(table)
+    for pin, outputs in TIMER_OUTPUTS.items():
+        for output in outputs:
+            place = (output.timer, output.channel)
+            assert simulated.get((pin.removeprefix("P"), ALTERNATE[output.timer])) == place, pin
 
 
 def test_an_arm_without_keeps_its_record() -> None:

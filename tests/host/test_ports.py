@@ -15,6 +15,7 @@ from armtempo.link import diagnose
 from armtempo.link.transport import SerialTransport
 from armtempo.ports import listing, names
 from armtempo.ports.listing import find_ports
+from armtempo.share import claim as claims
 from click.testing import CliRunner
 
 
@@ -81,7 +82,8 @@ def test_port_that_does_not_exist() -> None:
         SerialTransport("nonsense://x")
 
 
-def test_port_in_use() -> None:
+def test_port_in_use(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(claims, "PATIENCE_S", 0.1)  # in use for longer than that
     master, slave = os.openpty()
     try:
         first = SerialTransport(os.ttyname(slave))

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests import sources
+
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted(ROOT.glob("*/docs/*.md"))]
 SOURCES = ("host/armtempo", "board/armtempo_board", "shared/armtempo_shared")
@@ -41,7 +43,7 @@ def texts() -> str:
     found = []
     for folder in SOURCES:
         for file in (ROOT / folder).rglob("*.py"):
-            for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            for node in ast.walk(sources.tree(file)):
                 if isinstance(node, ast.JoinedStr):
                     found.append(
                         "".join(
@@ -68,6 +70,7 @@ def test_what_is_quoted_is_said(page: Path) -> None:
     assert [quote for quote in quotes(page) if not is_said(quote)] == []
 
 
+@sources.TOGETHER
 def test_there_are_quotes_and_a_wrong_one_is_noticed() -> None:
     assert sum(len(quotes(page)) for page in PAGES) >= 10
     assert not is_said("the flash has lots of room")

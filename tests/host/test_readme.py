@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests import sources
+
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 SOURCES = {
@@ -28,7 +30,7 @@ def names(side: str) -> frozenset[str]:
             continue
         module = path.parent.name if path.name == "__init__.py" else path.stem
         found.add(module)
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        for node in sources.tree(path).body:
             if isinstance(node, ast.FunctionDef | ast.ClassDef):
                 found.add(f"{module}.{node.name}")
             if isinstance(node, ast.ClassDef):
@@ -57,6 +59,7 @@ def test_the_tables_were_found() -> None:
     assert len(set(mentioned())) >= 25
 
 
+@sources.TOGETHER
 @pytest.mark.parametrize(("side", "name"), sorted(set(mentioned())))
 def test_what_the_readme_names_exists(side: str, name: str) -> None:
     assert name in names(side)

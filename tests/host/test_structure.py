@@ -7,6 +7,11 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
+from tests import sources
+from tests.sources import tree
+
+pytestmark = sources.TOGETHER
+
 ROOT = Path(__file__).parents[2]
 HOST = ROOT / "host" / "armtempo"
 SHARED = ROOT / "shared" / "armtempo_shared"
@@ -93,7 +98,7 @@ def imported(tree: ast.AST) -> Iterator[str]:
 
 def functions(path: Path) -> Iterator[ast.FunctionDef]:
     """All functions and methods of a module."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree(path)):
         if isinstance(node, ast.FunctionDef):
             yield node
 
@@ -106,7 +111,7 @@ def test_imports_point_one_way() -> None:
     for path in modules():
         here = part(path)
         if here not in LOWEST + HIGHEST:
-            for name in imported(ast.parse(path.read_text(encoding="utf-8"))):
+            for name in imported(tree(path)):
                 assert name not in ORDER or ORDER.index(name) <= ORDER.index(here), f"{path} imports {name}"
 
 
@@ -141,7 +146,7 @@ def test_no_class_name_stands_for_two_things() -> None:
         node.name
         for root in (HOST, SHARED)
         for path in root.rglob("*.py")
-        for node in ast.parse(path.read_text(encoding="utf-8")).body
+        for node in tree(path).body
         if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
     )
     assert {name for name, count in places.items() if count > 1} <= SAME_BY_DESIGN
@@ -151,7 +156,7 @@ def test_types_of_the_whole_package_have_one_home() -> None:
     homes = [
         (target.id, str(path.relative_to(HOST)))
         for path in modules()
-        for node in ast.parse(path.read_text(encoding="utf-8")).body
+        for node in tree(path).body
         if isinstance(node, ast.Assign)
         for target in node.targets
         if isinstance(target, ast.Name) and target.id in ("Array", "Progress")

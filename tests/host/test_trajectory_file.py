@@ -144,7 +144,10 @@ def test_refuses_what_it_does_not_understand(path: Path, edit: Callable[[Any], N
         trajectory_file.load(edited(path, edit))
 
 
-@pytest.mark.parametrize("text", ["[]", "1", "null", '{"format": NaN}', "[" * 100_000, "\xff"])
+@pytest.mark.parametrize(
+    "text",
+    ["[]", "1", "null", '{"format": NaN}', pytest.param("[" * 100_000, id="deep"), "\xff"],
+)
 def test_refuses_what_is_no_trajectory(tmp_path: Path, text: str) -> None:
     path = tmp_path / "other.json"
     path.write_bytes(text.encode("latin-1"))

@@ -9,7 +9,7 @@ import pytest
 from tests import scripted
 
 CASES = Path(__file__).parent / "scripts" / "cases"
-SCRIPTS = (CASES / "virtual_hardware.py", CASES / "virtual_flash.py")
+SCRIPTS = tuple(CASES / f"virtual_{name}.py" for name in ("hardware", "time", "flash"))
 
 
 @pytest.mark.parametrize("case", [case for script in SCRIPTS for case in scripted.cases(script)], ids=str)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import serial
+from armtempo.cli import virtual_board
 from armtempo.errors import LinkError
 from armtempo.simulator import LaunchOptions, VirtualBoard, edgelog, launch
 from armtempo.simulator.temporary_folder import PREFIX, TemporaryFolder
@@ -132,6 +133,11 @@ def test_nothing_is_wrong_with_a_board_unless_asked_for() -> None:
     options = LaunchOptions()
     assert options.virtual_time, "motions as fast as they can"
     assert not any((options.faults, options.power_cut_at, options.button_s, options.damage, options.sd_card))
+
+
+def test_the_command_starts_the_board_that_a_script_gets() -> None:
+    (seed,) = (option for option in virtual_board.command.params if option.name == "seed")
+    assert seed.default == LaunchOptions().seed
 
 
 def test_a_system_without_pseudo_terminals_is_told_where_they_come_from(

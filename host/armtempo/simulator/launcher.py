@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
@@ -96,11 +97,9 @@ class VirtualBoard:
         # it ends by itself when nobody has its port open any more
         for end in (self._process.poll, self._process.terminate, self._process.kill):
             end()
-            try:
+            with suppress(subprocess.TimeoutExpired):
                 self._process.wait(_STOP_S)
                 return
-            except subprocess.TimeoutExpired:
-                continue
 
     def kill(self) -> None:
         """End it at once."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 
 PREFIX = "armtempo-virtual-"
@@ -43,11 +44,7 @@ def _sweep() -> None:
             descriptor = os.open(lock, os.O_RDWR)
         except OSError:  # another user's, or just removed
             continue
-        try:
+        with suppress(OSError):  # it is in use
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:  # in use
-            continue
-        else:
             shutil.rmtree(lock.parent, ignore_errors=True)
-        finally:
-            os.close(descriptor)
+        os.close(descriptor)

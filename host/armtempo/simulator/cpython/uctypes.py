@@ -6,8 +6,8 @@ import ctypes
 from typing import Any
 
 ARRAY = -1 << 30
-INT32 = 5 << 26
-_COUNT = (1 << 26) - 1
+INT32 = 5 << 27
+_COUNT = (1 << 27) - 1
 
 
 def addressof(buffer: Any) -> int:

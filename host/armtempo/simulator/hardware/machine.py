@@ -27,7 +27,7 @@ class _Memory:
         words, at = memory.place(where)
         shift = 8 * (where & 3)
         kept = words[at] & ~(self._mask << shift)
-        words[at] = (kept | (value & self._mask) << shift) & memory.MASK
+        words[at] = kept | (value & self._mask) << shift
         machine_state.board.wrote()
 
 

@@ -25,6 +25,16 @@ def case_upload_out_of_order():
     assert host.ask("put_commit", (wire.record_crc(record),))[1] == "bad_offset"
 
 
+def case_a_new_upload_gives_up_the_one_under_way():
+    """Nothing of it stays in the flash."""
+    _, host = connected()
+    record, crc = host.record, wire.record_crc(host.record)
+    assert host.ask("put_begin", (len(record), crc), "two")[0] == "ok"
+    assert host.ask("put_data", (0,), record[:50])[0] == "ok"
+    assert host.upload("three", record)[-1][0] == "ok"
+    assert sorted(os.listdir(flash())) == ["arm.ata", "feed.atm", "three.atm"]
+
+
 def case_damaged_uploads_are_refused():
     _, host = connected()
     wrong = bytearray(host.record)

@@ -189,7 +189,9 @@ def case_blocked_joint_stands_still():
     motor, _, encoder = stepper()
     motor.blocked = True
     steps(motor, [MS * number for number in range(50)])
-    run(motor, 0, 1000)
+    run(motor, 0, 20)
+    assert motor.moved and motor._v == 0
+    run(motor, 20, 1000)
     assert motor._x == 0
     assert encoder.counts == 0
 

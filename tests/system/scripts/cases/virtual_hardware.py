@@ -13,10 +13,11 @@ from virtual_board import (  # replaces time, os, uctypes, micropython; so befor
     power_cycles,
     standalone,
 )
+from virtual_board.chip import memory, timer_registers, timers
 from virtual_board.chip.flash import real_open
 from virtual_board.chip.processor import TICKS_PER_US
 from virtual_board.chip.reset import Reset
-from virtual_board.firmware import usb_serial
+from virtual_board.firmware import repl, usb_serial
 from virtual_board.firmware.external_interrupts import set_level
 
 # isort: split
@@ -133,6 +134,20 @@ def case_dma_feeds_two_timers_exactly():
         assert [tick - start - LEAD for tick in found[pin][:1000]] == wanted, pin
 
 
+def case_each_stream_hears_its_channels():
+    """RM0090 table 42, request channels 3 and 6: the streams for a timer's channels 1 to 4."""
+    board = standalone.start()
+    for selection, timer, wanted in (
+        (3, 2, [[5], [6], [1], [6, 7]]),
+        (6, 5, [[2], [4], [0], [1, 3]]),
+    ):
+        for stream in board.dma.streams:
+            mem32[stm.DMA1 + 0x10 + 0x18 * stream.number] = selection << 25
+        for channel, streams in enumerate(wanted, 1):
+            hearing = [each.number for each in board.dma.streams if (timer, channel) in each.requests()]
+            assert hearing == streams, (timer, channel)
+
+
 def match_count(preload, late):
     """Matches of three when the third entry is written after the first match (``late``) or before."""
     board = standalone.start(edge_log=SCRATCH + "/preload", dma_preload=preload)
@@ -179,6 +194,26 @@ def case_an_entry_that_the_stream_brings_too_late_does_not_match():
         mem32[stm.TIM2 + stm.TIM_CR1] |= 1
         board.spend(84_000)
         assert len(edges(SCRATCH + "/late")[0][15]) == matches, gap
+        if matches == 1:  # it matches when the counter has come round
+            for _ in range(17):
+                board.spend(1 << 28)
+            first, second, third = edges(SCRATCH + "/late")[0][15]
+            assert (second - first, third - second) == ((1 << 32) + gap, 5000 - 100 - gap)
+
+
+def case_a_channel_that_made_pulses_matches_again():
+    """In another mode with the same compare value."""
+    board = standalone.start()
+    seen = []
+    timer = pyb.Timer(4, prescaler=0, period=999)
+    for mode, options in (
+        (pyb.Timer.OC_TIMING, {"compare": 250}),
+        (pyb.Timer.PWM, {"pulse_width": 250}),
+        (pyb.Timer.OC_TIMING, {"compare": 250, "callback": seen.append}),
+    ):
+        timer.channel(1, mode, **options)
+        board.spend(2000)
+    assert len(seen) >= 2, seen
 
 
 def case_forced_modes_act_at_once():
@@ -358,6 +393,13 @@ def case_step_1_is_low_from_the_first_line_on():
     assert line.mode() == 1 and line.read() == 0
 
 
+def case_after_a_reset_jtags_pins_are_pulled_up():
+    """PA13, PA15 and PB4 (RM0090 8.4.1)."""
+    standalone.start()
+    levels = [mem32[port + stm.GPIO_IDR] for port in (stm.GPIOA, stm.GPIOB, stm.GPIOC, stm.GPIOD, stm.GPIOE)]
+    assert levels == [1 << 15 | 1 << 13, 1 << 4, 0, 0, 0], levels
+
+
 def case_external_interrupt_within_20_us():
     board = standalone.start()
     seen = []
@@ -501,45 +543,37 @@ def case_after_a_soft_reset_the_prompt_has_the_port_again():
     assert machine_state.serial.attached
 
 
-def case_time_passes_in_calls():
+def case_ctrl_c_interrupts_only_what_the_prompt_runs():
+    """As micropython.kbd_intr(3) and, at the prompt, kbd_intr(-1)."""
     standalone.start()
-    assert time.localtime()[:6] == (2026, 1, 1, 0, 0, 0)
-    before = time.ticks_us()
-    time.sleep_us(1500)
-    assert 1500 <= time.ticks_diff(time.ticks_us(), before) < 102_000
-    before = time.ticks_ms()
-    for _ in range(3):
-        machine.idle()
-    # real time while nothing moves, at most 50 ms at once
-    assert 2 <= time.ticks_diff(time.ticks_ms(), before) <= 160
-    pace.Pace._elapsed_us = lambda self: 0
-    before = time.ticks_us()
-    os.sync()
-    assert time.ticks_diff(time.ticks_us(), before) > 0
+    line = machine_state.serial
+    assert line.interrupt_char == -1
+    seen = []
+    repl.Repl()._run(lambda: seen.append(line.interrupt_char))
+    assert (seen, line.interrupt_char) == ([3], -1)
 
 
-def case_a_host_talks_while_its_input_comes_often():
-    """Twice within 150 ms, and not longer than a second ago; then virtual time need not keep to real time."""
-    standalone.start()
-    kept, line = machine_state.pace, machine_state.serial
-    now = [kept._looked_us]
-    kept._ticks_us = lambda: now[0]
-    heard = []
-    for passed_us, pieces in ((10, 1), (400_000, 1), (100_000, 1), (100_000, 0), (850_000, 0), (100_000, 0)):
-        now[0] += passed_us
-        line.pieces += pieces
-        heard.append(kept._host_talks())
-    assert heard == [False, False, True, True, True, False], heard
+class Terminal(usb_serial.SilentPort):
+    """A host that has typed all it will, and keeps what the board says."""
+
+    def __init__(self):
+        self.shown = b""
+        super().__init__()
+
+    def put(self, data):
+        self.shown += bytes(data)
+        assert len(self.shown) < 2000, "the prompt goes on without end"
+        return len(data)
 
 
-def case_what_a_host_watches_moves_in_real_time():
-    board = standalone.start()
-    kept, speeds = machine_state.pace, []
-    kept._host_talks = lambda: True
-    kept._keep_pace = speeds.append
-    board.moving = lambda horizon: True
-    kept._millisecond()
-    assert speeds == [1]
+def case_the_prompt_echoes_and_answers():
+    terminal = Terminal()
+    standalone.start(line=terminal)
+    terminal.received.extend(b"6 * 7\r\x04")
+    repl.Repl().run()
+    assert terminal.shown.endswith(
+        b">>> 6 * 7\r\n42\r\n>>> \r\nMPY: sync filesystems\r\nMPY: soft reboot\r\n"
+    ), terminal.shown
 
 
 def case_the_backup_sram_has_4_kb():
@@ -553,23 +587,6 @@ def case_the_backup_sram_has_4_kb():
     raise AssertionError("there is more")
 
 
-def case_the_clock_counts_nanoseconds():
-    standalone.start()
-    before = time.time_ns()
-    time.sleep_us(2_500)
-    assert 2_500_000 <= time.time_ns() - before < 103_000_000
-    assert time.time_ns() // 1_000_000_000 == time.time()
-
-
-def case_an_interrupt_ends_the_wait():
-    pace.Pace._elapsed_us = lambda self: 0
-    standalone.start()
-    pyb.Timer(6, freq=10_000, callback=lambda timer: None)
-    before = time.ticks_us()
-    machine.idle()
-    assert 0 < time.ticks_diff(time.ticks_us(), before) < 200  # and not until the next millisecond
-
-
 def case_timers_of_the_faster_bus_count_twice_as_fast():
     """TIM1 counts 168 million a second, TIM2 half as many (RM0090 figure 21); a prescaler divides that."""
     board = standalone.start()
@@ -578,6 +595,45 @@ def case_timers_of_the_faster_bus_count_twice_as_fast():
     board.spend(8000)
     counted = [timer.counter() - first for timer, first in zip((slow, fast), before)]
     assert abs(counted[0] - 2000) < 50 and abs(counted[1] - 4000) < 100, counted
+
+
+def case_a_new_timer_has_nothing_to_do():
+    timer = timers.TimerUnit(standalone.start(), 2, 32)
+    assert (timer.next_match(), timer.next_interrupt()) == (timer_registers.NEVER, timer_registers.NEVER)
+
+
+def case_each_timer_is_clocked_by_its_bit():
+    """RM0090 6.3.13 and 6.3.14."""
+    standalone.start()
+    for enable, first_bit, numbers in (
+        (stm.RCC_APB1ENR, 0, (2, 3, 4, 5, 6, 7, 12, 13, 14)),
+        (stm.RCC_APB2ENR, 0, (1, 8)),
+        (stm.RCC_APB2ENR, 16, (9, 10, 11)),
+    ):
+        for place, number in enumerate(numbers):
+            before = mem32[stm.RCC + enable]
+            pyb.Timer(number, prescaler=0, period=0xFFFF)
+            assert mem32[stm.RCC + enable] ^ before == 1 << first_bit + place, number
+
+
+def case_peripherals_of_a_bus_are_1_kb_apart():
+    """RM0090 table 1."""
+    for first, names in (
+        (0x40000000, "TIM2 TIM3 TIM4 TIM5 TIM6 TIM7 TIM12 TIM13 TIM14"),
+        (0x40010000, "TIM1 TIM8"),
+        (0x40013800, "SYSCFG EXTI"),
+        (0x40014000, "TIM9 TIM10 TIM11"),
+        (0x40020000, "GPIOA GPIOB GPIOC GPIOD GPIOE"),
+        (0x40023800, "RCC FLASH"),
+        (0x40026000, "DMA1 DMA2"),
+    ):
+        for number, name in enumerate(names.split()):
+            assert memory.word_at(first + 0x400 * number) == memory.index(name), name
+
+
+def case_kinds_of_memory_have_micropythons_numbers():
+    """extmod/moductypes.c, of version 1.28: also where CPython has a stand-in."""
+    assert (uctypes.ARRAY, uctypes.INT32) == (-1 << 30, 5 << 27)
 
 
 def case_registers_by_the_chips_addresses():

@@ -5,7 +5,7 @@ from virtual_board.chip import memory
 MODER, OTYPER, OSPEEDR, PUPDR, IDR, ODR, BSRR = range(7)
 AFR = 8
 AT_RESET = (
-    # JTAG's pins, of which PA15 and PB4 are pulled up: 8.4.1, 8.4.4
+    # JTAG's pins, of which PA13, PA15 and PB4 are pulled up: 8.4.1, 8.4.4
     ("GPIOA", MODER, 0xA8000000), ("GPIOA", PUPDR, 0x64000000),
     ("GPIOB", MODER, 0x280), ("GPIOB", PUPDR, 0x100),
 )  # fmt: skip

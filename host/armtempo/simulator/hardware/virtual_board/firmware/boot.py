@@ -17,7 +17,7 @@ BOOT_ERROR, MAIN_ERROR = 4, 3
 """How often red and green flash in turn after an exception in boot.py, in main.py."""
 _BUTTON = "PA0"
 _RED, _GREEN, _ORANGE, _BLUE = "PD14", "PD12", "PD13", "PD15"
-_SHOWN_MS = 600
+_LOOKS = 30  # at the button, while a mode is shown
 _LOOK_MS = 20
 _FACTORY_FILES = {
     "boot.py": "# run first, after every reset\n",
@@ -47,7 +47,7 @@ def choose_mode(board, held_ms):
 def _held(board, mode, release):
     """Show a mode; whether the button is still held at the end."""
     _show(board, mode, 0)
-    for _ in range(_SHOWN_MS // _LOOK_MS):
+    for _ in range(_LOOKS):
         board.stand_still(_LOOK_MS * TICKS_PER_MS)
         if board.now >= release:
             external_interrupts.set_level(_BUTTON, None)

@@ -13,8 +13,6 @@ from virtual_board.chip.processor import TICKS_PER_US
 BUFFER = 1024
 _CHUNK = 512
 _POLLIN = 1
-_POLLHUP = 16
-_CTRL_C = 3
 
 
 class SilentPort:
@@ -36,7 +34,7 @@ class SilentPort:
         self.sending = bytearray()
         self.rts = self.cts = False
         self.attached = True
-        self.interrupt_char = _CTRL_C
+        self.interrupt_char = -1  # until the REPL runs something
 
     def wait(self, ms):
         """Wait in real time for input, at most so long; True where there is some."""

@@ -1,0 +1,158 @@
+"""How the simulated board's time passes: in calls, in waits, while the firmware starts, and against real time.
+
+Each case asserts by itself and prints its name.
+"""
+
+import cases
+from virtual_board import (  # replaces time, os, uctypes, micropython; so before everything else
+    machine_state,
+    pace,
+    standalone,
+)
+from virtual_board.chip.processor import CALL_TICKS, TICKS_PER_MS
+from virtual_board.firmware import boot, usb_serial
+
+# isort: split
+import os
+import time
+
+import machine
+import pyb
+
+
+def case_time_passes_in_calls():
+    standalone.start()
+    assert time.localtime()[:6] == (2026, 1, 1, 0, 0, 0)
+    before = time.ticks_us()
+    time.sleep_us(1500)
+    assert 1500 <= time.ticks_diff(time.ticks_us(), before) < 102_000
+    before = time.ticks_ms()
+    for _ in range(3):
+        machine.idle()
+    # real time while nothing moves, at most 50 ms at once
+    assert 2 <= time.ticks_diff(time.ticks_ms(), before) <= 160
+    pace.Pace._elapsed_us = lambda self: 0
+    before = time.ticks_us()
+    os.sync()
+    assert time.ticks_diff(time.ticks_us(), before) > 0
+
+
+def case_a_host_talks_while_its_input_comes_often():
+    """Twice within 150 ms, and not longer than a second ago; then virtual time need not keep to real time."""
+    standalone.start()
+    kept, line = machine_state.pace, machine_state.serial
+    now = [kept._looked_us]
+    kept._ticks_us = lambda: now[0]
+    heard = []
+    for passed_us, pieces in ((10, 1), (400_000, 1), (100_000, 1), (100_000, 0), (850_000, 0), (100_000, 0)):
+        now[0] += passed_us
+        line.pieces += pieces
+        heard.append(kept._host_talks())
+    assert heard == [False, False, True, True, True, False], heard
+
+
+def case_what_a_host_watches_moves_in_real_time():
+    board = standalone.start()
+    kept, speeds = machine_state.pace, []
+    kept._host_talks = lambda: True
+    kept._keep_pace = speeds.append
+    board.moving = lambda horizon: True
+    kept._millisecond()
+    assert speeds == [1]
+
+
+def case_the_clock_counts_nanoseconds():
+    standalone.start()
+    before = time.time_ns()
+    time.sleep_us(2_500)
+    assert 2_500_000 <= time.time_ns() - before < 103_000_000
+    assert time.time_ns() // 1_000_000_000 == time.time()
+
+
+def case_an_interrupt_ends_the_wait():
+    pace.Pace._elapsed_us = lambda self: 0
+    standalone.start()
+    pyb.Timer(6, freq=10_000, callback=lambda timer: None)
+    before = time.ticks_us()
+    machine.idle()
+    assert 0 < time.ticks_diff(time.ticks_us(), before) < 200  # and not until the next millisecond
+
+
+def case_each_call_of_the_serial_port_takes_its_time():
+    """As all calls do; else a program that only looks at the port would stand still in time."""
+    board = standalone.start()
+    port = pyb.USB_VCP()
+    for call in (port.isconnected, port.any, lambda: port.recv(1, timeout=0), lambda: port.send(b"")):
+        before = board.now + board.owed
+        call()
+        assert board.now + board.owed - before == CALL_TICKS
+
+
+class Looked(usb_serial.SilentPort):
+    """Counts how often the board has looked for input."""
+
+    looks = 0
+
+    def pump(self):
+        self.looks += 1
+
+
+def case_the_host_is_heard_from_the_first_millisecond_on():
+    line = Looked()
+    board = standalone.start(line=line)
+    board.spend(TICKS_PER_MS - 1)
+    assert line.looks == 0
+    board.spend(1)
+    assert line.looks > 0
+
+
+def case_without_a_speed_no_motion_keeps_to_real_time():
+    board = standalone.start()
+    kept, speeds = machine_state.pace, []
+    kept._keep_pace = speeds.append
+    board.moving = lambda horizon: True
+    kept._millisecond()
+    assert speeds == []
+
+
+def case_real_time_that_a_free_motion_took_is_not_caught_up():
+    """From where it keeps to real time again it waits for all of the time that it is ahead."""
+    board = standalone.start()
+    kept, waits = machine_state.pace, []
+    now_us = [kept._last_us]
+    kept._ticks_us = lambda: now_us[0]
+    kept._serial.wait = waits.append
+    kept._free = True
+    now_us[0] += 15_000
+    kept._keep_pace(1)
+    board.now += 5 * TICKS_PER_MS
+    kept._keep_pace(1)
+    assert waits == [5], waits
+
+
+class Lamp:
+    """Notes when a LED changes, in ms of the board's time."""
+
+    def __init__(self, board, pin):
+        self.changes_ms = []
+        board.pins.line(pin).sinks.append(self)
+
+    def edges(self, line, before, count, times, origin):
+        self.changes_ms.extend([(origin + time) // TICKS_PER_MS for time in times])
+
+
+def case_the_leds_tell_the_mode_with_the_firmwares_times():
+    """MicroPython, ports/stm32/boardctrl.c: a mode lasts 30 looks at the button, 20 ms apart; then it flashes."""
+    pace.Pace._elapsed_us = lambda self: 0  # no real time comes in
+    board = standalone.start()
+    green, orange = Lamp(board, "PD12"), Lamp(board, "PD13")
+    assert boot.choose_mode(board, 905) == boot.SAFE
+    assert green.changes_ms == [0, 600]
+    flashes = [920 + 50 * number for number in range(12)]
+    assert orange.changes_ms == [600] + flashes + [920 + 600 + 400], orange.changes_ms
+
+
+for name in cases.wanted(globals()):
+    standalone.start()
+    globals()[name]()
+    print(name)
