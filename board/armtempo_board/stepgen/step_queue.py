@@ -176,18 +176,9 @@ def emit(now: int, ring: ptr32, queue: ptr32, mask: int) -> object:
                 now += n
                 first += second
                 second += third
-                # All its steps, evenly spaced: four at a time, or the two of it
-                if count >= left:
+                # All its steps, evenly spaced: four at a time
+                if count >= left and left > 2:
                     count -= left
-                    if left == 2:
-                        left = 0
-                        now = now + step
-                        ring[_RISE] = (now >> shift) + base
-                        ring[_FALL] = ring[_RISE] + pulse
-                        now = now + step
-                        ring[_RISE_2] = (now >> shift) + base
-                        ring[_FALL_2] = ring[_RISE_2] + pulse
-                        ring = ptr32(int(ring) + 16)
                     while left:
                         now = now + step
                         ring[_RISE] = (now >> shift) + base
@@ -204,18 +195,14 @@ def emit(now: int, ring: ptr32, queue: ptr32, mask: int) -> object:
                         ring = ptr32(int(ring) + 32)
                         left -= 4
                     continue
-            # or some of them, singly
-            n = count
-            if n > left:
-                n = left
-            left -= n
-            count -= n
-            while n:
+            # or two of them, or those that have room, singly
+            while left and count:
                 now = now + step
                 ring[_RISE] = (now >> shift) + base
                 ring[_FALL] = ring[_RISE] + pulse
                 ring = ptr32(int(ring) + 8)
-                n -= 1
+                left -= 1
+                count -= 1
         queue[_TIME] = now
         queue[FIRST] = first
         queue[SECOND] = second + _BIAS
