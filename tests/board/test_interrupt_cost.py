@@ -18,7 +18,7 @@ BOARD = interpreters.ROOT / "board" / "armtempo_board"
 SERVE = {1: (209, 382), 3: (257, 478), 6: (329, 622)}
 TAKE = {1: 198, 3: 278, 6: 398}
 REFILL = {1: (211, 258), 3: (369, 510), 6: (606, 888)}
-EMIT = {2: 495, 32: 888, 512: 9138}
+EMIT = {2: 479, 32: 854, 512: 8564}
 WRITTEN = 193
 ARM_CHANNEL = 228
 

@@ -9,6 +9,7 @@ from array import array
 
 from armtempo_shared import codes
 from armtempo_shared.messages import ARM_RECORD_NAME
+from pyb import Pin, Timer
 
 from armtempo_board import heap
 from armtempo_board.app.arm_state import NEVER_MS
@@ -134,12 +135,23 @@ def _drop_engine(board: "ArmState") -> None:
     if board.engine:
         board.engine.close()
     if board.outputs:
-        from armtempo_board.app import output_setup  # here, so that it can be forgotten
-
-        output_setup.detach(board)
+        drop_outputs(board)
     board.engine = None
     board.joints = board.arm_crc = 0
     board.samples.configure(0)
     board.raw = array("i", [0] * COMMANDED)
     heap.forget()
     gc.collect()
+
+
+def drop_outputs(board: "ArmState") -> None:
+    """Safe values, then let go of pins and timers."""
+    outputs = board.outputs
+    outputs.safe()
+    for held in outputs.held:
+        if isinstance(held, Timer):
+            held.deinit()
+        else:
+            held.init(Pin.IN)
+    board.outputs = board.inputs = None
+    board.rows.clear()

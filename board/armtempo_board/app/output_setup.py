@@ -1,4 +1,4 @@
-"""Makes the outputs and inputs of an arm, and lets go of them; only needed then, so it is forgotten after it."""
+"""Makes the outputs and inputs of an arm; only needed then, so it is forgotten after it."""
 
 from array import array
 
@@ -24,40 +24,23 @@ if TYPE_CHECKING:
         rows: "dict[int, Any]"
 
 
-_MODULES = ("output_commands", "outputs", "digital_inputs")
-"""What stays in memory with the outputs and inputs, and is not known by name any more."""
-
-
 def attach(controller: "Controller", outputs: "Rows", inputs: "Rows") -> None:
     """Give the controller the outputs, with their safe values, the inputs, and the commands about them.
 
     ``outputs``, ``inputs``: rows of the arm record (``armrecord.OUTPUT``, ``INPUT``).
     """
-    from armtempo_shared.table import rows  # here, as ``detach`` needs none of them
+    from armtempo_shared.table import rows
 
     from armtempo_board.app import output_commands
 
     controller.outputs = outputs_of(outputs)
     controller.inputs = inputs_of(inputs)
     handlers = output_commands.output, output_commands.inputs_and_outputs
-    for command, answer, handler in zip(rows("O"), rows("P"), handlers):
-        _, number, fields, _, tail = command
-        _, _, values, _, _ = answer
+    for (_, number, fields, _, tail), (_, _, values, _, _), handler in zip(rows("O"), rows("P"), handlers):
         controller.rows[number] = (handler, fields, values, tail)
-    heap.forget(*_MODULES)
-
-
-def detach(controller: "Controller") -> None:
-    """Safe values, then let go of pins and timers."""
-    outputs = controller.outputs
-    outputs.safe()
-    for held in outputs.held:
-        if isinstance(held, Timer):
-            held.deinit()
-        else:
-            held.init(Pin.IN)
-    controller.outputs = controller.inputs = None
-    controller.rows.clear()
+    heap.forget(
+        "output_commands", "outputs", "digital_inputs"
+    )  # they stay, and are not known by name any more
 
 
 def outputs_of(table: "Rows") -> "Outputs":

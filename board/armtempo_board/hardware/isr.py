@@ -178,10 +178,7 @@ def read_counter(timer: ptr32) -> int:
 @micropython.viper
 def kiticks_until(timer: ptr32, words: ptr32, at: int) -> int:
     """Ki ticks from now until the time ``words[at]``; negative when it has passed."""
-    gap = ((words[at] - timer[CNT]) >> 10) & 0x3FFFFF
-    if gap >= 0x200000:
-        gap -= 0x400000
-    return gap
+    return ((((words[at] - timer[CNT]) >> 10) + 0x200000) & 0x3FFFFF) - 0x200000
 
 
 @micropython.viper
@@ -292,12 +289,6 @@ def push_away(timer: ptr32, compare: int, state: ptr32) -> object:
     far = timer[CNT] + (half << 31)
     timer[compare] = far
     state[FAR_TIME] = far
-
-
-@micropython.viper
-def set_last_to_now(timer: ptr32, state: ptr32) -> object:
-    """Take the time of the last entry for now."""
-    state[LAST_TIME] = timer[CNT]
 
 
 @micropython.viper

@@ -21,6 +21,9 @@ NOT_FED = const(-(1 << 22))
 """Instead of a time in Ki ticks: the interrupt does not write to the ring."""
 _FAR_KITICKS = const(1 << 20)
 _FIRST_FED = const(1)  # entry that the stream begins with: entry 0 goes into the compare register by hand
+# words of a ring's state, as isr.py names them
+_LAST_TIME = const(3)
+_FED = const(7)
 
 
 class Ring:
@@ -81,7 +84,7 @@ class Ring:
 
     def fed_kiticks(self) -> int:
         """Ki ticks (1024 ticks) from now to the last entry; NOT_FED where the interrupt does not write to the ring."""
-        return isr.kiticks_until(self.timer, self.state, isr.LAST_TIME) if self.state[isr.FED] else NOT_FED
+        return isr.kiticks_until(self.timer, self.state, _LAST_TIME) if self.state[_FED] else NOT_FED
 
     def stop(self) -> None:
         """Switch the stream off, ready to be filled from entry 0."""
@@ -121,4 +124,4 @@ class Ring:
 
     def set_last_to_now(self) -> None:
         """Take the time of the last entry for now: the ring is empty, only turns of DIR are measured from it."""
-        isr.set_last_to_now(self.timer, self.state)
+        isr.copy_word(self.timer, isr.CNT, self.state, isr.LAST_TIME)

@@ -12,7 +12,7 @@ from micropython import const
 from pyb import Pin
 
 from armtempo_board.hardware import isr
-from armtempo_board.hardware.ring import NOT_FED, Ring
+from armtempo_board.hardware.ring import Ring
 from armtempo_board.hardware.sampler import Sampler
 from armtempo_board.memory import Memory
 from armtempo_board.stepgen.step_generator import StepGenerator
@@ -28,6 +28,8 @@ _GUARD_KITICKS = const(16)  # 195 us: a turn of DIR is queued only behind an edg
 _OVERDUE_KITICKS = const(-164)  # 2 ms ago: the interrupt that fills the rings comes no more
 _REFILL_KITICKS = const(512)  # 6 ms between two looks at a queue that is full or goes on far enough, at most
 _NEVER_KITICKS = const(1 << 29)
+_NOT_FED = const(-(1 << 22))  # as ring.py says it
+_LATEST_KITICKS = const(22)  # of the queue, as in step_queue.py
 _TURN_SLACK_TICKS = const(8400)  # 100 us: how late the interrupt that turns DIR may come
 _TURNS = const(8)
 
@@ -108,7 +110,7 @@ class JointDrive:
     def ahead_kiticks(self) -> int:
         """How far ahead steps are in the ring, rounded up."""
         ahead_kiticks = self.ring.fed_kiticks()
-        return 0 if ahead_kiticks == NOT_FED else ahead_kiticks + 1
+        return 0 if ahead_kiticks == _NOT_FED else ahead_kiticks + 1
 
     def refill(self, now_kiticks: int) -> int:
         """Keep the queue filled; code of a fault, or 0."""
@@ -116,15 +118,14 @@ class JointDrive:
         if now_kiticks < self._next_refill_kiticks:
             return 0
         generator = self.generator
-        until_kiticks = now_kiticks + LOOKAHEAD_KITICKS
-        self.can_queue_more = generator.prepare(until_kiticks)
+        can_queue_more = self.can_queue_more = generator.prepare(now_kiticks + LOOKAHEAD_KITICKS)
         ahead_kiticks = self.ring.fed_kiticks()
-        if ahead_kiticks == NOT_FED:
+        if ahead_kiticks == _NOT_FED:
             return self._restart(now_kiticks) if self._sampler.quiet() else 0
         if generator.at_turn and not generator.waits() and ahead_kiticks > _GUARD_KITICKS and self._turn():
             self.can_queue_more = True
-        elif not self.can_queue_more:  # the queue is full, or goes on far enough
-            wait_kiticks = generator.latest_kiticks() - now_kiticks >> 3
+        elif not can_queue_more:  # the queue is full, or goes on far enough
+            wait_kiticks = generator.queue[_LATEST_KITICKS] - now_kiticks >> 3
             if wait_kiticks > _REFILL_KITICKS:
                 wait_kiticks = _REFILL_KITICKS
             self._next_refill_kiticks = now_kiticks + wait_kiticks

@@ -4,8 +4,11 @@ The compare interrupt and the switches rank above it and may interrupt it. While
 feeds one starts it (``Ring.feed``). What it costs: docs/hardware.md.
 """
 
+from array import array
+
 import micropython
 import stm
+import uctypes
 from armtempo_shared import codes
 from machine import mem32
 from micropython import const
@@ -18,12 +21,11 @@ from armtempo_board.stepgen.step_queue import emit
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from array import array
     from collections.abc import Callable
     from typing import Any
 
 _PERIOD_TICKS = const(42000)
-_CR1 = const(0)  # of TIM6
+_CR1 = const(0)  # of a timer
 # what the interrupt takes
 _BLOCK = const(0)
 _DMA = const(1)
@@ -31,15 +33,33 @@ _TIMER2 = const(2)
 _TIMER6 = const(3)
 _RINGS_TO_REFILL = const(4)
 _EMIT = const(5)
-_NOTE_WRITTEN = const(6)
-# and of each joint
-_STATE = const(0)
-_WORDS = const(1)
-_QUEUE = const(2)
-_PARTS = const(3)
-# as in isr.py: words of a ring's state
+_PLACES = const(6)
+# and of each joint: objects,
+_WORDS = const(0)
+_QUEUE = const(1)
+_PARTS = const(2)
+# and where they lie: the low 30 bits of an address, and in the next word the rest
+_RING_AT = const(0)
+_QUEUE_AT = const(2)
+_PLACE_WORDS = const(4)
+_MOST_JOINTS = const(6)
+# as in isr.py: of the block, of a joint in it, of a ring's state
+_BLOCK_HEAD = const(22)
+_RING = const(16)
+_JOINT_WORDS = const(25)
+_WRITTEN = const(0)
+_LAST_TIME = const(3)
+_FAR_TIME = const(4)
 _MASK = const(5)
 _ROOM = const(8)
+_CNT = const(9)  # of a timer
+_FIRST_ENTRY = const(0)
+# as in step_queue.py: words of the queue
+_STEPS = const(11)
+_PULSE = const(17)
+_HEAD = const(18)
+_IN = const(20)
+_OUT = const(21)
 
 
 class RingFeeder:
@@ -51,15 +71,22 @@ class RingFeeder:
     def __init__(self, block: "array[int]") -> None:
         self.inputs: "Any" = None
         self._parts: "list[Any]" = []
-        self._hook = _feeder(self, block, self._parts)
+        self._places = array("i", [0] * (_MOST_JOINTS * _PLACE_WORDS))
+        self._hook = _feeder(self, block, self._parts, self._places)
         mem32[stm.TIM6] = 0
 
     def connect(self, inputs: Inputs, joints: "list[JointDrive]") -> None:
         """Feed the joints' rings; ``inputs`` freezes all where one was written too late."""
         self.inputs = inputs
         self._parts.clear()
+        at = 0
         for joint in joints:
-            self._parts += (joint.ring.state, joint.ring.words, joint.generator.queue)
+            for part in (joint.ring.words, joint.generator.queue):
+                self._parts.append(part)
+                address = uctypes.addressof(part)
+                self._places[at] = address & 0x3FFFFFFF
+                self._places[at + 1] = address >> 30
+                at += 2
         Timer(6, prescaler=0, period=_PERIOD_TICKS - 1, callback=self._hook)  # type: ignore[arg-type]
         mem32[stm.TIM6] = 0
 
@@ -70,33 +97,48 @@ class RingFeeder:
         self._parts.clear()
 
 
-def _feeder(owner: RingFeeder, block: "array[int]", parts: "list[Any]") -> "Callable[[object], object]":
+def _feeder(
+    owner: RingFeeder, block: "array[int]", parts: "list[Any]", places: "array[int]"
+) -> "Callable[[object], object]":
     """What the interrupt does.
 
-    Looking up a name takes 110 to 150 instructions, so none is looked up for a joint. A call with more than four
-    variables from outside would allocate.
+    Looking up a name takes 110 to 150 instructions, an object's memory 150 to 250, a call 600 to 800. So of a joint
+    that has no steps to be written nothing is looked up, and what else could be called stands here: the end of the
+    loop is ``isr.note_written``. A call with more than four variables from outside would allocate.
     """
-    calls: "Any" = (block, stm.DMA1, stm.TIM2, stm.TIM6, isr.rings_to_refill, emit, isr.note_written)
+    calls: "Any" = (block, stm.DMA1, stm.TIM2, stm.TIM6, isr.rings_to_refill, emit, places)
 
     @micropython.viper
     def feed(timer: object) -> object:
-        timer2 = calls[_TIMER2]
-        wanted = int(calls[_RINGS_TO_REFILL](calls[_BLOCK], calls[_DMA], timer2))
+        wanted = int(calls[_RINGS_TO_REFILL](calls[_BLOCK], calls[_DMA], calls[_TIMER2]))
         if wanted < 0:
             ptr32(calls[_TIMER6])[_CR1] = 0
-            wanted = 0
-        joint = 0
-        while wanted:
-            if wanted & 1:
-                state = parts[joint + _STATE]
-                words = parts[joint + _WORDS]
-                queue = parts[joint + _QUEUE]
-                ring = ptr32(state)
-                calls[_EMIT](ring[_ROOM], words, queue, ring[_MASK])
-                if int(calls[_NOTE_WRITTEN](state, words, timer2, queue)):
-                    owner.inputs.freeze()
-                    isr.set_fault(calls[_BLOCK], codes.UNDERRUN, joint // _PARTS)
-            wanted >>= 1
-            joint += _PARTS
+        elif wanted:
+            state = ptr32(int(ptr32(calls[_BLOCK])) + 4 * (_BLOCK_HEAD + _RING))
+            place = ptr32(calls[_PLACES])
+            timer2 = ptr32(calls[_TIMER2])
+            joint = 0
+            while wanted:
+                if wanted & 1:
+                    queue = ptr32((place[_QUEUE_AT + 1] << 30) + place[_QUEUE_AT])
+                    if queue[_STEPS] | (queue[_IN] ^ queue[_OUT]):
+                        calls[_EMIT](state[_ROOM], parts[joint + _WORDS], parts[joint + _QUEUE], state[_MASK])
+                    written = queue[_HEAD]
+                    if written != state[_WRITTEN]:
+                        ring = ptr32((place[_RING_AT + 1] << 30) + place[_RING_AT])
+                        late = ((state[_LAST_TIME] - queue[_PULSE] - timer2[_CNT]) >> 31) & 1
+                        state[_WRITTEN] = written
+                        state[_LAST_TIME] = ring[(written - 1) & state[_MASK]]
+                        half = 1
+                        state[_FAR_TIME] = (half << 31) + state[_LAST_TIME]
+                        ring[written & state[_MASK]] = state[_FAR_TIME]
+                        ring[state[_MASK] + 1] = ring[_FIRST_ENTRY]
+                        if late:
+                            owner.inputs.freeze()
+                            isr.set_fault(calls[_BLOCK], codes.UNDERRUN, joint // _PARTS)
+                wanted >>= 1
+                joint += _PARTS
+                place = ptr32(int(place) + 4 * _PLACE_WORDS)
+                state = ptr32(int(state) + 4 * _JOINT_WORDS)
 
     return feed

@@ -8,6 +8,12 @@ from armtempo_board.stepgen.newton import set_interval, solve
 from armtempo_board.stepgen.time_law import scale_slope, to_real_time
 
 _MOST_STEPS = const(1024)  # of a cubic
+_NODES = const(12)  # solved in one call
+# results of ``queue_steps``
+NO_ROOM = const(0)  # the queue is full, or reaches UNTIL_KITICKS
+GOES_ON = const(1)
+STOPPED = const(2)  # HELD_BACK or HALTED is set
+
 _SINGLY = const(8)  # steps solved one by one before a cubic is tried again; an item of the queue holds 8
 
 # as in step_queue.py: words of the queue
@@ -91,10 +97,9 @@ def begin(solver: object, queue: object, arrays: object, position: int, at_start
     words[_LAST_STEP] = heading * steps - 1
     words[_REACHED] = 0
     words[_SINGLE_STEPS] = 0
-    words[_MODE] = words[_MODE] & _BY_LAW
+    words[_MODE] = (words[_MODE] & _BY_LAW) + _AT_START * at_start
     if at_start:
         nodes[_RANGE] = 0
-        words[_MODE] = words[_MODE] | _AT_START
     else:
         nodes[_TARGET] = 2 * (position - angle[_HIGH]) + heading + _BIAS
         set_interval(solver, arrays[_ANGLE], arrays[_ANGLE_MEASURES], arrays[_TIME_MEASURES])  # type: ignore[index]
@@ -102,12 +107,13 @@ def begin(solver: object, queue: object, arrays: object, position: int, at_start
 
 
 @micropython.viper
-def queue_steps(solver: object, queue: object, budget: int, law: object) -> object:
+def queue_steps(solver: object, queue: object, law: object) -> int:
     """Queue the subinterval's steps behind REACHED, until all are in, or the queue is full or reaches UNTIL_KITICKS.
 
-    ``budget``: nodes to be solved at most, or a few more; each takes about 2000 instructions. A last step that is
-    slow is not put in, but HELD_BACK is set. HALTED is set where by the law the next step never comes. The words of
-    ``queue`` are named in step_queue.py, those of ``solver`` in newton.py, those of ``law`` in time_law.py.
+    _NODES are solved at most, or a few more; each takes about 2000 instructions. A last step that is
+    slow is not put in, but HELD_BACK is set. HALTED is set where by the law the next step never comes. Returns one of
+    the results above. The words of ``queue`` are named in step_queue.py, those of ``solver`` in newton.py, those of
+    ``law`` in time_law.py.
     """
     words = ptr32(queue)  # type: ignore[arg-type]
     nodes = ptr32(solver)  # type: ignore[arg-type]
@@ -117,10 +123,14 @@ def queue_steps(solver: object, queue: object, budget: int, law: object) -> obje
     mode = words[_MODE]
     scale = words[_TIME_SCALE]
     slow_ticks = words[_SLOW_TICKS]
-    until_kiticks = words[_UNTIL_KITICKS]
+    result = GOES_ON
+    budget = _NODES
     count = 0  # single steps in the queue that IN does not count yet
     while reached < last and budget > 0:
-        if (words[_IN] - words[_OUT]) & _COUNT_MASK >= _FULL or words[_LATEST_KITICKS] > until_kiticks:
+        if (words[_IN] - words[_OUT]) & _COUNT_MASK >= _FULL or words[_LATEST_KITICKS] > words[
+            _UNTIL_KITICKS
+        ]:
+            result = NO_ROOM
             break
         length = (last - reached) >> 1
         if length > 1 and mode < _AT_START and not words[_SINGLE_STEPS]:
@@ -163,11 +173,10 @@ def queue_steps(solver: object, queue: object, budget: int, law: object) -> obje
                 words[_CUBIC_STEPS] = length if length > 2 else 2
             if length > 1:
                 reached += length + length
-                held_back = 0
                 if reached == last and nodes[_END_MANTISSA] >> nodes[_END_EXPONENT] > slow_ticks:
-                    held_back = 1
-                put_cubics(length, solver, queue, held_back)
-                words[_HELD_BACK] = held_back
+                    words[_HELD_BACK] = 1
+                    result = STOPPED
+                put_cubics(length, solver, queue, result - GOES_ON)
                 if verdict == 2 and length + length > size and size <= _MOST_STEPS >> 1:
                     words[_CUBIC_STEPS] = size + size
             else:
@@ -182,6 +191,7 @@ def queue_steps(solver: object, queue: object, budget: int, law: object) -> obje
             if mode & _BY_LAW:
                 if not int(to_real_time(law, solver, _FIRST_NODE, scale)):
                     words[_HALTED] = 1
+                    result = STOPPED
                     break
                 if mode == _BY_LAW:
                     scale_slope(solver, _FIRST_NODE)
@@ -189,14 +199,16 @@ def queue_steps(solver: object, queue: object, budget: int, law: object) -> obje
             reached += 1
             if reached == last and (mode > _BY_LAW or nodes[_MANTISSA] >> nodes[_EXPONENT] > slow_ticks):
                 words[_HELD_BACK] = 1
+                result = STOPPED
             else:
                 base += (nodes[_FIRST_TIME] + (1 << (scale - 1))) >> scale
                 if not count:
                     item = ptr32(int(words) + ((words[_IN] & _ITEMS_MASK) * _ITEM_WORDS + _ITEMS) * 4)
                     item[_LEFT] = 0
                     item[_GROUP] = 0
-                item[count] = ((high - _HIGH_BIAS) << 12) + base
-                words[_LATEST_KITICKS] = ((high - _HIGH_BIAS) << 2) + (base >> 10)
+                i = high - _HIGH_BIAS
+                item[count] = (i << 12) + base
+                words[_LATEST_KITICKS] = (i << 2) + (base >> 10)
                 if not count:
                     item[_BASE_KITICKS] = words[_LATEST_KITICKS]
                 count += 1
@@ -207,3 +219,4 @@ def queue_steps(solver: object, queue: object, budget: int, law: object) -> obje
     if count:
         words[_IN] = (words[_IN] + 1) & _COUNT_MASK
     words[_REACHED] = reached
+    return result

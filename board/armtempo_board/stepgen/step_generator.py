@@ -8,7 +8,7 @@ What steps come is found in the motion's own time, so it is the same however slo
 from micropython import const
 
 from armtempo_board.memory import Memory
-from armtempo_board.stepgen import newton, step_queue, subdivision
+from armtempo_board.stepgen import newton, step_queue
 from armtempo_board.stepgen.newton import solve
 from armtempo_board.stepgen.step_queue import emit, has_room, holds_steps, put_single
 from armtempo_board.stepgen.subintervals import Subintervals
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from armtempo_shared.motion import MotionHead
 
 _PARTS_PER_CALL = const(4)  # of the motion that one call of ``prepare`` looks at: bounds its time
-_NODES = const(12)  # solved for one of them
 # as in step_queue.py: words of the queue
 _STEPS = const(11)
 _TIME_SCALE = const(14)
@@ -56,9 +55,12 @@ _BIAS = const(1 << 28)
 # as in time_law.py: words of the law
 _REAL_START_HIGH = const(4)
 _MOTION_HIGH = const(14)
-# as in subdivision.py: what was found
+# what was found, as subdivision.py says it
 _NOT_YET = const(0)
+_FOUND_AT_START = const(2)
 _END = const(3)
+# as in interval_steps.py: results, 0 where the queue has no room
+_STOPPED = const(2)
 
 _CLEARED = (_STEPS, _LATEST_KITICKS, _REACHED, _LAST_STEP, _MODE, _HELD_BACK, _HALTED)
 _FIRST_CUBIC_STEPS = const(16)  # tried first in a motion
@@ -146,7 +148,11 @@ class StepGenerator:
             if self._first_waits:
                 self._queue_first()
             elif queue[_REACHED] < queue[_LAST_STEP]:
-                self._queue_more()
+                result = self._law.queue_steps(self._solver, queue, self._law_words)
+                if not result:
+                    return False
+                if result == _STOPPED:
+                    self._end_interval()
             else:
                 self._next_interval()
         return True
@@ -228,31 +234,40 @@ class StepGenerator:
         return _kiticks(self.queue[_INTERVAL_HIGH] if has_more else self.subintervals.time[_HIGH], 0)
 
     def _next_interval(self) -> None:
+        found = self._found or self.subintervals.search(self._position)
+        if self._held or self.queue[_MODE] & _BY_LAW:
+            self._found = found
+            if self._waits_for(found):
+                return
+        if found == _END:
+            self.ended = True
+        elif found:
+            self._found = _NOT_YET
+            self._begin_interval(found)
+
+    def _waits_for(self, found: int) -> bool:
+        """Whether something else is done, as a step is held back or by the law the motion's time stands still."""
         now = self.subintervals
-        if self._found == _NOT_YET:
-            self._found = now.search(self._position)
-        found = self._found
-        is_past = self.queue[_MODE] & _BY_LAW and self._law.is_past(now.time[_HIGH])
-        if found == _END or is_past:
+        if found == _END or (self.queue[_MODE] & _BY_LAW and self._law.is_past(now.time[_HIGH])):
             if self._held:
                 self._queue_held()
             elif found == _END:
-                self.ended = True
+                return False
             else:
                 self._halt()
         elif self._held and self._since_held(now.time[_HIGH], now.time[_LOW] >> 16) > self._gap_ticks:
             self._queue_held()
-        elif found != _NOT_YET:
-            self._found = _NOT_YET
-            self._begin_interval(found == subdivision.AT_START)
+        else:
+            return False
+        return True
 
-    def _begin_interval(self, at_start: bool) -> None:
+    def _begin_interval(self, found: int) -> None:
         """Take up the steps of the subinterval that was found, and solve the first."""
         queue = self.queue
         now = self.subintervals
         high = now.time[_HIGH]
         queue[_INTERVAL_HIGH] = self._law.count_from(high) if queue[_MODE] & _BY_LAW else high
-        steps = self._law.begin(self._solver, queue, now.arrays, self._position, at_start)
+        steps = self._law.begin(self._solver, queue, now.arrays, self._position, found == _FOUND_AT_START)
         self._position += steps
         self._heading = 1 if steps > 0 else -1
         self._first_waits = True
@@ -292,11 +307,9 @@ class StepGenerator:
                 self._held_queued = False
                 put_single(self.queue, self.queue[_INTERVAL_HIGH], self._ticks())
 
-    def _queue_more(self) -> None:
-        """The next steps of the subinterval."""
+    def _end_interval(self) -> None:
+        """``queue_steps`` came to the subinterval's last step, which is slow, or by the law to the last of all."""
         queue = self.queue
-        self._held_queued = False
-        self._law.queue_steps(self._solver, queue, _NODES, self._law_words)
         if queue[_HELD_BACK]:
             queue[_HELD_BACK] = 0
             if queue[_MODE] & _BY_LAW:  # its node is in real time

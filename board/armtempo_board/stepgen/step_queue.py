@@ -147,20 +147,24 @@ def emit(now: int, ring: ptr32, queue: ptr32, mask: int) -> object:
         left = queue[_LEFT]
         carry = queue[CARRY]
         step = queue[_STEP]
-        # Groups of one step, as they are many where the speed changes: as below, but shorter
+        # Groups of one step, as they are many where the speed changes: time and remainder in one, below a tick
         if queue[GROUP] == 1:
+            step = shift + power
+            remainder += (now & ((1 << shift) - 1)) << power
+            now = (now >> shift) + base
             while count:
                 count -= 1
-                step = first >> power
-                remainder += first - (step << power)
-                n = remainder >> carry
-                remainder -= n << carry
-                now += n + step
+                remainder += first
+                n = remainder >> step
+                remainder -= n << step
+                now += n
+                ring[_RISE] = now
+                ring[_FALL] = now + pulse
+                ring = ptr32(int(ring) + 8)
                 first += second
                 second += third
-                ring[_RISE] = (now >> shift) + base
-                ring[_FALL] = ring[_RISE] + pulse
-                ring = ptr32(int(ring) + 8)
+            now = ((now - base) << shift) + (remainder >> power)
+            remainder &= (1 << power) - 1
         while count:
             # The next group: the time of one of its steps, and the next differences
             if not left:
@@ -172,33 +176,33 @@ def emit(now: int, ring: ptr32, queue: ptr32, mask: int) -> object:
                 now += n
                 first += second
                 second += third
-            n = count
-            if n > left:
-                n = left
-            left -= n
-            count -= n
-            # Its steps, evenly spaced: four at a time, then singly
-            while n >= 4:
-                now = now + step
-                ring[_RISE] = (now >> shift) + base
-                ring[_FALL] = ring[_RISE] + pulse
-                now = now + step
-                ring[_RISE_2] = (now >> shift) + base
-                ring[_FALL_2] = ring[_RISE_2] + pulse
-                now = now + step
-                ring[_RISE_3] = (now >> shift) + base
-                ring[_FALL_3] = ring[_RISE_3] + pulse
-                now = now + step
-                ring[_RISE_4] = (now >> shift) + base
-                ring[_FALL_4] = ring[_RISE_4] + pulse
-                ring = ptr32(int(ring) + 32)
-                n -= 4
-            while n:
+                # All its steps, evenly spaced: four at a time
+                if count >= left and left > 2:
+                    count -= left
+                    while left:
+                        now = now + step
+                        ring[_RISE] = (now >> shift) + base
+                        ring[_FALL] = ring[_RISE] + pulse
+                        now = now + step
+                        ring[_RISE_2] = (now >> shift) + base
+                        ring[_FALL_2] = ring[_RISE_2] + pulse
+                        now = now + step
+                        ring[_RISE_3] = (now >> shift) + base
+                        ring[_FALL_3] = ring[_RISE_3] + pulse
+                        now = now + step
+                        ring[_RISE_4] = (now >> shift) + base
+                        ring[_FALL_4] = ring[_RISE_4] + pulse
+                        ring = ptr32(int(ring) + 32)
+                        left -= 4
+                    continue
+            # or two of them, or those that have room, singly
+            while left and count:
                 now = now + step
                 ring[_RISE] = (now >> shift) + base
                 ring[_FALL] = ring[_RISE] + pulse
                 ring = ptr32(int(ring) + 8)
-                n -= 1
+                left -= 1
+                count -= 1
         queue[_TIME] = now
         queue[FIRST] = first
         queue[SECOND] = second + _BIAS

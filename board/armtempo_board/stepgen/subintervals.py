@@ -24,6 +24,9 @@ ANGLE_MEASURES = const(2)
 TIME_MEASURES = const(3)
 
 _START_LEVEL = const(4)
+# what was found, as subdivision.py says it
+_NOT_YET = const(0)
+_END = const(3)
 
 
 class Subintervals:
@@ -87,8 +90,9 @@ class Subintervals:
         ``steps`` (+ bezier.BIAS): the position to which the steps so far lead.
         """
         found = search(self.time, self.angle, self.time_measures, self.angle_measures, steps, self.min_ticks)
-        # a new segment is enough for one call
-        return subdivision.NOT_YET if found == subdivision.END and self.load_segment() else found
+        if found == _END and self.load_segment():
+            found = _NOT_YET  # a new segment is enough for one call
+        return found
 
     def measure(self) -> int:
         """Compute and measure the subinterval; 0: past the end, else MEASURED and its other results."""

@@ -16,7 +16,7 @@ from virtual_board.firmware.external_interrupts import set_level
 # isort: split
 import struct
 
-from armtempo_board.app import output_setup
+from armtempo_board.app import arm_setup, output_setup
 from armtempo_board.app.output_setup import inputs_of, outputs_of
 from pin_rows import GRIPPER, PART, PUMP
 
@@ -88,7 +88,7 @@ class Board:
 def case_what_is_closed_can_be_made_anew():
     board = Board()
     output_setup.attach(board, [GRIPPER, HAND], [])
-    output_setup.detach(board)
+    arm_setup.drop_outputs(board)
     assert (board.outputs, board.inputs, board.rows) == (None, None, {})
     assert pulses("B8") == pulses("B15") == (0, 0)
     assert line("B8").mode() == 0
