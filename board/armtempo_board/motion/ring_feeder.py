@@ -35,8 +35,8 @@ _NOTE_WRITTEN = const(6)
 # and of each joint
 _STATE = const(0)
 _WORDS = const(1)
-_QUEUE = const(2)
-_PARTS = const(3)
+QUEUE = const(2)
+PARTS = const(3)
 # as in isr.py: words of a ring's state
 _MASK = const(5)
 _ROOM = const(8)
@@ -50,16 +50,16 @@ class RingFeeder:
 
     def __init__(self, block: "array[int]") -> None:
         self.inputs: "Any" = None
-        self._parts: "list[Any]" = []
-        self._hook = _feeder(self, block, self._parts)
+        self.parts: "list[Any]" = []
+        self._hook = _feeder(self, block, self.parts)
         mem32[stm.TIM6] = 0
 
     def connect(self, inputs: Inputs, joints: "list[JointDrive]") -> None:
         """Feed the joints' rings; ``inputs`` freezes all where one was written too late."""
         self.inputs = inputs
-        self._parts.clear()
+        self.parts.clear()
         for joint in joints:
-            self._parts += (joint.ring.state, joint.ring.words, joint.generator.queue)
+            self.parts += (joint.ring.state, joint.ring.words, joint.generator.queue)
         Timer(6, prescaler=0, period=_PERIOD_TICKS - 1, callback=self._hook)  # type: ignore[arg-type]
         mem32[stm.TIM6] = 0
 
@@ -67,7 +67,7 @@ class RingFeeder:
         """Hold no ring; none is fed any more."""
         mem32[stm.TIM6] = 0
         self.inputs = None
-        self._parts.clear()
+        self.parts.clear()
 
 
 def _feeder(owner: RingFeeder, block: "array[int]", parts: "list[Any]") -> "Callable[[object], object]":
@@ -90,13 +90,13 @@ def _feeder(owner: RingFeeder, block: "array[int]", parts: "list[Any]") -> "Call
             if wanted & 1:
                 state = parts[joint + _STATE]
                 words = parts[joint + _WORDS]
-                queue = parts[joint + _QUEUE]
+                queue = parts[joint + QUEUE]
                 ring = ptr32(state)
                 calls[_EMIT](ring[_ROOM], words, queue, ring[_MASK])
                 if int(calls[_NOTE_WRITTEN](state, words, timer2, queue)):
                     owner.inputs.freeze()
-                    isr.set_fault(calls[_BLOCK], codes.UNDERRUN, joint // _PARTS)
+                    isr.set_fault(calls[_BLOCK], codes.UNDERRUN, joint // PARTS)
             wanted >>= 1
-            joint += _PARTS
+            joint += PARTS
 
     return feed
