@@ -21,8 +21,9 @@ GENERATOR_PARTS = (78, 78, 20, 20, 12, 12, 60, 18, 136)
 
 Pieces of angle and of time, their control points, their measures; the solver, the law of time, the queue of steps.
 """
+GENERATOR_WORDS = sum(GENERATOR_PARTS)
 _BLOCK_WORDS = 1026  # for a ring of 1024 entries, or two of 512
-LARGEST_WORDS = 6 * sum(GENERATOR_PARTS) - PROCESSOR_WORDS + 1025 + 513 + 257 + 129 + 2 * 65 + 14
+LARGEST_WORDS = 6 * GENERATOR_WORDS - PROCESSOR_WORDS + 1025 + 513 + 257 + 129 + 2 * 65 + 14
 """For arms whose joints' highest step rates sum up to 240 000 steps/s; some have rings of SHORT_MS then.
 
 Where there is so much, there is heap for outputs and inputs too. The last words are left over at the ends of blocks.
@@ -50,6 +51,14 @@ def words(rates: "list[int]") -> int:
 def object_bytes(joints: int) -> int:
     """Bytes of heap that the engine's objects take besides: measured, see board/docs/memory.md."""
     return 1760 + 1184 * joints
+
+
+def ahead_bytes(joints: int) -> int:
+    """Bytes of heap that preparing a sequence's next motion takes: a second step generator for each joint.
+
+    With its objects, and the files that it reads: measured, see board/docs/memory.md.
+    """
+    return (4 * GENERATOR_WORDS + 880) * joints
 
 
 def output_bytes(outputs: int, inputs: int) -> int:

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 import serial
 from armtempo.errors import LinkError, RunFolderError
@@ -74,6 +75,16 @@ def test_a_motion_that_is_not_in_the_edge_log_is_told() -> None:
     for number in (-3, 2):
         with pytest.raises(RunFolderError, match=f"has 2 motions, not one number {number}"):
             cycle.motion(number)
+
+
+def test_a_motions_edges_are_those_behind_the_stop_of_the_clock_before_it() -> None:
+    """However soon it follows; the first one's begin 0.1 s before its time 0."""
+    second = 100_000_000
+    ticks = np.array([9_000_000, 19_000_000, second - 1_000_000, second - 400_000, second + 50])
+    edges = {"A15": (ticks, np.array([1, 0, 1, 0, 1]))}
+    cycle = edgelog.PowerCycle(edges, [18_000_000, second], ends=[1_000, second - 500_000, second + 100])
+    assert list(cycle.motion(0)["A15"][0] + 18_000_000) == [19_000_000, second - 1_000_000]
+    assert list(cycle.motion(1)["A15"][0]) == [-400_000, 50]
 
 
 def test_goes_with_its_launcher(tmp_path: Path) -> None:

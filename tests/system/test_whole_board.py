@@ -18,7 +18,7 @@ from armtempo_shared.limits import TICK_HZ
 from tests import interpreters, scripted
 
 CASES = Path(__file__).parent / "scripts" / "cases"
-SCRIPTS = [CASES / f"{name}.py" for name in ("standalone", "faults", "prompt")]
+SCRIPTS = [CASES / f"{name}.py" for name in ("standalone", "faults", "prompt", "sequences")]
 PROGRAM = f"{interpreters.ROOT / 'board'}:{interpreters.ROOT / 'shared'}"
 ARM = Arm.paper()
 HOME_DEG = np.array(ARM.home_deg)
@@ -32,11 +32,13 @@ CHOSEN = {
     },
     ("micropython-arm", "prompt"): {"case_boot_leaves_a_serial_port_only"},
     ("micropython-arm", "faults"): {"case_interrupt_dies"},
+    ("micropython-arm", "sequences"): {"case_the_pins_do_the_same"},
     ("cpython", "standalone"): {
         "case_button_starts_the_default_and_a_host_fetches_its_samples",
         "case_a_run_by_button_needs_no_host",
     },
     ("cpython", "prompt"): {"case_replay_typed_at_the_prompt"},
+    ("cpython", "sequences"): {"case_the_pins_do_the_same", "case_whatever_ends_it_at_any_moment"},
     ("cpython", "faults"): {"case_host_disappears_and_the_arm_stops", "case_stop", "case_broken_trajectory"},
 }
 """The emulated interpreter is slow, and CPython never runs on a board: what they are to run."""
@@ -44,8 +46,9 @@ INSIDE = {
     "case_a_failing_start_is_a_fault_not_the_end",
     "case_ctrl_c_stops_a_replay_wherever_it_comes",
     "case_exception_anywhere",
+    *(name for name in scripted.names(CASES / "sequences.py") if name != "case_compiled_files_refuse_it"),
 }
-"""They reach into the program by the names in its sources."""
+"""They reach into the program by the names in its sources, or need what compiled files are without."""
 ON_SOURCES = INSIDE.union(*(cases for (name, _), cases in CHOSEN.items() if name == "cpython"))
 """What MicroPython runs with the sources themselves; with what is made of them, compact and deployed, it runs all."""
 QUICKEST = "micropython" if "micropython" in interpreters.AVAILABLE else "cpython"
@@ -79,10 +82,26 @@ def flashes(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (folder / name / "armtempo" / "go.atm").write_bytes(
             encoded_motion.of_trajectory(trajectory, arm).data
         )
+    _add_legs(folder / "legs" / "armtempo")
     (folder / "ticks").write_text(str(round(trajectory.duration_s * TICK_HZ)))
     shutil.copytree(folder / "finish", folder / "broken")
     (folder / "broken" / "main.py").write_text("raise ValueError('broken')\n")
     return folder
+
+
+def _add_legs(folder: Path) -> None:
+    """A flash with short motions from each of three postures to each other, "leg0", …; one lies between two steps."""
+    folder.mkdir(parents=True)
+    arm = replace(ARM, safety=replace(ARM.safety, estop_fitted=True))
+    (folder / "arm.ata").write_bytes(encode.arm_record(arm))
+    half_a_step_deg = [0.5 / joint.steps_per_deg for joint in ARM.driven]
+    postures = (HOME_DEG, HOME_DEG + np.array([0.7, -0.4, 0.5]), HOME_DEG + np.array([-0.5, 0.3, 0.8]))
+    postures[1][1] = (round(postures[1][1] / half_a_step_deg[1]) | 1) * half_a_step_deg[1]
+    ways = [(one, other) for one in postures for other in postures if one is not other]
+    for number, way in enumerate(ways):
+        job = Job(f"leg{number}", tuple(tuple(map(float, end)) for end in way), population=5, iterations=20)
+        record = encoded_motion.of_trajectory(planner.plan(arm, job).trajectory, arm)
+        (folder / f"leg{number}.atm").write_bytes(record.data)
 
 
 @pytest.fixture(scope="session")

@@ -41,7 +41,7 @@ class Controller(ArmState):
         self.run_number = 0
         self.duration_ticks = 0
         self.done = False  # a run has ended without a fault, and the host has not been told
-        self._running = False  # a run has begun and its end has not been noticed
+        self.running = False  # a run has begun and its end has not been noticed
         self._braking = False
         self._can_brake = False  # the motion can come to rest along its path
         self._next_rate = _PERMILLE  # of the next run that a host starts
@@ -60,7 +60,7 @@ class Controller(ArmState):
             if self.fault():
                 self.outputs.safe()
             self.inputs.poll(time.ticks_ms())
-        if self._running:
+        if self.running:
             if not self.engine.moving:
                 self._end()
             elif silent_ms > self.silence_ms and self._by_host and not self._braking:
@@ -68,8 +68,11 @@ class Controller(ArmState):
                 self.stop(0)
             elif self._held and time.ticks_diff(time.ticks_ms(), self._hold_ms) > HOLD_TIMEOUT_MS:
                 self.stop(0)
-        if self.sequence and not self.engine.moving:
-            self.sequence.go_on()
+        if self.sequence:
+            if self.engine.moving:
+                self.sequence.prepare()
+            else:
+                self.sequence.go_on()
 
     def refill(self) -> None:
         """What cannot wait for the end of longer work while something moves."""
@@ -83,8 +86,9 @@ class Controller(ArmState):
     def _end(self) -> None:
         self._collect()
         self._withdraw_assumed()
-        heap.collect_often()
-        self._running = False
+        if not self.sequence:  # its next motion comes at once
+            heap.collect_often()
+        self.running = False
         self._braking = False
         if not self.fault():
             self.done = True
@@ -167,7 +171,7 @@ class Controller(ArmState):
             from armtempo_board.app import sequence_start  # here, so that it can be forgotten
 
             self.sequence = sequence_start.sequencer(self, name, crc, rate, flags)
-        except MemoryError:
+        except (MemoryError, ImportError):  # compiled files are without it
             raise Refused(codes.NO_SEQUENCE_ROOM)
 
     def _is_sequence(self, name: str) -> bool:
@@ -211,6 +215,10 @@ class Controller(ArmState):
             raise
         finally:
             heap.release()
+        self.start_loaded(motion, flags)
+
+    def start_loaded(self, motion: "MotionFile", flags: int) -> None:
+        """Start what the engine has loaded; ``flags`` as for ``begin``."""
         self.samples.clear()
         self.done = False
         self.duration_ticks = self.engine.rates.duration_ticks
@@ -219,10 +227,10 @@ class Controller(ArmState):
         self._can_brake = motion.brake_ticks > 0
         heap.tidy()
         heap.collect_often(0)
-        self._running = True
+        self.running = True
         self._held = flags & START_HELD
         self.hold()
-        self.engine.start(homing)
+        self.engine.start(bool(flags & START_HOMING))
 
     def _withdraw_assumed(self) -> None:
         if self._assumed:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 ROOT = "/flash/armtempo"
 _CTRL_C = const(3)
 _EXCEPTION_BUFFER = const(100)
-_EIGHTH_TURN = const(7)  # while something moves, LEDs, watchdog and button come in every eighth turn only
+_EIGHTH_TURN = const(7)  # while joints move, LEDs, watchdog and button come in every eighth turn only
 
 app: "Any" = None
 """The program's App; it is kept when the program is left for the REPL."""
@@ -82,7 +82,7 @@ def run(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
 def _serve_panel(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
     """LEDs, watchdog, button."""
     controller = app.controller
-    if controller.moving() and app.turns & _EIGHTH_TURN:
+    if controller.running and app.turns & _EIGHTH_TURN:
         return
     leds.show(controller.state())
     watchdog.feed()

@@ -19,7 +19,11 @@ def opened(board: "ArmState", name: str, crc: "int | None") -> "MotionFile":
     """The stored motion, checked as far as its head and checksum go, or Refused; ``crc``: see ``Controller.begin``."""
     store = board.store()
     gc.collect()  # what stays while it runs is to lie low
-    motion: MotionFile = store.motion(name)
+    return checked(board, store.motion(name), crc)
+
+
+def checked(board: "ArmState", motion: "MotionFile", crc: "int | None") -> "MotionFile":
+    """The motion, if it is the one that is meant, and for the board's arm; else Refused."""
     if crc is not None and motion.crc != crc:
         raise Refused(codes.BAD_CHECKSUM)
     if motion.arm_crc != board.arm_crc:

@@ -38,7 +38,19 @@ def sequencer(controller: "Runner", name: str, crc: "int | None", rate: int, fla
     except (MotionError, SequenceError):
         raise Refused(codes.BAD_RECORD)
     _check_rows(controller, record, ends)
-    return Sequencer(controller, record, name.encode(), rate)
+    return _kind(controller)(controller, record, name.encode(), rate)
+
+
+def _kind(controller: "Runner") -> "type[Sequencer]":
+    """One that prepares the next motion, where there is memory for it."""
+    if not controller.workspace.is_short:
+        try:
+            from armtempo_board.app.sequence_ahead import AheadSequencer  # here, so that it can be forgotten
+
+            return AheadSequencer
+        except ImportError:  # it is not among compiled files
+            pass
+    return Sequencer
 
 
 class _Ends:

@@ -43,6 +43,8 @@ if TYPE_CHECKING:
         run_number: int
         arm_crc: int
         workspace: Any
+        joints: int
+        root: str
 
         def store(self) -> Any: ...
 
@@ -52,12 +54,49 @@ if TYPE_CHECKING:
 
         def begin_motion(self, name: str, crc: "int | None", rate: int) -> None: ...
 
+        def start_loaded(self, motion: MotionFile, flags: int) -> None: ...
+
         def fault(self) -> int: ...
 
 
-_AMOUNT, _STEP_OF_ROW = const(3), const(4)  # of a row
+_OP, _NUMBER, _AMOUNT, _STEP_OF_ROW = const(0), const(1), const(3), const(4)  # of a row
 _START_BYTES = const(22_000)  # of heap for the start of a motion; some of it in large pieces (docs/memory.md)
 _MOST = const(0x3FFFFFFF)  # that a counter reaches; a larger number would take memory
+
+
+class Place:
+    """A place in the rows: ``next`` is the row that comes, behind repeats that have begun."""
+
+    def __init__(self) -> None:
+        self.next = 0
+        self._first = array("i", [0] * sequence.MAX_NESTING)  # of each repeat that has begun: its first row
+        self._left = array("i", [0] * sequence.MAX_NESTING)  # passes left, 0: for ever
+        self._depth = 0
+
+    def copy(self, other: "Place") -> None:
+        """Be at the same place."""
+        self.next = other.next
+        self._depth = other._depth
+        for depth in range(self._depth):
+            self._first[depth] = other._first[depth]
+            self._left[depth] = other._left[depth]
+
+    def go_on(self, row: "tuple[int, ...]") -> None:
+        """Behind the row that came."""
+        self.next += 1
+        op = row[_OP]
+        if op == sequence.REPEAT:
+            self._first[self._depth] = self.next
+            self._left[self._depth] = row[_AMOUNT]
+            self._depth += 1
+        elif op == sequence.END:  # from the first row of the repeat again, or on
+            inner = self._depth - 1
+            left = self._left[inner] - 1
+            if left:  # below 0: for ever
+                self.next = self._first[inner]
+                self._left[inner] = max(left, 0)
+            else:
+                self._depth = inner
 
 
 class Sequencer:
@@ -68,11 +107,8 @@ class Sequencer:
         self._record = record
         self._rate = rate  # of the motions' own time, in thousandths
         self._row: "tuple[int, ...]" = (0, 0, 0, 0, 0)  # the one under way
-        self._next = 0  # number of the one behind it
-        self._first = array("i", [0] * sequence.MAX_NESTING)  # of each repeat that has begun: its first row
-        self._left = array("i", [0] * sequence.MAX_NESTING)  # passes left, 0: for ever
-        self._depth = 0
-        self._judged = bytearray(record.motions)  # 1: the motion was checked in this run
+        self._place = Place()  # behind it
+        self._judged = 0  # motions whose splines were checked in this run
         self.told = array("i", [sequence.RUNNING] + [0] * VALUE)
         self.stopping = False
         self._command = SequenceCommand(
@@ -103,6 +139,9 @@ class Sequencer:
         else:
             self._rate = rate
 
+    def prepare(self) -> None:
+        """Called while a motion moves: nothing is prepared here, see ``sequence_ahead``."""
+
     def go_on(self) -> None:
         """Called while nothing moves: end, wait on, or do what the next row says."""
         controller = self._controller
@@ -112,66 +151,64 @@ class Sequencer:
             return self._end(sequence.STOPPED)
         if not self._is_over():
             return None
-        if self._next == self._record.rows:
+        if self._place.next == self._record.rows:
             return self._end(sequence.FINISHED)
         try:
-            return self._do()
+            return self._do() if self._judged == self._record.motions else self._judge()
         except Refused as refused:
             return self._end(sequence.REFUSED, refused.code)
         except OSError:
             return self._end(sequence.REFUSED, codes.FLASH_ERROR)
 
+    def _judge(self) -> None:
+        """Check the splines of a motion before any moves, once in a run: neither its record, whose checksum is compared
+        each time, nor the arm can change meanwhile.
+        """
+        from armtempo_board.motion.start_check import check_splines  # here, so that it can be forgotten
+
+        record = self._record
+        name, crc = record.motion(self._judged)
+        try:
+            engine = self._controller.engine
+            check_splines(self._controller.load(name, crc), engine.drives, engine.limits)
+        except Refused:
+            for self.told[ROW] in range(record.rows):
+                row = record.row(self.told[ROW])
+                if row[_OP] == sequence.MOVE and row[_NUMBER] == self._judged:
+                    self.told[STEP] = row[_STEP_OF_ROW]
+                    break
+            raise
+        self._judged += 1
+
     def _do(self) -> None:
         """What the next row says."""
-        self._row = self._record.row(self._next)
+        self._row = self._record.row(self._place.next)
         self.told[STEP] = self._row[_STEP_OF_ROW]
-        self.told[ROW] = self._next
+        self.told[ROW] = self._place.next
         self.told[VALUE] = 0
-        self._next += 1
+        self._place.go_on(self._row)
         self._since_ms = time.ticks_ms()  # the row's begin
         op, number, value, _, _ = self._row
         if op == sequence.MOVE:
             self._move(number)
         elif op == sequence.OUTPUT:
             self._controller.outputs.set(number, value)
-        elif op == sequence.REPEAT:
-            self._count(value)
-            self._first[self._depth] = self._next
-            self._left[self._depth] = self._row[_AMOUNT]
-            self._depth += 1
-        elif op == sequence.END:
-            self._count(value)
-            self._again()
+        elif op in (sequence.REPEAT, sequence.END):
+            self.told[CYCLE] = (self.told[CYCLE] + value) & _MOST
         elif op == sequence.COUNT:
             self.told[VALUE] = self._command.count(number)
         self.told[RUN] = self._controller.run_number
         self.told[PASSED] = (self.told[PASSED] + 1) & _MOST
 
     def _move(self, number: int) -> None:
-        """Begin a motion. Its splines are checked once in a run of the sequence: neither its record, whose checksum is
-        compared each time, nor the arm can change meanwhile.
-        """
+        """Begin a motion."""
         name, crc = self._record.motion(number)
         engine = self._controller.engine
-        engine.judged = bool(self._judged[number])
+        engine.judged = True
         try:
             self._controller.begin_motion(name, crc, self._rate)
         finally:
             engine.judged = False
-        self._judged[number] = 1
-
-    def _count(self, passes: int) -> None:
-        self.told[CYCLE] = (self.told[CYCLE] + passes) & _MOST
-
-    def _again(self) -> None:
-        """The end of a repeat: from its first row again, or on."""
-        inner = self._depth - 1
-        left = self._left[inner] - 1
-        if left:  # below 0: for ever
-            self._next = self._first[inner]
-            self._left[inner] = max(left, 0)
-        else:
-            self._depth = inner
 
     def _is_over(self) -> bool:
         """Whether the row under way is done; a motion is, as nothing moves."""

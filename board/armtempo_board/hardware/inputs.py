@@ -32,8 +32,8 @@ class Inputs:
         flags = head["flags"]
         self._block = sampler.block
         self._port = stm.GPIOE
-        self._on = 1 if flags & armrecord.FLAG_ENABLE_HIGH else 0
-        self.enable_pin = Pin(pins.ENABLE, Pin.OUT_PP, value=1 - self._on)
+        self.on_level = 1 if flags & armrecord.FLAG_ENABLE_HIGH else 0
+        self.enable_pin = Pin(pins.ENABLE, Pin.OUT_PP, value=1 - self.on_level)
         self.releases = bool(flags & armrecord.FLAG_ESTOP_RELEASES)
         self._estop = None
         self._estop_line = pins.line(pins.ESTOP)
@@ -60,7 +60,7 @@ class Inputs:
         from armtempo_board.hardware import pins  # here, so that it can be forgotten
 
         bit = 1 << pins.line(pins.ENABLE)
-        return bit << 16 if self._on else bit  # the upper half of BSRR clears
+        return bit << 16 if self.on_level else bit  # the upper half of BSRR clears
 
     def _hook(self, name: str, level: int) -> Pin:
         mode = ExtInt.IRQ_RISING if level else ExtInt.IRQ_FALLING
@@ -167,7 +167,7 @@ class Inputs:
 
     def enable(self, on: bool) -> None:
         """Drivers on or off."""
-        self.enable_pin.value(self._on if on else 1 - self._on)
+        self.enable_pin.value(self.on_level if on else 1 - self.on_level)
 
     def close(self) -> None:
         """Remove the interrupts' callbacks; drivers off."""

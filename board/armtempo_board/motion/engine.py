@@ -61,37 +61,44 @@ class Engine(EngineParts):
 
     # before a motion
 
-    def load(self, motion: "MotionHead", rate: int = _PERMILLE) -> None:
+    def load(self, motion: "MotionHead", rate: int = _PERMILLE, ready: "Any" = None) -> None:
         """Check a motion and fill the rings; Refused where something is wrong.
 
-        ``rate``, in thousandths: how fast the motion's own time is to run.
+        ``rate``, in thousandths: how fast the motion's own time is to run. ``ready``: the
+        ``NextMotion`` that has it loaded already.
         """
         if self.moving:
             raise Refused(codes.BUSY)
-        self._inputs.thaw()  # before it looks: a switch that trips from here on is found now or freezes the motion
+        self.inputs.thaw()  # before it looks: a switch that trips from here on is found now or freezes the motion
         self._watch_idle()
         if self.fault:
             raise Refused(codes.FAULT_PENDING, self.fault_joint, self.fault)
-        override = self._override(rate, motion.brake_ticks, self._checked(motion))
+        override = ready.override if ready else self._override(rate, motion)
         self.rates.begin(override, motion)
-        self._inputs.enable(True)
-        self._clock.set(-LEAD_TICKS)
+        self.clock.set(-(ready.lead_ticks() if ready else LEAD_TICKS))
+        self.inputs.enable(True)
         self._sampler.plan(self.rates.duration_ticks)
         self._readings.begin(override)
-        for number, joint in enumerate(self._joints):
-            joint.load(motion, number)
-            if rate != _PERMILLE:
-                joint.follow(override.law, False)
+        for number, joint in enumerate(self.drives):
+            if ready:
+                ready.hand_over(number, joint)
+            else:
+                joint.load(motion, number)
+                if rate != _PERMILLE:
+                    joint.follow(override.law, False)
             self._prefill(joint)
-        self._inputs.watch(1)
+        self.inputs.watch(1)
+        if not ready:
+            gc.collect()
 
     def _checked(self, motion: "MotionHead") -> int:
         from armtempo_board.motion import start_check  # here, so that it can be forgotten
 
-        return start_check.check_start(motion, self._joints, None if self.judged else self.limits, self.known)
+        return start_check.check_start(motion, self.drives, None if self.judged else self.limits, self.known)
 
-    def _override(self, rate: int, brake_ticks: int, duration_ticks: int) -> "Any":
+    def _override(self, rate: int, motion: "MotionHead") -> "Any":
         """The law of the motion's time, with the code that only a motion needs."""
+        duration_ticks = self._checked(motion)
         heap.release()
         heap.forget()
         gc.collect()
@@ -100,7 +107,7 @@ class Engine(EngineParts):
         except MemoryError:  # what the first attempt left free lies otherwise
             gc.collect()
             override = self._new_override()
-        override.begin(rate, brake_ticks, duration_ticks)
+        override.begin(rate, motion.brake_ticks, duration_ticks)
         if override.end_ticks() > LONGEST_RUN_TICKS:
             raise Refused(codes.TOO_LONG)
         return override
@@ -111,16 +118,15 @@ class Engine(EngineParts):
         return Override()
 
     def _prefill(self, joint: JointDrive) -> None:
-        now_kiticks = self._clock.kiticks()
+        now_kiticks = self.clock.kiticks()
         for _ in range(_PREFILLS):
             joint.refill(now_kiticks)
 
     def start(self, homing: bool = False) -> None:
         """Let the counters run. ``homing``: a limit switch ends the motion without a fault."""
-        gc.collect()
         self._homing = homing
         self.moving = True
-        if not self._clock.start():
+        if not self.clock.start():
             self._fail(codes.START_FAILED, NO_JOINT)
 
     # while it moves
@@ -133,7 +139,7 @@ class Engine(EngineParts):
 
     def refill(self) -> None:
         """Keep the queues filled and nothing else: for between other work, as full ones last a few milliseconds."""
-        if self.moving and not self._block[isr.FROZEN]:
+        if self.moving and not self.block[isr.FROZEN]:
             self._in_service = True
             self._refill_queues()
             self._in_service = False
@@ -142,7 +148,7 @@ class Engine(EngineParts):
         if not self.moving:
             self._watch_idle()
             return
-        if self._block[isr.FROZEN]:
+        if self.block[isr.FROZEN]:
             self._stopped()
             return
         if not self._refill_queues():
@@ -151,25 +157,25 @@ class Engine(EngineParts):
             self._change_rate()
         self._background_task = self._background_task + 1 if self._background_task < _CHECK_INTERRUPT else 0
         if self._background_task == _POLL_SWITCHES:
-            self._inputs.poll()
+            self.inputs.poll()
         elif self._background_task == _CHECK_FOLLOWING:
             self._check_following()
         elif self._sampler.overdue(self._watched_joint):
-            self._block[isr.TURN_LATE] = 1
-        if self._block[isr.TURN_LATE]:
+            self.block[isr.TURN_LATE] = 1
+        if self.block[isr.TURN_LATE]:
             self._fail(codes.INTERNAL, NO_JOINT)
         elif self._has_ended():
             self._finish(self.rates.duration_ticks)
 
     def _refill_queues(self) -> bool:
         """Keep all queues filled; False where that ended the motion."""
-        now_kiticks = self._clock.kiticks()
+        now_kiticks = self.clock.kiticks()
         self._readings.convert()
         rates = self.rates
         if rates.end_moves and self._sampler.quiet():
             self._sampler.end_at(rates.duration_ticks)
             rates.end_moves = False
-        joints = self._joints
+        joints = self.drives
         for _ in range(_ROUNDS):
             can_queue_more = False
             for joint in joints:
@@ -181,13 +187,13 @@ class Engine(EngineParts):
                     can_queue_more = True
             if not can_queue_more:
                 break
-            now_kiticks = self._clock.kiticks()
+            now_kiticks = self.clock.kiticks()
         return True
 
     def _has_ended(self) -> bool:
         if not self._sampler.done():
             return False
-        for joint in self._joints:
+        for joint in self.drives:
             if not joint.ended:
                 if self.rates.duration_ticks == LONGEST_RUN_TICKS:  # it has stood still for too long
                     self.freeze()
@@ -197,8 +203,8 @@ class Engine(EngineParts):
     def _check_following(self) -> None:
         """Compare one joint with its encoder; the next joint comes with the next call."""
         number = self._watched_joint
-        self._watched_joint = (number + 1) % len(self._joints)
-        joint = self._joints[number]
+        self._watched_joint = (number + 1) % len(self.drives)
+        joint = self.drives[number]
         if not self._following[number].limit:
             return
         matches = joint.ring.matches()
@@ -212,7 +218,7 @@ class Engine(EngineParts):
 
     def freeze(self) -> None:
         """Stop all outputs now; not a fault."""
-        self._inputs.freeze()
+        self.inputs.freeze()
         if self._in_service:
             self._in_service = False
             self.known = 0
@@ -232,7 +238,7 @@ class Engine(EngineParts):
         if not rates.brake():
             self.freeze()
         elif rates.stands():
-            for joint in self._joints:
+            for joint in self.drives:
                 joint.finish()
         else:
             self._change_rate()
@@ -254,18 +260,18 @@ class Engine(EngineParts):
         if not rates.is_due():
             return
         self._readings.convert()  # by the law that they were taken under
-        law = rates.ramp(max([joint.ahead_kiticks() for joint in self._joints]))
+        law = rates.ramp(max([joint.ahead_kiticks() for joint in self.drives]))
         if law is None:
             return
-        for joint in self._joints:
+        for joint in self.drives:
             joint.follow(law, rates.braked)
             if not self._refill_queues():
                 break
 
     def _fail(self, code: int, joint: int) -> None:
-        self._inputs.freeze()
+        self.inputs.freeze()
         self._note_trip()
-        isr.set_fault(self._block, code, joint)
+        isr.set_fault(self.block, code, joint)
         self._stopped()
 
     # after it
@@ -273,41 +279,41 @@ class Engine(EngineParts):
     def _stopped(self) -> None:
         """The outputs were frozen: let pulses that have begun end, then count."""
         time.sleep_us(self._pulse_us)
-        self._clock.stop()
-        end_ticks = max(self._clock.ticks(), 0)
-        self._clock.kiticks()
+        self.clock.stop()
+        end_ticks = max(self.clock.ticks(), 0)
+        self.clock.kiticks()
         self._readings.convert()
-        for joint in self._joints:
+        for joint in self.drives:
             joint.settle()
         self._sampler.take_now()
         self._readings.convert()
-        if self._block[isr.TURN_LATE]:
+        if self.block[isr.TURN_LATE]:
             self.known = 0
-        self._inputs.watch(0)  # a switch that bounces is noted once
+        self.inputs.watch(0)  # a switch that bounces is noted once
         self._note_trip()
-        if self._block[isr.FAULT] == codes.LIMIT_SWITCH and self._homing:
-            self._block[isr.FAULT] = 0
-        if self._block[isr.FAULT]:
+        if self.block[isr.FAULT] == codes.LIMIT_SWITCH and self._homing:
+            self.block[isr.FAULT] = 0
+        if self.block[isr.FAULT]:
             self._take_fault()
         self._finish(end_ticks)
 
     def _finish(self, end_ticks: int) -> None:
-        self._clock.stop()
+        self.clock.stop()
         self._readings.end(end_ticks)
         self.rates.override = None
-        for joint in self._joints:
+        for joint in self.drives:
             joint.empty()
             joint.generator.close()
-        self._inputs.watch(0)
+        self.inputs.watch(0)
         self.moving = False
 
     def close(self) -> None:
         """Release the hardware, the workspace and the motion's file; the engine is not used after it."""
         self.freeze()
-        for joint in self._joints:
+        for joint in self.drives:
             joint.close()
-        self._feeder.disconnect()
-        self._inputs.close()
+        self.feeder.disconnect()
+        self.inputs.close()
 
     # what it knows
 

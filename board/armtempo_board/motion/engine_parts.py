@@ -30,30 +30,30 @@ class EngineParts:
 
         from armtempo_board.hardware import registers
 
-        self._feeder = workspace.feeder
+        self.feeder = workspace.feeder
 
         rows = [row for row in joints if row["encoder"] != armrecord.NONE]
         fitted = [EncoderInput(row["encoder"], row["encoder_inverted"]) for row in rows]
         self._sampler = workspace.sampler
         self._sampler.configure(len(joints), tuple([encoder.address for encoder in fitted]))
-        self._block = self._sampler.block
+        self.block = self._sampler.block
         self._sampler.connect()
         registers.apply(registers.CLOCKS)
         registers.apply(registers.TIMERS)
         rings = workspace.rings([row["max_rate"] for row in joints])
         heap.forget("room", "engine_memory")
         arm = head, joints
-        self._joints = [
+        self.drives = [
             JointDrive(n, arm, self._sampler, ring, workspace.memory) for n, ring in enumerate(rings)
         ]
         self._encoders = [fitted[rows.index(row)] if row in rows else NoEncoder() for row in joints]
         slots = [isr.RAW_ENCODERS + rows.index(row) if row in rows else 0 for row in joints]
-        self._clock = MotionClock()
-        self.rates = RateControl(self._clock)
-        self._readings = Readings(self._sampler, self._clock, self._joints, self._encoders, slots)
+        self.clock = MotionClock()
+        self.rates = RateControl(self.clock)
+        self._readings = Readings(self._sampler, self.clock, self.drives, self._encoders, slots)
         self._following = [FollowingError(row) for row in joints]
-        self._inputs = Inputs(head, joints, self._sampler)
-        self._feeder.connect(self._inputs, self._joints)
+        self.inputs = Inputs(head, joints, self._sampler)
+        self.feeder.connect(self.inputs, self.drives)
         registers.apply(registers.PRIORITIES)
         self.limits = [{name: row[name] for name in _LIMITS} for row in joints]
         self._pulse_us = head["pulse_ticks"] // _TICKS_PER_US + _PULSE_SPARE_US
@@ -64,7 +64,7 @@ class EngineParts:
 
     def home(self, mask: int, steps: "list[int]") -> None:
         """The joints of ``mask`` stand at ``steps`` (one number for every joint)."""
-        for number, joint in enumerate(self._joints):
+        for number, joint in enumerate(self.drives):
             if mask >> number & 1:
                 joint.declare(steps[number])
                 self._encoders[number].declare(self._following[number].expected(steps[number]))
@@ -72,15 +72,15 @@ class EngineParts:
 
     def drivers(self, on: int) -> None:
         """The drivers on, or off: then the arm can be moved by hand, and only its encoders know where to."""
-        self._inputs.enable(on != 0)
+        self.inputs.enable(on != 0)
         if not on:
             self.known = 0
 
     def clear(self) -> bool:
         """Clear the fault, unless its cause is still there; True where it is cleared."""
-        if self.moving or self._inputs.estop_active():
+        if self.moving or self.inputs.estop_active():
             return False
-        self._block[isr.FAULT] = 0
+        self.block[isr.FAULT] = 0
         self.fault = 0
         self.fault_joint = NO_JOINT
         return True
@@ -89,17 +89,17 @@ class EngineParts:
         """While nothing moves: follow the encoders, and look at the E-stop."""
         for encoder in self._encoders:
             encoder.update()
-        if self._inputs.estop_active():
-            self._inputs.trip_estop()
+        if self.inputs.estop_active():
+            self.inputs.trip_estop()
         self._note_trip()
-        if self._block[isr.FAULT] and not self.fault:
+        if self.block[isr.FAULT] and not self.fault:
             self._take_fault()
 
     def _note_trip(self) -> None:
         """A switch may have tripped: know of it, and that an E-stop released the drivers."""
-        if self._inputs.note_trip() and self._inputs.releases:
+        if self.inputs.note_trip() and self.inputs.releases:
             self.known = 0
 
     def _take_fault(self) -> None:
-        self.fault = self._block[isr.FAULT]
-        self.fault_joint = self._block[isr.FAULT_JOINT]
+        self.fault = self.block[isr.FAULT]
+        self.fault_joint = self.block[isr.FAULT_JOINT]

@@ -84,13 +84,16 @@ class JointDrive:
 
     def load(self, motion: "MotionHead", number: int) -> None:
         """Stand before a motion; the clock stands before 0."""
-        position = self._base
-        self.generator.load(motion, number, position, self._sampler.block[isr.PULSE_TICKS], self.gap_ticks)
+        self.generator.load(motion, number, self._base, self._sampler.block[isr.PULSE_TICKS], self.gap_ticks)
+        self.stand()
+
+    def stand(self) -> None:
+        """Before the motion that the generator has loaded."""
         self._direction = self.generator.direction
         self._dir.value((self._direction > 0) ^ self._inverted)
         self.ring.release()  # a motion may have been loaded and never started
         self.ring.stop()
-        self._count_from(position)
+        self._count_from(self._base)
         self.ended = False
         self._next_refill_kiticks = -LOOKAHEAD_KITICKS  # nothing is to be done before
 

@@ -79,16 +79,22 @@ class RingFeeder:
         """Feed the joints' rings; ``inputs`` freezes all where one was written too late."""
         self.inputs = inputs
         self._parts.clear()
-        at = 0
-        for joint in joints:
-            for part in (joint.ring.words, joint.generator.queue):
-                self._parts.append(part)
-                address = uctypes.addressof(part)
-                self._places[at] = address & 0x3FFFFFFF
-                self._places[at + 1] = address >> 30
-                at += 2
+        for number, joint in enumerate(joints):
+            self._parts += (None, None)
+            self._put(_PARTS * number + _WORDS, joint.ring.words)
+            self.take_queue(number, joint.generator.queue)
         Timer(6, prescaler=0, period=_PERIOD_TICKS - 1, callback=self._hook)  # type: ignore[arg-type]
         mem32[stm.TIM6] = 0
+
+    def take_queue(self, joint: int, queue: "array[int]") -> None:
+        """A joint's steps come from this queue; nothing moves."""
+        self._put(_PARTS * joint + _QUEUE, queue)
+
+    def _put(self, at: int, part: "Any") -> None:
+        self._parts[at] = part
+        address = uctypes.addressof(part)
+        self._places[2 * at] = address & 0x3FFFFFFF
+        self._places[2 * at + 1] = address >> 30
 
     def disconnect(self) -> None:
         """Hold no ring; none is fed any more."""

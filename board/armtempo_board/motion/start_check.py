@@ -22,15 +22,16 @@ def check_start(
     ``limits`` as the engine has them, None for a motion whose splines were checked before; ``known``: bit a joint.
     """
     if limits is not None:
-        _check_splines(motion, joints[_ANY_JOINT], limits)
+        check_splines(motion, joints, limits)
     heap.forget()
     return _check_begin(motion, joints, known)
 
 
-def _check_splines(motion: "MotionHead", joint: "JointDrive", limits: "list[dict[str, int]]") -> None:
-    """``joint``: any, as the gap is the same for all; it walks through the motion."""
+def check_splines(motion: "MotionHead", joints: "list[JointDrive]", limits: "list[dict[str, int]]") -> None:
+    """The motion as such; Refused."""
     from armtempo_board.motion import motion_check  # here, so that it can be forgotten
 
+    joint = joints[_ANY_JOINT]  # as the gap is the same for all; it walks through the motion
     motion_check.check(motion, limits, joint.gap_ticks, joint.generator.subintervals)
 
 

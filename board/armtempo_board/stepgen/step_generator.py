@@ -101,6 +101,14 @@ class StepGenerator:
     def load(
         self, motion: "MotionHead", joint: int, position_steps: int, pulse_ticks: int, gap_ticks: int
     ) -> None:
+        """Stand at the first step of a motion; as ``begin``."""
+        self.begin(motion, joint, position_steps, pulse_ticks, gap_ticks)
+        while self.seek():
+            pass
+
+    def begin(
+        self, motion: "MotionHead", joint: int, position_steps: int, pulse_ticks: int, gap_ticks: int
+    ) -> None:
         """Stand at the start of a motion with the joint at ``position_steps``.
 
         ``pulse_ticks``: STEP high time; ``gap_ticks``: least time between steps in opposite directions. Two that
@@ -125,10 +133,15 @@ class StepGenerator:
         self.at_turn = self.ended = self.halted = self._is_last_law = False
         self._held = self._first_waits = self._held_queued = False
         self._found = _NOT_YET
-        while not holds_steps(queue) and not self.ended:
-            if self.at_turn:
-                self.turn()
-            self.prepare(0)
+
+    def seek(self) -> bool:
+        """Go on from the start towards the first step, for a limited time; False where it waits, or there is none."""
+        if self.ended or self.waits():
+            return False
+        if self.at_turn:
+            self.turn()
+        self.prepare(0)
+        return True
 
     def close(self) -> None:
         """The motion is read no further; what only a motion needs is let go."""

@@ -40,8 +40,6 @@ _TOGETHER = {
     f"{PACKAGES[0]}.app.output_commands": [
         f"{PACKAGES[0]}.hardware.{name}" for name in ("outputs", "digital_inputs")
     ],
-    f"{PACKAGES[0]}.app.sequencer": [f"{PACKAGES[0]}.app.sequence_command"],
-    f"{PACKAGES[0]}.app.sequence_start": [f"{PACKAGES[1]}.sequence_check"],
     f"{PACKAGES[0]}.app.room": [f"{PACKAGES[1]}.engine_memory", f"{PACKAGES[0]}.hardware.backup_sram"],
     f"{PACKAGES[0]}.app.command_rows": [f"{PACKAGES[0]}.app.store_commands"],
     f"{PACKAGES[1]}.table": [f"{PACKAGES[1]}.program_hash"],
@@ -49,6 +47,11 @@ _TOGETHER = {
     f"{PACKAGES[0]}.storage.motion_file": [f"{PACKAGES[1]}.motion"],
 }
 """Modules that are imported later, with those that come and go with them: each costs memory for names and a table."""
+_IN_FIRMWARE = (
+    f"{_MOTION}.next_motion",
+    *(f"{PACKAGES[0]}.app.sequence{name}" for name in ("_ahead", "_command", "_start", "r")),
+)
+"""Modules that compiled files are without, as there is no heap beside those for sequences (board/docs/memory.md)."""
 _AT_REST = {
     "start_up": (
         "app.arm_state.ArmState.__init__",
@@ -168,7 +171,11 @@ def compact_program(hash_module: str = "") -> Compact:
     ``hash_module``: source in the place of the module that takes the program's hash from its files.
     """
     files = {path[:-3].removesuffix("/__init__").replace("/", "."): file for path, file in modules().items()}
-    sources = {module: file.read_text(encoding="utf-8") for module, file in files.items()}
+    sources = {
+        module: file.read_text(encoding="utf-8")
+        for module, file in files.items()
+        if module not in _IN_FIRMWARE
+    }
     if hash_module:
         sources[f"{PACKAGES[1]}.program_hash"] = hash_module
     board = package_folder(PACKAGES[0])

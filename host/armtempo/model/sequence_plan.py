@@ -21,9 +21,9 @@ from armtempo.splines.trajectory import Trajectory
 
 FORMAT = "armtempo sequence"
 VERSION = 2
-PAUSE_S = 0.07
-"""About that from the end of a motion to the beginning of the next, on a board with the program in its firmware, once
-each motion was checked: host/docs/sequences.md."""
+PAUSE_S = 0.015
+"""About that from the end of a motion to the beginning of the next, on a board with the program in its firmware, which
+prepares it meanwhile: host/docs/sequences.md."""
 _AGAIN = "plan it again"
 _RULE = "a sequence's plan is replaced by one of a sequence of the same name"
 

@@ -15,6 +15,7 @@ Ticks are of 84 MHz, since the last reset.
 
 from __future__ import annotations
 
+import bisect
 import struct
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -66,12 +67,20 @@ class PowerCycle:
             )
         number %= len(self.starts)
         zero = self.starts[number]
-        end = self.starts[number + 1] if number + 1 < len(self.starts) else np.iinfo(np.int64).max
+        begin = self._before(zero)
+        end = (
+            self._before(self.starts[number + 1]) if number + 1 < len(self.starts) else np.iinfo(np.int64).max
+        )
         cut = {}
         for pin, (ticks, levels) in self.pins.items():
-            inside = (ticks >= zero - _LEAD_TICKS) & (ticks < end - _LEAD_TICKS)
+            inside = (ticks >= begin) & (ticks < end)
             cut[pin] = (ticks[inside] - zero, levels[inside])
         return cut
+
+    def _before(self, zero: int) -> int:
+        """Tick from which on edges belong to the motion of this time 0: the clock was stopped behind the one before."""
+        stopped = bisect.bisect_left(self.ends, zero)
+        return max([zero - _LEAD_TICKS, *self.ends[max(stopped - 1, 0) : stopped]])
 
 
 _LEAD_TICKS = 8_400_000

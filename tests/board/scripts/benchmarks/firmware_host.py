@@ -18,7 +18,7 @@ _BEYOND = const(0x20020000)  # 60 KB of the emulator's that the chip has not
 _BLOCKS = const(120)
 _BLOCK = const(512)
 _UART = const(3)
-_LONG_MS = const(10)  # no turn of the loop while something moves takes as long
+_STARTS = const(6)  # word of the state
 
 
 class Blocks:
@@ -47,7 +47,8 @@ class Port:
 
     def __init__(self):
         self._stage = -1
-        self._left_ms = 0
+        self._left_ms = self._longest_ms = 0
+        self._starts = 0
 
     def init(self, flow):
         """Flow control does not matter here."""
@@ -73,8 +74,11 @@ class Port:
         """Tell of the heap when the program has started, when a motion begins, and when it has ended."""
         moves = loop.moving()
         spent_ms = time.ticks_diff(time.ticks_ms(), self._left_ms)
-        if moves and spent_ms >= _LONG_MS:  # a motion has begun
+        if loop.state[_STARTS] != self._starts:
+            self._starts = loop.state[_STARTS]
             print("@ start", spent_ms)
+        elif moves:
+            self._longest_ms = max(self._longest_ms, spent_ms)
         if not moves:
             loop.hold_clock()
         if self._stage < 0:
@@ -82,6 +86,8 @@ class Port:
         elif moves and self._stage == 0:
             self._tell("running")
         elif not moves and self._stage == 1:
+            print("@ longest", self._longest_ms)
+            self._longest_ms = 0
             self._tell("ended")
             self._stage = 0
 

@@ -31,7 +31,8 @@ _BACKUP_SRAM = const(0x2002F000)  # memory of the emulator's that the chip has n
 dma = array("I", bytes(4 * 64))
 unmoved = array("I", bytes(4 * 24))  # the encoders' timers
 # 0: the clock; 1: entries of the log; 2: the turn's begin; 3, 4: bytes allocated since the last collection, and
-# where the firmware keeps them; 5: whether the clock stands; from 8 on the log: what, and when
+# where the firmware keeps them; 5: whether the clock stands; 6: starts of the counters; from 8 on the log: what, and
+# when
 state = array("I", bytes(4 * (8 + 2 * _LOGGED)))
 interrupts = []
 feeds = []
@@ -299,6 +300,7 @@ def start_clock(us):
     The next start is as this one only where the settings say ``again``, which costs the program a little time.
     """
     mem32[stm.TIM2 + _PSC] = mem32[stm.TIM5 + _PSC] = here["prescaler"]
+    state[6] += 1
     if not here.get("again"):
         here["engine"].time = time
     mem32[here["at_compare"]] = id(interrupt)

@@ -150,16 +150,121 @@ def case_a_motion_is_checked_once_in_a_run():
         for at in (10, 0, 10, 0):
             arrive(app, host, at)
             assert not engine.judged
-        assert [call for call in engine.calls if call.startswith("load")] == ["load"] * 2 + [
-            "load judged"
-        ] * 2
+        checks = [call for call in engine.calls if call == "check" or call.startswith("load")]
+        assert checks == ["check"] * 3 + ["load judged"] + ["load ready"] * 3, checks
     start(host)
     assert engine.calls[-2:] == ["load", "start"]
+
+
+def loads(app):
+    """How each motion was loaded."""
+    return [call[len("load ") :] for call in app.controller.engine.calls if call.startswith("load")]
+
+
+def case_what_comes_next_is_prepared_over_rows_between():
+    """Repeats that end and begin, outputs, counts and waits, none of which is done before its time."""
+    rows = [
+        (REPEAT, 0, 0, 2),
+        (MOVE, "there", 0, 0),
+        (END, 0, 0, 0),
+        (OUTPUT, 0, 5, 0),
+        (COUNT, 0, 0, 0),
+        (REPEAT, 0, 0, 2),
+        (WAIT, 0, 0, 500),
+        (END, 0, 0, 0),
+        (MOVE, "on", 0, 0),
+        (OUTPUT, 0, 6, 0),
+    ]
+    app, host = ready(rows, {"there": leg(0, 0), "on": leg(0, 3)}, counters=("many",))
+    engine, log = app.controller.engine, app.controller.outputs.log
+    assert begin(host)[0] == "ok"
+    arrive(app, host, 0)
+    host.turn(30)
+    assert engine.calls.count("prepare") == 2 and log == [] and counters_of(host) == {"many": 0}
+    arrive(app, host, 0)
+    assert not engine.moving and log == [(0, 5)] and counters_of(host) == {"many": 1}
+    for _ in range(2):
+        stand_in.Clock.now_ms += 500
+        host.turn(5)
+    assert loads(app) == ["judged", "ready", "ready"]
+    host.turn(30)
+    assert engine.calls.count("prepare") == 2, "nothing comes"
+    arrive(app, host, 3)
+    assert stands(host)[0] == "finished" and log == [(0, 5), (0, 6)]
+
+
+def case_without_room_nothing_is_prepared():
+    """Not when the sequence begins; or a motion is given up in the midst, and those behind it."""
+    for late in (False, True):
+        app, host = ready([(REPEAT, 0, 0, 2), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 1, 0)])
+        engine = app.controller.engine
+        engine.no_memory = not late
+        engine.has_time = False
+        begin(host)
+        engine.no_memory = engine.has_time = True
+        host.turn(20)
+        for at in (10, 0, 10, 0):
+            arrive(app, host, at)
+        assert stands(host)[0] == "finished" and loads(app) == ["judged"] * 4
+        assert engine.calls.count("prepare") == late
+        assert engine.calls.count("give back") == late
+
+
+def case_where_the_arm_stands_elsewhere_what_is_prepared_is_given_up():
+    app, host = ready([(REPEAT, 0, 0, 2), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 1, 0)])
+    engine = app.controller.engine
+    begin(host)
+    host.turn(20)
+    assert engine.calls.count("prepare") == 1
+    arrive(app, host, 9)
+    assert loads(app) == ["judged", "judged"]
+    arrive(app, host, 0)
+    arrive(app, host, 9)
+    assert loads(app) == ["judged", "judged", "ready", "ready"], "it ends there each time"
+
+
+def case_without_time_it_is_prepared_between_two():
+    """And while it waits."""
+    app, host = ready([(MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (WAIT, 0, 0, 500), (MOVE, "there", 0, 0)])
+    engine = app.controller.engine
+    engine.has_time = False
+    begin(host)
+    assert "prepare" not in engine.calls
+    arrive(app, host, 10)
+    assert loads(app) == ["judged", "ready"]
+    host.ask("speed", (500,))
+    arrive(app, host, 0)
+    host.turn(20)
+    assert engine.calls.count("prepare") == 2 and not engine.moving
+    stand_in.Clock.now_ms += 500
+    host.turn(5)
+    assert loads(app) == ["judged", "ready", "ready"]
+
+
+def case_behind_a_stop_nothing_is_prepared():
+    app, host = ready([(MOVE, "there", 0, 0), (MOVE, "back", 0, 0)])
+    app.controller.engine.has_time = False
+    begin(host)
+    host.ask("stop", (0,))
+    app.controller.engine.has_time = True
+    host.turn(20)
+    assert "prepare" not in app.controller.engine.calls
+    arrive(app, host, 4)
+    assert stands(host)[0] == "stopped" and runs(app) == 1
+
+
+def case_a_motion_that_is_unfit_is_refused_before_anything_moves():
+    app, host = ready([(OUTPUT, 0, 7, 0), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0)])
+    app.controller.engine.unfit = (codes.TOO_FAST, 1, 5)
+    begin(host)
+    assert stands(host) == ("refused", codes.TOO_FAST, 3, 2, 0), stands(host)
+    assert runs(app) == 0 and app.controller.outputs.log == [] and state(host) == "idle"
 
 
 def case_a_record_that_is_another_now_is_refused_though_it_was_checked():
     app, host = ready([(REPEAT, 0, 0, 2), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 1, 0)])
     begin(host)
+    app.controller.engine.has_time = False
     arrive(app, host, 10)
     with open(flash() + "/there.atm", "r+b") as file:
         file.seek(100)
@@ -334,6 +439,7 @@ def case_speed_holds_for_the_motions_that_follow():
     host.hello(7)
     arrive(app, host, 10)
     assert app.controller.engine.rates.wanted == 300
+    assert app.controller.engine.calls.count("load ready") == 1
     arrive(app, host, 0)
     begin(host)
     assert app.controller.engine.rates.wanted == 1000
@@ -355,7 +461,7 @@ def case_the_button_starts_it_as_the_default():
     app, host = ready([(MOVE, "there", 0, 0), (MOVE, "back", 0, 0)])
     assert host.ask("set_default", (), "seq")[0] == "ok"
     app.controller.begin(app.controller.store().default(), 0)
-    host.turn(3)
+    host.turn(6)
     arrive(app, host, 10)
     arrive(app, host, 0)
     assert stands(host)[0] == "finished"

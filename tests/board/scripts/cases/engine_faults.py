@@ -214,7 +214,7 @@ def with_slow_emit(motion, moment):
     def slow_emit(*arguments):
         emit(*arguments)
         for rig in slow:
-            if arguments[1] is rig.engine._joints[0].ring.words:
+            if arguments[1] is rig.engine.drives[0].ring.words:
                 rig.board.stand_still(84 * 30_000)
 
     ring_feeder.emit = slow_emit

@@ -94,14 +94,14 @@ def run(joints, brake_at):
     engine.home(7, [0, 0, 0])
     motion = record(BRAKE_TICKS)
     engine.load(motion)
-    streams = [Streams(joint.ring) for joint in engine._joints]
+    streams = [Streams(joint.ring) for joint in engine.drives]
     now = stm.BLOCKS["TIM2"][isr.CNT] - (1 << 32)
     engine.moving = True
     samples = 0
     while engine.moving:
         now += STEP_TICKS
         move_to(now, streams)
-        if engine._block[isr.SAMPLES_DONE] or (brake_at and now > brake_at):
+        if engine.block[isr.SAMPLES_DONE] or (brake_at and now > brake_at):
             engine.brake() if brake_at else engine.service()
             brake_at = 0
         else:

@@ -373,7 +373,7 @@ def case_interrupts_wait_while_a_channel_is_armed_or_released():
             return watched(found) if name in ("arm_channel", "release_channel") else found
 
     rig = Rig(arm(1))
-    each = rig.engine._joints[0].ring
+    each = rig.engine.drives[0].ring
     ring.isr = Watched()
     try:
         each.run(words(step_queue.QUEUE_SIZE))

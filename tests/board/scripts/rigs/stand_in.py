@@ -97,6 +97,10 @@ def install():
     ends = Module()
     ends.duration_ticks = lambda motion: 84000
     ends.start_offset = lambda motion, joint, position: 7 - position
+    checks = Module()
+    checks.check_splines = lambda motion, engine, limits: engine.check_splines()
+    ahead = Module()
+    ahead.NextMotion = NextMotion
     from armtempo_board import heap
 
     heap.forget = lambda *names: None  # what stands in for a module stays
@@ -105,6 +109,8 @@ def install():
     sys.modules["armtempo_board.motion.engine"] = engine
     sys.modules["armtempo_board.app.room"] = room
     sys.modules["armtempo_board.motion.endpoints"] = ends
+    sys.modules["armtempo_board.motion.start_check"] = checks
+    sys.modules["armtempo_board.motion.next_motion"] = ahead
     sys.modules["time"] = _install_time()
     if not hasattr(sys, "print_exception"):
         sys.print_exception = lambda error, file: file.write(repr(error))
@@ -125,6 +131,46 @@ class Rates:
     wanted = 1000
 
 
+class NextMotion:
+    """Is ready after three pieces of work, while the engine has time for them."""
+
+    def __init__(self, engine):
+        if engine.no_memory:
+            raise MemoryError
+        self.engine = engine
+        self.expected = [0] * engine.joints
+        self.close()
+
+    def close(self):
+        self.is_ready = False
+        self.motion = None
+
+    def pieces(self, rate, opened, stands_at):
+        self.close()
+        self.engine.calls.append("prepare")
+        yield 1
+        motion = opened()
+        for joint in range(self.engine.joints):
+            yield 1
+            self.expected[joint] = stands_at(motion, joint)
+        if self.engine.no_memory:
+            raise MemoryError
+        self.motion = motion
+        self.rate = rate
+        self.is_ready = True
+
+    def give_back(self):
+        assert not self.engine.moving
+        self.close()
+        self.engine.calls.append("give back")
+
+    def has_time(self):
+        return self.engine.has_time
+
+    def starts_from_here(self):
+        return self.is_ready and self.expected == self.engine.steps
+
+
 class Engine:
     """Moves when told, ends when told; remembers what was asked of it."""
 
@@ -143,9 +189,22 @@ class Engine:
         self.rates = Rates()
         self.ticks = 0
         self.judged = False
+        self.drives = self
+        self.unfit = None
+        self.has_time = True
+        self.no_memory = False
 
-    def load(self, motion, rate=1000):
-        self.calls.append("load judged" if self.judged else "load")
+    def check_splines(self):
+        self.calls.append("check")
+        if self.unfit:
+            from armtempo_board.errors import Refused
+
+            raise Refused(*self.unfit)
+
+    def load(self, motion, rate=1000, ready=None):
+        if ready:
+            assert ready.is_ready and ready.motion is motion and ready.rate == rate
+        self.calls.append("load ready" if ready else "load judged" if self.judged else "load")
         self.rates.wanted = rate
         if self.refusal:
             from armtempo_board.errors import Refused

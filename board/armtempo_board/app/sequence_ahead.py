@@ -1,0 +1,174 @@
+"""A sequence that prepares its next motion while one moves, so that it begins as soon as that has ended.
+
+Only where the heap has room for it, which is decided when the sequence begins; else the next motion is opened and
+loaded between the two. Not among the compiled files that ``armtempo deploy`` makes: beside them there is no room for
+sequences.
+"""
+
+import gc
+from array import array
+
+from armtempo_shared import sequence
+from armtempo_shared.limits import MOST_STEPS
+from armtempo_shared.motion import MotionError
+from micropython import const
+
+from armtempo_board.app.run_start import checked
+from armtempo_board.app.sequencer import Place, Sequencer
+from armtempo_board.errors import Refused
+from armtempo_board.motion import endpoints
+from armtempo_board.motion.next_motion import NextMotion
+from armtempo_board.storage import store
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Generator, Iterator
+    from typing import Any
+
+    from armtempo_shared.motion import MotionHead
+
+    from armtempo_board.storage.motion_file import MotionFile
+
+_OP, _NUMBER = const(0), const(1)  # of a row
+_NONE = const(-1)
+_BESIDE_BYTES = const(16_500)
+"""Of heap: 5 700 for what else the motions need, the rest for what is left behind between two collections."""
+
+
+class AheadSequencer(Sequencer):
+    """See ``Sequencer`` for its arguments."""
+
+    _ahead: "NextMotion | None" = None  # None: the heap has no room
+    _is_full = False  # it had, and has none any more
+    _work: "Iterator[None] | None" = None  # what is left to do for the next motion
+    _coming = _moved = _NONE  # the motion that is prepared, and the one that was begun last
+    _at_rate = 0  # it is prepared for
+
+    def begin(self) -> None:
+        """As of a ``Sequencer``; here it is decided whether motions are prepared."""
+        from armtempo_shared.engine_memory import ahead_bytes  # here, so that it can be forgotten
+
+        super().begin()
+        controller = self._controller
+        joints = controller.joints
+        gc.collect()
+        if hasattr(gc, "mem_free") and gc.mem_free() < _BESIDE_BYTES + ahead_bytes(joints):
+            return
+        try:
+            ends = array("i", [MOST_STEPS] * (self._record.motions * joints))
+            self._ahead = NextMotion(controller.engine)
+            self._ends = ends  # where each motion was seen to end, steps; MOST_STEPS: not yet
+        except MemoryError:  # it is not in one piece
+            self._ahead = None
+
+    def prepare(self) -> None:
+        """Called while a motion moves: go on with the next one, as far as there is time."""
+        self._keep_up()
+        if self._work and self._ahead and not self.stopping and self._ahead.has_time():
+            self._piece()
+            self._controller.engine.refill()
+
+    def go_on(self) -> None:
+        """See ``Sequencer``; in a wait there is time, too."""
+        super().go_on()
+        self._keep_up()
+        if self._work and not self._controller.engine.moving:
+            self._piece()
+
+    def _piece(self) -> None:
+        """A piece of the work. What is refused is given up, and looked at again between the motions."""
+        work: "Any" = self._work
+        try:
+            next(work)
+        except StopIteration:
+            self._work = None
+        except (Refused, MotionError, OSError):
+            self._drop()
+        except MemoryError:
+            self._drop()
+            self._is_full = True
+
+    def _keep_up(self, number: int = _NONE) -> None:
+        """The rate may have been changed; ``number`` as in ``_plan``."""
+        if self._moved != _NONE and self._at_rate != self._rate:
+            self._plan(number)
+
+    def _plan(self, number: int = _NONE) -> None:
+        """Prepare the motion ``number``; _NONE: the one that comes next from here."""
+        place = Place()
+        place.copy(self._place)  # now: the work may begin when it has gone on
+        self._coming = _NONE
+        self._at_rate = self._rate
+        self._work = self._pieces(place, number) if self._ahead and not self._is_full else None
+
+    def _drop(self) -> None:
+        """What was prepared is not meant any more."""
+        self._work = None
+        self._coming = _NONE
+        if self._ahead:
+            self._ahead.close()
+
+    def _pieces(self, place: Place, number: int) -> "Iterator[None]":
+        """See ``NextMotion.pieces``; the others as in ``_plan``."""
+        if number == _NONE:
+            number = yield from self._search(place)
+        if number != _NONE and self._ahead:
+            yield from self._ahead.pieces(self._rate, lambda: self._open(number), self._stands_at)
+            self._coming = number
+
+    def _search(self, place: Place) -> "Generator[None, None, int]":
+        """The motion that comes next, without anything being done on the way; _NONE: none, or too far away."""
+        record = self._record
+        for _ in range(sequence.MAX_ROWS):
+            yield
+            if place.next == record.rows:
+                break
+            row = record.row(place.next)
+            if row[_OP] == sequence.MOVE:
+                return row[_NUMBER]
+            place.go_on(row)
+        return _NONE
+
+    def _open(self, number: int) -> "MotionFile":
+        controller: "Any" = self._controller
+        name, crc = self._record.motion(number)
+        return checked(controller, store.Store(controller.root, recover=False).motion(name), crc)
+
+    def _stands_at(self, motion: "MotionHead", joint: int) -> int:
+        """Where a joint will stand before it, in steps."""
+        engine = self._controller.engine
+        if not engine.moving:
+            return int(engine.commanded(joint))
+        end = self._ends[self._moved * self._controller.joints + joint]
+        return endpoints.start_offset(motion, joint, 0) if end == MOST_STEPS else end
+
+    def _move(self, number: int) -> None:
+        """Begin a motion: the one that is prepared, where that is what is wanted."""
+        self._note_end()
+        self._keep_up(number)
+        while self._work:  # nothing moves now
+            self._piece()
+        self._moved = number
+        if self._ahead and self._coming == number and self._ahead.starts_from_here():
+            motion = self._ahead.motion
+            self._controller.engine.load(motion, self._rate, self._ahead)
+            self._controller.start_loaded(motion, 0)
+            self._drop()
+        else:
+            self._drop()
+            super()._move(number)
+        self._plan()
+
+    def _note_end(self) -> None:
+        """Where the motion before ended: a posture between two steps leads to either."""
+        if self._moved != _NONE and self._ahead:
+            joints = self._controller.joints
+            for joint in range(joints):
+                self._ends[self._moved * joints + joint] = self._controller.engine.commanded(joint)
+
+    def _end(self, ending: int, code: int = 0) -> None:
+        self._drop()
+        if self._ahead:
+            self._ahead.give_back()
+            self._ahead = None
+        super()._end(ending, code)

@@ -1,0 +1,161 @@
+"""The motion that comes next, brought as far as its first steps while another one moves.
+
+It has step generators of its own. Neither what moves nor pins, rings and clock are touched before ``hand_over``, when
+nothing moves. Imported for sequences, where the heap has room for it (``armtempo_shared.engine_memory.ahead_bytes``).
+"""
+
+import gc
+from array import array
+
+from armtempo_shared import codes
+from armtempo_shared.limits import LONGEST_RUN_TICKS, MAX_STEP_RATE_SUM
+from micropython import const
+
+from armtempo_board.errors import Refused
+from armtempo_board.hardware import isr
+from armtempo_board.memory import Memory
+from armtempo_board.motion import endpoints
+from armtempo_board.motion.engine import LEAD_TICKS
+from armtempo_board.motion.joint_drive import LOOKAHEAD_KITICKS
+from armtempo_board.stepgen.override import Override
+from armtempo_board.stepgen.step_generator import StepGenerator
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from typing import Any
+
+    from armtempo_shared.motion import MotionHead
+
+    from armtempo_board.motion.engine import Engine
+    from armtempo_board.motion.joint_drive import JointDrive
+
+_RESERVE_KITICKS = const(3277)
+"""40 ms, in Ki ticks (1024 ticks). Pieces of the work take 1 to 2 ms at 1.3 cycles an instruction, a collection of the
+heap 5, the checksum of the largest motion 10. What moves may need the loop for itself from then on, and all that
+can be queued before."""
+_FAST_PART = const(4)
+"""A motion of an arm that may be faster than this part of the highest rates needs the loop until its last step is
+queued."""
+_LEAD_TICKS = const(168000)  # 2 ms
+_PERMILLE = const(1000)
+
+
+class NextMotion:
+    """Of an engine. ``is_ready``: the motion is loaded, to start where ``expected`` says.
+
+    MemoryError where the heap has no room.
+    """
+
+    def __init__(self, engine: "Engine") -> None:
+        from armtempo_shared.engine_memory import GENERATOR_WORDS  # here, so that it can be forgotten
+
+        self._engine = engine
+        joints = len(engine.drives)
+        memory = Memory([GENERATOR_WORDS] * joints)
+        self._generators = [StepGenerator(memory) for _ in range(joints)]
+        self._is_fast = sum([row["max_rate"] for row in engine.limits]) > MAX_STEP_RATE_SUM // _FAST_PART
+        self._own = [joint.generator for joint in engine.drives]  # whose memory is the engine's
+        self.expected = array("i", [0] * joints)  # steps
+        self.motion: "Any" = None
+        self.override: "Any" = None
+        self.is_ready = False
+
+    def pieces(
+        self, rate: int, opened: "Callable[[], MotionHead]", stands_at: "Callable[[MotionHead, int], int]"
+    ) -> "Iterator[None]":
+        """Do the work, a piece each time. Refused.
+
+        ``rate``: as for ``Engine.load``; ``opened``: gives the motion, whose splines were checked before;
+        ``stands_at``: where a joint will stand before it.
+        """
+        self.close()
+        yield
+        gc.collect()  # now: else the heap would be collected when it is full, whatever moves
+        yield
+        motion = opened()
+        for number in range(len(self._generators)):
+            yield
+            self._expect(motion, number, stands_at(motion, number))
+        yield
+        override = Override()
+        override.begin(rate, motion.brake_ticks, endpoints.duration_ticks(motion))
+        if override.end_ticks() > LONGEST_RUN_TICKS:
+            raise Refused(codes.TOO_LONG)
+        pulse_ticks = self._engine.block[isr.PULSE_TICKS]
+        for number, generator in enumerate(self._generators):
+            yield
+            gap_ticks = self._engine.drives[number].gap_ticks
+            generator.begin(motion, number, self.expected[number], pulse_ticks, gap_ticks)
+            while generator.seek():
+                yield
+            if rate != _PERMILLE:
+                yield
+                generator.follow(override.law, False)
+            while generator.prepare(LOOKAHEAD_KITICKS):
+                yield
+        self.motion = motion
+        self.override = override
+        self.is_ready = True
+
+    def _expect(self, motion: "MotionHead", joint: int, position: int) -> None:
+        """Refused where the joint may not stand there."""
+        off = endpoints.start_offset(motion, joint, position)
+        if off:
+            raise Refused(codes.WRONG_START, joint, off)
+        self.expected[joint] = position
+
+    def has_time(self) -> bool:
+        """Whether what moves can go without ``Engine.refill`` for a piece: its queues hold the last steps, or many."""
+        until_kiticks = self._engine.clock.kiticks() + _RESERVE_KITICKS
+        for joint in self._engine.drives:
+            generator = joint.generator
+            if generator.ended:
+                continue
+            if (
+                self._is_fast
+                or joint.can_queue_more
+                or generator.at_turn
+                or generator.latest_kiticks() < until_kiticks
+            ):
+                return False
+        return True
+
+    def starts_from_here(self) -> bool:
+        """Whether it is ready, and all joints stand where it begins."""
+        engine = self._engine
+        for joint, expected in enumerate(self.expected):
+            if not engine.known >> joint & 1 or engine.commanded(joint) != expected:
+                return False
+        return self.is_ready
+
+    def lead_ticks(self) -> int:
+        """Time before it, from when the counters start: DIR settles, but drivers that are on have been on."""
+        inputs = self._engine.inputs
+        if inputs.enable_pin.value() != inputs.on_level:
+            return LEAD_TICKS
+        return max(_LEAD_TICKS, max([joint.gap_ticks for joint in self._engine.drives]))
+
+    def hand_over(self, number: int, joint: "JointDrive") -> None:
+        """Give a joint the generator that stands before the motion, for the one that it had; nothing moves."""
+        generator = self._generators[number]
+        self._generators[number] = joint.generator
+        self._put(number, joint, generator)
+        joint.stand()
+
+    def give_back(self) -> None:
+        """All joints have again the generators that they had before, and this is not used any more; nothing moves."""
+        self.close()
+        for number, joint in enumerate(self._engine.drives):
+            self._put(number, joint, self._own[number])
+
+    def _put(self, number: int, joint: "JointDrive", generator: StepGenerator) -> None:
+        joint.generator = generator
+        self._engine.feeder.take_queue(number, generator.queue)
+
+    def close(self) -> None:
+        """The motion is not meant any more, or others read it now."""
+        self.is_ready = False
+        self.motion = self.override = None
+        for generator in self._generators:
+            generator.close()
