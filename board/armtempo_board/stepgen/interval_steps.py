@@ -85,7 +85,7 @@ def begin(solver: object, queue: object, arrays: object, position: int, at_start
 
     ``arrays``: those of the subinterval (subintervals.py). ``position`` (+ bezier.BIAS):
     where the steps so far lead; ``at_start``: 1 where all steps come at its start. Unless the law stretches the
-    the motion's time, the first step is solved, and it is queued where more follow and they go in ``direction`` (0: never).
+    motion's time, the first step is solved, and it is queued where more follow and they go in ``direction`` (0: never).
     """
     words = ptr32(queue)  # type: ignore[arg-type]
     nodes = ptr32(solver)  # type: ignore[arg-type]
