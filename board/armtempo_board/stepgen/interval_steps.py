@@ -5,6 +5,7 @@ from micropython import const
 
 from armtempo_board.stepgen.cubics import cubics_fit, put_cubics
 from armtempo_board.stepgen.newton import set_interval, solve
+from armtempo_board.stepgen.step_queue import put_single
 from armtempo_board.stepgen.time_law import scale_slope, to_real_time
 
 _MOST_STEPS = const(1024)  # of a cubic
@@ -78,11 +79,13 @@ _SCALE = const(0)
 
 
 @micropython.viper
-def begin(solver: object, queue: object, arrays: object, position: int, at_start: int) -> int:
-    """Take up the steps of a subinterval, ready to be solved; returns how many, below 0 where they go down.
+def begin(solver: object, queue: object, arrays: object, position: int, at_start: int, direction: int) -> int:
+    """Take up the steps of a subinterval. Returns twice as many as they are, below 0 where they go down; and 1 more
+    where the first of them is in the queue.
 
     ``arrays``: those of the subinterval (subintervals.py). ``position`` (+ bezier.BIAS):
-    where the steps so far lead; ``at_start``: 1 where all steps come at its start.
+    where the steps so far lead; ``at_start``: 1 where all steps come at its start. Unless the law stretches the
+    motion's time, the first step is solved, and it is queued where more follow and they go in ``direction`` (0: never).
     """
     words = ptr32(queue)  # type: ignore[arg-type]
     nodes = ptr32(solver)  # type: ignore[arg-type]
@@ -91,18 +94,27 @@ def begin(solver: object, queue: object, arrays: object, position: int, at_start
     measures = ptr32(arrays[_TIME_MEASURES])  # type: ignore[index]
     steps = angle[_LAST_HIGH] + (angle[_LAST_LOW] >> 27) - position
     heading = 1 if steps > 0 else -1
+    last = heading * steps - 1
     scale = measures[_SCALE] - 12
     words[_TIME_SCALE] = scale
     nodes[_TIME_OFFSET] = time[_LOW] >> (16 - scale)
-    words[_LAST_STEP] = heading * steps - 1
+    words[_LAST_STEP] = last
     words[_REACHED] = 0
     words[_SINGLE_STEPS] = 0
-    words[_MODE] = (words[_MODE] & _BY_LAW) + _AT_START * at_start
+    by_law = words[_MODE] & _BY_LAW
+    words[_MODE] = by_law + _AT_START * at_start
+    steps += steps
     if at_start:
         nodes[_RANGE] = 0
     else:
         nodes[_TARGET] = 2 * (position - angle[_HIGH]) + heading + _BIAS
         set_interval(solver, arrays[_ANGLE], arrays[_ANGLE_MEASURES], arrays[_TIME_MEASURES])  # type: ignore[index]
+    if not by_law:
+        words[_INTERVAL_HIGH] = time[_HIGH]
+        solve(solver, 0, 0)
+        if last and heading == direction:
+            put_single(queue, time[_HIGH], (nodes[_FIRST_TIME] + (1 << (scale - 1))) >> scale)  # type: ignore[arg-type]
+            steps += 1
     return steps
 
 

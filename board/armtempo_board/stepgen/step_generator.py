@@ -278,14 +278,24 @@ class StepGenerator:
         """Take up the steps of the subinterval that was found, and solve the first."""
         queue = self.queue
         now = self.subintervals
-        high = now.time[_HIGH]
-        queue[_INTERVAL_HIGH] = self._law.count_from(high) if queue[_MODE] & _BY_LAW else high
-        steps = self._law.begin(self._solver, queue, now.arrays, self._position, found == _FOUND_AT_START)
-        self._position += steps
+        by_law = queue[_MODE] & _BY_LAW
+        if by_law:
+            queue[_INTERVAL_HIGH] = self._law.count_from(now.time[_HIGH])
+        self._interval_in = queue[_IN]
+        direction = 0 if self._held else self.direction
+        at_start = found == _FOUND_AT_START
+        steps = self._law.begin(self._solver, queue, now.arrays, self._position, at_start, direction)
+        self._position += steps >> 1
+        if steps & 1:
+            self._held_queued = False
+            return
         self._heading = 1 if steps > 0 else -1
         self._first_waits = True
-        self._interval_in = queue[_IN]
-        self._solve(0)
+        if by_law:
+            self._solve(0)
+        else:
+            self._first_ticks = self._node_ticks()
+            self._first_comes = True
 
     def _solve(self, index: int) -> None:
         """Set the first node to the subinterval's step ``index``."""
