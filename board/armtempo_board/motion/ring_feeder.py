@@ -86,7 +86,7 @@ class RingFeeder:
         Timer(6, prescaler=0, period=_PERIOD_TICKS - 1, callback=self._hook)  # type: ignore[arg-type]
         mem32[stm.TIM6] = 0
 
-    def take_queue(self, joint: int, queue: "array[int]") -> None:
+    def take_queue(self, joint: int, queue: "memoryview[int]") -> None:
         """A joint's steps come from this queue; nothing moves."""
         self._put(_PARTS * joint + _QUEUE, queue)
 

@@ -7,7 +7,16 @@ from array import array
 
 import uctypes
 
-ROWS = "TIM2 TIM3 TIM4 TIM5 TIM6", "GPIOA GPIOB GPIOC GPIOD GPIOE", "TIM1", "TIM8", "DMA1", "RCC", "PWR", "NVIC_IPR"
+ROWS = (
+    "TIM2 TIM3 TIM4 TIM5 TIM6",
+    "GPIOA GPIOB GPIOC GPIOD GPIOE",
+    "TIM1",
+    "TIM8",
+    "DMA1",
+    "RCC",
+    "PWR",
+    "NVIC_IPR",
+)
 APART = 256
 """Words from one block of a row to the next; a block has fewer registers."""
 BLOCKS = {"BKPSRAM": array("I", bytearray(4096))}
