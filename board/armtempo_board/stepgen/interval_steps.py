@@ -113,7 +113,7 @@ def begin(solver: object, queue: object, arrays: object, position: int, at_start
         words[_INTERVAL_HIGH] = time[_HIGH]
         solve(solver, 0, 0)
         if last and heading == direction:
-            put_single(queue, time[_HIGH], (nodes[_FIRST_TIME] + (1 << (scale - 1))) >> scale)  # type: ignore[arg-type]
+            put_single(queue, time[_HIGH], (nodes[_FIRST_TIME] + (1 << (scale - 1))) >> scale)
             steps += 1
     return steps
 
