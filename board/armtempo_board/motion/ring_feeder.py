@@ -42,6 +42,7 @@ _PARTS = const(2)
 _RING_AT = const(0)
 _QUEUE_AT = const(2)
 _PLACE_WORDS = const(4)
+_ADDRESS_WORDS = const(2)
 _MOST_JOINTS = const(6)
 # as in isr.py: of the block, of a joint in it, of a ring's state
 _BLOCK_HEAD = const(22)
@@ -93,8 +94,9 @@ class RingFeeder:
     def _put(self, at: int, part: "Any") -> None:
         self._parts[at] = part
         address = uctypes.addressof(part)
-        self._places[2 * at] = address & 0x3FFFFFFF
-        self._places[2 * at + 1] = address >> 30
+        low = _ADDRESS_WORDS * at
+        self._places[low] = address & 0x3FFFFFFF
+        self._places[low + 1] = address >> 30
 
     def disconnect(self) -> None:
         """Hold no ring; none is fed any more."""
