@@ -10,7 +10,7 @@ from tests.board import heap_use
 
 PEAK = 79_300
 MOTION = 63_800
-MACHINE_CODE = 28_500
+MACHINE_CODE = 28_900
 
 
 @pytest.mark.slow
