@@ -8,7 +8,7 @@ import pytest
 
 from tests.board import heap_use
 
-PEAK = 79_300
+PEAK = 80_300
 MOTION = 63_800
 MACHINE_CODE = 28_900
 
