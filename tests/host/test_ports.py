@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 from pathlib import Path
@@ -10,8 +11,8 @@ import pytest
 from armtempo import deploy
 from armtempo.cli import main
 from armtempo.deploy import program_files
-from armtempo.errors import InputError, LinkError
-from armtempo.link import diagnose
+from armtempo.errors import InputError, LinkError, PortError, PortInUseError
+from armtempo.link import diagnose, transport
 from armtempo.link.transport import SerialTransport
 from armtempo.ports import listing, names
 from armtempo.ports.listing import find_ports
@@ -118,3 +119,12 @@ def test_ports_as_json() -> None:
     assert found.exit_code == 0
     ports = json.loads(found.stdout)["ports"]
     assert [one["port"] for one in ports] == [port.device for port in find_ports()]
+
+
+@pytest.mark.parametrize(("platform", "kind"), [("win32", PortInUseError), ("linux", PortError)])
+def test_no_permission_is_a_port_in_use_on_windows(
+    platform: str, kind: type[PortError], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.platform", platform)
+    denied = PermissionError(errno.EACCES, "Access is denied.")
+    assert type(transport._open_error("COM5", denied)) is kind

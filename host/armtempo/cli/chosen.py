@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +11,6 @@ import click
 from armtempo.cli.verbosity import is_quiet
 from armtempo.errors import InputError
 from armtempo.project.settings import ARM, JOB, RUNS, ProjectSettings, nothing_set
-from armtempo.share.claim import PATIENCE_S
 
 if TYPE_CHECKING:
     from armtempo.link.traffic import Sink
@@ -23,8 +21,6 @@ if TYPE_CHECKING:
     from armtempo.robot.board import Board
     from armtempo.robot.board_state import BoardState
     from armtempo.robot.shared_board import SharedBoard
-
-_LOOK_S = 0.05
 
 
 def tell(text: str) -> None:
@@ -226,21 +222,17 @@ def shared_or_own(
 
     A program that opens the port just now answers for it soon; one that ends gives it up.
     """
-    from armtempo.errors import PortInUseError
+    from armtempo.link import patiently
     from armtempo.robot import shared_board
 
-    limit_s = time.monotonic() + PATIENCE_S
-    while True:
+    def either() -> SharedBoard | Board:
         shared = shared_board.find(port)
-        if shared is not None:
-            tell(f"port {port}: through {shared.program}")
-            return shared
-        try:
+        if shared is None:
             return board(port, log_traffic, arm, any_program, sink, wait=False)
-        except PortInUseError:
-            if time.monotonic() > limit_s:
-                raise
-            time.sleep(_LOOK_S)
+        tell(f"port {port}: through {shared.program}")
+        return shared
+
+    return patiently(either)
 
 
 def board_state(port: str, log_traffic: Path | None = None) -> BoardState:

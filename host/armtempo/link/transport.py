@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import sys
 from contextlib import suppress
 from typing import Protocol
 
@@ -106,7 +107,8 @@ def _open_error(port: str, error: Exception) -> PortError | InputError:
     if number in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in text:
         return PortInUseError(f"port {port} is in use by another program", "close it and try again")
     if number == errno.EACCES or "PermissionError" in text:
-        return PortError(
+        kind = PortInUseError if sys.platform == "win32" else PortError  # Windows says so of a port in use
+        return kind(
             f"no permission to open {port}: another program holds it, or your user may not use serial ports",
             "close the other program, or on Debian: 'sudo adduser $USER dialout', then log in again",
         )
