@@ -60,7 +60,8 @@ def main(registers):
     """Count for each line; ``registers``: address of what the firmware takes for those of the external interrupts."""
     head = dict(HEAD)
     head["flags"] = FLAGS
-    sampler = Sampler(3, ())
+    sampler = Sampler()
+    sampler.configure(len(JOINTS), ())
     inputs = Inputs(head, JOINTS, sampler)
     block = sampler.block
     block[isr.PORT_A_BEHIND] = _CLOCK_AS_PORT
