@@ -16,14 +16,14 @@ _SPARE_ENTRIES = 8  # of a ring, that are not overwritten: as in isr.py
 PROCESSOR_WORDS = 1024
 """Words (4 bytes) that the processor alone reaches: the chip's backup SRAM, which is no part of MicroPython's heap
 (hardware/backup_sram.py of the board program). So none of them are for rings, which DMA reads."""
-GENERATOR_PARTS = (78, 78, 20, 20, 12, 12, 60, 18, 136)
+GENERATOR_PARTS = (78, 78, 20, 20, 12, 12, 49, 18, 128)
 """Words of a joint's step generator, in the order in which they are taken.
 
 Pieces of angle and of time, their control points, their measures; the solver, the law of time, the queue of steps.
 """
 GENERATOR_WORDS = sum(GENERATOR_PARTS)
 _BLOCK_WORDS = 1026  # for a ring of 1024 entries, or two of 512
-LARGEST_WORDS = 6 * GENERATOR_WORDS - PROCESSOR_WORDS + 1025 + 513 + 257 + 129 + 2 * 65 + 14
+LARGEST_WORDS = 6 * GENERATOR_WORDS - PROCESSOR_WORDS + 1025 + 513 + 257 + 129 + 2 * 65 + 11
 """For arms whose joints' highest step rates sum up to 240 000 steps/s; some have rings of SHORT_MS then.
 
 Where there is so much, there is heap for outputs and inputs too. The last words are left over at the ends of blocks.

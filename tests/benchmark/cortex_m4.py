@@ -25,6 +25,7 @@ sys.path[:0] = [str(ROOT)] + [
 ]
 
 import micropython  # noqa: E402, F401  (puts ptr32 and its like into place)
+from armtempo_board.hardware import isr  # noqa: E402
 from armtempo_board.stepgen import (  # noqa: E402
     bezier,
     control_points,
@@ -40,7 +41,7 @@ from armtempo_board.stepgen import (  # noqa: E402
 from armtempo_shared.motion import Motion  # noqa: E402
 
 from tests.board import motions, oracle  # noqa: E402
-from tests.board.emulated import Machine  # noqa: E402
+from tests.board.emulated import Machine, ring_state  # noqa: E402
 
 CORE_HZ = 168_000_000
 CYCLES = 1.3
@@ -80,6 +81,7 @@ class Count:
         self.lines: Counter[str] = Counter()
         self.native = 0.0
         self.longest = 0.0
+        self._parts: list[Any] = []  # ring and queue
         for name in self.machine.functions:
             home = next(module for module in COMPILED if hasattr(module, name))
             replaced = self._either(name, getattr(home, name))
@@ -93,6 +95,8 @@ class Count:
                 return original(*arguments)
             if sys._getframe(1).f_code.co_name in NATIVE:
                 self.native += CALL
+            if name == "emit":
+                return self._emit(original, *arguments)
             if not self.verify:
                 return self.machine.run(name, *arguments)
             copies = [argument[:] if isinstance(argument, array) else argument for argument in arguments]
@@ -103,20 +107,32 @@ class Count:
 
         return call
 
+    def _emit(self, original: Any, rings: int, state: array[int], timer: array[int]) -> None:
+        """``emit`` finds ring and queue by their addresses."""
+        parts = [part[:] for part in self._parts] if self.verify else self._parts
+        room = state[isr.ROOM]
+        self.machine.run("emit", rings, ring_state(vars(isr), room, *parts), timer, beside=parts)
+        if self.verify:
+            original(rings, state, timer)
+            assert parts == self._parts
+
     def walk(self, record: bytes, joint: int, skip: int, steps: int, batch: int = 512) -> dict[str, float]:
         """Instructions per step of ``steps`` steps behind the first ``skip``, in batches of entries."""
         motion = Motion(record)
         subject = step_generator.StepGenerator(Arrays())
-        ring = array("I", bytes(4096))
+        ring = array("I", bytes(4100))
+        state = ring_state(vars(isr), 0, ring, subject.queue)
+        isr.set_places(state, ring, subject.queue)
+        self._parts = [ring, subject.queue]
         subject.load(motion, joint, oracle.start_steps(motion, joint), 168, 20_000)
-        head = self._fill(subject, ring, 0, skip, batch)
+        head = self._fill(subject, state, 0, skip, batch)
         self.machine.clear()
         self.lines.clear()
         self.native = 0.0
         self.on = True
         sys.settrace(self._trace)
         try:
-            end = self._fill(subject, ring, head, steps, batch)
+            end = self._fill(subject, state, head, steps, batch)
         finally:
             sys.settrace(None)
             self.on = False
@@ -132,7 +148,7 @@ class Count:
         }
 
     def _fill(
-        self, subject: step_generator.StepGenerator, ring: array[int], head: int, steps: int, batch: int
+        self, subject: step_generator.StepGenerator, state: array[int], head: int, steps: int, batch: int
     ) -> int:
         end = head + 2 * steps
         self.longest = 0.0
@@ -142,7 +158,7 @@ class Count:
             before = self._all()
             subject.prepare(1 << 28)
             self.longest = max(self.longest, self._all() - before)
-            head += subject.write(ring, 1023, head, batch)
+            head += subject.write(state, head, batch, state)
         return head
 
     def _all(self) -> float:
@@ -163,16 +179,18 @@ class Count:
         """Instructions of the loop that writes a step's two entries, groups of 16 steps."""
         counts = []
         for steps in (128, 384):
-            state = array("i", bytes(4 * step_queue.QUEUE_SIZE))
+            queue = array("i", bytes(4 * step_queue.QUEUE_SIZE))
             settings = {
                 step_queue.FIRST: 252 << 22, step_queue.SECOND: 1 << 29, step_queue.THIRD: 1 << 29, step_queue.POWER: 9,
-                step_queue.SHIFT: 13, step_queue.GROUP: 16, step_queue.CARRY: 5, step_queue.STEPS: steps,
+                step_queue.SHIFT: 13, step_queue.GROUP: 5, step_queue.STEPS: steps,
                 step_queue.UNTIL_KITICKS: 1 << 28, step_queue.PULSE: 168,
             }  # fmt: skip
             for place, value in settings.items():
-                state[place] = value
+                queue[place] = value
             self.machine.clear()
-            self.machine.run("emit", 1022, array("I", bytes(4096)), state, 1023)
+            ring = array("I", bytes(4100))
+            timer = array("I", bytes(64))
+            self.machine.run("emit", 1, ring_state(vars(isr), 1022, ring, queue), timer, beside=(ring, queue))
             counts.append(self.machine.count)
         return (counts[1] - counts[0]) / 256
 

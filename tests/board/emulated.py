@@ -13,6 +13,7 @@ import subprocess
 import tempfile
 from array import array
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import CodeType
@@ -30,6 +31,7 @@ from unicorn.arm_const import (
 )
 
 _CODE, _TABLES, _STUBS, _RETURN, _STACK, DATA_AT = 0x10000, 0x40000, 0x50000, 0x5F000, 0x70000, 0x100000
+_BESIDE_AT = 0x180000
 _FROM_OBJECT, _TO_OBJECT, _FLOOR_DIVIDE, _MODULO, _ENTRIES = 3, 4, 46, 47, 50
 _POINTERS = {"ptr8", "ptr16", "ptr32"}
 _CLOSED = "closed"
@@ -61,10 +63,11 @@ class Machine:
         self.core.hook_add(UC_HOOK_BLOCK, self._block)
         self.core.hook_add(UC_HOOK_CODE, self._answer, begin=_STUBS, end=_RETURN - 1)
 
-    def run(self, name: str, *arguments: int | array[int] | bytes) -> int:
+    def run(self, name: str, *arguments: int | array[int] | bytes, beside: Sequence[array[int]] = ()) -> int:
         """Call a function; arrays are written back. Returns its value and counts in ``count``.
 
-        All variables that a nested function takes from around it stand for one array, its first argument.
+        All variables that a nested function takes from around it stand for one array, its first argument. ``beside``:
+        what it finds by addresses (see ``places``).
         """
         entry, kinds = self.functions[name]
         self._arguments: list[tuple[int, int]] = []
@@ -87,6 +90,10 @@ class Machine:
                 value = int(argument)  # type: ignore[arg-type]
             self._arguments.append((number, value))
             words.append(_STACK + 0x200 + 8 * number if kind == _CLOSED else number)
+        for argument, place in zip(beside, self.places(*beside), strict=True):
+            data = bytes(argument)
+            self.core.mem_write(place, data)
+            places.append((argument, place, len(data)))
         self._write(_STACK + 0x100, words)
         for register, value in (
             (UC_ARM_REG_R0, _TABLES), (UC_ARM_REG_R1, len(arguments)), (UC_ARM_REG_R2, 0),
@@ -103,6 +110,16 @@ class Machine:
                 argument[:] = array(argument.typecode, bytes(data))
         result = self._result
         return result - (1 << 32) if result >> 31 else result
+
+    @staticmethod
+    def places(*arrays: array[int]) -> list[int]:
+        """Addresses at which arrays stand ``beside`` the arguments of a function."""
+        found = []
+        at = _BESIDE_AT
+        for part in arrays:
+            found.append(at)
+            at += (len(bytes(part)) + 255) & ~255
+        return found
 
     def clear(self) -> None:
         """Count from zero."""
@@ -256,6 +273,19 @@ def _raw_code(reader: _Reader) -> _Code:
         assert reader.number() & 0x70 == 0, "relocations are not handled"
     children = [_raw_code(reader) for _ in range(reader.number())] if has_children else []
     return _Code(data if kind == 2 else None, children)
+
+
+def ring_state(isr: Mapping[str, int], room: int, ring: array[int], queue: array[int]) -> array[int]:
+    """The words by which ``emit`` finds a ring with room for so many entries, and its queue, ``beside`` it.
+
+    ``isr``: what isr.py names. The ring has a word more than entries.
+    """
+    state = array("i", bytes(4 * isr["STATE_WORDS"]))
+    state[isr["MASK"]] = len(ring) - 2
+    state[isr["ROOM"]] = room
+    for word, address in zip(("RING_AT", "QUEUE_AT"), Machine.places(ring, queue), strict=True):
+        state[isr[word]] = address
+    return state
 
 
 def machine_code_bytes(data: bytes) -> int:

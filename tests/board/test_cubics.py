@@ -1,4 +1,4 @@
-"""Cubics: how many steps are a group, within which time grows evenly, under CPython."""
+"""Cubics: how many steps are a group, and of which kind, under CPython."""
 
 from __future__ import annotations
 
@@ -9,18 +9,26 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from math import frexp
 from types import ModuleType
+from unittest.mock import patch
 
 import pytest
+from armtempo_shared.motion import Motion
 
 from tests import inprocess
+from tests.board import motions
 
 SEED = 20261124
 CASES = 300
 TIME_SCALE = 8
-ALLOWED_TICKS = 3 / 32
+EVEN_TICKS = 3 / 32
+SQUARE_TICKS = 1 / 16
+SHORTEST_SQUARE = 8
 LONGEST = 16
 MANTISSA_BITS = 29
-ITEM_WORDS = 13
+ITEM_WORDS = 12
+NEVER_KITICKS = 1 << 28
+LEAST_STEPS = {8_000: 30, 40_000: 120, 240_000: 500}
+"""By steps/s: of two cubics, on the mean of the whole way."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +41,13 @@ class Modules:
 
 
 @pytest.fixture(scope="module")
-def board() -> Iterator[Modules]:
+def records() -> dict[int, bytes]:
+    """Motions up to some rates and down again; made before the board's modules take the place of others."""
+    return {rate: motions.cruise(rate, total_s=1.2) for rate in LEAST_STEPS}
+
+
+@pytest.fixture(scope="module")
+def board(records: dict[int, bytes]) -> Iterator[Modules]:
     with inprocess.board_modules():
         yield Modules(
             *(
@@ -51,8 +65,8 @@ def put_node(board: Modules, solver: array[int], node: int, ticks: float, slope:
     solver[node + board.newton.NODE_EXPONENT] = MANTISSA_BITS - power
 
 
-def group_of(board: Modules, steps: int, slopes: tuple[float, float], ticks: float) -> int:
-    """Steps in a group of the cubic that takes so many ticks, from one slope to the other."""
+def group_of(board: Modules, steps: int, slopes: tuple[float, float], ticks: float) -> tuple[int, bool]:
+    """Steps in a group of the cubic that takes so many ticks, from one slope to the other; whether these change."""
     solver = array("i", bytes(4 * board.newton.SOLVER_SIZE))
     queue = array("i", bytes(4 * board.queue.QUEUE_SIZE))
     queue[board.queue.TIME_SCALE] = TIME_SCALE
@@ -62,39 +76,117 @@ def group_of(board: Modules, steps: int, slopes: tuple[float, float], ticks: flo
     board.cubics.put_cubics(steps, solver, queue, 0)
     assert queue[board.queue.IN] == 2
     first_item = board.queue.QUEUE_SIZE - ITEM_WORDS * board.queue.CAPACITY
-    return queue[first_item + board.queue.GROUP]
+    kind = queue[first_item + board.queue.GROUP] - 1
+    return 1 << kind % board.queue.SQUARE, kind >= board.queue.SQUARE
 
 
-def error_ticks(steps: int, slopes: tuple[float, float], ticks: float, group: int) -> float:
-    """The most that a chord over a group leaves the cubic: its second derivative is greatest at an end."""
+def derivatives(steps: int, slopes: tuple[float, float], ticks: float) -> tuple[float, float]:
+    """Of time over steps: the second at the end where it is greatest, and the third."""
     bend = (slopes[1] - slopes[0]) * steps
     missing = ticks - slopes[0] * steps
     square, cubic = 3 * missing - bend, bend - 2 * missing
-    second = max(abs(2 * square), abs(2 * square + 6 * cubic)) / steps**2
+    return max(abs(2 * square), abs(2 * square + 6 * cubic)) / steps**2, abs(6 * cubic) / steps**3
+
+
+def even_ticks(second: float, group: int) -> float:
+    """The most that steps of one length leave the cubic within a group."""
     return second * group**2 / 8
 
 
-def rounding_ticks(steps: int, slopes: tuple[float, float], group: int) -> float:
-    """The second derivative is rounded up to the unit in which the cubic is computed: what that adds to the error."""
-    unit = 2.0 ** (frexp(max(slopes))[1] + (steps - 1).bit_length() - MANTISSA_BITS)
-    return unit * group**2 / 8
+def square_ticks(third: float, group: int) -> float:
+    """As much of steps whose lengths change evenly: x (x - 1/2) (x - 1) / 6 is 0.00802 at most."""
+    return third * group**3 * 0.00802
 
 
-def test_a_group_is_as_long_as_time_grows_evenly_in_it(board: Modules) -> None:
-    """Within 3/32 tick; a group of twice the length would not do."""
+def unit_ticks(steps: int, slopes: tuple[float, float]) -> float:
+    """The unit in which the cubic is computed."""
+    return 2.0 ** (frexp(max(slopes))[1] + (steps - 1).bit_length() - MANTISSA_BITS)
+
+
+def test_a_group_is_as_long_as_its_error_bound_allows(board: Modules) -> None:
+    """Steps of one length within 3/32 tick, else of lengths that change evenly; twice as long would not do."""
     random.seed(SEED)
     found = set()
     for _ in range(CASES):
         steps = random.randrange(8, 400)
         first = random.uniform(400.0, 4000.0)
-        slopes = (first, first + random.choice((-1, 1)) * 10 ** random.uniform(-2.0, 1.6))
+        slopes = (first, first + random.choice((-1, 1)) * first * 10 ** random.uniform(-5.0, -0.7))
         even = steps * (slopes[0] + slopes[1]) / 2
         ticks = even + random.uniform(-0.15, 0.15) * steps * (slopes[1] - slopes[0])
-        group = group_of(board, steps, slopes, ticks)
-        found.add(group)
-        case = f"{steps} steps, slopes {slopes}, {ticks} ticks: {group}"
-        assert group == 1 or error_ticks(steps, slopes, ticks, group) <= 1.01 * ALLOWED_TICKS, case
-        if 2 * group <= min(LONGEST, steps):
-            twice = error_ticks(steps, slopes, ticks, 2 * group) + rounding_ticks(steps, slopes, 2 * group)
-            assert twice > 0.99 * ALLOWED_TICKS, case
-    assert found == {1, 2, 4, 8, 16}
+        group, is_square = group_of(board, steps, slopes, ticks)
+        found.add((group, is_square))
+        case = f"seed {SEED}: {steps} steps, slopes {slopes}, {ticks} ticks: {group}, {is_square}"
+        second, third = derivatives(steps, slopes, ticks)
+        unit = unit_ticks(steps, slopes)
+        longer = 2 * max(group, 2)
+        if is_square:
+            assert group >= SHORTEST_SQUARE, case
+            assert even_ticks(second + unit, SHORTEST_SQUARE) > 0.99 * EVEN_TICKS, case
+            assert square_ticks(third, group) <= SQUARE_TICKS, case
+            assert unit * group**2 / 16 <= SQUARE_TICKS, case
+            if longer <= min(LONGEST, steps) and unit * longer**2 / 16 <= SQUARE_TICKS:
+                # what is left over of the last group makes it at most twice as long as steps // group says
+                assert square_ticks(third, longer) * 8 > SQUARE_TICKS, case
+        else:
+            assert group == 1 or even_ticks(second, group) <= 1.01 * EVEN_TICKS, case
+            if longer <= min(LONGEST, steps):
+                assert even_ticks(second + unit, longer) > 0.99 * EVEN_TICKS, case
+    assert found >= {(1, False), (8, False), (16, False), (8, True), (16, True)}, found
+
+
+@dataclass
+class Tried:
+    """How often cubics were tried, and the steps of those that kept the error bound, on the way through a motion."""
+
+    fitted: int = 0
+    rejected: int = 0
+    steps: int = 0
+
+
+class Arrays:
+    """In the place of ``armtempo_board.memory.Memory``."""
+
+    def take_for_processor(self, words: int) -> array[int]:
+        """So many words."""
+        return array("i", bytes(4 * words))
+
+
+def walk(board: Modules, record: bytes) -> Tried:
+    """Through a motion of one joint."""
+    generators, intervals = (
+        importlib.import_module(f"armtempo_board.stepgen.{name}")
+        for name in ("step_generator", "interval_steps")
+    )
+    tried = Tried()
+    fit, put = intervals.cubics_fit, intervals.put_cubics
+
+    def fitting(steps: int, solver: array[int], queue: array[int]) -> int:
+        verdict: int = fit(steps, solver, queue)
+        tried.rejected += not verdict
+        return verdict
+
+    def putting(steps: int, *others: object) -> None:
+        tried.fitted += 1
+        tried.steps += 2 * steps
+        put(steps, *others)
+
+    with patch.multiple(intervals, cubics_fit=fitting, put_cubics=putting):
+        generator = generators.StepGenerator(Arrays())
+        generator.load(Motion(record), 0, 0, 168, 20_000)
+        while not generator.ended:
+            generator.prepare(NEVER_KITICKS)
+            generator.queue[board.queue.STEPS] = 0
+            generator.queue[board.queue.OUT] = generator.queue[board.queue.IN]
+            assert not generator.at_turn
+    return tried
+
+
+@pytest.mark.parametrize("rate", LEAST_STEPS)
+def test_how_long_the_next_cubics_may_be_is_found_without_many_trials(
+    board: Modules, records: dict[int, bytes], rate: int
+) -> None:
+    """Speeding up, where they may become longer, and slowing down, where they have to become shorter."""
+    tried = walk(board, records[rate])
+    assert 0.95 * rate * 0.7 < tried.steps < rate * 0.7, tried
+    assert tried.rejected <= 0.12 * tried.fitted, tried
+    assert tried.steps >= LEAST_STEPS[rate] * tried.fitted, tried

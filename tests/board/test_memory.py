@@ -8,9 +8,9 @@ import pytest
 
 from tests.board import heap_use
 
-PEAK = 80_300
+PEAK = 80_800
 MOTION = 63_800
-MACHINE_CODE = 28_900
+MACHINE_CODE = 29_650
 
 
 @pytest.mark.slow

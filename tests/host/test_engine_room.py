@@ -48,10 +48,10 @@ def test_an_arm_with_more_joints_is_sent_to_the_firmware() -> None:
 
 
 def test_a_room_that_is_too_small_is_told_in_bytes() -> None:
-    small = Room(1_800, 3)
+    small = Room(1_600, 3)
     with pytest.raises(InputError) as refused:
         engine_room.check(PAPER, board(small))
-    assert "the board has 1800" in refused.value.problem
+    assert "the board has 1600" in refused.value.problem
     assert "lower its top speeds" in refused.value.hint
 
 

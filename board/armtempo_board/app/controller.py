@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from armtempo_board.storage.motion_file import MotionFile
 
 _PERMILLE = const(1000)
-_PIECES_BYTES = (2_112, 1_904, 1_584, 1_344, 1_312, 1_088, 1_008)
+_PIECES_BYTES = (2_416, 2_192, 1_648, 1_584, 1_360, 1_088, 1_008, 512)
 
 
 class Controller(ArmState):

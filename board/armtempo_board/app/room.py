@@ -13,7 +13,7 @@ from armtempo_board import heap
 from armtempo_board.hardware import backup_sram
 from armtempo_board.motion.workspace import Workspace
 
-_RESERVE = 26_600  # bytes of heap for the rest
+_RESERVE = 27_000  # bytes of heap for the rest
 _USUAL_JOINTS = 3  # there is heap for their objects before there is memory for larger rings
 _MOST_SAMPLES = 4096  # bytes of the sample buffer at most,
 _LEAST_SAMPLES = 768  # and at least;

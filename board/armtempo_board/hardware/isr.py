@@ -79,16 +79,16 @@ PIN_BIT = const(7)
 TURN_TIMES = const(8)  # when the queued turns are due
 TURN_ROOM = const(8)  # so many
 RING = const(16)  # the state of its ring
-JOINT_WORDS = const(25)
+JOINT_WORDS = const(29)
 # words of a line behind six joints: of an external interrupt, 8 to 15, or of the program itself
-FIRST_LINE = const(172)
+FIRST_LINE = const(196)
 SOFTWARE_LINE = const(7)
 LINE_LEVELS = const(0)  # DIR pins that freeze where they are low,
 LINE_MASK = const(1)  # and all that freeze at one of their levels
 LINE_RELEASE = const(2)  # written to port E's BSRR
 LINE_TRIPPED = const(3)  # it has called for a freeze
 LINE_WORDS = const(4)
-BLOCK_WORDS = const(208)
+BLOCK_WORDS = const(232)
 # words of a ring's state
 WRITTEN = const(0)  # entries written since the stream was started
 MATCHED = const(1)  # words that the stream has handed on since; so many matches have been
@@ -99,7 +99,9 @@ MASK = const(5)  # entries of the ring, a power of two, less 1
 NDTR_AT = const(6)  # word offset of its stream's NDTR in DMA1
 FED = const(7)  # the interrupt writes to the ring; it stops that when the ring has run out of entries
 ROOM = const(8)  # entries that may be written now
-STATE_WORDS = const(9)
+RING_AT = const(9)  # where its words are: the low 30 bits of the address, and in the next word the rest
+QUEUE_AT = const(11)  # and those of the queue that it is filled from
+STATE_WORDS = const(13)
 
 # words of a raw sample
 RAW_COUNTER = const(0)
@@ -108,10 +110,6 @@ RAW_ENCODERS = const(7)  # four counters
 RAW_WORDS = const(11)
 RAW_ROOM = const(4)  # raw samples: 0.4 s; the main loop comes every few milliseconds
 
-# as in step_queue.py: words of the queue
-_PULSE = const(17)
-_HEAD = const(18)
-
 # SAMPLE_TICKS of limits.py
 _SAMPLE_TICKS = const(8400000)
 
@@ -119,6 +117,7 @@ _FIRST_ENTRY = const(0)
 _HERE = const(0)  # the word at which a pointer stands
 _LEAST_AHEAD_TICKS = const(84)  # 1 us: a compare value nearer than that may be missed
 _CALL_TICKS = const(336)  # 4 us
+_LOW_BITS = const(0x3FFFFFFF)
 SPARE_ENTRIES = const(8)  # of a ring, that are not overwritten: those matched last, and the far-away entry
 _GUARD_TICKS = const(32768)  # 390 us: entries are only added behind a rising edge that is further away,
 _FAR_AHEAD_TICKS = const(3145728)  # but not 37 ms away,
@@ -132,7 +131,7 @@ _TIM5 = const(768)  # behind TIM2
 _PORT_B = const(256)  # behind port A
 _PORT_E = const(1024)
 _CCMR2 = const(7)
-_LINE_0 = const(144)  # FIRST_LINE - SOFTWARE_LINE * LINE_WORDS
+_LINE_0 = const(168)  # FIRST_LINE - SOFTWARE_LINE * LINE_WORDS
 _LINE_BYTES = const(16)
 _LOW = const(64)  # forced inactive for the first channel of a CCMR register,
 _BOTH_LOW = const(16448)  # for both of them; less 1 in a mode's place: toggle
@@ -228,24 +227,12 @@ def rings_to_refill(block: ptr32, dma: ptr32, timer: ptr32) -> int:
     return found if fed else -1
 
 
-@micropython.viper
-def note_written(state: ptr32, ring: ptr32, timer: ptr32, queue: ptr32) -> int:
-    """Count what was written up to the queue's HEAD, and write the far-away entry behind it; 1: it came too late.
-
-    The program itself puts entry 0 into the compare register. So the stream begins with entry 1 and goes on to one
-    word behind the ring: entry 0 is repeated there.
-    """
-    late = 0
-    written = queue[_HEAD]
-    if written != state[WRITTEN]:
-        late = ((state[LAST_TIME] - queue[_PULSE] - timer[CNT]) >> 31) & 1
-        state[WRITTEN] = written
-        state[LAST_TIME] = ring[(written - 1) & state[MASK]]
-        half = 1
-        state[FAR_TIME] = (half << 31) + state[LAST_TIME]
-        ring[written & state[MASK]] = state[FAR_TIME]
-        ring[state[MASK] + 1] = ring[_FIRST_ENTRY]
-    return late
+def set_places(state: "array[int] | memoryview[int]", ring: object, queue: object) -> None:
+    """Note where a ring's words and its queue are."""
+    for at, part in ((RING_AT, ring), (QUEUE_AT, queue)):
+        address = uctypes.addressof(part)
+        state[at] = address & _LOW_BITS
+        state[at + 1] = address >> 30
 
 
 @micropython.viper

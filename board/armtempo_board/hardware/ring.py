@@ -96,12 +96,11 @@ class Ring:
         self.state[isr.MATCHED] = 0
         self.state[isr.NDTR_AT_START] = self.entries
 
-    def run(self, queue: "memoryview[int]") -> int:
-        """Take in what was written from entry 0 on, switch the stream on and let the output toggle.
+    def run(self) -> int:
+        """Entries were written from 0 on: switch the stream on and let the output toggle.
 
-        1 where the first entry came too late. ``queue``: see step_queue.py.
+        1 where the first entry came too late.
         """
-        isr.note_written(self.state, self.words, self.timer, queue)
         mem32[self._registers] = self._mode | isr.STREAM_ON
         self.state[isr.NDTR_AT_START] = mem32[self._ndtr] & 0xFFFF
         before = disable_irq()

@@ -53,7 +53,7 @@ class EngineParts:
         self._readings = Readings(self._sampler, self.clock, self.drives, self._encoders, slots)
         self._following = [FollowingError(row) for row in joints]
         self.inputs = Inputs(head, joints, self._sampler)
-        self.feeder.connect(self.inputs, self.drives)
+        self.feeder.connect(self.inputs, self.drives, [row["max_rate"] for row in joints])
         registers.apply(registers.PRIORITIES)
         self.limits = [{name: row[name] for name in _LIMITS} for row in joints]
         self._pulse_us = head["pulse_ticks"] // _TICKS_PER_US + _PULSE_SPARE_US

@@ -122,6 +122,8 @@ class JointDrive:
             return 0
         generator = self.generator
         can_queue_more = self.can_queue_more = generator.prepare(now_kiticks + LOOKAHEAD_KITICKS)
+        if can_queue_more and self.ring.state[isr.FED]:
+            return 0  # it is looked after once the queue is full
         ahead_kiticks = self.ring.fed_kiticks()
         if ahead_kiticks == _NOT_FED:
             return self._restart(now_kiticks) if self._sampler.quiet() else 0
@@ -168,9 +170,9 @@ class JointDrive:
             return 0
         if ring.written():
             self.empty()
-        if not generator.write(ring.words, ring.entries - 1, 0, ring.entries - isr.SPARE_ENTRIES):
+        if not generator.write(ring.state, 0, ring.entries - isr.SPARE_ENTRIES, ring.timer):
             return 0
-        return codes.UNDERRUN if ring.run(generator.queue) else 0
+        return codes.UNDERRUN if ring.run() else 0
 
     def follow(self, law: "array[int]", is_last: bool) -> None:
         """Take the motion's time by another law (see ``StepGenerator.follow``)."""

@@ -151,7 +151,7 @@ class NextMotion:
 
     def _put(self, number: int, joint: "JointDrive", generator: StepGenerator) -> None:
         joint.generator = generator
-        self._engine.feeder.take_queue(number, generator.queue)
+        self._engine.feeder.take_queue(joint)
 
     def close(self) -> None:
         """The motion is not meant any more, or others read it now."""

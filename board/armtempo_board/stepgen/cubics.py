@@ -17,10 +17,9 @@ _BASE = const(6)
 _REMAINDER = const(7)
 _LEFT = const(8)
 _GROUP = const(9)
-_CARRY = const(10)
+_BASE_KITICKS = const(10)
 _STEPS = const(11)
-_BASE_KITICKS = const(12)
-_ITEM_WORDS = const(13)
+_ITEM_WORDS = const(12)
 _TIME_SCALE = const(14)
 _BASE_HIGH = const(15)
 _IN = const(20)
@@ -35,31 +34,36 @@ _FIRST_NODE = const(28)
 _FIRST_TIME = const(28)
 _FIRST_MANTISSA = const(29)
 _FIRST_EXPONENT = const(30)
-_MIDDLE_TIME = const(36)
-_MIDDLE_MANTISSA = const(37)
-_MIDDLE_EXPONENT = const(38)
-_END_TIME = const(44)
-_END_MANTISSA = const(45)
-_END_EXPONENT = const(46)
+_MIDDLE_TIME = const(33)
+_MIDDLE_MANTISSA = const(34)
+_MIDDLE_EXPONENT = const(35)
+_END_TIME = const(38)
+_END_MANTISSA = const(39)
+_END_EXPONENT = const(40)
 # of two neighbouring nodes
 _NODE_TIME = const(0)
 _NODE_MANTISSA = const(1)
 _NODE_EXPONENT = const(2)
 _NODE_DELAY = const(3)
 _NODE_RATE = const(4)
-_NEXT_TIME = const(8)
-_NEXT_MANTISSA = const(9)
-_NEXT_EXPONENT = const(10)
-_NODE_WORDS = const(8)
+_NEXT_TIME = const(5)
+_NEXT_MANTISSA = const(6)
+_NEXT_EXPONENT = const(7)
+_NODE_WORDS = const(5)
 
 _HALF_MASK = const((1 << 15) - 1)
+_MANY = const(5)  # log2 of steps that are many
+_SQUARE = const(8)
+# log2 of the steps in a group, if it is more than one step
+_SHORTEST_GROUP = const(3)
+_LONGEST_GROUP = const(4)
 
 
 @micropython.viper
 def cubics_fit(steps: int, solver: ptr32, queue: ptr32) -> int:
-    """1 where two cubics of ``steps`` each, from FIRST_NODE over MIDDLE_NODE to END_NODE, keep the error bound; else 0.
+    """Above 0 where two cubics of ``steps`` each, from FIRST_NODE over MIDDLE_NODE to END_NODE, keep the error bound.
 
-    2 where twice as many steps would do.
+    Then the next ones may have so many eighths of these steps, as the error grows with their fourth power.
 
     The Hermite cubic through the first and the end node misses the middle one by D in time and by E / (4 steps) in
     slope. Its fourth derivative alone makes each of the two D / 16 wrong at most, its fifth E / 26. D / 16 + E / 16 <=
@@ -68,6 +72,8 @@ def cubics_fit(steps: int, solver: ptr32, queue: ptr32) -> int:
     """
     # Log2 of the steps, rounded up, and the slopes with one exponent
     power = 0
+    if steps > 1 << _MANY:
+        power = _MANY
     while (1 << power) < steps:
         power += 1
     exponent = solver[_FIRST_EXPONENT]
@@ -86,13 +92,12 @@ def cubics_fit(steps: int, solver: ptr32, queue: ptr32) -> int:
         off = 0 - off
     if off > start >> 2:
         return 0
-    # and groups are long enough for the third difference: the second derivative is greatest at an end
+    # and groups can be long enough for the third difference: of steps whose lengths change evenly, or of one length
     group = (3 * power - exponent - 4) >> 1
     if group > 0:
-        first = 2 * middle - start - end
-        if first < 0:
-            first = 0 - first
-        if group > 4 or (off + 3 * first) >> 1 > 3 * steps << (exponent - 2 - 2 * group):
+        if group < _SHORTEST_GROUP:
+            group = _SHORTEST_GROUP
+        if group > _LONGEST_GROUP or 2 * group > exponent - power:
             return 0
     # steps * slope at the three nodes, in units of the nodes' times
     up = 15 - power
@@ -114,6 +119,18 @@ def cubics_fit(steps: int, solver: ptr32, queue: ptr32) -> int:
     # D and E of the Hermite cubic at the middle node
     first = solver[_MIDDLE_TIME] - solver[_FIRST_TIME] - start
     second = solver[_END_TIME] - solver[_MIDDLE_TIME] - start
+    if group > 0:
+        power = middle - 2 * first
+        if power < 0:
+            power = 0 - power
+        off = middle + end - 2 * second
+        if off < 0:
+            off = 0 - off
+        if off < power:
+            off = power
+        group = steps >> group
+        if off >> queue[_TIME_SCALE] > group * group * group:
+            return 0
     off = 2 * (first - second) + end
     if off < 0:
         off = 0 - off
@@ -125,8 +142,12 @@ def cubics_fit(steps: int, solver: ptr32, queue: ptr32) -> int:
     if off > limit:
         return 0
     if off <= limit >> 4:
-        return 2
-    return 1
+        return 16
+    if 5 * off <= limit:
+        return 12
+    if 5 * off <= 2 * limit:
+        return 10
+    return 7 if 4 * off > 3 * limit else 8
 
 
 @micropython.viper
@@ -138,20 +159,31 @@ def put_cubics(steps: int, node: ptr32, queue: ptr32, held_back: int) -> object:
 
     With K = T - N s_a and D = N (s_b - s_a), the Hermite cubic is s_a k + (3 K - D) k**2 / N**2 + (D - 2 K) k**3 /
     N**3: T ticks over N steps, with slopes s_a, s_b at the two nodes.
-    Its differences are taken over groups of steps; within a group time grows evenly: groups are as long as
-    that is true within 3/32 tick (second derivative times the group squared, over 8). What the third and the
-    second difference lose by rounding goes into those below them, so that the cubic it leaves vanishes at both
-    ends and in the middle, the square at both ends: at most 0.004 M**3 and 0.06 M**2 units, for M groups.
+    Its differences are taken over groups of G steps. Within a group time grows evenly where that is true within 3/32
+    tick (second derivative times G**2 / 8) for eight steps or more; else as a square, if that is true within 1/16 tick
+    (third derivative times G**3 / 125) for so many, and its rounding of G**2 / 16 units of time within another 1/16.
+    What the third and the second difference lose by rounding goes into those below them, so that the cubic it leaves
+    vanishes at both ends and in the middle, the square at both ends: at most 0.004 M**3 and 0.06 M**2 units, for M
+    groups.
     """
     scale = queue[_TIME_SCALE]
     node = ptr32(int(node) + 4 * _FIRST_NODE)  # then the middle one
     put_in = queue[_IN]
+    # Log2 of the steps, rounded up, and 2**(power + 29) / steps by long division with 15-bit digits
+    power = 0
+    if steps > 1 << _MANY:
+        power = _MANY
+    while (1 << power) < steps:
+        power += 1
+    high = (1 << 14) << power
+    over_high = high // steps
+    over_low = ((high - over_high * steps) << 15) // steps
+    bits = power
+    if bits > 8:
+        bits = 8
     while True:
         item = ptr32(int(queue) + 4 * (_ITEMS + _ITEM_WORDS * (put_in & _ITEMS_MASK)))
-        # The slopes with one exponent; D; log2 of the steps, rounded up
-        power = 0
-        while (1 << power) < steps:
-            power += 1
+        # The slopes with one exponent; D
         exponent = node[_NODE_EXPONENT]
         if node[_NEXT_EXPONENT] < exponent:
             exponent = node[_NEXT_EXPONENT]
@@ -174,7 +206,7 @@ def put_cubics(steps: int, node: ptr32, queue: ptr32, held_back: int) -> object:
         # Hermite: the square and the cubic coefficient (times 6)
         square = 3 * time - bend
         cubic = 6 * (bend - 2 * time)
-        # How long a group may be: the second derivative is greatest at an end
+        # How long a group of steps of one length may be: the second derivative is greatest at an end
         time = 2 * square
         bend = time + cubic
         if time < 0:
@@ -183,34 +215,62 @@ def put_cubics(steps: int, node: ptr32, queue: ptr32, held_back: int) -> object:
             bend = 0 - bend
         if time < bend:
             time = bend
-        time = time // steps // steps + 1
-        group = 4
-        if group > power:
-            group = power
-        while group and (time << (2 * group)) > (3 << shift) >> 2:
-            group -= 1
+        time = (3 << shift >> 2) // (time // steps // steps + 1)
+        high = _LONGEST_GROUP
+        if high > power:
+            high = power
+        group = 0
+        while time > 3 and group < high:
+            time >>= 2
+            group += 1
+        # and one of steps whose lengths change evenly
+        kind = 1
+        if group < _SHORTEST_GROUP or group < (2 * power - shift - 4) >> 1:
+            group = 0
+            if high > shift >> 1:
+                high = shift >> 1
+            bend = cubic
+            if bend < 0:
+                bend = 0 - bend
+            while high >= _SHORTEST_GROUP:
+                time = steps >> high
+                if bend >> shift <= 7 * time * time * time:
+                    group = high
+                    kind += _SQUARE
+                    break
+                high -= 1
         # Into units of the differences, with some fraction bits: cubic * 2**(2 group + power) / steps**3
-        bits = power
-        if bits > 8:
-            bits = 8
-        up = 2 * group + power + bits
-        time = 5
-        while time:
-            if time == 2:  # and square * 2**(group + power) / steps**2
-                third = cubic << up
-                cubic = square
-                up = group + power + bits
+        up = 2 * group + bits + 3 - 2 * power
+        factors = 3
+        while True:
             high = cubic
             if high < 0:
                 high = 0 - high
-            while up and not high >> 28:
-                high += high
-                cubic += cubic
-                up -= 1
-            cubic = cubic // steps
-            time -= 1
+            if high:
+                while not high >> 24:
+                    high <<= 4
+                    cubic <<= 4
+                    up -= 4
+            time = factors
+            while time:
+                high = cubic >> 15
+                cubic = (
+                    high * over_high + (((cubic & _HALF_MASK) * over_high) >> 15) + ((high * over_low) >> 15)
+                )
+                time -= 1
+            if up >= 0:
+                cubic <<= up
+            else:
+                cubic >>= 0 - up
+            if factors < 3:
+                break
+            # and square * 2**(group + power) / steps**2
+            third = cubic
+            cubic = square
+            up = group + bits + 2 - power
+            factors = 2
         # Forward differences, rounded; what the third and the second lose goes into those below
-        square = cubic << up
+        square = cubic
         cubic = third
         half = (1 << bits) >> 1
         groups = steps >> group
@@ -233,8 +293,7 @@ def put_cubics(steps: int, node: ptr32, queue: ptr32, held_back: int) -> object:
         item[_BASE] = (high << 12) + time
         item[_REMAINDER] = 0
         item[_LEFT] = 0
-        item[_CARRY] = power - group
-        item[_GROUP] = 1 << group
+        item[_GROUP] = group + kind
         item[_STEPS] = steps
         item[_BASE_KITICKS] = (high << 2) + (time >> 10)
         node = ptr32(int(node) + 4 * _NODE_WORDS)

@@ -21,9 +21,9 @@ _SINGLY = const(8)  # steps solved one by one before a cubic is tried again; an 
 _LEFT = const(8)
 _GROUP = const(9)
 _STEPS = const(11)
-_BASE_KITICKS = const(12)
+_BASE_KITICKS = const(10)
 _UNTIL_KITICKS = const(13)
-_ITEM_WORDS = const(13)
+_ITEM_WORDS = const(12)
 _TIME_SCALE = const(14)
 _BASE_HIGH = const(15)
 _IN = const(20)
@@ -51,18 +51,18 @@ _FIRST_TIME = const(28)
 _MANTISSA = const(29)  # of the first node
 _EXPONENT = const(30)
 _FIRST_DELAY = const(31)
-_MIDDLE_NODE = const(36)
-_END_NODE = const(44)
-_END_MANTISSA = const(45)
-_END_EXPONENT = const(46)
-_END_DELAY = const(47)
+_MIDDLE_NODE = const(33)
+_END_NODE = const(38)
+_END_MANTISSA = const(39)
+_END_EXPONENT = const(40)
+_END_DELAY = const(41)
 _TARGET = const(20)
 _RANGE = const(22)
 _TIME_OFFSET = const(23)
 # of a node
 _NODE_TIME = const(0)
 _NODE_DELAY = const(3)
-_NODE_WORDS = const(8)
+_NODE_WORDS = const(5)
 # as in subintervals.py: arrays of a subinterval
 _ANGLE = const(0)
 _TIME = const(1)
@@ -181,7 +181,7 @@ def queue_steps(solver: object, queue: object, law: object) -> int:
                     verdict = int(cubics_fit(length, solver, queue))
                 if verdict:
                     break
-                length >>= 1
+                length = (length * 3) >> 2
                 words[_CUBIC_STEPS] = length if length > 2 else 2
             if length > 1:
                 reached += length + length
@@ -189,8 +189,11 @@ def queue_steps(solver: object, queue: object, law: object) -> int:
                     words[_HELD_BACK] = 1
                     result = STOPPED
                 put_cubics(length, solver, queue, result - GOES_ON)
-                if verdict == 2 and length + length > size and size <= _MOST_STEPS >> 1:
-                    words[_CUBIC_STEPS] = size + size
+                i = (length * verdict) >> 3
+                if i > _MOST_STEPS:
+                    i = _MOST_STEPS
+                if (i > size and verdict > 8) or (verdict < 8 and i > 1):
+                    words[_CUBIC_STEPS] = i
             else:
                 words[_SINGLE_STEPS] = _SINGLY
         else:

@@ -37,10 +37,11 @@ _LAST_RATE = const(26)  # a fifth of the angle's derivative
 _LAST_ANGLE = const(27)
 # nodes: the step reached last, and two ahead of it
 FIRST_NODE = const(28)
-MIDDLE_NODE = const(36)
-END_NODE = const(44)
-HELD_NODE = const(52)  # the step held back, only where the law of real time moves it
-SOLVER_SIZE = const(60)
+MIDDLE_NODE = const(33)
+END_NODE = const(38)
+HELD_NODE = const(43)  # the step held back, only where the law of real time moves it
+_TREND = const(48)  # half of how LAST_RATE differs from the one before, + 2**29
+SOLVER_SIZE = const(49)
 
 # words of a node; its time is ticks * 2**(scale of the subinterval's time), from the subinterval's first high word on
 NODE_TIME = const(0)
@@ -48,7 +49,7 @@ NODE_MANTISSA = const(1)  # ticks per step = mantissa / 2**exponent; the mantiss
 NODE_EXPONENT = const(2)
 NODE_DELAY = const(3)  # by the law of real time: whole ticks of it beside the time,
 NODE_RATE = const(4)  # and the rate of the motion's time
-_NODE_WORDS = const(8)
+_NODE_WORDS = const(5)
 
 # as in subdivision.py: measures of a piece
 _SCALE = const(0)
@@ -99,6 +100,7 @@ def set_interval(solver: ptr32, angle: ptr32, angle_measures: ptr32, time_measur
             solver[_LAST_W] = 0
             solver[_LAST_RATE] = a
             solver[_LAST_ANGLE] = 0
+            solver[_TREND] = _BIAS
         # From Bezier to power form: differences of the differences
         e += 6 * c - 4 * d - 4 * b + a
         d += 3 * b - 3 * c - a
@@ -151,10 +153,12 @@ def solve(solver: ptr32, high: int, length: int) -> object:
             target = 0
         if target > solver[RANGE]:
             target = solver[RANGE]
-        # Newton: w += residual / rate, from the step solved last
+        # Newton: w += residual / rate, from the step solved last; first with the rate half way if it goes on changing
         w = solver[_LAST_W]
         rate = solver[_LAST_RATE]
         residual = target - solver[_LAST_ANGLE]
+        if residual > 0:
+            rate += solver[_TREND] - _BIAS
         rounds = 0
         while True:
             if rate < 1:  # rounding, where a subinterval is a few units high
@@ -250,6 +254,7 @@ def solve(solver: ptr32, high: int, length: int) -> object:
             + solver[TIME_OFFSET]
         )
         solver[_LAST_W] = w
+        solver[_TREND] = ((rate - solver[_LAST_RATE]) >> 1) + _BIAS
         solver[_LAST_RATE] = rate
         solver[_LAST_ANGLE] = target
         # The slope of time over angle as a floating-point number: both rates to 30 bits, then a long division
@@ -258,6 +263,8 @@ def solve(solver: ptr32, high: int, length: int) -> object:
         if slope < 1:
             slope = 1
         i = solver[_SLOPE_EXPONENT] - 34
+        rate <<= 2  # neither exceeds two fifths of the range
+        slope <<= 2
         while rate < (1 << 29):
             rate <<= 1
             i -= 1

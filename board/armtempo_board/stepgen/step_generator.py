@@ -10,7 +10,7 @@ from micropython import const
 from armtempo_board.memory import Memory
 from armtempo_board.stepgen import newton, step_queue
 from armtempo_board.stepgen.newton import solve
-from armtempo_board.stepgen.step_queue import emit, has_room, holds_steps, put_single
+from armtempo_board.stepgen.step_queue import emit, has_room, put_single
 from armtempo_board.stepgen.subintervals import Subintervals
 
 TYPE_CHECKING = False
@@ -43,7 +43,7 @@ _BY_LAW = const(1)
 _AT_START = const(2)
 # as in newton.py: words of the solver
 _FIRST_NODE = const(28)
-_HELD_NODE = const(52)
+_HELD_NODE = const(43)
 # of a node
 _NODE_MANTISSA = const(1)
 _NODE_EXPONENT = const(2)
@@ -62,6 +62,10 @@ _END = const(3)
 # as in interval_steps.py: results, 0 where the queue has no room
 _STOPPED = const(2)
 
+# as in isr.py: word of a ring's state
+_ROOM = const(8)
+
+_THIS_RING = const(1)  # bit of the first one at hand
 _CLEARED = (_STEPS, _LATEST_KITICKS, _REACHED, _LAST_STEP, _MODE, _HELD_BACK, _HALTED)
 _FIRST_CUBIC_STEPS = const(16)  # tried first in a motion
 _LAW_WORDS = const(18)  # as in time_law.py
@@ -170,14 +174,16 @@ class StepGenerator:
                 self._next_interval()
         return True
 
-    def write(self, ring: "array[int] | memoryview[int]", mask: int, head: int, room: int) -> int:
-        """Write up to ``room`` edge times (rise, fall, ...; ticks modulo 2**32) to ``ring`` from ``head`` on.
+    def write(self, ring: "array[int] | memoryview[int]", head: int, room: int, timer: "Any") -> int:
+        """Write up to ``room`` edge times (rise, fall, ...; ticks modulo 2**32) to a ring, from the entry ``head`` on.
 
-        ``ring``: array('I') of ``mask`` + 1 entries, ``head`` even. Returns how many were written.
+        ``ring``: the ring's state (isr.py), which says where it and the queue are. ``head`` is even. ``timer``: see
+        ``emit``. Returns how many were written.
         """
         queue = self.queue
         queue[_HEAD] = head
-        emit(room, ring, queue, mask)
+        ring[_ROOM] = room
+        emit(_THIS_RING, ring, timer)
         return int(queue[_HEAD] - head)
 
     def latest_kiticks(self) -> int:
@@ -187,7 +193,8 @@ class StepGenerator:
 
     def waits(self) -> bool:
         """Whether steps wait in the queue."""
-        return holds_steps(self.queue) != 0
+        queue = self.queue
+        return queue[_STEPS] != 0 or queue[_IN] != queue[_OUT]
 
     def turn(self) -> None:
         """Let the steps in the other direction come."""
@@ -208,7 +215,7 @@ class StepGenerator:
         queue[_INTERVAL_HIGH] = self._law.take(law, high)
         start_kiticks = _kiticks(self._law_words[_REAL_START_HIGH], 0)
         reached = queue[_REACHED]
-        if queue[_LATEST_KITICKS] >= start_kiticks and holds_steps(queue):
+        if queue[_LATEST_KITICKS] >= start_kiticks and self.waits():
             if self._held_queued:
                 step_queue.withdraw(queue, queue[_IN] - 1 & 0xFFFF, start_kiticks)
                 self._held = True

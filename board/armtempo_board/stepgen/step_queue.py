@@ -18,21 +18,26 @@ THIRD = const(3)  # the third, + 2**29
 POWER = const(4)
 SHIFT = const(5)
 _BASE = const(6)  # ticks, modulo 2**32
-_REMAINDER = const(7)  # what the steps of a group have left over of its time
-_LEFT = const(8)  # steps left in the group; of single steps: the word in which the next one's time stands
-GROUP = const(9)  # steps in a group; 0: single steps, whose times stand in words 0 to 7
-CARRY = const(10)  # _REMAINDER / 2**CARRY is in units of _TIME
+_REMAINDER = const(7)  # what the steps of a group have left over of its time, as FIRST
+_LEFT = const(
+    8
+)  # steps left in the group that ``emit`` is in; single steps: where the next one's time stands
+# log2 of the steps in a group, + 1, and SQUARE more where these steps' lengths change evenly; else they are all the
+# same. 0: single steps, whose times stand in words 0 to 7
+GROUP = const(9)
+_BASE_KITICKS = const(10)
 STEPS = const(11)  # steps not written yet
-_BASE_KITICKS = const(12)
-_ITEM_WORDS = const(13)
+_ITEM_WORDS = const(12)
+# and what ``emit`` keeps besides
+_CHANGE = const(12)  # of _STEP, from one step of the group to the next, + 2**29
 UNTIL_KITICKS = const(13)  # steps after it are not written
 # what cubics are made from
 TIME_SCALE = const(14)  # fraction bits of the nodes' times
 _BASE_HIGH = const(15)  # what the nodes' times count from; 4096 ticks, + 2**28
-_STEP = const(16)  # time of one step of the group that ``emit`` is in; ticks * 2**SHIFT
+_STEP = const(16)  # time of the next step of the group that ``emit`` is in; ticks * 2**SHIFT
 PULSE = const(17)  # ticks
 HEAD = const(18)  # entry of the ring to be written next; not masked
-_ROOM = const(19)  # entries of the ring that may be written
+_ENTRIES_LEFT = const(19)  # entries of the ring that may be written
 # items put in and taken out, modulo 2**16
 IN = const(20)
 OUT = const(21)
@@ -49,8 +54,10 @@ HELD_BACK = const(30)
 HALTED = const(31)  # by the law of real time its next step never comes
 _ITEMS = const(32)  # CAPACITY of them
 CAPACITY = const(8)  # items
-QUEUE_SIZE = const(136)
+QUEUE_SIZE = const(128)
 
+SQUARE = const(8)
+_GROUP_MASK = const(7)
 _FULL = const(7)  # items: there is no room for two more
 # bits of MODE
 BY_LAW = const(1)  # real time is not the motion's own, see time_law.py
@@ -69,146 +76,222 @@ _FALL_3 = const(5)
 _RISE_4 = const(6)
 _FALL_4 = const(7)
 
+# as in isr.py: words of a ring's state, of a joint in the block, and of a timer
+_WRITTEN = const(0)
+_LAST_TIME = const(3)
+_FAR_TIME = const(4)
+_MASK = const(5)
+_ROOM = const(8)
+_RING_AT = const(9)
+_QUEUE_AT = const(11)
+_JOINT_WORDS = const(29)
+_CNT = const(9)
+
 _BIAS = const(1 << 29)
 _HIGH_BIAS = const(1 << 28)
 _LONG_KITICKS = const(1 << 19)  # longer than any cubic
 
 
 @micropython.viper
-def emit(now: int, ring: ptr32, queue: ptr32, mask: int) -> object:
-    """Write edges of the items in the queue to the ring: up to UNTIL_KITICKS, and as many as ``now`` says.
+def emit(now: int, ring: ptr32, timer: ptr32) -> int:
+    """Write edges of queued items to rings: of each joint up to UNTIL_KITICKS, and as many as its ROOM says.
 
-    The compiler keeps the first two arguments in registers: ``now`` becomes the running time, and ``ring`` moves.
+    ``now``: bit a joint; ``ring``: the state of the first joint's ring in the block of isr.py, behind which the others'
+    stand. Returns a bit for each joint whose last edge had passed by ``timer`` before all was written. One call for
+    all, as a call costs as much as ten steps or more. The compiler keeps the first two arguments in registers: ``now``
+    becomes the running time, and ``ring`` moves.
+
+    The program itself puts entry 0 of a ring into the compare register. So the stream begins with entry 1 and goes on
+    to one word behind the ring: entry 0 is repeated there. Behind the last entry stands one that is far away.
     """
-    start = int(ring)
-    pulse = queue[PULSE]
-    queue[_ROOM] = now
-    while True:
-        if queue[_ROOM] < 2:
-            break
-        # Take the next item out of the queue
-        if not queue[STEPS]:
-            count = queue[OUT]
-            if count == queue[IN]:
-                break
-            ring = ptr32(int(queue) + 4 * (_ITEMS + _ITEM_WORDS * (count & _ITEMS_MASK)))
-            n = 0
-            while n < _ITEM_WORDS:
-                queue[n] = ring[n]
-                n += 1
-            queue[OUT] = (count + 1) & _COUNT_MASK
-        at = queue[HEAD] & mask
-        # Single steps: their times as they stand
-        if not queue[GROUP]:
-            now = queue[queue[_LEFT]]
-            if queue[_BASE_KITICKS] + (((now - queue[_TIME]) >> 10) & _KITICKS_MASK) > queue[UNTIL_KITICKS]:
-                break
-            ring = ptr32(start + 4 * at)
-            ring[_RISE] = now
-            ring[_FALL] = now + pulse
-            queue[_LEFT] = queue[_LEFT] + 1
-            queue[STEPS] = queue[STEPS] - 1
-            queue[HEAD] = queue[HEAD] + 2
-            queue[_ROOM] = queue[_ROOM] - 2
-            continue
-        # A cubic: how many of its steps fit in front of the ring's end, into the room and before UNTIL_KITICKS
-        now = queue[_TIME]
-        shift = queue[SHIFT]
-        count = (mask + 1 - at) >> 1
-        n = queue[_ROOM] >> 1
-        if count > n:
-            count = n
-        if count > queue[STEPS]:
-            count = queue[STEPS]
-        n = queue[UNTIL_KITICKS] - queue[_BASE_KITICKS]
-        if n < _LONG_KITICKS:
-            step = queue[_STEP]
-            if not queue[_LEFT]:
-                step = queue[FIRST] >> queue[POWER]
-            n = (n << 10) - ((now + step) >> shift)
-            if n < 0:
-                break
-            n = n // ((step >> shift) + 1) + 1
-            if count > n:
-                count = n
-        if not count:
-            break
-        queue[STEPS] = queue[STEPS] - count
-        queue[HEAD] = queue[HEAD] + count + count
-        queue[_ROOM] = queue[_ROOM] - count - count
-        ring = ptr32(start + 4 * at)
-        base = queue[_BASE]
-        # Forward differences, in local variables, which cost less than words of the queue
-        first = queue[FIRST]
-        second = queue[SECOND] - _BIAS
-        third = queue[THIRD] - _BIAS
-        power = queue[POWER]
-        remainder = queue[_REMAINDER]
-        left = queue[_LEFT]
-        carry = queue[CARRY]
-        step = queue[_STEP]
-        # Groups of one step, as they are many where the speed changes: time and remainder in one, below a tick
-        if queue[GROUP] == 1:
-            step = shift + power
-            remainder += (now & ((1 << shift) - 1)) << power
-            now = (now >> shift) + base
-            while count:
-                count -= 1
-                remainder += first
-                n = remainder >> step
-                remainder -= n << step
-                now += n
-                ring[_RISE] = now
-                ring[_FALL] = now + pulse
-                ring = ptr32(int(ring) + 8)
-                first += second
-                second += third
-            now = ((now - base) << shift) + (remainder >> power)
-            remainder &= (1 << power) - 1
-        while count:
-            # The next group: the time of one of its steps, and the next differences
-            if not left:
-                left = queue[GROUP]
-                step = first >> power
-                remainder += first - (step << power)
-                n = remainder >> carry
-                remainder -= n << carry
-                now += n
-                first += second
-                second += third
-                # All its steps, evenly spaced: four at a time
-                if count >= left and left > 2:
-                    count -= left
-                    while left:
+    wanted = now
+    state = ring
+    bit = 1
+    late = 0
+    while wanted:
+        if wanted & 1:
+            start = (state[_RING_AT + 1] << 30) + state[_RING_AT]
+            queue = ptr32((state[_QUEUE_AT + 1] << 30) + state[_QUEUE_AT])
+            mask = state[_MASK]
+            pulse = queue[PULSE]
+            queue[_ENTRIES_LEFT] = state[_ROOM]
+            while True:
+                if queue[_ENTRIES_LEFT] < 2:
+                    break
+                # Take the next item out of the queue
+                if not queue[STEPS]:
+                    count = queue[OUT]
+                    if count == queue[IN]:
+                        break
+                    ring = ptr32(int(queue) + 4 * (_ITEMS + _ITEM_WORDS * (count & _ITEMS_MASK)))
+                    place = queue
+                    n = _ITEM_WORDS
+                    while n:  # four words at a time
+                        place[_TIME] = ring[_TIME]
+                        place[FIRST] = ring[FIRST]
+                        place[SECOND] = ring[SECOND]
+                        place[THIRD] = ring[THIRD]
+                        place = ptr32(int(place) + 16)
+                        ring = ptr32(int(ring) + 16)
+                        n -= 4
+                    queue[OUT] = (count + 1) & _COUNT_MASK
+                at = queue[HEAD] & mask
+                # Single steps: their times as they stand
+                if not queue[GROUP]:
+                    now = queue[queue[_LEFT]]
+                    if (
+                        queue[_BASE_KITICKS] + (((now - queue[_TIME]) >> 10) & _KITICKS_MASK)
+                        > queue[UNTIL_KITICKS]
+                    ):
+                        break
+                    ring = ptr32(start + 4 * at)
+                    ring[_RISE] = now
+                    ring[_FALL] = now + pulse
+                    queue[_LEFT] = queue[_LEFT] + 1
+                    queue[STEPS] = queue[STEPS] - 1
+                    queue[HEAD] = queue[HEAD] + 2
+                    queue[_ENTRIES_LEFT] = queue[_ENTRIES_LEFT] - 2
+                    continue
+                # A cubic: how many of its steps fit in front of the ring's end, into the room and before UNTIL_KITICKS
+                now = queue[_TIME]
+                shift = queue[SHIFT]
+                count = (mask + 1 - at) >> 1
+                n = queue[_ENTRIES_LEFT] >> 1
+                if count > n:
+                    count = n
+                if count > queue[STEPS]:
+                    count = queue[STEPS]
+                n = queue[UNTIL_KITICKS] - queue[_BASE_KITICKS]
+                if n < _LONG_KITICKS:
+                    step = queue[_STEP]
+                    if not queue[_LEFT]:
+                        step = queue[FIRST] >> queue[POWER]
+                    n = (n << 10) - ((now + step) >> shift)
+                    if n < 0:
+                        break
+                    n = n // ((step >> shift) + 1) + 1
+                    if count > n:
+                        count = n
+                if not count:
+                    break
+                queue[STEPS] = queue[STEPS] - count
+                queue[HEAD] = queue[HEAD] + count + count
+                queue[_ENTRIES_LEFT] = queue[_ENTRIES_LEFT] - count - count
+                ring = ptr32(start + 4 * at)
+                base = queue[_BASE]
+                # Forward differences, in local variables, which cost less than words of the queue
+                first = queue[FIRST]
+                second = queue[SECOND] - _BIAS
+                third = queue[THIRD] - _BIAS
+                power = queue[POWER]
+                remainder = queue[_REMAINDER]
+                left = queue[_LEFT]
+                step = queue[_STEP]
+                change = queue[_CHANGE] - _BIAS
+                group = queue[GROUP] - 1
+                # Groups of one step, where the speed changes much
+                if not group:
+                    while count:
+                        count -= 1
+                        remainder += first
+                        n = remainder >> power
+                        remainder -= n << power
+                        now += n
+                        ring[_RISE] = (now >> shift) + base
+                        ring[_FALL] = ring[_RISE] + pulse
+                        ring = ptr32(int(ring) + 8)
+                        first += second
+                        second += third
+                is_square = group & SQUARE
+                if not is_square:
+                    change = 0
+                group &= _GROUP_MASK
+                carry = power - group
+                while count:
+                    # The next group: the time of its first step, how that changes, and the next differences
+                    if not left:
+                        left = 1 << group
+                        step = first >> power
+                        remainder += first - (step << power)
+                        if is_square:
+                            n = power + group
+                            change = (second - (third >> 1) + ((1 << n) >> 1)) >> n
+                            n = change * (left - 1)
+                            step -= n >> 1
+                            remainder -= (n & 1) << power >> 1
+                        n = remainder >> carry
+                        remainder -= n << carry
+                        now += n
+                        first += second
+                        second += third
+                        # All its steps, some at a time: all of one length,
+                        if count >= left:
+                            count -= left
+                            if not change:
+                                while left:
+                                    now = now + step
+                                    ring[_RISE] = (now >> shift) + base
+                                    ring[_FALL] = ring[_RISE] + pulse
+                                    now = now + step
+                                    ring[_RISE_2] = (now >> shift) + base
+                                    ring[_FALL_2] = ring[_RISE_2] + pulse
+                                    now = now + step
+                                    ring[_RISE_3] = (now >> shift) + base
+                                    ring[_FALL_3] = ring[_RISE_3] + pulse
+                                    now = now + step
+                                    ring[_RISE_4] = (now >> shift) + base
+                                    ring[_FALL_4] = ring[_RISE_4] + pulse
+                                    ring = ptr32(int(ring) + 32)
+                                    left -= 4
+                                continue
+                            # or of lengths that change evenly
+                            while left:
+                                now = now + step
+                                ring[_RISE] = (now >> shift) + base
+                                ring[_FALL] = ring[_RISE] + pulse
+                                step += change
+                                now = now + step
+                                ring[_RISE_2] = (now >> shift) + base
+                                ring[_FALL_2] = ring[_RISE_2] + pulse
+                                step += change
+                                ring = ptr32(int(ring) + 16)
+                                left -= 2
+                            continue
+                    # or those that have room, singly
+                    while left and count:
                         now = now + step
                         ring[_RISE] = (now >> shift) + base
                         ring[_FALL] = ring[_RISE] + pulse
-                        now = now + step
-                        ring[_RISE_2] = (now >> shift) + base
-                        ring[_FALL_2] = ring[_RISE_2] + pulse
-                        now = now + step
-                        ring[_RISE_3] = (now >> shift) + base
-                        ring[_FALL_3] = ring[_RISE_3] + pulse
-                        now = now + step
-                        ring[_RISE_4] = (now >> shift) + base
-                        ring[_FALL_4] = ring[_RISE_4] + pulse
-                        ring = ptr32(int(ring) + 32)
-                        left -= 4
-                    continue
-            # or two of them, or those that have room, singly
-            while left and count:
-                now = now + step
-                ring[_RISE] = (now >> shift) + base
-                ring[_FALL] = ring[_RISE] + pulse
-                ring = ptr32(int(ring) + 8)
-                left -= 1
-                count -= 1
-        queue[_TIME] = now
-        queue[FIRST] = first
-        queue[SECOND] = second + _BIAS
-        queue[_REMAINDER] = remainder
-        queue[_LEFT] = left
-        queue[_STEP] = step
+                        step += change
+                        ring = ptr32(int(ring) + 8)
+                        left -= 1
+                        count -= 1
+                if queue[STEPS]:
+                    queue[_TIME] = now
+                    queue[FIRST] = first
+                    queue[SECOND] = second + _BIAS
+                    queue[_REMAINDER] = remainder
+                    queue[_LEFT] = left
+                    queue[_STEP] = step
+                    queue[_CHANGE] = change + _BIAS
+            # Count what was written
+            n = queue[HEAD]
+            if n != state[_WRITTEN]:
+                if ((state[_LAST_TIME] - pulse - timer[_CNT]) >> 31) & 1:
+                    late += bit
+                ring = ptr32(start)
+                now = ring[(n - 1) & mask]
+                state[_WRITTEN] = n
+                state[_LAST_TIME] = now
+                count = 1
+                now += count << 31
+                state[_FAR_TIME] = now
+                ring[n & mask] = now
+                ring[mask + 1] = ring[_RISE]
+        wanted >>= 1
+        bit += bit
+        state = ptr32(int(state) + 4 * _JOINT_WORDS)
+    return late
 
 
 @micropython.viper
@@ -234,12 +317,6 @@ def has_room(queue: ptr32, until_kiticks: int) -> int:
     if (queue[IN] - queue[OUT]) & _COUNT_MASK >= _FULL:
         return 0
     return ((queue[LATEST_KITICKS] - until_kiticks - 1) >> 31) & 1
-
-
-@micropython.viper
-def holds_steps(queue: ptr32) -> int:
-    """Not 0 while steps in the queue have not been written."""
-    return queue[STEPS] | (queue[IN] ^ queue[OUT])
 
 
 @micropython.viper

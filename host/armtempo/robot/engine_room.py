@@ -51,8 +51,8 @@ class Room:
         return 0
 
 
-AS_FILES = Room(5_576, 3)
-IN_FIRMWARE = Room(14_592, 6)
+AS_FILES = Room(4_648, 3)
+IN_FIRMWARE = Room(4 * engine_memory.LARGEST_WORDS, limits.MAX_JOINTS)
 """The program as compiled files on MicroPython's own firmware for the STM32F4DISC, and built into it.
 
 Measured: ``python -m tests.benchmark.room MICROPYTHON``.

@@ -21,7 +21,6 @@ from micropython import const
 
 _SYSTICK_LOAD = const(0xE000E014)
 _LOOKS = const(25)  # of the emulated board at the clock, in a millisecond
-_FEED_TICKS = const(42000)
 _PSC = const(0x28)
 _EVERY_MS = const(50)  # a command that often while something moves
 _BEFORE, _BEHIND = const(20), const(40)  # turns between two commands, and at the end
@@ -59,6 +58,7 @@ class Timer:
     def __init__(self, number, callback=None, **settings):
         if callback:
             feeds.append(callback)
+            mem32[here["feed_ticks"]] = (settings["period"] + 1) * (settings["prescaler"] + 1)
 
     def channel(self, number, mode, callback):
         """Keep it."""
@@ -333,7 +333,6 @@ def replace(settings, port=Port):
     state[4] = mem32[here["allocated"]]
     mem32[_SYSTICK_LOAD] = here["millisecond"] // _LOOKS - 1
     mem32[here["looks_per_ms"]] = _LOOKS
-    mem32[here["feed_ticks"]] = _FEED_TICKS
     still = uctypes.addressof(unmoved)
     sys.modules["pyb"] = Beyond(pyb, USB_VCP=port, Timer=Timer)
     sys.modules["os"] = Beyond(os, dupterm=nothing, urandom=bytes)

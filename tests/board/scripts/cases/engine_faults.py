@@ -211,11 +211,11 @@ def with_slow_emit(motion, moment):
     emit = ring_feeder.emit
     slow = []
 
-    def slow_emit(*arguments):
-        emit(*arguments)
+    def slow_emit(rings, *arguments):
         for rig in slow:
-            if arguments[1] is rig.engine.drives[0].ring.words:
+            if rings & 1:
                 rig.board.stand_still(84 * 30_000)
+        return emit(rings, *arguments)
 
     ring_feeder.emit = slow_emit
     try:

@@ -3,14 +3,18 @@
 from array import array
 
 import cases
+import stm
 import uctypes
 import virtual_board.standalone  # noqa: F401
 from armtempo_board.hardware import isr, pins, registers
 from armtempo_board.stepgen import step_queue
 from armtempo_shared.engine_memory import ring_words
-from engine_rig import Rig, arm
+from engine_rig import Rig, arm, row
+from machine import mem32
 
 BLOCK = isr.BLOCK_HEAD + 6 * isr.JOINT_WORDS
+ITEM_TIME, ITEM_BASE = 0, 6  # as in step_queue.py: words of a queue
+APART = 6_000_000  # ticks from one step to the next
 
 
 def words(count):
@@ -22,6 +26,11 @@ def ring_state(entries):
     state = words(isr.STATE_WORDS)
     state[isr.MASK] = entries - 1
     return state
+
+
+def states(block):
+    """Where the states of the rings begin."""
+    return memoryview(block)[isr.BLOCK_HEAD + isr.RING :]
 
 
 def case_counting_matches():
@@ -90,20 +99,25 @@ def case_when_to_write():
 def case_written_and_wrapped():
     """The far-away entry stands behind the newest, the first word is repeated behind the end; too late is told."""
     for entries in (64, 256, 1024):
-        _, state, _, timer = ready(entries, 0, 0, 1000, 0)
-        queue = words(step_queue.QUEUE_SIZE)
+        block, state, _, timer = ready(entries, 0, 0, 1000, 0)
+        queue, ring = words(step_queue.QUEUE_SIZE), words(entries + 1)
+        isr.set_places(state, ring, queue)
         queue[step_queue.PULSE] = 100
-        ring = words(entries + 1)
+        queue[step_queue.FIRST] = APART
+        queue[step_queue.SECOND] = queue[step_queue.THIRD] = 1 << 29
+        queue[step_queue.GROUP] = 1
+        queue[step_queue.UNTIL_KITICKS] = 1 << 28
         made = 0
         for count in (2, entries - 24, 20, 2, entries - 16, 16, 2, 0):
             before = state[isr.LAST_TIME]
-            for n in range(count):
-                ring[(made + n) % entries] = (made + n) * 3_000_000 & 0xFFFFFFFF
-            queue[step_queue.HEAD] = made + count
+            queue[ITEM_TIME] = 0
+            queue[ITEM_BASE] = made // 2 * APART & 0xFFFFFFFF
+            queue[step_queue.STEPS] = count // 2
+            state[isr.ROOM] = count
             timer[isr.CNT] = (before - 100 + (count == 20)) & 0xFFFFFFFF
-            assert isr.note_written(state, ring, timer, queue) == (count == 20)
+            assert step_queue.emit(2, states(block), timer) == 2 * (count == 20)
             made += count
-            last = (made - 1) * 3_000_000 & 0xFFFFFFFF
+            last = (made // 2 * APART + 100) & 0xFFFFFFFF
             assert state[isr.WRITTEN] == made
             assert state[isr.LAST_TIME] == last
             assert ring[made % entries] == last ^ 0x80000000 == state[isr.FAR_TIME]
@@ -119,6 +133,19 @@ def case_sizes():
         assert entries == 1024 or (entries - 8) * 1000 >= 2 * rate * 3, rate
         previous = entries
     assert [ring_words(rate, 3) for rate in (0, 9_300, 9_600, 333_000)] == [65, 65, 129, 1025]
+
+
+def case_how_often_rings_are_written():
+    """Every millisecond where each ring lasts 3.15 ms when it is full, else twice as often; TIM6 has 16 bits."""
+    for rates, ticks in (
+        ([20_000] * 3, 84_000),
+        ([162_000], 84_000),
+        ([163_000], 42_000),
+        ([5_000, 163_000, 5_000], 42_000),
+    ):
+        Rig([row(channel=n, max_rate=rate) for n, rate in enumerate(rates)])
+        prescaler, period = (mem32[stm.TIM6 + 4 * word] for word in (isr.PSC, isr.ARR))
+        assert (prescaler + 1) * (period + 1) == ticks, rates
 
 
 def case_times_across_the_wrap():
@@ -376,7 +403,7 @@ def case_interrupts_wait_while_a_channel_is_armed_or_released():
     each = rig.engine.drives[0].ring
     ring.isr = Watched()
     try:
-        each.run(words(step_queue.QUEUE_SIZE))
+        each.run()
         each.release()
     finally:
         ring.isr = isr

@@ -11,6 +11,7 @@ from array import array
 
 import micropython
 from armtempo_board.errors import Refused
+from armtempo_board.hardware import isr
 from armtempo_board.memory import Memory
 from armtempo_board.motion import motion_check as checking
 from armtempo_board.motion import rate_check
@@ -29,7 +30,9 @@ FREE = {"min_steps": -50000000, "max_steps": 50000000, "max_rate": 336330}
 
 def walk(motion, joint, generator, out, pulse, gap, room, start, length):
     """All steps of one joint; nothing may be allocated on the way."""
-    ring = array("I", bytes(4 * (MASK + 1)))
+    ring, state = array("I", bytes(4 * (MASK + 2))), array("i", bytes(4 * isr.STATE_WORDS))
+    state[isr.MASK] = MASK
+    isr.set_places(state, ring, generator.queue)
     generator.load(motion, joint, first_position(motion, joint), pulse, gap)
     head = 0
     braked = not length
@@ -43,7 +46,7 @@ def walk(motion, joint, generator, out, pulse, gap, room, start, length):
         generator.prepare(NEVER if braked else start_kiticks)
         near = generator.next_kiticks()
         brake_now = not braked and near >= start_kiticks
-        count = 0 if brake_now else generator.write(ring, MASK, head, room)
+        count = 0 if brake_now else generator.write(state, head, room, state)
         unlock()
         if brake_now:
             OVERRIDE.ramp(start, 0)

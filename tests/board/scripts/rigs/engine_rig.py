@@ -12,7 +12,8 @@ from virtual_board.arm import motors
 TICK_HZ = 84_000_000
 FEWER = 6 if "short" in sys.argv else 1
 """Repetitions are divided by it; the emulated interpreter is slow."""
-SLOTS = step_queue.QUEUE_SIZE - 13 * step_queue.CAPACITY
+ITEM_WORDS = 12
+SLOTS = step_queue.QUEUE_SIZE - ITEM_WORDS * step_queue.CAPACITY
 
 
 class Steps:
@@ -113,10 +114,10 @@ class StepGenerator:
     def _lengthen(self, time, gap, steps):
         """The item queued last has so many steps, all as far apart."""
         state = self.queue
-        place = SLOTS + 13 * ((state[step_queue.IN] - 1) % step_queue.CAPACITY)
+        place = SLOTS + ITEM_WORDS * ((state[step_queue.IN] - 1) % step_queue.CAPACITY)
         base = (time - gap) & 0xFFFFFFFF
         base -= base >> 31 << 32
-        words = (0, gap, 1 << 29, 1 << 29, 0, 0, base, 0, 0, 16, 0, steps, (time - gap) >> 10)
+        words = (0, gap, 1 << 29, 1 << 29, 0, 0, base, 0, 0, 1, (time - gap) >> 10, steps)
         for word, value in enumerate(words):
             state[place + word] = value
         state[step_queue.LATEST_KITICKS] = (time + (steps - 1) * gap) >> 10

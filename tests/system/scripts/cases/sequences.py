@@ -6,6 +6,7 @@ and what a stop, a fault or a change of speed leaves. Arguments: see ``whole_boa
 
 import cases
 import whole_board
+from armtempo_board.hardware import isr
 from armtempo_shared import sequence, wire
 from armtempo_shared.messages import RESUME
 from virtual_board import machine_state
@@ -161,7 +162,8 @@ def generators():
     from armtempo_board.app import program
 
     engine = program.app.controller.engine
-    return [id(joint.generator) for joint in engine.drives] + [id(part) for part in engine.feeder._parts]
+    queues = [joint.ring.state[isr.QUEUE_AT : isr.QUEUE_AT + 2] for joint in engine.drives]
+    return [id(joint.generator) for joint in engine.drives] + [list(words) for words in queues]
 
 
 def ready(world):
