@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-_PERIOD_TICKS = const(42000)  # between two interrupts: 0.5 ms, or twice as long where all rings are long:
-_LONG_US = const(
-    3150
-)  # when full. A ring is not filled before three eighths are free, nor in its last 390 us
+# Between two interrupts: 0.5 ms, or twice as long where each ring, when full, lasts _LONG_US. It is not filled before
+# three eighths are free, nor in its last 390 us.
+_PERIOD_TICKS = const(42000)
+_LONG_US = const(3150)
 _HALF_SECOND_US = const(500000)  # a step takes two entries
 _CR1 = const(0)  # of a timer
 # what the interrupt takes
