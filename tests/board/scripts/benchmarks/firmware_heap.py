@@ -16,6 +16,7 @@ import stm
 from micropython import mem_info
 
 FRAMES = "/flash/frames"
+ROUNDS = "/flash/rounds"
 TURNS = 20
 """Turns of the program's loop between two frames, and at the end."""
 BACKUP_SRAM = 0x2002F000
@@ -46,7 +47,8 @@ class Port:
 
     def __init__(self):
         self._frames = open(FRAMES, "rb")  # noqa: SIM115  until the end
-        self._left = 0
+        self._left = self._second = 0  # bytes left of a frame; where the second begins
+        self._rounds = rounds()
         self._turns = 0
         self._stages = ["program", "hello"]
 
@@ -69,6 +71,10 @@ class Port:
         if self._stages:
             tell(self._stages.pop(0))
         head = self._frames.read(2)
+        if not head and self._rounds > 1:
+            self._rounds -= 1
+            self._frames.seek(self._second)
+            head = self._frames.read(2)
         if not head:
             tell("motion")
             tell("end")
@@ -77,11 +83,22 @@ class Port:
         if self._left >= _STAGE:
             tell(str(self._frames.read(self._left - _STAGE), "ascii"))
             self._next()
+        elif not self._second:
+            self._second = 2 + self._left
 
     def write(self, buffer, start, count):
         """Tell the host that looks on."""
         print("@ answer", hexlify(memoryview(buffer)[start : start + count]).decode())
         return count
+
+
+def rounds():
+    """How often the host sends its frames, but for the first; 1 where nothing is said."""
+    try:
+        with open(ROUNDS) as file:
+            return int(file.read())
+    except OSError:
+        return 1
 
 
 def tell(name):
