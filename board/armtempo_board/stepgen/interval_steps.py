@@ -189,6 +189,7 @@ def queue_steps(solver: object, queue: object, law: object) -> int:
                     words[_HELD_BACK] = 1
                     result = STOPPED
                 put_cubics(length, solver, queue, result - GOES_ON)
+                # The next ones: eighths of these, and longer than before only where it says so
                 i = (length * verdict) >> 3
                 if i > _MOST_STEPS:
                     i = _MOST_STEPS
