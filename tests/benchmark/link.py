@@ -15,7 +15,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from armtempo.errors import LinkError
+from armtempo.basics.errors import LinkError
 from armtempo.link import Client, open_board
 from armtempo.link.follow import Follower
 from armtempo.model import trajectory_file

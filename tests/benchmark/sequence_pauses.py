@@ -17,7 +17,7 @@ from pathlib import Path
 
 import armtempo
 import numpy as np
-from armtempo.errors import ArmtempoError
+from armtempo.basics.errors import ArmtempoError
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.sequence import Sequence

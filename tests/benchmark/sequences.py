@@ -17,7 +17,7 @@ from pathlib import Path
 
 import armtempo
 import numpy as np
-from armtempo.errors import BoardError
+from armtempo.basics.errors import BoardError
 from armtempo.model.arm import LimitSwitches
 from armtempo.model.sequence_plan import SequencePlan
 from armtempo.robot.board import Board

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.cli import main
-from armtempo.errors import ArmtempoError, InputError
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.research.bench import cases, result_plot, result_store, result_table, worker_pool

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from armtempo.errors import LinkError
+from armtempo.basics.errors import LinkError
 from armtempo.model.arm import Limits
 from armtempo.report.evaluation import evaluate
 from armtempo.research.bench.cases import Case, Trial

@@ -13,9 +13,9 @@ from typing import Any
 import click
 
 from armtempo import __version__
+from armtempo.basics.errors import INTERRUPTED, ArmtempoError
 from armtempo.cli import examples, messages
 from armtempo.cli.interrupts import raised_by_signals
-from armtempo.errors import INTERRUPTED, ArmtempoError
 from armtempo.formats.spelling import did_you_mean
 
 GROUPS = {

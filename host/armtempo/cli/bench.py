@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from armtempo.basics.errors import INTERRUPTED, InputError, MissingPackageError
 from armtempo.cli import chosen, messages, options, results
 from armtempo.cli.progress import ProgressBar
-from armtempo.errors import INTERRUPTED, InputError, MissingPackageError
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from armtempo import optimise
-from armtempo.arrays import Array
-from armtempo.errors import InputError
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError
 from armtempo.model.arm import Arm, Limits
 from armtempo.model.job import GRADIENT, Job
 from armtempo.planning import interval_search, planner

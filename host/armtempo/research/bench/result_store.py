@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import armtempo
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.research.bench.cases import Case, Problem, Trial
 
 FILE = "runs.jsonl"

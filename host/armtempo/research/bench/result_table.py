@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.research.bench.cases import Trial
 
 PAPER = {

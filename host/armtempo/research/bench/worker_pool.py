@@ -14,7 +14,7 @@ from importlib import import_module
 from typing import Any
 
 import armtempo
-from armtempo.errors import ArmtempoError, InputError, MissingPackageError
+from armtempo.basics.errors import ArmtempoError, InputError, MissingPackageError
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _CONNECT_S = 10

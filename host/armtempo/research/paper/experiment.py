@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from armtempo.basics.progress import Progress
 from armtempo.model.plan import Plan
 from armtempo.ports.names import SIM
-from armtempo.progress import Progress
 from armtempo.report.evaluation import Evaluation, evaluate
 from armtempo.research.paper import motions, printed
 from armtempo.research.paper.claims import DIFFERS, SAME, Claim

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.inverse import inverse
 from armtempo.model.arm import Arm

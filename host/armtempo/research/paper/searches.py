@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from armtempo.basics.progress import Progress
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
-from armtempo.progress import Progress
 from armtempo.research.bench import cases, worker_pool
 from armtempo.research.bench.result_store import ResultStore
 from armtempo.research.bench.result_table import PAPER, Row, rows
