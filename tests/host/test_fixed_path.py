@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from armtempo.model.job import Job
-from armtempo.planning import interval_search, limit_ratios, planner
+from armtempo.planning import interval_search, limit_ratios, planner, time_parameterization
 from armtempo.planning.fixed_path import FixedPath
+from armtempo.planning.time_parameterization import Group
 from armtempo.splines import bspline
 
 from tests.host import problems
@@ -201,3 +202,24 @@ def test_gradients_start_within_bounds_and_are_not_held_by_them() -> None:
     plan = planner.plan(arm, replace(job, bounds_s=(20.0, 21.0)))
     assert not plan.notes
     assert plan.total_s == pytest.approx(planner.plan(arm, job).total_s, rel=1e-4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("vias", "joints", "timing"),
+    [(2, 3, "shared"), (7, 2, "per-joint"), (258, 1, "shared"), (500, 1, "shared")],
+)
+def test_auto_is_never_slower_than_any_fixed_refine(vias: int, joints: int, timing: str) -> None:
+    """By no more than the least saving for which it goes on; from 258 via points on the record holds no finer axis."""
+    points = bspline.fit(np.random.default_rng(vias).normal(0, 40, (vias, joints)), 5)
+    together = [list(range(joints))] if timing == "shared" else [[joint] for joint in range(joints)]
+    groups = [Group(tuple(own), points[:, own], LIMITS[: len(own)]) for own in together]
+    job = Job("any", ((0.0,) * joints,) * vias, timing=timing, iterations=20)
+    most = time_parameterization.most_refine(job, vias - 1, joints)
+    times = {
+        refine: max(
+            axis.total_s for axis in time_parameterization.axes(groups, replace(job, refine=refine), most)
+        )
+        for refine in ("auto", *range(1, min(most, 3) + 1), most)
+    }
+    assert times["auto"] <= min(times.values()) * 1.001, times
