@@ -26,7 +26,7 @@ MIN_DURATION_S = 0.01
 _POLISHED_GAP = 1e-8
 _REFINED_GAP = 1e-4
 """How near to its local optimum an axis should come."""
-_FINER = 4
+_FINER = 8
 _PAYS = 1e-3
 """With ``refine = "auto"`` each axis gets so many times more segments while that saves this part of its time."""
 
