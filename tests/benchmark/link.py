@@ -18,7 +18,6 @@ from pathlib import Path
 from armtempo.basics.errors import LinkError
 from armtempo.link import Client, open_board
 from armtempo.link.follow import Follower
-from armtempo.model import trajectory_file
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import planner
@@ -76,7 +75,7 @@ def upload_to_ready_s() -> tuple[float, float]:
     plan = planner.plan(arm, Job.paper(arm))
     with tempfile.TemporaryDirectory() as name, launch() as process:
         file = Path(name) / "feed.json"
-        trajectory_file.save(plan, file)
+        plan.save(file)
         with open_board(process.port) as board:
             arm_state.configure(board, arm, replace=True)
             begin_s = time.monotonic()

@@ -17,7 +17,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from armtempo.link import open_board
-from armtempo.model import trajectory_file
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
@@ -45,7 +44,7 @@ def slow_plan() -> Plan:
 def record(plan: Plan, folder: Path, numbers: random.Random) -> list[float]:
     """Run the plan in a process of its own that is stopped now and then; gives the pauses."""
     file = folder / "slow.json"
-    trajectory_file.save(plan, file)
+    plan.save(file)
     pauses = []
     with launch(LaunchOptions(arm=plan.arm, virtual_time=False)) as process:
         with open_board(process.port) as board:

@@ -18,7 +18,7 @@ from pathlib import Path
 import armtempo
 import numpy as np
 from armtempo.basics.errors import BoardError
-from armtempo.model.arm import LimitSwitches
+from armtempo.model.parts import LimitSwitches
 from armtempo.model.sequence_plan import SequencePlan
 from armtempo.robot.board import Board
 from armtempo.simulator import InjectedFault, LaunchOptions, edgelog, launch

@@ -13,8 +13,9 @@ from pathlib import Path
 import numpy as np
 from armtempo.link import open_board
 from armtempo.link.board_messages import Sample
-from armtempo.model.arm import Arm, Encoder
+from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.model.parts import Encoder
 from armtempo.planning import planner
 from armtempo.records import encode
 from armtempo.robot import arm_state, stored_motion

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from armtempo.basics.errors import LinkError
-from armtempo.model.arm import Limits
+from armtempo.model.parts import Limits
 from armtempo.report.evaluation import evaluate
 from armtempo.research.bench.cases import Case, Trial
 from armtempo.research.bench.result_table import Row, rows

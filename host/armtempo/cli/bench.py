@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 def _names(ctx: click.Context, parameter: click.Parameter, value: str) -> list[str]:
     """Algorithms, separated by commas."""
-    from armtempo.model.job_file import OPTIMISERS
+    from armtempo.model.job import OPTIMISERS
 
     names = [name.strip().lower() for name in value.split(",")]
     for name in names:

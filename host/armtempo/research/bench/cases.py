@@ -9,11 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from armtempo import optimise
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
-from armtempo.model.arm import Arm, Limits
+from armtempo.model.arm import Arm
 from armtempo.model.job import GRADIENT, Job
+from armtempo.model.parts import Limits
+from armtempo.optimise import Function, Settings, minimise
 from armtempo.planning import interval_search, planner
 from armtempo.planning.fitness import Fitness
 from armtempo.planning.fixed_path import FixedPath
@@ -37,9 +38,9 @@ class Problem:
         """Control points of the path: (n + degree, 1)."""
         return bspline.fit(np.array(self.via_deg)[:, None], self.degree)
 
-    def function(self) -> optimise.Function:
+    def function(self) -> Function:
         """Fitness (N,) of intervals (N, m)."""
-        judge: optimise.Function = getattr(Fitness(self.points(), self.degree, [self.limits]), self.fitness)
+        judge: Function = getattr(Fitness(self.points(), self.degree, [self.limits]), self.fitness)
         return judge
 
 
@@ -119,9 +120,9 @@ def solve(problem: Problem, case: Case) -> Trial:
         found = interval_search.gradient(path, bounds, rng, case.population).result
     else:
         function = problem.function()
-        settings = optimise.Settings(case.algorithm, case.population, problem.iterations)
+        settings = Settings(case.algorithm, case.population, problem.iterations)
         start = time.thread_time()
-        found = optimise.minimise(function, bounds, rng, settings)
+        found = minimise(function, bounds, rng, settings)
     seconds = time.thread_time() - start
     better = [0, *(np.flatnonzero(np.diff(found.history) < 0) + 1)]
     improvements = tuple((int(at), float(found.history[at])) for at in better)

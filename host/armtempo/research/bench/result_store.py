@@ -13,8 +13,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import armtempo
 from armtempo.basics.errors import InputError
+from armtempo.basics.version import installed_version
 from armtempo.research.bench.cases import Case, Problem, Trial
 
 FILE = "runs.jsonl"
@@ -27,7 +27,7 @@ class ResultStore:
         """Open or create the file. Raises InputError where it holds runs of another problem."""
         self.path = folder / FILE
         self.runs: dict[Case, Trial] = {}
-        head = _plain({"armtempo": armtempo.__version__, **asdict(problem)})
+        head = _plain({"armtempo": installed_version(), **asdict(problem)})
         try:
             folder.mkdir(parents=True, exist_ok=True)
             lines = self._whole_lines()

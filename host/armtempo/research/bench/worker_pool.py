@@ -13,8 +13,8 @@ from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
 
-import armtempo
 from armtempo.basics.errors import ArmtempoError, InputError, MissingPackageError
+from armtempo.basics.version import installed_version
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _CONNECT_S = 10
@@ -70,10 +70,10 @@ def _check_workers(address: str, versions: dict[str, object]) -> None:
             f"start some with: dask worker {address}",
         )
     for worker, found in versions.items():
-        if found != armtempo.__version__:
+        if found != installed_version():
             what = "no armtempo" if isinstance(found, Exception) else f"armtempo {found}"
             raise ArmtempoError(
-                f"worker {worker} has {what}, here is {armtempo.__version__}",
+                f"worker {worker} has {what}, here is {installed_version()}",
                 "install this version on all workers",
             )
 
