@@ -16,7 +16,7 @@ from types import ModuleType
 from typing import Any
 from unittest.mock import patch
 
-from armtempo.errors import LinkError
+from armtempo.basics.errors import LinkError
 from armtempo.link import Client, greet
 
 from tests.board.scripts.rigs import stand_in

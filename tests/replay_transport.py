@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable
 
-from armtempo.errors import LinkError
+from armtempo.basics.errors import LinkError
 from armtempo.link.traffic import TO_BOARD, Chunk
 
 

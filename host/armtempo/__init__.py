@@ -64,7 +64,7 @@ if TYPE_CHECKING:
     __version__: str
 
     from armtempo import deploy, optimise, simulator
-    from armtempo.errors import (
+    from armtempo.basics.errors import (
         ArmtempoError,
         BoardError,
         InputError,
@@ -93,7 +93,7 @@ if TYPE_CHECKING:
     from armtempo.splines.trajectory import Trajectory
 
 _HOMES = {
-    "armtempo.errors": (
+    "armtempo.basics.errors": (
         "ArmtempoError",
         "BoardError",
         "InputError",

@@ -6,7 +6,7 @@ import _signal  # built in; ``signal`` imports much, in which a Ctrl-C would be 
 import os
 import sys
 
-from armtempo.errors import INTERRUPTED
+from armtempo.basics.errors import INTERRUPTED
 
 
 def _end(*signalled: object) -> None:

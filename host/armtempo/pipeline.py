@@ -17,7 +17,8 @@ from __future__ import annotations
 from collections import abc
 from pathlib import Path
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
+from armtempo.basics.progress import Progress, part
 from armtempo.model import trajectory_file
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
@@ -25,10 +26,9 @@ from armtempo.model.plan import Plan
 from armtempo.model.sequence import Sequence
 from armtempo.model.sequence_plan import SequencePlan
 from armtempo.planning import checks, planner, sequence_planner
-from armtempo.planning import corridor_curve as corridors
 from armtempo.planning import split as cut
-from armtempo.planning.corridor_curve import CorridorTime
-from armtempo.progress import Progress, part
+from armtempo.planning.free import corridor_curve as corridors
+from armtempo.planning.free.corridor_curve import CorridorTime
 from armtempo.records import encode
 from armtempo.report import comparison, sequence_report, text_summary
 from armtempo.robot.connect import connect

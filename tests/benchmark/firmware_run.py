@@ -27,9 +27,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import ArmtempoError
 from armtempo.deploy import program_files
-from armtempo.errors import ArmtempoError
 from armtempo.model.arm import Arm, LimitSwitches, Safety
 from armtempo.model.job import Job
 from armtempo.planning import planner

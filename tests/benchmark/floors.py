@@ -17,7 +17,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
 import numpy as np  # noqa: E402
-from armtempo.errors import InputError  # noqa: E402
+from armtempo.basics.errors import InputError  # noqa: E402
 from armtempo.planning import planner, time_parameterization  # noqa: E402
 
 from tests.host.test_floors import random_motion  # noqa: E402

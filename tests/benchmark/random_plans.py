@@ -17,7 +17,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
 import numpy as np  # noqa: E402
-from armtempo.errors import InputError, PlanError  # noqa: E402
+from armtempo.basics.errors import InputError, PlanError  # noqa: E402
 from armtempo.model.arm import Arm  # noqa: E402
 from armtempo.model.job import Job  # noqa: E402
 from armtempo.model.plan import Plan  # noqa: E402

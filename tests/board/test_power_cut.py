@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.errors import LinkError
+from armtempo.basics.errors import LinkError
 from armtempo.link.client import Client
 from armtempo.link.session import Session
 from armtempo.link.transport import SerialTransport

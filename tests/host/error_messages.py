@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from armtempo import errors
+from armtempo.basics import errors
 
 from tests.sources import parsed
 

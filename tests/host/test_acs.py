@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from armtempo import optimise
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.planning.fitness import Fitness
 
 from tests.host import problems

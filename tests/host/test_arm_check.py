@@ -7,7 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from armtempo.arm_check import Level, check, check_arm, drives
+from armtempo.diagnosis import drives
+from armtempo.diagnosis.arm_check import check, check_arm
+from armtempo.diagnosis.finding import Level
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 

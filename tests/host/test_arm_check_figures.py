@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.arm_check import figures, resolution, torque
+from armtempo.diagnosis import figures, resolution, torque
 from armtempo.kinematics.chain import chains_mm, outline_mm
 from armtempo.model import arm_file, shipped
 from armtempo.model.arm import Arm, JointModel

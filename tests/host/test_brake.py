@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.model.arm import Arm, Limits
 from armtempo.model.plan import Plan
 from armtempo.planning import brake_time, planner, point_to_point

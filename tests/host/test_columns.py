@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from armtempo.arm_check.finding import Finding, Level
 from armtempo.cli import show
+from armtempo.diagnosis.finding import Finding, Level
 from armtempo.formats.text_table import aligned
 from armtempo.model.plan import Plan
 from armtempo.records import encoded_motion

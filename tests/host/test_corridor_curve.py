@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job, Stop
-from armtempo.planning import corridor, corridor_curve, planner
-from armtempo.planning.corridor_curve import CorridorTime
-from armtempo.planning.tool import Tool
+from armtempo.planning import planner
+from armtempo.planning.free import corridor, corridor_curve
+from armtempo.planning.free.corridor_curve import CorridorTime
+from armtempo.planning.free.tool import Tool
 from armtempo.report import corridor_plot
 
 from tests.host import problems

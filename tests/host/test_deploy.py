@@ -10,9 +10,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from armtempo.basics.errors import InputError, LinkError, MissingPackageError
 from armtempo.deploy import changes, package, program_files, remote
 from armtempo.deploy.remote import Remote, Survey
-from armtempo.errors import InputError, LinkError, MissingPackageError
 from armtempo.link.program_version import PACKAGES, own_crc, package_folder
 from armtempo_shared.program_hash import sources_crc
 

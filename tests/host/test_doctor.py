@@ -7,11 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from armtempo import doctor
+from armtempo.basics.errors import LinkError
 from armtempo.cli import main
-from armtempo.doctor import Condition, machine, robot
-from armtempo.errors import LinkError
+from armtempo.diagnosis import machine
+from armtempo.diagnosis.item import Condition
 from armtempo.ports.listing import Port
+from armtempo.robot import board_check
 from armtempo.robot.board_state import BoardState
 from click.testing import CliRunner
 
@@ -43,7 +44,7 @@ STATE = BoardState(
 
 
 def test_a_sound_board_has_nothing_wrong() -> None:
-    assert {item.level for item in doctor.examine_board(STATE)} == {Condition.GOOD}
+    assert {item.level for item in board_check.examine_board(STATE)} == {Condition.GOOD}
 
 
 @pytest.mark.parametrize(
@@ -65,7 +66,9 @@ def test_what_is_wrong_with_a_board(
     change: dict[str, object], level: Condition, words: str, cure: str
 ) -> None:
     found = [
-        item for item in doctor.examine_board(replace(STATE, **change)) if item.level is not Condition.GOOD
+        item
+        for item in board_check.examine_board(replace(STATE, **change))
+        if item.level is not Condition.GOOD
     ]  # type: ignore[arg-type]
     assert [item.level for item in found] == [level]
     assert words in found[0].found
@@ -73,16 +76,16 @@ def test_what_is_wrong_with_a_board(
 
 
 def test_a_board_that_does_not_answer() -> None:
-    (item,) = doctor.examine_board(LinkError("no answer within 2 s; check power and cable"))
+    (item,) = board_check.examine_board(LinkError("no answer within 2 s; check power and cable"))
     assert item.level is Condition.WRONG
     assert "no answer" in item.found
 
 
 def test_a_port_that_may_not_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(robot, "find_ports", lambda: [Port("/dev/ttyACM0", "board", True)])
-    monkeypatch.setattr(robot.os, "access", lambda *_: False)
-    monkeypatch.setattr(robot.sys, "platform", "linux")
-    (item,) = doctor.ports()
+    monkeypatch.setattr(machine, "find_ports", lambda: [Port("/dev/ttyACM0", "board", True)])
+    monkeypatch.setattr(machine.os, "access", lambda *_: False)
+    monkeypatch.setattr(machine.sys, "platform", "linux")
+    (item,) = machine.ports()
     assert item.level is Condition.WRONG
     assert "dialout" in item.next_step
 
@@ -92,7 +95,7 @@ def test_packages_that_are_missing(monkeypatch: pytest.MonkeyPatch) -> None:
         raise machine.PackageNotFoundError(name)
 
     monkeypatch.setattr(machine, "version", nothing)
-    levels = {item.what: item.level for item in doctor.packages()}
+    levels = {item.what: item.level for item in machine.packages()}
     assert levels["numpy"] is Condition.WRONG
     assert levels["matplotlib"] is Condition.NOTE
     assert "sphinx" not in levels

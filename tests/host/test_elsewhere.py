@@ -8,7 +8,7 @@ from pathlib import Path
 
 import armtempo
 import pytest
-from armtempo.errors import LinkError
+from armtempo.basics.errors import LinkError
 from armtempo.ports import names
 from armtempo.simulator import launch
 

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from armtempo.errors import InputError, PlanError
+from armtempo.basics.errors import InputError, PlanError
 from armtempo.model.arm import Arm, Limits
 from armtempo.planning import checks
 from armtempo.records import encode

@@ -4,7 +4,7 @@ from itertools import combinations_with_replacement
 
 import pytest
 from armtempo import Arm
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.link.board_messages import Hello
 from armtempo.robot import engine_room
 from armtempo.robot.engine_room import AS_FILES, IN_FIRMWARE, Room

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import click
 import pytest
-from armtempo import cli, errors
+from armtempo import cli
+from armtempo.basics import errors
 from armtempo.cli import LazyGroup
 from armtempo.link.refusal import refusal
 from armtempo_shared import codes, wire

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from armtempo.basics.errors import InputError
 from armtempo.cli import main
-from armtempo.errors import InputError
 from armtempo.model import arm_file, exchange, thinning, trajectory_file
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job

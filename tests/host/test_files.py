@@ -6,8 +6,8 @@ import os
 from pathlib import Path
 
 import pytest
+from armtempo.basics.errors import InputError
 from armtempo.cli import main
-from armtempo.errors import InputError
 from armtempo.formats.atomic_file import replace_text
 from armtempo.planning import planner
 from click.testing import CliRunner

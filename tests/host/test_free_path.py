@@ -6,15 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from armtempo.errors import InputError, PlanError
+from armtempo.basics.errors import InputError, PlanError
 from armtempo.kinematics.forward import forward
 from armtempo.kinematics.geometry import Geometry
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job, Stop
 from armtempo.model.plan import Plan
 from armtempo.model.tool_pose import Pose
-from armtempo.planning import checks, corridor, planner
-from armtempo.planning.tool import Tool
+from armtempo.planning import checks, planner
+from armtempo.planning.free import corridor
+from armtempo.planning.free.tool import Tool
 from armtempo.splines import bspline
 
 from tests.host import problems

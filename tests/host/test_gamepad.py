@@ -11,10 +11,10 @@ from typing import Any
 from unittest.mock import patch
 
 import pytest
+from armtempo.basics.errors import InputError, MissingPackageError
 from armtempo.cli import gamepad
 from armtempo.cli.gamepad import AFTER, BEFORE, REPEAT_S, GamepadState, KeysAndGamepad
 from armtempo.cli.jog_screen import RELEASE_S, JogChoice
-from armtempo.errors import InputError, MissingPackageError
 
 DOWN, REMOVED = 1, 2
 LIMIT_S = 20.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from armtempo.arm_check import check
+from armtempo.diagnosis.arm_check import check
 from armtempo.model import arm_file, job_file
 
 from tests.host.arm_files import changed, run_check

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.tool_pose import Pose

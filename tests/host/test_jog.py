@@ -8,13 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.kinematics.of_arm import forward
 from armtempo.model.arm import Arm
-from armtempo.planning import jog, jog_law
-from armtempo.planning.jog import JogMotion, JogMove
-from armtempo.planning.jog_law import WayLimits
-from armtempo.planning.jog_line import FollowedLine
+from armtempo.planning.jog import jog_law, jog_motion
+from armtempo.planning.jog.jog_law import WayLimits
+from armtempo.planning.jog.jog_line import FollowedLine
+from armtempo.planning.jog.jog_motion import JogMotion, JogMove
 from armtempo.records import encode
 from armtempo.splines import extremes
 from armtempo.splines.trajectory import JointSpline, Trajectory
@@ -38,8 +38,8 @@ def check_limits(motion: JogMotion, arm: Arm, speed: float) -> None:
     for reached, joint in zip(extremes.of_joints(motion.trajectory.joints), arm.driven, strict=True):
         most = joint.limits
         assert reached.speed_deg_s <= speed * most.speed_deg_s * (1 + 1e-9)
-        assert reached.acceleration_deg_s2 <= jog.RAMP * most.acceleration_deg_s2 * (1 + 1e-9)
-        assert reached.jerk_deg_s3 <= jog.RAMP * most.jerk_deg_s3 * (1 + 1e-9)
+        assert reached.acceleration_deg_s2 <= jog_motion.RAMP * most.acceleration_deg_s2 * (1 + 1e-9)
+        assert reached.jerk_deg_s3 <= jog_motion.RAMP * most.jerk_deg_s3 * (1 + 1e-9)
     angles = motion.trajectory(np.linspace(0.0, motion.trajectory.duration_s, 2000))
     low, high = np.array([joint.range_deg for joint in arm.driven]).T
     assert np.all(angles >= low)
@@ -75,12 +75,12 @@ def test_a_joint_goes_to_the_end_of_its_range_and_not_beyond() -> None:
         for number, joint in enumerate(arm.driven):
             for sign in (1, -1):
                 try:
-                    motion = jog.plan("x", arm, here, JogMove(sign * INF, joint=number))
+                    motion = jog_motion.plan("x", arm, here, JogMove(sign * INF, joint=number))
                 except InputError:  # home is there already
                     assert here[number] in joint.range_deg
                     continue
                 assert "end of its range" in motion.ends
-                check_limits(motion, arm, jog.SPEED)
+                check_limits(motion, arm, jog_motion.SPEED)
                 edge = joint.range_deg[sign > 0]
                 assert 0 <= sign * (edge - motion.end_deg[number]) < 1 / joint.steps_per_deg
                 others = np.delete(motion.end_deg - here, number)
@@ -89,10 +89,10 @@ def test_a_joint_goes_to_the_end_of_its_range_and_not_beyond() -> None:
 
 def test_at_the_end_of_the_range_only_the_way_back_is_open() -> None:
     here = on_steps(PAPER, [0.0, -60.0, 40.0])
-    end = jog.plan("x", PAPER, here, JogMove(INF, joint=1)).end_deg
+    end = jog_motion.plan("x", PAPER, here, JogMove(INF, joint=1)).end_deg
     with pytest.raises(InputError, match="joint 2 is at the end of its range"):
-        jog.plan("x", PAPER, end, JogMove(1.0, joint=1))
-    back = jog.plan("x", PAPER, end, JogMove(-1.0, joint=1))
+        jog_motion.plan("x", PAPER, end, JogMove(1.0, joint=1))
+    back = jog_motion.plan("x", PAPER, end, JogMove(-1.0, joint=1))
     assert back.end_deg[1] == pytest.approx(end[1] - 1.0)
 
 
@@ -101,7 +101,7 @@ def test_at_the_end_of_the_range_only_the_way_back_is_open() -> None:
 @pytest.mark.parametrize("speed", [0.01, 0.25, 1.0])
 def test_a_step_goes_as_far_as_it_says(by: float, speed: float) -> None:
     here = on_steps(AR4, ELBOW_DEG)
-    motion = jog.plan("x", AR4, here, JogMove(by, joint=4), speed)
+    motion = jog_motion.plan("x", AR4, here, JogMove(by, joint=4), speed)
     assert motion.end_deg[4] - here[4] == pytest.approx(by)
     assert not motion.ends
     check_limits(motion, AR4, speed)
@@ -113,8 +113,8 @@ def test_a_stop_is_quick() -> None:
     for arm in (PAPER, AR4):
         here = on_steps(arm, list(arm.home_deg))
         for number, joint in enumerate(arm.driven):
-            motion = jog.plan("x", arm, here, JogMove(-INF, joint=number))
-            speed, most = jog.SPEED * joint.limits.speed_deg_s, joint.limits
+            motion = jog_motion.plan("x", arm, here, JogMove(-INF, joint=number))
+            speed, most = jog_motion.SPEED * joint.limits.speed_deg_s, joint.limits
             from_speed_s = max(
                 1.5 * speed / most.acceleration_deg_s2, (10 / 3**0.5 * speed / 1.25 / most.jerk_deg_s3) ** 0.5
             )
@@ -126,8 +126,8 @@ def test_a_stop_is_quick() -> None:
 @pytest.mark.parametrize("by", [INF, -INF, 5.0, -0.1])
 def test_the_tool_moves_along_a_line_and_keeps_its_orientation(axis: str, by: float) -> None:
     here = on_steps(AR4, ELBOW_DEG)
-    motion = jog.plan("x", AR4, here, JogMove(by, axis=axis))
-    check_limits(motion, AR4, jog.SPEED)
+    motion = jog_motion.plan("x", AR4, here, JogMove(by, axis=axis))
+    check_limits(motion, AR4, jog_motion.SPEED)
     start = forward(AR4, here)
     unit = np.eye(3)["xyz".index(axis[-1])] * math.copysign(1, by)
     direction = start[:3, :3] @ unit if axis.startswith("tool") else unit
@@ -147,8 +147,8 @@ def test_the_tool_moves_along_a_line_and_keeps_its_orientation(axis: str, by: fl
 @pytest.mark.parametrize("by", [10.0, -INF])
 def test_the_tool_turns_about_its_own_point(by: float) -> None:
     here = on_steps(AR4, ELBOW_DEG)
-    motion = jog.plan("x", AR4, here, JogMove(by, axis="tool-y", about=True))
-    check_limits(motion, AR4, jog.SPEED)
+    motion = jog_motion.plan("x", AR4, here, JogMove(by, axis="tool-y", about=True))
+    check_limits(motion, AR4, jog_motion.SPEED)
     start = forward(AR4, here)
     poses = forward(AR4, motion.trajectory(np.linspace(0.0, motion.trajectory.duration_s, 300)))
     assert np.abs(poses[:, :3, 3] - start[:3, 3]).max() < 0.5
@@ -160,25 +160,25 @@ def test_the_tool_turns_about_its_own_point(by: float) -> None:
 
 def test_an_arm_of_three_joints_moves_its_tool_and_lets_it_turn() -> None:
     here = on_steps(PAPER, [0.0, -60.0, 40.0])
-    motion = jog.plan("x", PAPER, here, JogMove(10.0, axis="z"))
+    motion = jog_motion.plan("x", PAPER, here, JogMove(10.0, axis="z"))
     way = forward(PAPER, motion.end_deg)[:3, 3] - forward(PAPER, here)[:3, 3]
     np.testing.assert_allclose(way, [0.0, 0.0, 10.0], atol=0.05)
     with pytest.raises(InputError, match="cannot turn the tool about z"):
-        jog.plan("x", PAPER, here, JogMove(10.0, axis="z", about=True))
+        jog_motion.plan("x", PAPER, here, JogMove(10.0, axis="z", about=True))
 
 
 def test_a_fast_jog_stays_on_its_line_where_its_ramps_take_all_of_it() -> None:
     here = on_steps(PAPER, [42.186, -67.396, 17.178])
-    motion = jog.plan("x", PAPER, here, JogMove(-INF, axis="x"), 1.0)
+    motion = jog_motion.plan("x", PAPER, here, JogMove(-INF, axis="x"), 1.0)
     check_limits(motion, PAPER, 1.0)
     start = forward(PAPER, here)[:3, 3]
     tool = forward(PAPER, motion.trajectory(np.linspace(0.0, motion.trajectory.duration_s, 800)))[:, :3, 3]
-    assert np.linalg.norm((tool - start)[:, 1:], axis=1).max() < 1.1 * jog.STRAY_MM
+    assert np.linalg.norm((tool - start)[:, 1:], axis=1).max() < 1.1 * jog_motion.STRAY_MM
     assert start[0] - tool[-1, 0] > 700.0
 
 
 def test_a_line_ends_before_a_singular_posture() -> None:
-    motion = jog.plan("x", AR4, on_steps(AR4, ELBOW_DEG), JogMove(INF, axis="x"))
+    motion = jog_motion.plan("x", AR4, on_steps(AR4, ELBOW_DEG), JogMove(INF, axis="x"))
     assert "singular" in motion.ends
     assert (
         np.abs(np.diff(motion.trajectory(np.linspace(0, motion.trajectory.duration_s, 400)), axis=0)).max()
@@ -192,14 +192,14 @@ def test_a_line_that_the_joints_cannot_follow_is_made_shorter(
 ) -> None:
     """And says so, where nothing else has ended it before."""
     lengths: list[float] = []
-    on_line = jog._on_line
+    on_line = jog_motion._on_line
 
     def hindered(name: str, followed: FollowedLine, length: float, speed: float) -> Trajectory | None:
         lengths.append(length)
         return on_line(name, followed, length, speed) if len(lengths) > 1 else None
 
-    monkeypatch.setattr(jog, "_on_line", hindered)
-    motion = jog.plan("x", AR4, on_steps(AR4, ELBOW_DEG), JogMove(by, axis="x"))
+    monkeypatch.setattr(jog_motion, "_on_line", hindered)
+    motion = jog_motion.plan("x", AR4, on_steps(AR4, ELBOW_DEG), JogMove(by, axis="x"))
     assert len(lengths) == 2
     assert lengths[1] < lengths[0]
     assert said in motion.ends
@@ -208,7 +208,7 @@ def test_a_line_that_the_joints_cannot_follow_is_made_shorter(
 @pytest.mark.slow
 def test_a_held_jog_is_a_small_record() -> None:
     for move in (JogMove(INF, joint=0), JogMove(INF, axis="x"), JogMove(-INF, axis="y")):
-        motion = jog.plan("x", AR4, on_steps(AR4, ELBOW_DEG), move)
+        motion = jog_motion.plan("x", AR4, on_steps(AR4, ELBOW_DEG), move)
         assert len(encode.motion_record(motion.trajectory, AR4, motion.brake_s)) < 2048
 
 
@@ -226,7 +226,7 @@ def test_a_held_jog_is_a_small_record() -> None:
 )
 def test_what_is_no_jog_is_refused(move: JogMove, speed: float, said: str) -> None:
     with pytest.raises(InputError, match=said):
-        jog.plan("x", PAPER, [0.0, -60.0, 40.0], move, speed)
+        jog_motion.plan("x", PAPER, [0.0, -60.0, 40.0], move, speed)
 
 
 @pytest.mark.parametrize(
@@ -234,17 +234,17 @@ def test_what_is_no_jog_is_refused(move: JogMove, speed: float, said: str) -> No
 )
 def test_the_tool_moves_from_a_posture_of_the_arm_only(start: list[float], said: str) -> None:
     with pytest.raises(InputError, match=said):
-        jog.plan("x", PAPER, start, JogMove(1.0, axis="x"), 0.25)
+        jog_motion.plan("x", PAPER, start, JogMove(1.0, axis="x"), 0.25)
 
 
 def test_joints_have_numbers_and_names() -> None:
     named = replace(PAPER, joints=tuple(replace(j, name=f"j{n}") for n, j in enumerate(PAPER.joints, 1)))
     assert (
-        jog.number_of_joint(named, "j2")
-        == jog.number_of_joint(named, 2)
-        == jog.number_of_joint(named, "2")
+        jog_motion.number_of_joint(named, "j2")
+        == jog_motion.number_of_joint(named, 2)
+        == jog_motion.number_of_joint(named, "2")
         == 1
     )
     for wrong in (0, 4, "j9", "-1", -1):
         with pytest.raises(InputError, match="drives no joint"):
-            jog.number_of_joint(named, wrong)
+            jog_motion.number_of_joint(named, wrong)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.kinematics import forward
 from armtempo.kinematics.constraint import Constraint, Miss
 from armtempo.kinematics.descent import PoseProblem, _posture, _system

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.kinematics import BRANCHES, Geometry, branch_of, forward, inverse, refusals
 from armtempo.kinematics.inverse import CHUNK
 from armtempo.kinematics.solutions import OK, WRIST_STRAIGHT

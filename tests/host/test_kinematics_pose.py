@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.kinematics import pose_file
 from armtempo.model import pose
 from armtempo.model.tool_pose import WHOLE

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.kinematics import Geometry, forward, inverse, inverse_of_pose
 from armtempo.kinematics.shape import Shape
 from armtempo.kinematics.solutions import DUPLICATE, ELBOW_STRETCHED, OK

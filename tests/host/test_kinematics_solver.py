@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.kinematics import choose, forward
 from armtempo.kinematics.solver import CLOSED_FORM, NUMERICAL, PoseSolver
 from armtempo.model import pose

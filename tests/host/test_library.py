@@ -14,7 +14,7 @@ from typing import Any, cast
 import armtempo
 import numpy as np
 import pytest
-from armtempo import errors
+from armtempo.basics import errors
 from armtempo.kinematics import PoseSolver
 from armtempo.kinematics.chain import chains_mm
 from armtempo.link.board_messages import Sample

@@ -6,7 +6,7 @@ import random
 from pathlib import Path
 
 import pytest
-from armtempo.errors import BoardError, LinkError
+from armtempo.basics.errors import BoardError, LinkError
 from armtempo.link.follow import Follower
 from armtempo.records.encoded_motion import MotionKey
 from armtempo.robot import stored_motion

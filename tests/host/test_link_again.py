@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from armtempo.errors import LinkError, NoAnswerError, OtherBoardError
+from armtempo.basics.errors import LinkError, NoAnswerError, OtherBoardError
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import Follower, RunEnd

@@ -6,7 +6,7 @@ import random
 from pathlib import Path
 
 import pytest
-from armtempo.errors import LinkError
+from armtempo.basics.errors import LinkError
 from armtempo.link.follow import Follower
 from armtempo_shared import wire
 

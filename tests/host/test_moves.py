@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
 from armtempo.records import decode, encode

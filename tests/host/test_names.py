@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from armtempo.basics.errors import InputError
 from armtempo.cli import main
-from armtempo.errors import InputError
 from armtempo.link import board_messages
 from armtempo.model import arm_file, shipped, trajectory_file
 from armtempo.model.plan import Plan

@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 from armtempo import optimise
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.optimise import genes, iaga, levy, swarm
 from armtempo.optimise.parameters import Number
 from armtempo.optimise.tracker import Array, Task

@@ -8,8 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from armtempo import arm_check, simulator
-from armtempo.errors import InputError
+from armtempo import simulator
+from armtempo.basics.errors import InputError
+from armtempo.diagnosis import arm_check
 from armtempo.model import arm_json, engine_pins, pin_use
 from armtempo.model.arm import Arm
 from armtempo.model.boards import BOARDS, TIMER_OUTPUTS
@@ -21,7 +22,7 @@ from armtempo_shared import armrecord
 from tests.host import wired_arms
 from tests.host.wired_arms import ALL, DOOR, FAN, GRIPPER, PART, PUMP
 
-GPIO = Path(simulator.__file__).parent / "hardware" / "virtual_board" / "chip" / "gpio.py"
+GPIO = Path(simulator.__file__).parent / "hardware" / "chip" / "gpio.py"
 HARDWARE_PAGE = Path(__file__).parents[2] / "board" / "docs" / "hardware.md"
 
 

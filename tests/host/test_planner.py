@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from armtempo.errors import InputError, PlanError
+from armtempo.basics.errors import InputError, PlanError
 from armtempo.model.arm import Arm, Limits
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan

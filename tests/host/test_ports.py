@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 from armtempo import deploy
+from armtempo.basics.errors import InputError, LinkError, PortError, PortInUseError
 from armtempo.cli import main
 from armtempo.deploy import program_files
-from armtempo.errors import InputError, LinkError, PortError, PortInUseError
 from armtempo.link import diagnose, transport
 from armtempo.link.transport import SerialTransport
+from armtempo.ports import claim as claims
 from armtempo.ports import listing, names
 from armtempo.ports.listing import find_ports
-from armtempo.share import claim as claims
 from click.testing import CliRunner
 
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from armtempo.basics.errors import InputError
 from armtempo.cli import main
 from armtempo.cli.posture import NamedPosture
-from armtempo.errors import InputError
 from armtempo.kinematics.of_arm import forward
 from armtempo.model import arm_file, arm_json, posture_text
 from armtempo.model.arm import Arm

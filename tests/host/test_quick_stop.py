@@ -10,14 +10,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from armtempo.errors import LinkError
-from armtempo.ports import names
+from armtempo.basics.errors import LinkError
+from armtempo.ports import claim, claim_file, names
+from armtempo.ports.caller import Ownership, ownership
+from armtempo.ports.lines import Message
+from armtempo.ports.server import Server
 from armtempo.project import quick_stop
 from armtempo.project.settings import ProjectSettings
-from armtempo.share import claim, claim_file
-from armtempo.share.caller import Ownership, ownership
-from armtempo.share.lines import Message
-from armtempo.share.server import Server
 
 PORT = "/dev/q"
 HEAVY = (

@@ -83,6 +83,6 @@ def test_the_pages_on_arms_and_kinematics_name_modules_that_exist() -> None:
 
 
 def test_the_tour_names_every_package() -> None:
-    tour = README[README.index("host/armtempo/  formats") : README.index("shared/armtempo_shared/   ")]
+    tour = README[README.index("host/armtempo/  basics") : README.index("shared/armtempo_shared/   ")]
     packages = {path.parent.name for path in SOURCES["host"].glob("*/__init__.py")} | {"pipeline"}
     assert packages <= set(re.findall(r"\w+", tour))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.errors import InputError, RunFolderError
+from armtempo.basics.errors import InputError, RunFolderError
 from armtempo.link.board_messages import Positions, Sample
 from armtempo.model.arm import Arm
 from armtempo.runs import reader, run_folder

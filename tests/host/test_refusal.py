@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from armtempo.errors import BoardError
+from armtempo.basics.errors import BoardError
 from armtempo.link.refusal import refusal
 from armtempo_shared import wire
 from armtempo_shared.limits import MAX_MOTION_BYTES

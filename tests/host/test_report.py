@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from armtempo.basics.errors import RunFolderError
 from armtempo.cli import main
-from armtempo.errors import RunFolderError
 from armtempo.model import trajectory_file
 from armtempo.model.arm import Driver, Joint, Limits
 from armtempo.model.plan import Plan

@@ -10,7 +10,7 @@ from pathlib import Path
 import armtempo
 import numpy as np
 import pytest
-from armtempo.errors import ArmtempoError, InputError
+from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.kinematics.of_arm import forward
 from armtempo.model import sequence_file
 from armtempo.model.arm import Arm

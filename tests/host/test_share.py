@@ -11,13 +11,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from armtempo.errors import BoardError, LinkError, NoAnswerError, PortError
+from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, PortError
 from armtempo.link.turns import Turns
+from armtempo.ports import caller, claim
+from armtempo.ports.caller import Caller, Ownership, ownership
+from armtempo.ports.lines import Message
+from armtempo.ports.server import Server
 from armtempo.robot.shared_board import SharedBoard
-from armtempo.share import caller, claim
-from armtempo.share.caller import Caller, Ownership, ownership
-from armtempo.share.lines import Message
-from armtempo.share.server import Server
 
 
 def handle(request: Message) -> Message:

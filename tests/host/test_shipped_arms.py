@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.kinematics import Geometry, forward
 from armtempo.kinematics.shape import refusals
 from armtempo.model import shipped

@@ -16,32 +16,26 @@ ROOT = Path(__file__).parents[2]
 HOST = ROOT / "host" / "armtempo"
 SHARED = ROOT / "shared" / "armtempo_shared"
 ORDER = (
-    "errors",
-    "arrays",
-    "progress",
-    "virtual_id",  # how a virtual board is told from a real one
+    "basics",  # errors, the array type, progress
     "formats",  # TOML tables, JSON, text tables, whole files
-    "ports",  # names of serial ports, and which there are
-    "share",  # the program that has a port answers others
+    "ports",  # names of serial ports; the program that has one answers others
     "project",  # armtempo.toml, variables; which board is meant
     "splines",  # B-splines, the time axis, trajectories, bounds of their extremes
     "optimise",  # population searches
     "model",  # arm, job, pose, plan, and their files
     "kinematics",  # forward, inverse, choice
-    "urdf",  # from a robot description to an arm file
     "planning",  # from a job to a plan
     "records",  # arm and motion as the board takes them
-    "arm_check",  # what looks wrong about an arm and a job
-    "new_project",  # a folder for an arm of one's own
+    "diagnosis",  # what looks wrong about an arm, a job, this machine
+    "new_arm",  # a folder for a new arm, also from a robot description
     "simulator",  # the virtual board
     "link",  # port, session, commands, samples of a run
     "deploy",  # the board program onto a board
     "runs",  # run folders and what the samples say
     "report",  # pages, plots, tables
     "robot",  # a board in use: home, go, run, stop
-    "doctor",  # what a fault report needs to know
     "pipeline",  # plan, load, run, report
-    "research",  # comparison of searches, the paper repeated
+    "paper",  # its tables and figures, repeated
     "cli",
 )
 """Each package or module imports from those before it in this list, never from those behind."""
@@ -161,4 +155,4 @@ def test_types_of_the_whole_package_have_one_home() -> None:
         for target in node.targets
         if isinstance(target, ast.Name) and target.id in ("Array", "Progress")
     ]
-    assert sorted(homes) == [("Array", "arrays.py"), ("Progress", "progress.py")]
+    assert sorted(homes) == [("Array", "basics/arrays.py"), ("Progress", "basics/progress.py")]

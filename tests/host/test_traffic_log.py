@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from armtempo.errors import InputError, LinkError
+from armtempo.basics.errors import InputError, LinkError
 from armtempo.link import Client, traffic
 from armtempo.link.session import Session
 from armtempo_shared import wire

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.model import trajectory_file
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job

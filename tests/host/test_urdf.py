@@ -10,13 +10,14 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from armtempo.basics.errors import InputError, PlanError
 from armtempo.cli import main
-from armtempo.errors import InputError, PlanError
 from armtempo.kinematics import Geometry, forward
 from armtempo.kinematics.shape import refusals
 from armtempo.model import arm_file
-from armtempo.urdf import fitting, reader
-from armtempo.urdf import rows as dh
+from armtempo.new_arm import urdf_fitting as fitting
+from armtempo.new_arm import urdf_reader as reader
+from armtempo.new_arm import urdf_rows as dh
 from click.testing import CliRunner
 from numpy.typing import NDArray
 

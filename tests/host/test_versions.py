@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from armtempo.model import arm_json, sequence_plan, trajectory_file
+from armtempo.ports import claim_file
 from armtempo.runs import run_folder, sequence_folder
-from armtempo.share import claim_file
 from armtempo_shared import armrecord, messages
 
 

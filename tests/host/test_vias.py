@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from armtempo.basics.errors import InputError, PlanError
 from armtempo.cli import main
-from armtempo.errors import InputError, PlanError
 from armtempo.kinematics import Geometry, forward
 from armtempo.model import arm_file, trajectory_file
 from armtempo.model.arm import Arm

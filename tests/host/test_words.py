@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 import serial
+from armtempo.basics.errors import InputError, LinkError
 from armtempo.cli import state
-from armtempo.errors import InputError, LinkError
 from armtempo.formats import toml_table
 from armtempo.link.transport import SerialTransport
 from armtempo.robot import board_state, speed

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import armtempo
-from armtempo.errors import InputError, LinkError
+from armtempo.basics.errors import InputError, LinkError
 from armtempo.link.board_messages import Event, Sample, Status
 from armtempo.robot import jog
 from armtempo.robot.board import Board

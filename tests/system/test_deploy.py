@@ -6,9 +6,9 @@ import shutil
 from pathlib import Path
 
 import pytest
+from armtempo.basics.errors import LinkError
 from armtempo.deploy import deploy, package, remote
 from armtempo.deploy.firmware import frozen
-from armtempo.errors import LinkError
 from armtempo.simulator import LaunchOptions, VirtualBoard, edgelog, launch
 
 from tests import forked, interpreters

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.errors import BoardError, InputError, LinkError
+from armtempo.basics.errors import BoardError, InputError, LinkError
 from armtempo.link import Client, open_board
 from armtempo.model import arm_file
 from armtempo.model.arm import Arm

@@ -15,9 +15,9 @@ from pathlib import Path
 import armtempo
 import numpy as np
 import pytest
+from armtempo.basics.errors import InputError
 from armtempo.cli import main
 from armtempo.cli.teach_points import TaughtPoints, by_hand
-from armtempo.errors import InputError
 from armtempo.link.board_messages import Notice
 from armtempo.model import arm_file
 from armtempo.simulator import LaunchOptions, launch

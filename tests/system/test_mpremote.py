@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.errors import LinkError
+from armtempo.basics.errors import LinkError
 from armtempo.link import Client, open_board
 from armtempo.link.client import Started
 from armtempo.planning import point_to_point

@@ -8,7 +8,7 @@ from pathlib import Path
 import armtempo
 import numpy as np
 import pytest
-from armtempo.errors import LinkError, RunFolderError
+from armtempo.basics.errors import LinkError, RunFolderError
 from armtempo.link.board_messages import SequenceState
 from armtempo.report import sequence_report
 from armtempo.runs.leg_results import results

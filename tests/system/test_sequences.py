@@ -8,8 +8,8 @@ from pathlib import Path
 
 import armtempo
 import pytest
+from armtempo.basics.errors import BoardError, LinkError
 from armtempo.cli import state
-from armtempo.errors import BoardError, LinkError
 from armtempo.simulator import InjectedFault, LaunchOptions, edgelog, launch
 from armtempo_shared.limits import TICK_HZ
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import armtempo
 import numpy as np
 import pytest
-from armtempo.errors import BoardError, InputError
+from armtempo.basics.errors import BoardError, InputError
 from armtempo.link.board_messages import Sample
 from armtempo.planning import brake_time
 from armtempo.report import run_report

@@ -86,7 +86,7 @@ def test_the_installed_command_begins_there() -> None:
 
 def test_little_is_imported_before_an_interrupt_is_minded(whole: Watched) -> None:
     ours = [name for name in whole.first if name.startswith("armtempo")]
-    assert ours == ["armtempo", "armtempo.errors", "armtempo.__main__"]
+    assert ours == ["armtempo", "armtempo.basics", "armtempo.basics.errors", "armtempo.__main__"]
     assert {"click", "numpy", "armtempo.planning.planner"} <= set(whole.imported)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from armtempo.errors import BoardError
+from armtempo.basics.errors import BoardError
 from armtempo.link import open_board, traffic
 from armtempo.link.board_messages import Done, Event, Sample
 from armtempo.link.session import Session

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import serial
-from armtempo.errors import LinkError, RunFolderError
+from armtempo.basics.errors import LinkError, RunFolderError
 from armtempo.link.connect import open_board
 from armtempo.simulator import LaunchOptions, edgelog, launch, launcher
 

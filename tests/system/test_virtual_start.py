@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 import serial
+from armtempo.basics.errors import LinkError
 from armtempo.cli import virtual_board
-from armtempo.errors import LinkError
 from armtempo.simulator import LaunchOptions, VirtualBoard, edgelog, launch
 from armtempo.simulator.temporary_folder import PREFIX, TemporaryFolder
 

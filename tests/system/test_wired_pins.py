@@ -10,8 +10,8 @@ from pathlib import Path
 
 import armtempo
 import pytest
+from armtempo.basics.errors import BoardError, InputError, LinkError
 from armtempo.cli import main
-from armtempo.errors import BoardError, InputError, LinkError
 from armtempo.model.arm import Arm
 from armtempo.robot.board import Board
 from armtempo.simulator import InjectedFault, LaunchOptions, edgelog, launch

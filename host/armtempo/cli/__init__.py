@@ -13,9 +13,9 @@ from typing import Any
 import click
 
 from armtempo import __version__
+from armtempo.basics.errors import INTERRUPTED, ArmtempoError
 from armtempo.cli import examples, messages
 from armtempo.cli.interrupts import raised_by_signals
-from armtempo.errors import INTERRUPTED, ArmtempoError
 from armtempo.formats.spelling import did_you_mean
 
 GROUPS = {
@@ -44,7 +44,7 @@ GROUPS = {
         *("upload", "list", "show", "remove", "rename"),
         *("virtual-board", "monitor", "config", "doctor"),
     ),
-    "Develop": ("bench", "paper", "completion"),
+    "Develop": ("paper", "completion"),
 }
 """Commands in the order of the help page. Each is ``command`` in its module: '-' as '_', a keyword with '_' behind."""
 COMMANDS = tuple(name for names in GROUPS.values() for name in names)

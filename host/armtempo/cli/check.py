@@ -10,8 +10,8 @@ import click
 from armtempo.cli import chosen, options, results
 
 if TYPE_CHECKING:
-    from armtempo.arm_check import Finding
-    from armtempo.arm_check.figures import JointFigures
+    from armtempo.diagnosis.figures import JointFigures
+    from armtempo.diagnosis.finding import Finding
     from armtempo.model.arm import Arm
 
 
@@ -34,7 +34,9 @@ def command(
     Steps, step rates, resolution at the tool, torque, encoders, ranges, wiring. Exit code 1 where there are
     errors; warnings and notes leave it 0.
     """
-    from armtempo.arm_check import Level, check, figures
+    from armtempo.diagnosis import figures
+    from armtempo.diagnosis.arm_check import check
+    from armtempo.diagnosis.finding import Level
     from armtempo.project.settings import JOB, ProjectSettings
 
     _check_picture(picture, force)
@@ -51,7 +53,7 @@ def command(
 
 def _check_picture(picture: Path | None, force: bool) -> None:
     """Raise InputError where the picture cannot be written as asked."""
-    from armtempo.errors import InputError
+    from armtempo.basics.errors import InputError
 
     if picture is None:
         return
@@ -64,8 +66,8 @@ def _check_picture(picture: Path | None, force: bool) -> None:
 
 
 def _print_text(path: Path, arm: Arm | None, joints: tuple[JointFigures, ...], found: list[Finding]) -> None:
-    from armtempo.arm_check import Level
-    from armtempo.arm_check.figures import table
+    from armtempo.diagnosis.figures import table
+    from armtempo.diagnosis.finding import Level
 
     click.echo(f"arm: {arm.name if arm else '(not readable)'} ({path})")
     for line in table(joints):

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from armtempo.basics.errors import InputError
 from armtempo.cli.verbosity import is_quiet
-from armtempo.errors import InputError
 from armtempo.project.settings import ARM, JOB, RUNS, ProjectSettings, nothing_set
 
 if TYPE_CHECKING:
@@ -237,7 +237,7 @@ def shared_or_own(
 
 def board_state(port: str, log_traffic: Path | None = None) -> BoardState:
     """What the board says, whoever has the port."""
-    from armtempo.errors import PortGivenUpError
+    from armtempo.basics.errors import PortGivenUpError
 
     while True:
         with shared_or_own(port, log_traffic, any_program=True) as found:

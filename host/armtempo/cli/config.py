@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
+from armtempo.basics.errors import InputError
 from armtempo.cli import options, results
-from armtempo.errors import InputError
 from armtempo.project import settings
 from armtempo.project.settings import ProjectSettings, Setting
 

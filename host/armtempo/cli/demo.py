@@ -6,10 +6,10 @@ from pathlib import Path
 
 import click
 
+from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, messages, options, sequences
 from armtempo.cli.progress import ProgressBar
 from armtempo.cli.run import run_and_tell
-from armtempo.errors import InputError
 from armtempo.ports.names import SIM
 
 
@@ -39,7 +39,7 @@ def command(out: Path | None, port: str, pick_and_place: bool, log_traffic: Path
         _pick_and_place()
         return
     from armtempo import pipeline
-    from armtempo.errors import ArmtempoError, MissingPackageError
+    from armtempo.basics.errors import ArmtempoError, MissingPackageError
     from armtempo.model.arm import Arm
     from armtempo.model.job import Job
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import click
 
+from armtempo.basics.errors import ArmtempoError
 from armtempo.cli import chosen, options, results
-from armtempo.errors import ArmtempoError
 from armtempo.project import settings
 from armtempo.project.settings import ProjectSettings
 
 if TYPE_CHECKING:
-    from armtempo.doctor import Item
+    from armtempo.diagnosis.item import Item
     from armtempo.robot.board_state import BoardState
 
 
@@ -28,17 +28,18 @@ def command(arm_path: Path | None, port: str | None, as_json: bool) -> None:
     Nothing is changed and nothing moves. Without a port it looks at the one board that is plugged in, if there is one.
     Exit code 1 where something is wrong.
     """
-    from armtempo import doctor
+    from armtempo.diagnosis import machine
+    from armtempo.diagnosis.item import Condition
 
     parts = {
-        "machine": doctor.examine_machine(),
-        "packages": doctor.packages(),
-        "ports": doctor.ports(),
+        "machine": machine.examine_machine(),
+        "packages": machine.packages(),
+        "ports": machine.ports(),
         "project": _project(arm_path, port),
         "arm": _arm(arm_path),
         "board": _board(port, arm_path),
     }
-    wrong = any(item.level is doctor.Condition.WRONG for items in parts.values() for item in items)
+    wrong = any(item.level is Condition.WRONG for items in parts.values() for item in items)
     if as_json:
         results.show_json({part: [_values(item) for item in items] for part, items in parts.items()})
     else:
@@ -48,7 +49,7 @@ def command(arm_path: Path | None, port: str | None, as_json: bool) -> None:
 
 
 def _project(arm_path: Path | None, port: str | None) -> list[Item]:
-    from armtempo.doctor import Condition, Item
+    from armtempo.diagnosis.item import Condition, Item
 
     project = ProjectSettings()
     given = {settings.ARM: arm_path, settings.PORT: port}
@@ -60,30 +61,30 @@ def _project(arm_path: Path | None, port: str | None) -> list[Item]:
 
 
 def _arm(arm_path: Path | None) -> list[Item]:
-    from armtempo import doctor
+    from armtempo.diagnosis import arm_check
+    from armtempo.diagnosis.item import Condition, Item
     from armtempo.model import shipped
 
     try:
         setting = ProjectSettings().get(settings.ARM, arm_path)
-        return doctor.examine_arm(shipped.find(setting.value).path) if setting else []
+        return arm_check.examine_arm(shipped.find(setting.value).path) if setting else []
     except ArmtempoError as error:
-        return [doctor.Item("arm file", str(error), doctor.Condition.WRONG, "name an arm file that is there")]
+        return [Item("arm file", str(error), Condition.WRONG, "name an arm file that is there")]
 
 
 def _board(port: str | None, arm_path: Path | None) -> list[Item]:
-    from armtempo import doctor
+    from armtempo.diagnosis.item import Condition, Item
     from armtempo.project import board_port
+    from armtempo.robot import board_check
 
     try:
         name = board_port.choose(port, others=True).value
     except ArmtempoError:  # none was named and none can be meant: nothing is wrong with that
-        return [
-            doctor.Item("board", "not looked at", doctor.Condition.NOTE, "give --port PORT, or --port sim")
-        ]
+        return [Item("board", "not looked at", Condition.NOTE, "give --port PORT, or --port sim")]
     try:
-        return doctor.examine_board(_named(chosen.board_state(name), arm_path))
+        return board_check.examine_board(_named(chosen.board_state(name), arm_path))
     except ArmtempoError as error:
-        return doctor.examine_board(error)
+        return board_check.examine_board(error)
 
 
 def _named(state: BoardState, arm_path: Path | None) -> BoardState:

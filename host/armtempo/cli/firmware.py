@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from armtempo.basics.errors import InputError
 from armtempo.cli import options, results
 from armtempo.cli.flash import put_on_board
 from armtempo.cli.progress import ProgressBar
-from armtempo.errors import InputError
 
 if TYPE_CHECKING:
     from armtempo.deploy.firmware.image import Image

@@ -10,7 +10,7 @@ import click
 from armtempo.cli import chosen, options, results
 
 if TYPE_CHECKING:
-    from armtempo.arrays import Array
+    from armtempo.basics.arrays import Array
     from armtempo.model.arm import Arm
 
 

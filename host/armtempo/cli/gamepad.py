@@ -15,8 +15,8 @@ from threading import Event, Thread
 from types import MappingProxyType
 from typing import Any
 
+from armtempo.basics.errors import InputError, MissingPackageError
 from armtempo.cli.keys import Keys
-from armtempo.errors import InputError, MissingPackageError
 
 BUTTONS = MappingProxyType({0: "p", 1: " ", 2: "s", 3: "h", 6: "<", 7: ">"})
 """Keys by the numbers of buttons: A, B, X, Y, Back and Start of the usual layout."""

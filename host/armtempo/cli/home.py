@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
+from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, options, posture
-from armtempo.errors import InputError
 
 
 @click.command(context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture

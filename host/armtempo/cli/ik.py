@@ -118,7 +118,7 @@ def _within(pose: Pose, tolerance_mm: float | None, tolerance_deg: float | None)
 
 def _poses(given: _Given) -> list[Pose]:
     """The poses of the options; InputError where they do not make exactly one of the three forms."""
-    from armtempo.errors import InputError
+    from armtempo.basics.errors import InputError
     from armtempo.kinematics import pose_file
 
     if sum(form is not None for form in (given.matrix, given.position, given.poses)) != 1:
@@ -162,7 +162,7 @@ def _positioned(given: _Given, angles: dict[str, float]) -> Pose:
 
 def _posture(previous: str | None, solver: PoseSolver) -> Sequence[float]:
     """The posture to stay near to, in rad: (joints,)."""
-    from armtempo.errors import InputError
+    from armtempo.basics.errors import InputError
     from armtempo.kinematics.pose_file import numbers
 
     if previous is None:
@@ -200,7 +200,7 @@ def _print_json(solver: PoseSolver, found: Iterable[Listing]) -> None:
 
 def _fail(without: list[int]) -> None:
     """End with exit code 1 where poses are left without a solution."""
-    from armtempo.errors import PlanError
+    from armtempo.basics.errors import PlanError
 
     if without:
         which = ", ".join(map(str, without))

@@ -31,11 +31,13 @@ def command(urdf: Path, out: Path, base: str | None, tip: str | None, force: boo
     The rows are held against the URDF's own forward kinematics at 1000 random postures before anything is
     written. Motors, which a URDF does not describe, are left as comments to fill in. Needs the extra 'urdf'.
     """
-    from armtempo.errors import InputError
+    from armtempo.basics.errors import InputError
     from armtempo.formats import toml_table
     from armtempo.formats.atomic_file import replace_text
     from armtempo.model import arm_file
-    from armtempo.urdf import arm_text, fitting, reader
+    from armtempo.new_arm import arm_text
+    from armtempo.new_arm import urdf_fitting as fitting
+    from armtempo.new_arm import urdf_reader as reader
 
     if out.exists() and not force:
         raise InputError(f"{out}: is there already", "choose another name, or --force to replace it")

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, options, posture
-from armtempo.errors import InputError
 
 if TYPE_CHECKING:
     from armtempo.cli.jog_screen import JogScreen
@@ -88,7 +88,7 @@ def command(
 
 def prepare(board: Board, arm: Arm, replace_arm: bool = False) -> None:
     """Set the board up; LinkError where the position is unknown. A virtual arm that has just come stands at home."""
-    from armtempo.errors import LinkError
+    from armtempo.basics.errors import LinkError
     from armtempo.ports.names import is_sim
 
     board.configure(arm, replace=replace_arm)

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Self
 
 import click
 
+from armtempo.basics.errors import ArmtempoError, BoardError, InputError, LinkError, PlanError
 from armtempo.cli.keys import END, INTERRUPT, Keys
-from armtempo.errors import ArmtempoError, BoardError, InputError, LinkError, PlanError
 from armtempo.robot.stop_request import Stopped, StopRequest
 
 if TYPE_CHECKING:

@@ -10,10 +10,10 @@ import click
 import numpy as np
 from armtempo_shared.limits import TICK_HZ
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import ArmtempoError
 from armtempo.cli import chosen, messages
 from armtempo.cli.progress import ProgressBar
-from armtempo.errors import ArmtempoError
 from armtempo.link.board_messages import Sample
 from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.report.live_plot import LivePlot

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from armtempo.errors import ArmtempoError
+from armtempo.basics.errors import ArmtempoError
 from armtempo.formats.plain_text import visible
 
 

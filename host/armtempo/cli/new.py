@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 import click
 
+from armtempo.basics.errors import InputError
 from armtempo.cli import options, results
-from armtempo.errors import InputError
 
 if TYPE_CHECKING:
-    from armtempo.new_project.geometry import ArmText
-    from armtempo.new_project.joint_entry import JointEntry
+    from armtempo.new_arm.given_geometry import ArmText
+    from armtempo.new_arm.joint_entry import JointEntry
 
 _QUESTIONS = {
     "name": "name",
@@ -62,7 +62,7 @@ def command(
 
     Asks for what no option says, if there is somebody at the terminal to ask.
     """
-    from armtempo import new_project
+    from armtempo.new_arm import folder as project_folder
 
     if sum(map(bool, (like, urdf, joints))) > 1:
         raise InputError("--like, --urdf and --joint exclude each other", "give one of them")
@@ -75,9 +75,9 @@ def command(
         arm = _given_arm(folder.name, like, urdf, joints)
     if port is None:
         port = click.prompt("port of the board", default="sim:board") if asked else "sim:board"
-    from armtempo.arm_check import figures
+    from armtempo.diagnosis import figures
 
-    written = new_project.write(folder, arm, port)
+    written = project_folder.write(folder, arm, port)
     joint_figures = figures.of(arm.arm)
     values = {"files": [str(path) for path in written], "joints": [joint.values for joint in joint_figures]}
     next_step = f"next: cd {folder}; armtempo check; the other commands are in README.md"
@@ -91,33 +91,32 @@ def _asked() -> bool:
 
 
 def _given_arm(name: str, like: str | None, urdf: Path | None, joints: tuple[str, ...]) -> ArmText:
-    from armtempo import new_project
-    from armtempo.new_project import joint_entry
+    from armtempo.new_arm import given_geometry, joint_entry
 
     if like:
-        return new_project.from_shipped(like)
+        return given_geometry.from_shipped(like)
     if urdf:
-        return new_project.from_urdf(urdf)
-    return new_project.from_joints(name, [joint_entry.parse(text, n) for n, text in enumerate(joints, 1)])
+        return given_geometry.from_urdf(urdf)
+    return given_geometry.from_joints(name, [joint_entry.parse(text, n) for n, text in enumerate(joints, 1)])
 
 
 def _ask_arm(name: str) -> ArmText:
-    from armtempo import new_project
     from armtempo.model import shipped
+    from armtempo.new_arm import given_geometry
 
     choices = [*shipped.files(), "own"]
     like = click.prompt("which arm", type=click.Choice(choices), default="own")
     if like != "own":
-        return new_project.from_shipped(like)
+        return given_geometry.from_shipped(like)
     count = click.prompt("how many joints", type=click.IntRange(1, 6), default=3)
     click.echo(
         "standard Denavit-Hartenberg rows, base first; the steps and speeds are shown after each joint"
     )
-    return new_project.from_joints(name, [_ask_joint(number, count) for number in range(1, count + 1)])
+    return given_geometry.from_joints(name, [_ask_joint(number, count) for number in range(1, count + 1)])
 
 
 def _ask_joint(number: int, count: int) -> JointEntry:
-    from armtempo.new_project.joint_entry import JointEntry
+    from armtempo.new_arm.joint_entry import JointEntry
 
     entry = JointEntry(f"joint {number}")
     click.echo(f"joint {number} of {count}")

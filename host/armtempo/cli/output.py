@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, options, results
-from armtempo.errors import InputError
 
 if TYPE_CHECKING:
     from armtempo.model.outputs import Output

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, messages, options, results, sequences
 from armtempo.cli.progress import ProgressBar
-from armtempo.errors import InputError
 
 if TYPE_CHECKING:
     from armtempo.model.arm import Arm
@@ -166,9 +166,9 @@ def _json(file: Path, plan: Plan) -> dict[str, Any]:
 def _write_curve(arm: Arm, job: Job, target: Path, force: bool, as_json: bool) -> None:
     """Table to the terminal and as CSV, and the figure where matplotlib is installed."""
     from armtempo import pipeline
-    from armtempo.errors import MissingPackageError
+    from armtempo.basics.errors import MissingPackageError
     from armtempo.formats.atomic_file import check_replaceable, replace_text
-    from armtempo.planning.corridor_curve import unit_of
+    from armtempo.planning.free.corridor_curve import unit_of
     from armtempo.report import corridor_plot, drawing
 
     table, picture = (target.with_name(f"{target.stem}-corridor{suffix}") for suffix in (".csv", ".png"))

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, results, state
-from armtempo.errors import InputError
 from armtempo.model.posture import HOME as HOME
 from armtempo.model.posture import is_via as is_via
 from armtempo.model.posture import name_problem
 
 if TYPE_CHECKING:
-    from armtempo.arrays import Array
+    from armtempo.basics.arrays import Array
     from armtempo.model.arm import Arm
     from armtempo.model.job import Job
     from armtempo.model.plan import Plan

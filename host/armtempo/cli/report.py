@@ -30,7 +30,7 @@ def command(runs: tuple[Path, ...], out: Path | None, force: bool, as_json: bool
     is named there.
     """
     from armtempo import pipeline
-    from armtempo.errors import InputError, RunFolderError
+    from armtempo.basics.errors import InputError, RunFolderError
     from armtempo.formats.atomic_file import check_replaceable
     from armtempo.robot.run import Run
     from armtempo.runs.sequence_reader import SequenceRun, is_sequence_run

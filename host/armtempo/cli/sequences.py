@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, results
 from armtempo.cli.progress import ProgressBar
-from armtempo.errors import InputError
 from armtempo.formats.text_table import aligned
 
 if TYPE_CHECKING:
@@ -146,8 +146,8 @@ def run_and_tell(
 
     ``as_json``: the end as JSON. Exit code 1 where an input did not come.
     """
+    from armtempo.basics.errors import ArmtempoError, LinkError
     from armtempo.cli.state import counted
-    from armtempo.errors import ArmtempoError, LinkError
     from armtempo.robot.sequence_run import cycles, where
     from armtempo.robot.stop_request import Stopped
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import click
 from armtempo_shared.messages import RESUME
 
+from armtempo.basics.errors import LinkError
 from armtempo.cli import chosen, options, results
-from armtempo.errors import LinkError
 
 
 @click.command()

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, options, results, state
-from armtempo.errors import InputError
 
 if TYPE_CHECKING:
     from armtempo.model.arm import Arm

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import click
 
+from armtempo.basics.errors import LinkError, NoAnswerError, PortInUseError
 from armtempo.cli import chosen, options, results
-from armtempo.errors import LinkError, NoAnswerError, PortInUseError
 from armtempo.project import quick_stop
 from armtempo.project.quick_stop import StopAnswer
 from armtempo.robot import shared_board
@@ -94,7 +94,7 @@ def _with_degrees(found: BoardState) -> BoardState:
     """The same in degrees, where the arm is known; the stop is done by now, so it may take a while."""
     if found.arm or not found.arm_crc:
         return found
-    from armtempo.errors import ArmtempoError
+    from armtempo.basics.errors import ArmtempoError
     from armtempo.model.arm import Arm
 
     try:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, jog, keys, options
-from armtempo.errors import InputError
 
 if TYPE_CHECKING:
     from armtempo.cli.keys import Keys

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import click
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError
 from armtempo.cli.keys import END, INTERRUPT, Keys
-from armtempo.errors import InputError
 from armtempo.formats.atomic_file import replace_text
 from armtempo.model import job_text, posture, posture_text
 from armtempo.model.arm import Arm

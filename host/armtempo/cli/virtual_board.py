@@ -7,8 +7,8 @@ from pathlib import Path
 
 import click
 
+from armtempo.basics.errors import LinkError
 from armtempo.cli import chosen, options
-from armtempo.errors import LinkError
 
 _LOOK_S = 0.5
 

@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from armtempo.basics.errors import LinkError
 from armtempo.cli import chosen
-from armtempo.errors import LinkError
 from armtempo.link.board_messages import Levels
 from armtempo.model.arm import Arm
 from armtempo.robot.outputs import Way

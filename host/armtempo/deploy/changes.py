@@ -7,9 +7,9 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from armtempo.basics.errors import LinkError
 from armtempo.deploy import program_files
 from armtempo.deploy.remote import Survey
-from armtempo.errors import LinkError
 from armtempo.link.program_version import own_crc
 
 LEAST_RELEASE = (1, 20)

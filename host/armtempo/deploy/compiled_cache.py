@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.formats import atomic_file
 
 Files = Mapping[str, bytes]

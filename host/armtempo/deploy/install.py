@@ -13,14 +13,14 @@ from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 
+from armtempo.basics.errors import InputError, LinkError, NoProgramError, PortError
+from armtempo.basics.progress import Progress
 from armtempo.deploy import program_files
 from armtempo.deploy.changes import Tell, check_suitable, choose, difference, is_complete, last_files, ours
 from armtempo.deploy.remote import RECOVERY, Remote, Survey, each, rename
-from armtempo.errors import InputError, LinkError, NoProgramError, PortError
 from armtempo.link import open_board, patiently
 from armtempo.link.board_messages import Hello
 from armtempo.ports.names import is_sim
-from armtempo.progress import Progress
 
 KEPT_ASIDE = ".before-armtempo"
 """Suffix of a boot.py or main.py that was there before and is kept."""

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from armtempo import __version__
+from armtempo.basics.errors import InputError
 from armtempo.deploy import program_files
-from armtempo.errors import InputError
 
 PACKAGE = "package.json"
 STM32F4 = 6 | 3 << 8 | 7 << 10

@@ -16,9 +16,9 @@ from armtempo_shared.program_hash import STAMP
 from armtempo_shared.table import rows
 
 from armtempo import simulator
+from armtempo.basics.errors import LinkError, MissingPackageError
 from armtempo.deploy import compiled_cache, plain_frames
 from armtempo.deploy.compact import Compact, compact, frames
-from armtempo.errors import LinkError, MissingPackageError
 from armtempo.link.program_version import PACKAGES, own_crc, package_folder
 
 ROOT = "/flash"

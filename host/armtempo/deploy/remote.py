@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from armtempo.errors import LinkError
+from armtempo.basics.errors import LinkError
 
 SILENCE_S = 30.0
 """Longest time without output of a step other than copying a file; mpremote itself would wait for ever."""

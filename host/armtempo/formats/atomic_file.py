@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 
 
 def replace_text(path: Path, text: str, newline: str | None = None) -> None:

@@ -15,7 +15,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.formats.plain_text import visible
 from armtempo.formats.spelling import did_you_mean
 

@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.formats.atomic_file import why
 
 _SEPARATORS = (";", "\t", ",")

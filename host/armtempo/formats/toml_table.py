@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.formats.atomic_file import why
 from armtempo.formats.plain_text import is_plain
 from armtempo.formats.spelling import did_you_mean, misspelt

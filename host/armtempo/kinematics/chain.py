@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armtempo.arrays import Array
-from armtempo.errors import InputError
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError
 from armtempo.kinematics.forward import array_frames, postures
 from armtempo.kinematics.geometry import Geometry
 from armtempo.model.arm import Arm

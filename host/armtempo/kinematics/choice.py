@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.kinematics.branches import BRANCHES, Branch
 from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.inverse import inverse_of_pose, wrist_centre

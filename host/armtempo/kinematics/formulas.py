@@ -13,7 +13,7 @@ from typing import Any, Generic, NamedTuple
 
 import numpy as np
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.kinematics.geometry import T
 from armtempo.kinematics.shape import Shape
 

@@ -9,7 +9,7 @@ from typing import Any, Generic, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.kinematics.geometry import Geometry, Link, T
 
 Triple = tuple[T, T, T]

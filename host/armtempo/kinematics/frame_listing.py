@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.formats.text_table import aligned
 from armtempo.kinematics.forward import all_frames
 from armtempo.kinematics.geometry import Geometry

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.kinematics import formulas
 from armtempo.kinematics.formulas import ARRAYS
 from armtempo.kinematics.regions import Mask, Radii, radii

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, TypeVar
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.model.arm import Arm
 
 T = TypeVar("T", float, Array)

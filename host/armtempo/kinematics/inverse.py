@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.kinematics import formulas
 from armtempo.kinematics.formulas import ARRAYS
 from armtempo.kinematics.geometric import ArmPart, duplicates, on_border, solve_arm

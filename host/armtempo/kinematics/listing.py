@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.kinematics.choice import Candidate, Choice
 from armtempo.kinematics.constraint import Miss
 from armtempo.kinematics.numerical import NumericalSolution, NumericalSolutions

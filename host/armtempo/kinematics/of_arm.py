@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armtempo.arrays import Array
-from armtempo.errors import InputError
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError
 from armtempo.kinematics.chain import spread_deg
 from armtempo.kinematics.choice import Candidate
 from armtempo.kinematics.constraint import Miss

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.model.arm import Arm
 
 TOLERANCE_RAD = 1e-9

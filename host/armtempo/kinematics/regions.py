@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.kinematics import formulas
 from armtempo.kinematics.shape import Shape
 

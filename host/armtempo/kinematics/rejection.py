@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.kinematics.ranges import Ranges
 from armtempo.kinematics.regions import radii
 from armtempo.kinematics.shape import Shape

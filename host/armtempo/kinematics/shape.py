@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.kinematics.geometry import Geometry, twist
 
 TOLERANCE = 1e-12

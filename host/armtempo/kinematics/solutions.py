@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 
 OK, TOO_FAR, TOO_NEAR, IN_OFFSET, DUPLICATE = range(5)
 """What became of a solution: there, or Eq. (3) violated at the outer or inner border, or the wrist centre

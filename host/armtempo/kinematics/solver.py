@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from armtempo.arrays import Array
-from armtempo.errors import InputError
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError
 from armtempo.kinematics.choice import Choice, choose
 from armtempo.kinematics.constraint import Constraint, Miss
 from armtempo.kinematics.descent import descend

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.kinematics import formulas
 from armtempo.kinematics.formulas import ARRAYS
 from armtempo.kinematics.geometric import ArmPart

@@ -10,8 +10,8 @@ from armtempo_shared import wire
 from armtempo_shared.limits import TICK_HZ
 from armtempo_shared.sequence import ENDINGS
 
+from armtempo.basics.virtual_id import is_virtual
 from armtempo.formats.plain_text import visible
-from armtempo.virtual_id import is_virtual
 
 
 @dataclass(frozen=True)

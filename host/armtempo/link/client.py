@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from armtempo_shared import limits, wire
 from armtempo_shared.messages import MAX_PAYLOAD, PERMILLE
 
-from armtempo.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
+from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
+from armtempo.basics.progress import Progress
 from armtempo.link import board_messages
 from armtempo.link.session import ANSWER_TIMEOUT_S, Session
-from armtempo.progress import Progress
 
 FLASH_TIMEOUT_S = 30.0
 """Time-out of commands for which the board erases flash or checks a whole motion before it answers."""

@@ -8,17 +8,24 @@ from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import TypeVar
 
-from armtempo.errors import BoardError, DisturbedError, LinkError, NoAnswerError, PortError, PortInUseError
+from armtempo.basics.errors import (
+    BoardError,
+    DisturbedError,
+    LinkError,
+    NoAnswerError,
+    PortError,
+    PortInUseError,
+)
 from armtempo.link import diagnose, traffic
 from armtempo.link.client import Client
 from armtempo.link.program_version import own_crc
 from armtempo.link.session import Session
 from armtempo.link.transport import SerialTransport, Transport
 from armtempo.model.arm import Arm
+from armtempo.ports import claim as claims
 from armtempo.ports import names
-from armtempo.share import claim as claims
-from armtempo.share.caller import Ownership, ownership
-from armtempo.share.claim import PortClaim
+from armtempo.ports.caller import Ownership, ownership
+from armtempo.ports.claim import PortClaim
 
 _Found = TypeVar("_Found")
 _NOISY_TRIES = 10

@@ -5,7 +5,7 @@ from __future__ import annotations
 from armtempo_shared import wire
 from armtempo_shared.messages import SYNC
 
-from armtempo.errors import DisturbedError, LinkError, NoProgramError
+from armtempo.basics.errors import DisturbedError, LinkError, NoProgramError
 from armtempo.link.transport import Transport
 
 LOOK_S = 0.4

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from armtempo.errors import LinkError
+from armtempo.basics.errors import LinkError
 from armtempo.link.board_messages import Done, Event, Fault, Notice, Positions, Sample
 from armtempo.link.client import Client
 

@@ -6,7 +6,7 @@ from armtempo_shared import wire
 from armtempo_shared.limits import MAX_JOINTS, MAX_MOTION_BYTES
 from armtempo_shared.meanings import VALUES
 
-from armtempo.errors import BoardError
+from armtempo.basics.errors import BoardError
 
 _FASTER_JOINT = "the motion is faster than the joint's speed limit in the arm file that the board has"
 _FASTER_TOGETHER = "the joints together need more steps per second than the board can make"

@@ -15,7 +15,7 @@ from typing import Any
 
 from armtempo_shared import wire
 
-from armtempo.errors import ArmtempoError, LinkError, NoAnswerError, OtherBoardError
+from armtempo.basics.errors import ArmtempoError, LinkError, NoAnswerError, OtherBoardError
 from armtempo.link import board_messages
 from armtempo.link.refusal import refusal
 from armtempo.link.transport import Transport

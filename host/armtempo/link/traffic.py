@@ -17,7 +17,7 @@ from typing import Any, Self
 
 from armtempo_shared import wire
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.formats.atomic_file import why
 from armtempo.link.transport import Transport
 

@@ -10,7 +10,7 @@ from typing import Protocol
 
 import serial
 
-from armtempo.errors import InputError, LinkError, PortError, PortInUseError
+from armtempo.basics.errors import InputError, LinkError, PortError, PortInUseError
 
 BAUD_RATE = 115_200
 """Has no effect over USB; a UART between host and board would use it."""

@@ -7,7 +7,7 @@ from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.formats import json_codec
 from armtempo.formats.spelling import did_you_mean
 from armtempo.model import boards

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.formats import toml_table
 from armtempo.formats.toml_table import Table
 from armtempo.model import boards, outputs_file, pin_use, pose_table

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.formats import json_codec
 from armtempo.formats.atomic_file import replace_text, why
 from armtempo.model import boards, pin_use

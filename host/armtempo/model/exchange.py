@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from armtempo.arrays import Array
-from armtempo.errors import InputError
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError
 from armtempo.formats import number_table
 from armtempo.formats.number_table import NumberTable
 from armtempo.model import thinning

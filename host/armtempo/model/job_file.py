@@ -8,7 +8,7 @@ from pathlib import Path
 
 from armtempo_shared.limits import MAX_NAME, MAX_SEGMENTS
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.formats import toml_table
 from armtempo.formats.toml_table import Table
 from armtempo.model import pose_table

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from armtempo_shared.limits import MAX_NAME
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 
 _HEAD = """\
 # Via points that were taught with 'armtempo teach'; every key: host/docs/files.md

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from armtempo_shared.limits import FULL_OUTPUT
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.formats.spelling import did_you_mean
 
 SWITCH, PWM, SERVO = "switch", "pwm", "servo"

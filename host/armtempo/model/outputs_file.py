@@ -7,7 +7,7 @@ from typing import Any
 
 from armtempo_shared.limits import MAX_INPUTS, MAX_OUTPUTS
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.formats.toml_table import Table
 from armtempo.model.outputs import KINDS, PWM, SERVO, SWITCH, Input, Output
 

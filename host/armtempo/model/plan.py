@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.formats import json_codec
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job

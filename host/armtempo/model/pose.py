@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armtempo.arrays import Array
-from armtempo.errors import InputError
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError
 
 LARGEST = 1e9
 """Lengths in mm and angles in degrees beyond this are typing errors; no digit of a result would be right."""

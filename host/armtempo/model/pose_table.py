@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.formats.toml_table import Table
 from armtempo.model import pose
 from armtempo.model.tool_pose import LARGEST_DEG, LARGEST_MM, SMALLEST, WHOLE, Pose

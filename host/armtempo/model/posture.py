@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.formats.spelling import did_you_mean
 from armtempo.model.tool_pose import Pose
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from armtempo_shared.sequence import MAX_NESTING, MAX_REPEATS, MAX_WAIT_MS
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.formats import toml_table
 from armtempo.formats.spelling import did_you_mean
 from armtempo.formats.toml_table import Table

@@ -12,7 +12,7 @@ from typing import Any
 from armtempo_shared import sequence as record
 from armtempo_shared.sequence import COUNT, END, MOVE, REPEAT, WAIT
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.formats import json_codec
 from armtempo.formats.atomic_file import check_replaceable, replace_text, why
 from armtempo.model import arm_json

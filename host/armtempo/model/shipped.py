@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.model import arm_file
 
 PAPER = "paper"

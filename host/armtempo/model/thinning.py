@@ -7,8 +7,8 @@ from armtempo_shared.limits import MAX_SEGMENTS
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from armtempo.arrays import Array
-from armtempo.errors import InputError
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError
 
 LARGEST_DEG = 90.0
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from armtempo.arrays import Array
-from armtempo.errors import InputError
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError
 from armtempo.formats import json_codec
 from armtempo.model import pose
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from armtempo_shared.basis import BASIS
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.formats import json_codec
 from armtempo.formats.atomic_file import check_replaceable, replace_text, why
 from armtempo.model import arm_json

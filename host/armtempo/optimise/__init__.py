@@ -16,11 +16,11 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armtempo.arrays import Array
-from armtempo.errors import InputError
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError
+from armtempo.basics.progress import Progress
 from armtempo.optimise.parameters import Parameter, Value
 from armtempo.optimise.tracker import Function, Result, Task
-from armtempo.progress import Progress
 
 __all__ = ["ALGORITHMS", "Function", "Result", "Settings", "minimise", "parameters"]
 

@@ -21,7 +21,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.optimise.levy import BETA, levy_scale
 from armtempo.optimise.parameters import Number, OneOf, Parameter
 from armtempo.optimise.tracker import Result, Task, Tracker

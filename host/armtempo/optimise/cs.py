@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.optimise.levy import BETA, levy_steps
 from armtempo.optimise.parameters import Number, Parameter
 from armtempo.optimise.tracker import Result, Task, Tracker

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.optimise.parameters import Number
 
 Bits = NDArray[np.bool_]

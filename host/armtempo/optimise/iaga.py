@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.optimise.genes import BITS, crossover, decode, merits, mutate, random_bits, roulette
 from armtempo.optimise.parameters import Number, Parameter
 from armtempo.optimise.tracker import Result, Task, Tracker

@@ -15,7 +15,7 @@ from typing import Protocol
 
 import numpy as np
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.optimise.kkt import BandedKkt, Equalities, Factor
 
 

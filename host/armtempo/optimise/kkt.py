@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 
 Index = NDArray[np.intp]
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.optimise.parameters import Number
 
 BETA = Number(1.5, 0.3, 1.99)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from armtempo.arrays import Array
-from armtempo.progress import Progress
+from armtempo.basics.arrays import Array
+from armtempo.basics.progress import Progress
 
 Function = Callable[[Array], Array]
 """Values (N,) of points (N, d)."""

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.model.arm import Limits
 from armtempo.splines.bspline import Array
 from armtempo.splines.trajectory import Trajectory

@@ -19,8 +19,8 @@ from armtempo_shared.limits import (
 )
 
 from armtempo import optimise
-from armtempo.arrays import Array
-from armtempo.errors import InputError, PlanError
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError, PlanError
 from armtempo.model.arm import Arm, DrivenJoint, Limits
 from armtempo.model.job import (
     AUTO,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.planning.fitness import stretch_of
 from armtempo.planning.variables import Index
 from armtempo.splines import bspline, extremes, time_axis

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.planning.dual_bound import SHARE, Cells, Multipliers
 from armtempo.splines import bernstein, bspline
 

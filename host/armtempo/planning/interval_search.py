@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from armtempo import optimise
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
+from armtempo.basics.progress import Progress
 from armtempo.model.arm import Limits
 from armtempo.model.job import GRADIENT, Job
 from armtempo.optimise.tracker import Result
 from armtempo.planning import checks, rest_to_rest
 from armtempo.planning.fitness import Fitness
 from armtempo.planning.fixed_path import FixedPath
-from armtempo.progress import Progress
 from armtempo.splines import bspline
 
 _REACH = 6.0

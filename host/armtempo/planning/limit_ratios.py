@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 
 
 def ratios(angle: Array, time: Array, limits: Array) -> Array:

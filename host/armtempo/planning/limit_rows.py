@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.planning import limit_ratios
 from armtempo.planning.collocation import Points
 from armtempo.planning.variables import Index, MotionVariables, angle_basis, time_basis

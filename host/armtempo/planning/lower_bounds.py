@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.model.arm import Limits
 from armtempo.planning import dual_bound, dual_value, rest_to_rest
 from armtempo.planning.dual_bound import Cells

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.optimise.interior_point import Linearised
 from armtempo.optimise.kkt import BandedKkt, Equalities
 from armtempo.planning.linear_rows import LinearRows

@@ -10,13 +10,14 @@ from importlib.metadata import version
 import numpy as np
 
 import armtempo
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
+from armtempo.basics.progress import Progress
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.model.tool_pose import Pose
-from armtempo.planning import checks, free_plan, through_plan
-from armtempo.progress import Progress
+from armtempo.planning import checks, through_plan
+from armtempo.planning.free import free_plan
 from armtempo.splines import extremes
 
 

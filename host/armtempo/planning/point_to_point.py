@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.model.arm import Arm, DrivenJoint
 from armtempo.splines import bspline, time_axis
 from armtempo.splines.bspline import Array

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.model.arm import Limits
 
 _ROUNDING = 8 * float(np.finfo(float).eps)

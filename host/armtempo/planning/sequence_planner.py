@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from armtempo_shared import sequence as record
 
-from armtempo.errors import ArmtempoError, InputError
+from armtempo.basics.errors import ArmtempoError, InputError
+from armtempo.basics.progress import Progress
 from armtempo.model import sequence as kinds
 from armtempo.model.arm import Arm
 from armtempo.model.job import GRADIENT, Job
@@ -16,7 +17,6 @@ from armtempo.model.posture import ArmPosture
 from armtempo.model.sequence import Sequence, SourceMotion, Step
 from armtempo.model.sequence_plan import SequencePlan, SequenceRow, check_size
 from armtempo.planning import checks, planner, via_points
-from armtempo.progress import Progress
 from armtempo.splines.trajectory import Trajectory
 
 Angles = tuple[float, ...]

@@ -8,8 +8,8 @@ from itertools import pairwise
 
 from armtempo_shared.limits import LONGEST_TICKS, MAX_NAME, TICK_HZ
 
-from armtempo.arrays import Array
-from armtempo.errors import PlanError
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import PlanError
 from armtempo.model.job import Job, Stop
 from armtempo.splines.trajectory import Trajectory
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
+from armtempo.basics.progress import Progress
 from armtempo.model.arm import Arm, Limits
 from armtempo.model.job import Job
 from armtempo.model.plan import Search
 from armtempo.planning import checks, lower_bounds, time_parameterization
 from armtempo.planning.planned import Planned
 from armtempo.planning.time_parameterization import Group, Timed
-from armtempo.progress import Progress
 from armtempo.splines import bspline
 from armtempo.splines.trajectory import JointSpline, Trajectory
 

@@ -10,14 +10,14 @@ import numpy as np
 from armtempo_shared import motion
 from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
+from armtempo.basics.progress import Progress
 from armtempo.model.arm import Limits
 from armtempo.model.job import REFINE, Job
 from armtempo.optimise.tracker import Result
 from armtempo.planning import interval_search
 from armtempo.planning.fixed_path import FixedPath, Optimum
 from armtempo.planning.variables import time_points
-from armtempo.progress import Progress
 from armtempo.splines import time_axis
 
 MIN_DURATION_S = 0.01

@@ -12,7 +12,7 @@ from math import perm
 import numpy as np
 from numpy.typing import NDArray
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.splines import bspline
 
 Index = NDArray[np.intp]

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armtempo.arrays import Array
-from armtempo.errors import InputError, PlanError
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError, PlanError
 from armtempo.kinematics.branches import Branch, branch_of
 from armtempo.kinematics.choice import Choice, choose
 from armtempo.kinematics.constraint import Constraint, Miss

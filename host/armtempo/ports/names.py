@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 
 TYPE_CHECKING = False  # as "typing" has it, which takes longer to import than the rest of a stop
 if TYPE_CHECKING:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
+from armtempo.ports import claim
+from armtempo.ports.caller import Ownership, ownership
 from armtempo.ports.listing import find_ports
 from armtempo.ports.names import SIM
 from armtempo.project.settings import PORT, ProjectSettings, Setting, nothing_set
-from armtempo.share import claim
-from armtempo.share.caller import Ownership, ownership
 
 ONLY_BOARD = "the only board plugged in"
 ONLY_OPEN = "the only port that an armtempo program has open"

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import os
 
-from armtempo.ports import names
-from armtempo.share import claim_file
+from armtempo.ports import claim_file, names
 
 TYPE_CHECKING = False  # as "typing" has it
 if TYPE_CHECKING:
@@ -103,7 +102,7 @@ def _pass_on(claim: list[str], now: bool) -> None:
     asked = f'{{"id":2,"request":"stop","now":{"true" if now else "false"},"by":"{BY}"}}\n'
     lines = _answers_of(address, said + asked)
     if not lines:
-        from armtempo.share import caller
+        from armtempo.ports import caller
 
         caller.remember_hanging(number)
         return

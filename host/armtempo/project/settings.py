@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 
 FILE = "armtempo.toml"
 PORT, ARM, JOB, RUNS = NAMES = ("port", "arm", "job", "runs")

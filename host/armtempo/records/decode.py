@@ -9,8 +9,8 @@ import numpy as np
 from armtempo_shared import limits
 from armtempo_shared.motion import Motion, MotionError
 
-from armtempo.arrays import Array
-from armtempo.errors import InputError
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
 

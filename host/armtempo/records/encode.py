@@ -12,7 +12,7 @@ from armtempo_shared import armrecord, limits, motion
 from armtempo_shared.wire import record_crc
 from numpy.typing import NDArray
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.model.arm import Arm, DrivenJoint
 from armtempo.planning import checks
 from armtempo.records import output_rows

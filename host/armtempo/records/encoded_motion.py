@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from armtempo_shared.limits import MAX_NAME
 from armtempo_shared.wire import record_crc
 
-from armtempo.arrays import Array
-from armtempo.errors import InputError
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.planning import brake_time

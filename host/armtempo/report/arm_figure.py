@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.report.drawing import PAGE_COLOUR
 from armtempo.report.plots import COLOURS, new_figure
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.kinematics import Geometry, all_frames, forward
 from armtempo.kinematics.chain import outline_mm
 from armtempo.model.arm import Arm

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from armtempo.arrays import Array
-from armtempo.errors import RunFolderError
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import RunFolderError
 from armtempo.formats.atomic_file import replace_text
 from armtempo.report import drawing, html_page, plots
 from armtempo.report.evaluation import Evaluation, evaluate

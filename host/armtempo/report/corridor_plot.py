@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from armtempo.formats.text_table import aligned
-from armtempo.planning.corridor_curve import CorridorTime
+from armtempo.planning.free.corridor_curve import CorridorTime
 from armtempo.report import plots
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from armtempo.errors import InputError, RunFolderError
+from armtempo.basics.errors import InputError, RunFolderError
 from armtempo.model.arm import Arm, Limits
 from armtempo.model.plan import Plan
 from armtempo.runs import analysis, peaks, reader, replayed, stretched

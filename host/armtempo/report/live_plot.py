@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from armtempo.arrays import Array
-from armtempo.errors import ArmtempoError, MissingPackageError
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import ArmtempoError, MissingPackageError
 from armtempo.report.plots import COLOURS
 from armtempo.splines.trajectory import Trajectory
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armtempo.arrays import Array
-from armtempo.errors import MissingPackageError
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import MissingPackageError
 from armtempo.model.arm import Limits
 from armtempo.report.drawing import PAGE_COLOUR
 from armtempo.runs import stretched

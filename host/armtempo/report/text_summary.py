@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from armtempo_shared import motion
 from armtempo_shared.limits import MAX_MOTION_BYTES
 
-from armtempo.arm_check.resolution import findings as coarse_steps
+from armtempo.diagnosis.resolution import findings as coarse_steps
 from armtempo.formats.text_table import aligned
 from armtempo.model.job import AUTO, GRADIENT
 from armtempo.model.plan import Plan, Search

@@ -6,8 +6,8 @@ import numpy as np
 from armtempo_shared import wire
 from numpy.typing import ArrayLike
 
-from armtempo.arrays import Array
-from armtempo.errors import LinkError
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import LinkError
 from armtempo.link import Client
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point

@@ -13,15 +13,15 @@ import numpy as np
 from armtempo_shared.messages import RESUME
 from armtempo_shared.sequence import KIND_BYTES, MAGIC
 
-from armtempo.arrays import Array
-from armtempo.errors import InputError
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError
+from armtempo.basics.progress import Progress
 from armtempo.link import Client
 from armtempo.link.board_messages import Hello, SequenceState, Status, StoredMotion
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequencePlan
-from armtempo.planning.jog import SPEED, move_of
-from armtempo.progress import Progress
+from armtempo.planning.jog.jog_motion import SPEED, move_of
 from armtempo.records import encoded_motion, encoded_sequence
 from armtempo.records.encoded_motion import EncodedMotion, MotionKey
 from armtempo.robot import (

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from armtempo.errors import LinkError
+from armtempo.basics.errors import LinkError
 
 if TYPE_CHECKING:
     from armtempo.link import Client

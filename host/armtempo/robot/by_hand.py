@@ -9,8 +9,8 @@ from typing import Self
 import numpy as np
 from armtempo_shared.meanings import BUTTON_NOTICE
 
-from armtempo.arrays import Array
-from armtempo.errors import BoardError, InputError, LinkError
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import BoardError, InputError, LinkError
 from armtempo.link import Client
 from armtempo.link.board_messages import Notice
 from armtempo.model.arm import Arm

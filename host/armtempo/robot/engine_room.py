@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from armtempo_shared import engine_memory, limits
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.link.board_messages import Hello
 from armtempo.model.arm import Arm
 from armtempo.records import encode

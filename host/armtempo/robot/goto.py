@@ -6,13 +6,13 @@ from contextlib import suppress
 
 from armtempo_shared import limits
 
-from armtempo.arrays import Array
-from armtempo.errors import LinkError
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import LinkError
+from armtempo.basics.progress import Progress
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
-from armtempo.progress import Progress
 from armtempo.records import encoded_motion
 from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.robot import arm_state

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from armtempo_shared.messages import START_HOMING
 
-from armtempo.errors import InputError, LinkError
+from armtempo.basics.errors import InputError, LinkError
 from armtempo.link import Client
 from armtempo.model.arm import Arm, DrivenJoint, Limits
 from armtempo.planning import point_to_point

@@ -12,15 +12,15 @@ from armtempo_shared.codes import NOT_MOVING
 from armtempo_shared.limits import HOLD_TIMEOUT_MS
 from armtempo_shared.messages import START_HELD
 
-from armtempo.arrays import Array
-from armtempo.errors import BoardError, LinkError
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import BoardError, LinkError
 from armtempo.link import Client
 from armtempo.link.board_messages import Done, Event, Fault, Positions, Sample
 from armtempo.link.refusal import refusal
 from armtempo.link.transport import Transport
 from armtempo.model.arm import Arm
-from armtempo.planning import jog
-from armtempo.planning.jog import JogMotion, JogMove
+from armtempo.planning.jog import jog_motion
+from armtempo.planning.jog.jog_motion import JogMotion, JogMove
 from armtempo.records import encode
 from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.robot import arm_state, goto, stored_motion
@@ -42,9 +42,9 @@ def rest_s(motion: JogMotion, told: bool = False) -> float:
     return silence_s + BEFORE_BRAKING_S + motion.brake_s
 
 
-def plan(client: Client, arm: Arm, move: JogMove, speed: float = jog.SPEED) -> JogMotion:
-    """The jog from where the arm stands; LinkError where that is unknown, else errors as of ``planning.jog.plan``."""
-    return jog.plan(NAME, arm, arm_state.posture_deg(client, arm).tolist(), move, speed)
+def plan(client: Client, arm: Arm, move: JogMove, speed: float = jog_motion.SPEED) -> JogMotion:
+    """The jog from where the arm stands; LinkError where that is unknown, else errors as of ``jog_motion.plan``."""
+    return jog_motion.plan(NAME, arm, arm_state.posture_deg(client, arm).tolist(), move, speed)
 
 
 def step(client: Client, arm: Arm, move: JogMove, speed: float, stop: StopRequest) -> JogMotion:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import Protocol
 
-from armtempo.errors import LinkError
+from armtempo.basics.errors import LinkError
 from armtempo.link.board_messages import Levels
 from armtempo.model.arm import Arm
 from armtempo.model.outputs import Input, Output

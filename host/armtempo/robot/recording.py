@@ -7,12 +7,12 @@ from pathlib import Path
 
 from armtempo_shared.limits import TICK_HZ
 
-from armtempo.errors import LinkError
+from armtempo.basics.errors import LinkError
+from armtempo.basics.progress import Progress
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import Follower, RunEnd
 from armtempo.model import arm_json, trajectory_file
-from armtempo.progress import Progress
 from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.robot.goto import go_back
 from armtempo.robot.stop_request import StopRequest

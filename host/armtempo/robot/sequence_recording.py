@@ -10,7 +10,7 @@ from pathlib import Path
 from armtempo_shared import sequence, wire
 from armtempo_shared.sequence import SequenceData, SequenceError
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.link import Client
 from armtempo.link.board_messages import Event, RowBegun, Sample, SequenceState
 from armtempo.model import arm_json

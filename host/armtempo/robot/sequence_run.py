@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from armtempo_shared import sequence as record
 from armtempo_shared import wire
 
-from armtempo.errors import LinkError, NoAnswerError, OtherBoardError
+from armtempo.basics.errors import LinkError, NoAnswerError, OtherBoardError
+from armtempo.basics.progress import Progress
 from armtempo.link import Client
 from armtempo.link.board_messages import SequenceState, StoredMotion
 from armtempo.link.refusal import refusal
 from armtempo.link.session import RECONNECT_S
-from armtempo.progress import Progress
 from armtempo.records.encoded_motion import MotionKey
 from armtempo.records.encoded_sequence import EncodedSequence
 from armtempo.robot import stored_motion

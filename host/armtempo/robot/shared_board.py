@@ -10,12 +10,11 @@ from collections.abc import Iterator
 from types import TracebackType
 from typing import Any, Self
 
-from armtempo.errors import LinkError
+from armtempo.basics.errors import LinkError
 from armtempo.link.board_messages import Levels
-from armtempo.ports import names
+from armtempo.ports import claim, names
+from armtempo.ports.caller import Caller
 from armtempo.robot.board_state import BoardState
-from armtempo.share import claim
-from armtempo.share.caller import Caller
 
 ANSWER_S = 8.0
 """The program that has the port answers a request within this time, even where the board is silent, or it hangs."""

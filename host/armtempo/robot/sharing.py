@@ -14,19 +14,18 @@ from typing import Any
 
 from armtempo_shared.limits import FULL_OUTPUT, TICK_HZ
 
-from armtempo.errors import ArmtempoError, LinkError, NoAnswerError
+from armtempo.basics.errors import ArmtempoError, LinkError, NoAnswerError
 from armtempo.link import Client
 from armtempo.link.board_messages import Done, Event, Fault, Sample
 from armtempo.link.traffic import Chunk
 from armtempo.model.arm import Arm
-from armtempo.ports import names
+from armtempo.ports import claim, names
+from armtempo.ports.lines import Message
+from armtempo.ports.server import TOPICS, Server
 from armtempo.robot.board_state import BoardState
 from armtempo.robot.speed import change_speed
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.stored_motion import fault_name, send_stop
-from armtempo.share import claim
-from armtempo.share.lines import Message
-from armtempo.share.server import TOPICS, Server
 
 TURN_S = 1.0
 """A request waits so long for its turn to talk to the board."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from armtempo_shared.messages import PERMILLE, RESUME, SLOWEST_PERMILLE
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.link import Client
 
 

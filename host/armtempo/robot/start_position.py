@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from armtempo.arrays import Array
-from armtempo.errors import LinkError
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import LinkError
 from armtempo.link import Client
 from armtempo.model.arm import Arm
 from armtempo.ports.names import is_sim

@@ -8,13 +8,13 @@ from contextlib import suppress
 from armtempo_shared import wire
 from armtempo_shared.messages import PERMILLE
 
-from armtempo.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
+from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
+from armtempo.basics.progress import Progress
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import CHECK_S, Follower, RunEnd
 from armtempo.link.refusal import refusal
 from armtempo.link.session import RECONNECT_S
-from armtempo.progress import Progress
 from armtempo.records.encoded_motion import MotionKey
 from armtempo.robot.stop_request import StopRequest
 

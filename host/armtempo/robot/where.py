@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequencePlan

@@ -9,7 +9,7 @@ import numpy as np
 from armtempo_shared.limits import SAMPLE_TICKS, TICK_HZ
 from numpy.typing import NDArray
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.runs import stretched
 from armtempo.runs.differentiation import of_curves
 from armtempo.runs.reader import RepetitionData

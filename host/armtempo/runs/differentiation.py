@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 
 WINDOW = 5
 DEGREE = 3

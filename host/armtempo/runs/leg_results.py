@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.runs.sequence_reader import SequenceRun
 
 END_S = 1e-3

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.model.arm import Limits
 from armtempo.runs import stretched
 from armtempo.runs.analysis import SAMPLE_S, Curves

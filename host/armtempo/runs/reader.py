@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armtempo.arrays import Array
-from armtempo.errors import RunFolderError
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import RunFolderError
 from armtempo.formats.plain_text import visible
 from armtempo.link.follow import Gap
 from armtempo.runs.run_folder import FORMAT, META, TRAJECTORY, VERSION, JointScale, Repetition

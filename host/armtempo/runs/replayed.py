@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from armtempo.errors import InputError, RunFolderError
+from armtempo.basics.errors import InputError, RunFolderError
 from armtempo.formats.atomic_file import why
 from armtempo.model import arm_json, trajectory_file
 from armtempo.model.arm import Arm

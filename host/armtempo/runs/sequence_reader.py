@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armtempo.errors import ArmtempoError, RunFolderError
+from armtempo.basics.errors import ArmtempoError, RunFolderError
 from armtempo.formats.plain_text import visible
 from armtempo.records import decode
 from armtempo.runs import reader

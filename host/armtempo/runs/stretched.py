@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from armtempo.arrays import Array
+from armtempo.basics.arrays import Array
 from armtempo.runs.reader import RepetitionData
 from armtempo.splines.trajectory import Trajectory
 

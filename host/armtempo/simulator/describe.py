@@ -8,7 +8,7 @@ from typing import Any
 
 from armtempo_shared import armrecord
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 from armtempo.model.arm import Arm, DrivenJoint
 from armtempo.records import encode
 

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armtempo.errors import RunFolderError
+from armtempo.basics.errors import RunFolderError
 
 _RECORD = struct.Struct("<BBBBIq")
 _EDGES, _COUNTER, _INPUT, _RESET, _PULSES = 1, 2, 3, 4, 5

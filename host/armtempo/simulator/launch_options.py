@@ -9,8 +9,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from armtempo.basics.virtual_id import PREFIX
 from armtempo.model.arm import Arm
-from armtempo.virtual_id import PREFIX
 
 DEFAULT_MACHINE = "STM32F4DISC with STM32F407"
 

@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
-from armtempo.errors import InputError, LinkError
+from armtempo.basics.errors import InputError, LinkError
 from armtempo.simulator.describe import describe
 from armtempo.simulator.launch_options import LaunchOptions, ProcessOptions, unique_id
 from armtempo.simulator.temporary_folder import TemporaryFolder

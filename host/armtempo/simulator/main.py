@@ -20,8 +20,8 @@ def prepare():
     sys.path[0:0] = folders
     if sys.implementation.name != "micropython":
         import additions  # noqa: F401
-    from virtual_board import power_cycles
-    from virtual_board.firmware import builtin_modules
+    import power_cycles
+    from firmware import builtin_modules
 
     builtin_modules.replace()
     builtin_modules.replace_sys()

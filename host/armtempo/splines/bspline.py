@@ -9,8 +9,8 @@ import numpy as np
 from armtempo_shared.basis import BASIS, FACTORIAL
 from numpy.typing import ArrayLike, NDArray
 
-from armtempo.arrays import Array as Array
-from armtempo.errors import InputError
+from armtempo.basics.arrays import Array as Array
+from armtempo.basics.errors import InputError
 
 _REST_ROWS: dict[int, tuple[tuple[float, ...], ...]] = {
     3: ((-1, 0, 1),),

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from armtempo.basics.errors import InputError, ToolError
 from armtempo.deploy import program_files
 from armtempo.deploy.firmware import build, checkout, frozen, image
-from armtempo.errors import InputError, ToolError
 from armtempo.link.program_version import PACKAGES, own_crc, package_folder
 
 from tests import interpreters

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from armtempo.basics.errors import InputError, ToolError
 from armtempo.deploy.firmware import build, checkout
-from armtempo.errors import InputError, ToolError
 
 from tests.host.firmware.fakes import BOARD_MAKE, STM32F4DISC, no_progress, outcome
 

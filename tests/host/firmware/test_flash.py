@@ -7,8 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from armtempo.basics.errors import LinkError
 from armtempo.deploy.firmware import flash, image
-from armtempo.errors import LinkError
 from armtempo.link.program_version import own_crc
 
 from tests.host.firmware.fakes import DFU, MACHINE, ONE, TOOL, no_progress, outcome

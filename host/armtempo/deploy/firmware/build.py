@@ -9,12 +9,12 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
+from armtempo.basics.errors import InputError, ToolError
+from armtempo.basics.progress import Progress
 from armtempo.deploy import package
 from armtempo.deploy.firmware import checkout, frozen, image, toolchain
 from armtempo.deploy.firmware.checkout import BoardDefinition, Checkout
-from armtempo.errors import InputError, ToolError
 from armtempo.link.program_version import own_crc
-from armtempo.progress import Progress
 
 _SAID_LINES = 12
 """Of a build that fails, the last ones are shown."""

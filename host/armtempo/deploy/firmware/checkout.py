@@ -6,9 +6,9 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from armtempo.basics.errors import InputError
 from armtempo.deploy.changes import LEAST_RELEASE
 from armtempo.deploy.firmware import frozen
-from armtempo.errors import InputError
 
 RELEASE = "v1.28.0"
 """MicroPython's tag that the firmwares of armtempo's releases are built from."""

@@ -13,15 +13,15 @@ import subprocess
 import time
 from pathlib import Path
 
+from armtempo.basics.errors import InputError, LinkError, ToolError
+from armtempo.basics.progress import Progress
 from armtempo.deploy.changes import Tell
 from armtempo.deploy.firmware import image
 from armtempo.deploy.firmware.image import Image, Piece
 from armtempo.deploy.install import end_program
 from armtempo.deploy.remote import Remote
-from armtempo.errors import InputError, LinkError, ToolError
 from armtempo.link.program_version import own_crc
 from armtempo.ports.names import is_sim
-from armtempo.progress import Progress
 
 DFU, STLINK = "dfu-util", "st-flash"
 TOOLS = (DFU, STLINK)

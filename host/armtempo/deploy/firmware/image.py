@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from armtempo.errors import InputError
+from armtempo.basics.errors import InputError
 
 ABOUT = "firmware.json"
 

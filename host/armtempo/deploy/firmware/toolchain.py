@@ -6,7 +6,7 @@ import shutil
 import subprocess
 from pathlib import Path
 
-from armtempo.errors import ToolError
+from armtempo.basics.errors import ToolError
 
 CROSS = "arm-none-eabi-gcc"
 INSTALL = (

@@ -1,8 +1,8 @@
 """The board program's ``micropython``: the interpreter's own, and what the unix port lacks."""
 
+import machine_state
 import micropython as _own
 from micropython import *  # noqa: F403
-from virtual_board import machine_state
 
 const = _own.const
 

@@ -2,8 +2,8 @@
 
 import os as _own
 
-from virtual_board import machine_state
-from virtual_board.chip import flash as _flash
+import machine_state
+from chip import flash as _flash
 
 
 def getcwd():

@@ -2,8 +2,8 @@
 
 import sys as _own
 
-from virtual_board import machine_state as _the
-from virtual_board.firmware import repl as _repl
+import machine_state as _the
+from firmware import repl as _repl
 
 platform = "pyboard"
 

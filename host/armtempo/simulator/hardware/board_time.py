@@ -1,6 +1,6 @@
 """The board program's ``time``: MicroPython's functions, on virtual time."""
 
-from virtual_board import machine_state
+import machine_state
 
 _PERIOD = 1 << 30
 _EPOCH_S = 820454400  # 2026-01-01, in seconds since 2000

@@ -1,8 +1,8 @@
 """The board program's ``uctypes``: the interpreter's own; remembers what DMA may be pointed at."""
 
 import uctypes as _own
+from chip import memory
 from uctypes import *  # noqa: F403
-from virtual_board.chip import memory
 
 
 def addressof(buffer):

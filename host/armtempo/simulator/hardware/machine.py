@@ -1,11 +1,11 @@
 """MicroPython's ``machine`` of the STM32 port, as far as the board program uses it."""
 
-from virtual_board import machine_state
-from virtual_board.chip import memory
-from virtual_board.chip import reset as _reset
-from virtual_board.chip.processor import CALL_TICKS
-from virtual_board.chip.watchdog import WDT  # noqa: F401
-from virtual_board.firmware.pin_api import Pin  # noqa: F401
+import machine_state
+from chip import memory
+from chip import reset as _reset
+from chip.processor import CALL_TICKS
+from chip.watchdog import WDT  # noqa: F401
+from firmware.pin_api import Pin  # noqa: F401
 
 PWRON_RESET, HARD_RESET, WDT_RESET, DEEPSLEEP_RESET, SOFT_RESET = 1, 2, 3, 4, 0
 

@@ -1,13 +1,13 @@
 """MicroPython's ``pyb`` of the STM32F4DISC board, as far as the board program uses it."""
 
+import machine_state
+from firmware.external_interrupts import ExtInt
+from firmware.pin_api import Pin
+from firmware.timer_api import Timer, TimerChannel  # noqa: F401
+from firmware.usb_serial import USB_VCP
 from machine import disable_irq, enable_irq, freq, unique_id  # noqa: F401
 from machine import idle as wfi  # noqa: F401
 from machine import reset as hard_reset  # noqa: F401
-from virtual_board import machine_state
-from virtual_board.firmware.external_interrupts import ExtInt
-from virtual_board.firmware.pin_api import Pin
-from virtual_board.firmware.timer_api import Timer, TimerChannel  # noqa: F401
-from virtual_board.firmware.usb_serial import USB_VCP
 
 _LED_PINS = ("PD14", "PD12", "PD13", "PD15")
 

@@ -3,7 +3,7 @@
 A block's address is where its memory is in this process; offsets are the chip's (RM0090).
 """
 
-from virtual_board.chip import memory as _memory
+from chip import memory as _memory
 
 for _name in _memory.BLOCKS:
     globals()[_name] = _memory.address(_name)

@@ -3,12 +3,12 @@
 import random
 from array import array
 
+import bare_board
 import cases
 from armtempo_board.hardware import isr
 from armtempo_board.hardware.encoders import EncoderInput
 from armtempo_board.motion.following_error import FollowingError
 from engine_rig import TICK_HZ, Motion, Rig, Steps, arm, row
-from virtual_board import standalone
 
 SEED = 20263
 
@@ -18,7 +18,7 @@ def case_both_ways_round():
     random.seed(SEED)
     for channel, timer in ((0, 1), (1, 3), (2, 8), (3, 4)):
         for inverted in (0, 1):
-            board = standalone.start()
+            board = bare_board.start()
             encoder = EncoderInput(channel, inverted)
             total = 0
             for n in range(300):
@@ -33,7 +33,7 @@ def case_both_ways_round():
 
 def case_declared():
     """The count goes on from what was declared, also across the counter's zero."""
-    board = standalone.start()
+    board = bare_board.start()
     encoder = EncoderInput(0, 0)
     board.timers[1].turn(-5)
     encoder.declare(-1000)
@@ -92,7 +92,7 @@ def case_moved_by_hand():
 
 def case_unread_counter():
     """The counter of an encoder timer reads back as 16 bits."""
-    board = standalone.start()
+    board = bare_board.start()
     encoder = EncoderInput(1, 0)
     board.timers[3].turn(-1)
     assert isr.read_counter(encoder.address) == 0xFFFF

@@ -3,10 +3,10 @@
 import random
 
 import cases
+import machine_state
 from armtempo_shared import armrecord, codes
 from engine_rig import FEWER, HEAD, TICK_HZ, Evaluator, Motion, Rig, Steps, arm, row
-from virtual_board import machine_state
-from virtual_board.firmware import external_interrupts
+from firmware import external_interrupts
 
 FREEZE_TICKS = 84 * 10
 SEED = 20261

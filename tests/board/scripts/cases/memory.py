@@ -3,8 +3,8 @@
 import random
 import sys
 
+import bare_board
 import cases
-from virtual_board import standalone
 
 # isort: split
 import stm
@@ -36,7 +36,7 @@ def parts_of(generator):
 
 
 def case_the_backup_sram_is_found():
-    standalone.start()
+    bare_board.start()
     assert backup_sram.find() == stm.BKPSRAM
     assert Workspace(LARGE, 6, stm.BKPSRAM).memory.take_for_processor(engine_memory.PROCESSOR_WORDS)
 
@@ -45,7 +45,7 @@ def case_a_memory_that_keeps_nothing_is_not_used():
     """Without any of its three bits nothing is kept; then the words come from the heap."""
     rows = registers.BACKUP_SRAM
     for missing in range(len(rows)):
-        standalone.start()
+        bare_board.start()
         registers.BACKUP_SRAM = rows[:missing] + rows[missing + 1 :]
         assert backup_sram.find() == 0
     registers.BACKUP_SRAM = rows
@@ -56,7 +56,7 @@ def case_a_memory_that_keeps_nothing_is_not_used():
 
 
 def case_parts_lie_one_behind_the_other_and_are_0():
-    standalone.start()
+    bare_board.start()
     address = backup_sram.find()
     memory = Memory([100], address, 50)
     first, second = memory.take_for_processor(20), memory.take_for_processor(30)
@@ -76,7 +76,7 @@ def case_an_engine_takes_what_the_formula_counts():
     """As many words as it says are enough, as far as blocks go; rings never lie where DMA does not reach."""
     print("seed", SEED)
     random.seed(SEED)
-    standalone.start()
+    bare_board.start()
     address = backup_sram.find()
     for _ in range(12):
         rates = [random.randrange(1, 240_001) for _ in range(random.randrange(1, 7))]
@@ -107,7 +107,7 @@ def case_without_it_there_is_less_for_arms():
     before = room._free
     room._free = lambda: 40_000
     try:
-        standalone.start()
+        bare_board.start()
         with_it = room.workspace().words
         backup_sram.find, find = lambda: 0, backup_sram.find
         without = room.workspace().words
@@ -118,7 +118,7 @@ def case_without_it_there_is_less_for_arms():
 
 
 def case_outputs_take_of_the_engines_memory_only_where_it_is_short():
-    standalone.start()
+    bare_board.start()
     taken = engine_memory.output_bytes(2, 1) // 4
     for words, left in ((engine_memory.LARGEST_WORDS, engine_memory.LARGEST_WORDS), (LARGE, LARGE - taken)):
         workspace = Workspace(words, 6, stm.BKPSRAM)

@@ -2,10 +2,10 @@
 
 from array import array
 
+import bare_board  # noqa: F401
 import cases
 import stm
 import uctypes
-import virtual_board.standalone  # noqa: F401
 from armtempo_board.hardware import isr, pins, registers
 from armtempo_board.stepgen import step_queue
 from armtempo_shared.engine_memory import ring_words

@@ -1,7 +1,7 @@
 """The registers after start-up, before anything moves: one line each, all that are not zero."""
 
+from chip import memory
 from engine_rig import Rig, arm
-from virtual_board.chip import memory
 
 rig = Rig([dict(joint, limit_low=0, limit_high=2) for joint in arm(6)])
 rig.board.sync()

@@ -2,12 +2,12 @@
 
 import sys
 
-from virtual_board import standalone
+import bare_board
 
-standalone.start(flash=sys.argv[1], program=sys.path[:])
+bare_board.start(flash=sys.argv[1], program=sys.path[:])
 
+import setup  # noqa: E402
 from armtempo_board.hardware import pins  # noqa: E402
-from virtual_board import setup  # noqa: E402
 
 setup.connect(pins)
 import armtempo_board  # noqa: E402

@@ -3,11 +3,12 @@
 import sys
 from array import array
 
+import bare_board
+import machine_state
+from arm import motors
 from arm_rows import HEAD, arm, row  # noqa: F401
 from armtempo_board.errors import Refused
 from armtempo_board.stepgen import bezier, step_generator, step_queue
-from virtual_board import machine_state, standalone
-from virtual_board.arm import motors
 
 TICK_HZ = 84_000_000
 FEWER = 6 if "short" in sys.argv else 1
@@ -241,7 +242,7 @@ class Rig:
         self.joints = joints
         self.turn_ticks = 84 * turn_us
         self.samples = []
-        self.board = standalone.start()
+        self.board = bare_board.start()
         self.board.observers.append(self)
         self._zero = 0
         import armtempo_board.motion.engine

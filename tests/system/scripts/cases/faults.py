@@ -8,12 +8,12 @@ import struct
 from binascii import crc32
 
 import cases
+import machine_state
 import traps
 import whole_board
 from armtempo_shared import wire
-from virtual_board import machine_state
-from virtual_board.chip.flash import real_open
-from virtual_board.chip.processor import TICKS_PER_MS
+from chip.flash import real_open
+from chip.processor import TICKS_PER_MS
 
 FLASHES, PROGRAM, HOME, DURATION, FEWER = whole_board.arguments()
 SEED = 20265

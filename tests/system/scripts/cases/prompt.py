@@ -4,9 +4,9 @@ Every case asserts, and its name is printed when it holds. Arguments: see ``whol
 """
 
 import cases
+import machine_state
 import whole_board
 from armtempo_shared import wire
-from virtual_board import machine_state
 
 FLASHES, PROGRAM, HOME, DURATION, _ = whole_board.arguments()
 GO = whole_board.read(FLASHES + "/finish/armtempo/go.atm")

@@ -5,14 +5,14 @@ and what a stop, a fault or a change of speed leaves. Arguments: see ``whole_boa
 """
 
 import cases
+import machine_state
 import whole_board
 from armtempo_board.hardware import isr
 from armtempo_shared import sequence, wire
 from armtempo_shared.messages import RESUME
-from virtual_board import machine_state
-from virtual_board.chip.flash import real_open
-from virtual_board.chip.processor import TICKS_PER_MS
-from virtual_board.firmware.external_interrupts import set_level
+from chip.flash import real_open
+from chip.processor import TICKS_PER_MS
+from firmware.external_interrupts import set_level
 
 FLASHES, PROGRAM, HOME, _, FEWER = whole_board.arguments()
 FLASH = FLASHES + "/legs"

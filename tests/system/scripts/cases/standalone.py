@@ -6,9 +6,9 @@ Every case asserts, and its name is printed when it holds. Arguments: see ``whol
 import sys
 
 import cases
+import machine_state
 import whole_board
 from armtempo_shared import armrecord, meanings, wire
-from virtual_board import machine_state
 
 FLASHES, PROGRAM, HOME, *_ = whole_board.arguments()
 STEADY_MS = 30

@@ -1,14 +1,14 @@
 """The stepper model by itself, case by case; each asserts and prints its name."""
 
+import bare_board
 import cases
-from virtual_board import standalone
 
 # isort: split
 from math import cos, exp, pi, sin, sqrt
 
-from virtual_board.arm import switches
-from virtual_board.arm.noise import Noise
-from virtual_board.arm.stepper import Stepper
+from arm import switches
+from arm.noise import Noise
+from arm.stepper import Stepper
 
 MS = 84_000
 MODEL = {
@@ -203,7 +203,7 @@ class Wired:
 
 
 def case_limit_switches_trip_at_and_beyond_their_angles():
-    board = standalone.start()
+    board = bare_board.start()
     motor = Line()
     joint = {"limit_low": 0, "low_deg": -8.0, "limit_high": 1, "high_deg": 30.0, "limit_active_high": 1}
     found = switches.fitted(motor, joint, Wired)
@@ -223,5 +223,5 @@ def case_noise_is_normal():
     assert abs(spread - 1) < 0.05
 
 
-standalone.start()
+bare_board.start()
 cases.run(globals())

@@ -5,9 +5,9 @@ Argument: a scratch folder.
 
 import sys
 
+import bare_board  # replaces time, os, uctypes, micropython; so before everything else
 import cases
-from virtual_board import standalone  # replaces time, os, uctypes, micropython; so before everything else
-from virtual_board.chip.reset import Reset
+from chip.reset import Reset
 
 # isort: split
 import os
@@ -63,12 +63,12 @@ def case_power_cuts():
     operations = 5  # open, write, close, removal of the old one, rename
     states = []
     for cut in range(1, operations + 2):
-        standalone.start(flash=SCRATCH)
+        bare_board.start(flash=SCRATCH)
         for name in list(os.listdir()):
             if name.startswith("file"):
                 os.remove(name)
         write_aside("file", b"old")
-        standalone.start(flash=SCRATCH, power_cut_at=cut)
+        bare_board.start(flash=SCRATCH, power_cut_at=cut)
         try:
             write_aside("file", b"newer")
             whole = True
@@ -91,9 +91,9 @@ def case_power_cuts():
 def case_what_is_not_synced_is_lost_with_the_power():
     """Whatever its name is by then; what was synced lasts, and so does what others had before."""
     for synced in (True, False):
-        standalone.start(flash=SCRATCH)
+        bare_board.start(flash=SCRATCH)
         write_aside("file", b"old")
-        standalone.start(flash=SCRATCH, power_cut_at=6)
+        bare_board.start(flash=SCRATCH, power_cut_at=6)
         write_aside("file", b"newer", synced)
         try:
             os.mkdir("folder")  # here the power fails
@@ -106,6 +106,6 @@ def case_what_is_not_synced_is_lost_with_the_power():
 
 
 for name in cases.wanted(globals()):
-    standalone.start(flash=SCRATCH + "/flash")
+    bare_board.start(flash=SCRATCH + "/flash")
     globals()[name]()
     print(name)

@@ -5,20 +5,18 @@ Argument: a scratch folder.
 
 import sys
 
+import bare_board
 import cases
-from virtual_board import (  # replaces time, os, uctypes, micropython; so before everything else
-    injected_faults,
-    machine_state,
-    pace,
-    power_cycles,
-    standalone,
-)
-from virtual_board.chip import memory, timer_registers, timers
-from virtual_board.chip.flash import real_open
-from virtual_board.chip.processor import TICKS_PER_US
-from virtual_board.chip.reset import Reset
-from virtual_board.firmware import repl, usb_serial
-from virtual_board.firmware.external_interrupts import set_level
+import injected_faults  # replaces time, os, uctypes, micropython; so before everything else
+import machine_state
+import pace
+import power_cycles
+from chip import memory, timer_registers, timers
+from chip.flash import real_open
+from chip.processor import TICKS_PER_US
+from chip.reset import Reset
+from firmware import repl, usb_serial
+from firmware.external_interrupts import set_level
 
 # isort: split
 import io
@@ -110,7 +108,7 @@ def times(count):
 
 def case_dma_feeds_two_timers_exactly():
     log = SCRATCH + "/dma"
-    board = standalone.start(edge_log=log)
+    board = bare_board.start(edge_log=log)
     wanted = times(1000)
     ring = array("I", wanted[1 : 1 + RING])
     counters()
@@ -136,7 +134,7 @@ def case_dma_feeds_two_timers_exactly():
 
 def case_each_stream_hears_its_channels():
     """RM0090 table 42, request channels 3 and 6: the streams for a timer's channels 1 to 4."""
-    board = standalone.start()
+    board = bare_board.start()
     for selection, timer, wanted in (
         (3, 2, [[5], [6], [1], [6, 7]]),
         (6, 5, [[2], [4], [0], [1, 3]]),
@@ -150,7 +148,7 @@ def case_each_stream_hears_its_channels():
 
 def match_count(preload, late):
     """Matches of three when the third entry is written after the first match (``late``) or before."""
-    board = standalone.start(edge_log=SCRATCH + "/preload", dma_preload=preload)
+    board = bare_board.start(edge_log=SCRATCH + "/preload", dma_preload=preload)
     ring = array("I", [2000, 0, 0, 0])
     counters()
     feed(5, 3, stm.TIM2 + stm.TIM_CCR1, ring)
@@ -173,7 +171,7 @@ def case_dma_fetches_one_word_ahead():
 
 
 def case_stale_ring_entries_do_not_match():
-    board = standalone.start(edge_log=SCRATCH + "/stale")
+    board = bare_board.start(edge_log=SCRATCH + "/stale")
     counters()
     feed(5, 3, stm.TIM2 + stm.TIM_CCR1, array("I", [500, 400, 300, 200]))
     put(stm.TIM2, 13, 100)
@@ -186,7 +184,7 @@ def case_stale_ring_entries_do_not_match():
 def case_an_entry_that_the_stream_brings_too_late_does_not_match():
     """It takes a few ticks from the match to the next compare value."""
     for gap, matches in ((6, 1), (7, 3)):
-        board = standalone.start(edge_log=SCRATCH + "/late")
+        board = bare_board.start(edge_log=SCRATCH + "/late")
         counters()
         feed(5, 3, stm.TIM2 + stm.TIM_CCR1, array("I", [100 + gap, 5000, 0, 0]))
         put(stm.TIM2, 13, 100)
@@ -203,7 +201,7 @@ def case_an_entry_that_the_stream_brings_too_late_does_not_match():
 
 def case_a_channel_that_made_pulses_matches_again():
     """In another mode with the same compare value."""
-    board = standalone.start()
+    board = bare_board.start()
     seen = []
     timer = pyb.Timer(4, prescaler=0, period=999)
     for mode, options in (
@@ -217,7 +215,7 @@ def case_a_channel_that_made_pulses_matches_again():
 
 
 def case_forced_modes_act_at_once():
-    standalone.start()
+    bare_board.start()
     counters()
     line = machine_state.board.pins.line("A15")
     mode = stm.TIM2 + stm.TIM_CCMR1
@@ -231,7 +229,7 @@ def case_forced_modes_act_at_once():
 
 
 def case_prescaler_period_and_update_callback():
-    board = standalone.start()
+    board = bare_board.start()
     seen = []
     timer = pyb.Timer(7, freq=1000, callback=lambda timer: seen.append(board.now))
     begun = board.now
@@ -249,7 +247,7 @@ def case_prescaler_period_and_update_callback():
 
 
 def case_compare_interrupt_comes_soon_and_gets_the_timer():
-    board = standalone.start()
+    board = bare_board.start()
     seen = []
     timer = pyb.Timer(2, prescaler=0, period=0x3FFFFFFF)
     channel = timer.channel(
@@ -263,7 +261,7 @@ def case_compare_interrupt_comes_soon_and_gets_the_timer():
 
 
 def case_a_match_before_there_was_a_callback_calls_none():
-    board = standalone.start()
+    board = bare_board.start()
     seen = []
     timer = pyb.Timer(2, prescaler=0, period=0x3FFFFFFF)
     channel = timer.channel(4, pyb.Timer.OC_TIMING, compare=50_000)
@@ -275,7 +273,7 @@ def case_a_match_before_there_was_a_callback_calls_none():
 
 
 def case_an_exception_in_a_callback_switches_it_off():
-    board = standalone.start()
+    board = bare_board.start()
     calls = []
 
     def fail(timer):
@@ -288,7 +286,7 @@ def case_an_exception_in_a_callback_switches_it_off():
 
 
 def case_encoder_counter_wraps():
-    board = standalone.start()
+    board = bare_board.start()
     timer = pyb.Timer(3, prescaler=0, period=0xFFFF)
     timer.channel(1, pyb.Timer.ENC_AB, pin=pyb.Pin("B4"))
     assert mem32[stm.TIM3 + stm.TIM_CCMR1] == 0x0101  # both channels are inputs (RM0090 18.4.7)
@@ -302,7 +300,7 @@ def case_encoder_counter_wraps():
 
 
 def case_pins():
-    standalone.start(edge_log=SCRATCH + "/pins")
+    bare_board.start(edge_log=SCRATCH + "/pins")
     modes = (pyb.Pin.IN, pyb.Pin.OUT_PP, pyb.Pin.OUT_OD, pyb.Pin.AF_PP, pyb.Pin.AF_OD, pyb.Pin.ANALOG)
     assert modes == (0, 1, 0x11, 2, 0x12, 3)  # as on the chip
     assert (pyb.Pin.PULL_NONE, pyb.Pin.PULL_UP, pyb.Pin.PULL_DOWN) == (0, 1, 2)
@@ -332,7 +330,7 @@ def case_pins():
 
 
 def case_pins_that_the_chip_has_not():
-    standalone.start()
+    bare_board.start()
     for name in ("E16", "PZ9", "LED", "", None):
         try:
             pyb.Pin(name)
@@ -353,7 +351,7 @@ class Listener:
 
 
 def case_a_pin_that_is_taken_from_its_timer_makes_no_pulses():
-    board = standalone.start()
+    board = bare_board.start()
     listener = Listener()
     board.pins.line("D12").pulse_sinks.append(listener)
     board.pins.line("D13").pulse_sinks.append(listener)
@@ -368,7 +366,7 @@ def case_a_pin_that_is_taken_from_its_timer_makes_no_pulses():
 
 def case_eight_calls_can_wait():
     """MICROPY_SCHEDULER_DEPTH."""
-    board = standalone.start()
+    board = bare_board.start()
     called = []
     for number in range(8):
         board.schedule(called.append, number)
@@ -383,7 +381,7 @@ def case_eight_calls_can_wait():
 
 def case_step_1_is_low_from_the_first_line_on():
     """A reset pulls PA15 up, as it is one of JTAG's pins; boot.py drives it low before anything else."""
-    board = standalone.start()
+    board = bare_board.start()
     line = board.pins.line("A15")
     assert line.read() == 1
     with open(__file__.rsplit("/tests/", 1)[0] + "/board/armtempo_board/boot.py") as file:
@@ -395,13 +393,13 @@ def case_step_1_is_low_from_the_first_line_on():
 
 def case_after_a_reset_jtags_pins_are_pulled_up():
     """PA13, PA15 and PB4 (RM0090 8.4.1)."""
-    standalone.start()
+    bare_board.start()
     levels = [mem32[port + stm.GPIO_IDR] for port in (stm.GPIOA, stm.GPIOB, stm.GPIOC, stm.GPIOD, stm.GPIOE)]
     assert levels == [1 << 15 | 1 << 13, 1 << 4, 0, 0, 0], levels
 
 
 def case_external_interrupt_within_20_us():
-    board = standalone.start()
+    board = bare_board.start()
     seen = []
     pin = pyb.Pin("PE15", pyb.Pin.IN, pyb.Pin.PULL_UP)
     pyb.ExtInt(pin, pyb.ExtInt.IRQ_FALLING, pyb.Pin.PULL_UP, lambda line: seen.append((line, board.now)))
@@ -420,7 +418,7 @@ def case_external_interrupt_within_20_us():
 
 
 def case_interrupts_wait_while_off():
-    board = standalone.start()
+    board = bare_board.start()
     seen = []
     pyb.Timer(6, freq=10_000, callback=lambda timer: seen.append(1))
     before = machine.disable_irq()
@@ -431,7 +429,7 @@ def case_interrupts_wait_while_off():
 
 
 def case_usb_buffers():
-    standalone.start()
+    bare_board.start()
     port, line = pyb.USB_VCP(), machine_state.serial
     line.received.extend(b"hello")
     assert port.any() and port.recv(3, timeout=0) == b"hel"
@@ -449,14 +447,14 @@ def case_usb_buffers():
 
 
 def case_a_program_that_receives_waits_for_what_comes():
-    board = standalone.start()
+    board = bare_board.start()
     line = machine_state.serial
     board.at(board.now + 20 * 84_000, lambda: line.received.extend(b"late"))
     assert pyb.USB_VCP().recv(4, timeout=1000) == b"late"
 
 
 def case_a_program_that_sends_waits_for_room():
-    board = standalone.start()
+    board = bare_board.start()
     line = machine_state.serial
     port = pyb.USB_VCP()
     port.init(flow=pyb.USB_VCP.RTS | pyb.USB_VCP.CTS)
@@ -479,7 +477,7 @@ class Written(usb_serial.Serial):
 
 def case_what_the_program_does_not_read_is_lost_unless_the_host_is_held_back():
     for is_held_back in (0, 1):
-        standalone.start()
+        bare_board.start()
         line = Written(bytes(3000))
         line.rts = bool(is_held_back)
         line.pump()
@@ -491,7 +489,7 @@ def case_what_the_program_does_not_read_is_lost_unless_the_host_is_held_back():
 
 
 def case_a_silenced_board_speaks_again():
-    board = standalone.start()
+    board = bare_board.start()
     injected_faults._silence(board, {"ms": 2})
     assert machine_state.serial.silent
     board.spend(3 * 84_000)
@@ -500,7 +498,7 @@ def case_a_silenced_board_speaks_again():
 
 def case_watchdog_bites():
     pace.Pace._elapsed_us = lambda self: 0  # no real time comes in
-    board = standalone.start()
+    board = bare_board.start()
     watchdog = machine.WDT(timeout=100)
     assert mem32[0x40003008] == 100 // 8  # IWDG_RLR, in units of 8 ms
     for _ in range(5):
@@ -511,12 +509,12 @@ def case_watchdog_bites():
         raise AssertionError("no bite")
     except Reset as reset:
         assert reset.cause == machine.WDT_RESET
-    standalone.start(cause=machine.WDT_RESET)
+    bare_board.start(cause=machine.WDT_RESET)
     assert machine.reset_cause() == machine.WDT_RESET
 
 
 def case_a_timer_that_was_given_up_calls_nobody():
-    board = standalone.start()
+    board = bare_board.start()
     called = []
     timer = pyb.Timer(4, freq=1000)
     timer.channel(1, pyb.Timer.OC_TIMING, callback=called.append)
@@ -527,7 +525,7 @@ def case_a_timer_that_was_given_up_calls_nobody():
 
 
 def case_a_soft_reset_starts_python_again():
-    standalone.start()
+    bare_board.start()
     try:
         machine.soft_reset()
         raise AssertionError("it went on")
@@ -536,7 +534,7 @@ def case_a_soft_reset_starts_python_again():
 
 
 def case_after_a_soft_reset_the_prompt_has_the_port_again():
-    standalone.start()
+    bare_board.start()
     os.dupterm(None, 1)
     assert not machine_state.serial.attached
     power_cycles._soft_reset()
@@ -545,7 +543,7 @@ def case_after_a_soft_reset_the_prompt_has_the_port_again():
 
 def case_ctrl_c_interrupts_only_what_the_prompt_runs():
     """As micropython.kbd_intr(3) and, at the prompt, kbd_intr(-1)."""
-    standalone.start()
+    bare_board.start()
     line = machine_state.serial
     assert line.interrupt_char == -1
     seen = []
@@ -568,7 +566,7 @@ class Terminal(usb_serial.SilentPort):
 
 def case_the_prompt_echoes_and_answers():
     terminal = Terminal()
-    standalone.start(line=terminal)
+    bare_board.start(line=terminal)
     terminal.received.extend(b"6 * 7\r\x04")
     repl.Repl().run()
     assert terminal.shown.endswith(
@@ -577,7 +575,7 @@ def case_the_prompt_echoes_and_answers():
 
 
 def case_the_backup_sram_has_4_kb():
-    standalone.start()
+    bare_board.start()
     mem32[stm.RCC + stm.RCC_AHB1ENR] |= 1 << 18
     assert mem32[0x40024000 + 4092]
     try:
@@ -589,7 +587,7 @@ def case_the_backup_sram_has_4_kb():
 
 def case_timers_of_the_faster_bus_count_twice_as_fast():
     """TIM1 counts 168 million a second, TIM2 half as many (RM0090 figure 21); a prescaler divides that."""
-    board = standalone.start()
+    board = bare_board.start()
     slow, fast = (pyb.Timer(number, prescaler=3, period=0xFFFF) for number in (2, 1))
     before = [timer.counter() for timer in (slow, fast)]
     board.spend(8000)
@@ -598,13 +596,13 @@ def case_timers_of_the_faster_bus_count_twice_as_fast():
 
 
 def case_a_new_timer_has_nothing_to_do():
-    timer = timers.TimerUnit(standalone.start(), 2, 32)
+    timer = timers.TimerUnit(bare_board.start(), 2, 32)
     assert (timer.next_match(), timer.next_interrupt()) == (timer_registers.NEVER, timer_registers.NEVER)
 
 
 def case_each_timer_is_clocked_by_its_bit():
     """RM0090 6.3.13 and 6.3.14."""
-    standalone.start()
+    bare_board.start()
     for enable, first_bit, numbers in (
         (stm.RCC_APB1ENR, 0, (2, 3, 4, 5, 6, 7, 12, 13, 14)),
         (stm.RCC_APB2ENR, 0, (1, 8)),
@@ -637,7 +635,7 @@ def case_kinds_of_memory_have_micropythons_numbers():
 
 
 def case_registers_by_the_chips_addresses():
-    standalone.start()
+    bare_board.start()
     mem32[0x40000000 + 0x2C] = -1
     assert mem32[stm.TIM2 + stm.TIM_ARR] == -1
     assert machine.mem8[stm.TIM2 + stm.TIM_ARR] == machine.mem8[stm.TIM2 + stm.TIM_ARR + 3] == 0xFF
@@ -684,6 +682,6 @@ def case_backup_sram_needs_its_clock_and_write_access():
 
 
 for name in cases.wanted(globals()):
-    standalone.start(flash=SCRATCH + "/flash")
+    bare_board.start(flash=SCRATCH + "/flash")
     globals()[name]()
     print(name)

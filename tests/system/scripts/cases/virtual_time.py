@@ -3,14 +3,12 @@
 Each case asserts by itself and prints its name.
 """
 
+import bare_board
 import cases
-from virtual_board import (  # replaces time, os, uctypes, micropython; so before everything else
-    machine_state,
-    pace,
-    standalone,
-)
-from virtual_board.chip.processor import CALL_TICKS, TICKS_PER_MS
-from virtual_board.firmware import boot, usb_serial
+import machine_state  # replaces time, os, uctypes, micropython; so before everything else
+import pace
+from chip.processor import CALL_TICKS, TICKS_PER_MS
+from firmware import boot, usb_serial
 
 # isort: split
 import os
@@ -21,7 +19,7 @@ import pyb
 
 
 def case_time_passes_in_calls():
-    standalone.start()
+    bare_board.start()
     assert time.localtime()[:6] == (2026, 1, 1, 0, 0, 0)
     before = time.ticks_us()
     time.sleep_us(1500)
@@ -39,7 +37,7 @@ def case_time_passes_in_calls():
 
 def case_a_host_talks_while_its_input_comes_often():
     """Twice within 150 ms, and not longer than a second ago; then virtual time need not keep to real time."""
-    standalone.start()
+    bare_board.start()
     kept, line = machine_state.pace, machine_state.serial
     now = [kept._looked_us]
     kept._ticks_us = lambda: now[0]
@@ -52,7 +50,7 @@ def case_a_host_talks_while_its_input_comes_often():
 
 
 def case_what_a_host_watches_moves_in_real_time():
-    board = standalone.start()
+    board = bare_board.start()
     kept, speeds = machine_state.pace, []
     kept._host_talks = lambda: True
     kept._keep_pace = speeds.append
@@ -62,7 +60,7 @@ def case_what_a_host_watches_moves_in_real_time():
 
 
 def case_the_clock_counts_nanoseconds():
-    standalone.start()
+    bare_board.start()
     before = time.time_ns()
     time.sleep_us(2_500)
     assert 2_500_000 <= time.time_ns() - before < 103_000_000
@@ -71,7 +69,7 @@ def case_the_clock_counts_nanoseconds():
 
 def case_an_interrupt_ends_the_wait():
     pace.Pace._elapsed_us = lambda self: 0
-    standalone.start()
+    bare_board.start()
     pyb.Timer(6, freq=10_000, callback=lambda timer: None)
     before = time.ticks_us()
     machine.idle()
@@ -80,7 +78,7 @@ def case_an_interrupt_ends_the_wait():
 
 def case_each_call_of_the_serial_port_takes_its_time():
     """As all calls do; else a program that only looks at the port would stand still in time."""
-    board = standalone.start()
+    board = bare_board.start()
     port = pyb.USB_VCP()
     for call in (port.isconnected, port.any, lambda: port.recv(1, timeout=0), lambda: port.send(b"")):
         before = board.now + board.owed
@@ -99,7 +97,7 @@ class Looked(usb_serial.SilentPort):
 
 def case_the_host_is_heard_from_the_first_millisecond_on():
     line = Looked()
-    board = standalone.start(line=line)
+    board = bare_board.start(line=line)
     board.spend(TICKS_PER_MS - 1)
     assert line.looks == 0
     board.spend(1)
@@ -107,7 +105,7 @@ def case_the_host_is_heard_from_the_first_millisecond_on():
 
 
 def case_without_a_speed_no_motion_keeps_to_real_time():
-    board = standalone.start()
+    board = bare_board.start()
     kept, speeds = machine_state.pace, []
     kept._keep_pace = speeds.append
     board.moving = lambda horizon: True
@@ -117,7 +115,7 @@ def case_without_a_speed_no_motion_keeps_to_real_time():
 
 def case_real_time_that_a_free_motion_took_is_not_caught_up():
     """From where it keeps to real time again it waits for all of the time that it is ahead."""
-    board = standalone.start()
+    board = bare_board.start()
     kept, waits = machine_state.pace, []
     now_us = [kept._last_us]
     kept._ticks_us = lambda: now_us[0]
@@ -144,7 +142,7 @@ class Lamp:
 def case_the_leds_tell_the_mode_with_the_firmwares_times():
     """MicroPython, ports/stm32/boardctrl.c: a mode lasts 30 looks at the button, 20 ms apart; then it flashes."""
     pace.Pace._elapsed_us = lambda self: 0  # no real time comes in
-    board = standalone.start()
+    board = bare_board.start()
     green, orange = Lamp(board, "PD12"), Lamp(board, "PD13")
     assert boot.choose_mode(board, 905) == boot.SAFE
     assert green.changes_ms == [0, 600]
@@ -153,6 +151,6 @@ def case_the_leds_tell_the_mode_with_the_firmwares_times():
 
 
 for name in cases.wanted(globals()):
-    standalone.start()
+    bare_board.start()
     globals()[name]()
     print(name)

@@ -5,13 +5,11 @@ Argument: a scratch folder.
 
 import sys
 
+import bare_board
 import cases
-from virtual_board import (  # replaces time, os, uctypes, micropython; so before everything else
-    machine_state,
-    standalone,
-)
-from virtual_board.chip.flash import real_open
-from virtual_board.firmware.external_interrupts import set_level
+import machine_state  # replaces time, os, uctypes, micropython; so before everything else
+from chip.flash import real_open
+from firmware.external_interrupts import set_level
 
 # isort: split
 import struct
@@ -110,7 +108,7 @@ def case_inputs_have_their_pull_and_debounce():
 
 def case_the_edge_log_tells_of_pulses():
     path = SCRATCH + "/log"
-    standalone.start(edge_log=path)
+    bare_board.start(edge_log=path)
     outputs = outputs_of([GRIPPER])
     machine_state.board.spend(50 * MS)
     outputs.set(0, 65535)
@@ -133,6 +131,6 @@ def case_the_edge_log_tells_of_pulses():
 
 
 for name in cases.wanted(globals()):
-    standalone.start()
+    bare_board.start()
     globals()[name]()
     print(name)

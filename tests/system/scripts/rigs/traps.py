@@ -2,7 +2,7 @@
 
 import sys
 
-from virtual_board import machine_state
+import machine_state
 
 
 class Planned(Exception):

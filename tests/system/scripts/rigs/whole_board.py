@@ -9,14 +9,16 @@ import sys
 
 if sys.implementation.name != "micropython":
     import additions  # noqa: F401
+import machine_state
+import pace
+import power_cycles
 from armtempo_shared import armrecord, wire
-from virtual_board import machine_state, pace, power_cycles
-from virtual_board.chip.flash import real_open
-from virtual_board.chip.processor import TICKS_PER_MS, print_exception
-from virtual_board.firmware import builtin_modules
-from virtual_board.firmware.external_interrupts import set_level
-from virtual_board.firmware.usb_serial import Serial, SilentPort
-from virtual_board.standalone import DEFAULTS
+from bare_board import DEFAULTS
+from chip.flash import real_open
+from chip.processor import TICKS_PER_MS, print_exception
+from firmware import builtin_modules
+from firmware.external_interrupts import set_level
+from firmware.usb_serial import Serial, SilentPort
 
 builtin_modules.replace_sys()
 pace.Pace._elapsed_us = lambda self: 0  # no real time comes in

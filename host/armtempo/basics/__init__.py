@@ -1,0 +1,1 @@
+"""Errors, the array type, progress, the version."""

@@ -1,0 +1,91 @@
+"""Common sense about an arm file and a job: what looks wrong, and what to do about it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from armtempo.basics.errors import InputError
+from armtempo.diagnosis import drives, encoders, geometry, resolution, torque, wiring
+from armtempo.diagnosis.finding import Finding, Level, error, note
+from armtempo.diagnosis.item import Condition, Item
+from armtempo.model import arm_file as reader
+from armtempo.model.arm import Arm
+
+_CONSTANT_DEG = 0.01
+"""A joint of so narrow a range is a constant row of the table, such as a tool's."""
+
+
+def check(arm_file: Path, job_file: Path | None = None) -> tuple[Arm | None, list[Finding]]:
+    """The arm of the file, None where it cannot be read, and all findings on it and on the job.
+
+    What the readers refuse is a finding too.
+    """
+    try:
+        arm = reader.read(arm_file)
+    except InputError as refused:
+        return None, [error("arm file", str(refused), "correct that; the rest of the file was not looked at")]
+    found = check_arm(arm)
+    if job_file is None:
+        return arm, found
+    if any(finding.level is Level.ERROR for finding in found):
+        return arm, [*found, note("job", "not looked at", "correct the arm first")]
+    from armtempo.diagnosis import job  # here, because it brings the whole planner
+
+    return arm, _sorted([*found, *job.findings(arm, job_file)])
+
+
+def check_arm(arm: Arm) -> list[Finding]:
+    """Everything found in an arm that was read, errors first.
+
+    It need not be ready to be driven: ``armtempo.model.arm_file.read`` reads one without motors.
+    """
+    found = [*geometry.findings(arm), *_motors(arm)]
+    if arm.driven:
+        for part in (drives, resolution, encoders, torque, wiring):
+            found += part.findings(arm)
+        if not any(finding.level is Level.ERROR for finding in found):
+            found += drives.record_findings(arm)
+            found += _postures(arm)
+    return _sorted(found)
+
+
+def _postures(arm: Arm) -> list[Finding]:
+    """Tool poses of the arm's named postures that it cannot take."""
+    from armtempo.planning import via_points  # here, because it brings the inverse kinematics
+
+    try:
+        via_points.check_postures(arm)
+    except InputError as refused:
+        return [error("posture", refused.problem, refused.hint)]
+    return []
+
+
+def _sorted(found: list[Finding]) -> list[Finding]:
+    """Errors first, notes last, each in the order found."""
+    return sorted(found, key=lambda finding: list(Level).index(finding.level))
+
+
+def _motors(arm: Arm) -> list[Finding]:
+    if not arm.driven:
+        next_step = "give each driven joint a motor and a limits table; imported files have them as '#' lines"
+        return [error("motors", "no joint has a motor, so nothing can move", next_step)]
+    still = [
+        joint.name for joint in arm.joints if joint.motor is None and np.ptp(joint.range_deg) > _CONSTANT_DEG
+    ]
+    if not still:
+        return []
+    text = f"no motor: {', '.join(still)}; they stand still at home_deg"
+    return [note("motors", text, "give them a motor and limits table if they are to be driven")]
+
+
+def examine_arm(path: Path) -> list[Item]:
+    """Whether the arm file can be read, and how many errors and warnings a check finds in it."""
+    arm, findings = check(path)
+    errors = sum(finding.level is Level.ERROR for finding in findings)
+    warnings = sum(finding.level is Level.WARNING for finding in findings)
+    name = f"{arm.name}, {len(arm.driven_indices)} driven joints" if arm else "not readable"
+    level = Condition.WRONG if errors else Condition.NOTE if warnings else Condition.GOOD
+    advice = f"armtempo check --arm {path}" if errors or warnings else ""
+    return [Item(str(path), f"{name}; {errors} errors, {warnings} warnings", level, advice)]

@@ -1,0 +1,118 @@
+"""Motors and gears: step rates against the board and the drivers, steps against the ranges."""
+
+from __future__ import annotations
+
+from armtempo_shared.limits import MAX_STEP_RATE, MAX_STEP_RATE_SUM
+
+from armtempo.basics.errors import ArmtempoError
+from armtempo.diagnosis.finding import Finding, error, warning
+from armtempo.model.arm import Arm, DrivenJoint, Driver
+from armtempo.records import encode
+
+_MICROSTEPS = {*(1 << n for n in range(9)), 5, 10, 20, 25, 40, 50, 100, 125, 200, 250}
+"""What stepper drivers offer: powers of 2, and the decimal ones."""
+_FAST_RPM = 1500.0
+"""Above this few steppers have torque left."""
+_FEWEST_STEPS = 10
+_SLOW_STEPS_S = 10.0
+_SUDDEN_S = 0.01
+"""A joint that reaches its speed limit in less has an acceleration limit that limits nothing."""
+
+
+def top_rate_steps_s(joint: DrivenJoint) -> float:
+    """Step rate of a driven joint at its speed limit."""
+    return joint.limits.speed_deg_s * joint.steps_per_deg
+
+
+def motor_rpm(joint: DrivenJoint) -> float:
+    """Speed of a driven joint's motor at the joint's speed limit."""
+    return joint.limits.speed_deg_s * joint.motor.gear_ratio / 6.0
+
+
+def findings(arm: Arm) -> list[Finding]:
+    """What looks wrong about the drives of all driven joints, and about them together."""
+    found = [finding for joint in arm.driven for finding in _of(joint, arm.driver)]
+    rates = sum(top_rate_steps_s(joint) for joint in arm.driven)
+    if rates > MAX_STEP_RATE_SUM:
+        found.append(
+            warning(
+                "all joints",
+                f"all at their speed limits together need {rates:.0f} steps/s, the board makes {MAX_STEP_RATE_SUM}",
+                "use fewer microsteps or lower speed limits; else a plan that needs more is refused",
+            )
+        )
+    return found
+
+
+def record_findings(arm: Arm) -> list[Finding]:
+    """What the board itself would refuse."""
+    try:
+        encode.arm_record(arm)
+    except (ArmtempoError, OverflowError) as refused:
+        return [error("the board", f"cannot be given this arm: {refused}", "correct that figure")]
+    return []
+
+
+def _of(joint: DrivenJoint, driver: Driver) -> list[Finding]:
+    return [*_motor(joint), *_rates(joint, driver), *_range(joint)]
+
+
+def _motor(joint: DrivenJoint) -> list[Finding]:
+    found = []
+    if joint.motor.steps_per_rev % 4:
+        found.append(
+            warning(
+                joint.name,
+                f"steps_per_rev = {joint.motor.steps_per_rev} is no multiple of 4, as a stepper's full steps are",
+                "give the motor's full steps a turn: 200 for 1.8 deg, 400 for 0.9 deg; microsteps have their own key",
+            )
+        )
+    if joint.motor.microsteps not in _MICROSTEPS:
+        found.append(
+            warning(
+                joint.name,
+                f"microsteps = {joint.motor.microsteps} is no setting that stepper drivers have",
+                "look up the driver's switches: mostly 1, 2, 4, 8, 16, 32 and on",
+            )
+        )
+    return found
+
+
+def _rates(joint: DrivenJoint, driver: Driver) -> list[Finding]:
+    rate, speed = top_rate_steps_s(joint), joint.limits.speed_deg_s
+    at_limit = f"at its speed limit of {speed:g} deg/s"
+    rpm = motor_rpm(joint)
+    found = []
+    if rate > MAX_STEP_RATE:
+        text = f"{at_limit} it needs {rate:.0f} steps/s, the board makes at most {MAX_STEP_RATE}"
+        found.append(
+            error(joint.name, text, "lower speed_deg_s or use fewer microsteps; check the gear ratio")
+        )
+    elif rate * (driver.pulse_us + driver.low_us) > 1e6:
+        text = f"{at_limit} a step comes every {1e6 / rate:.3g} us, its pulse takes {driver.pulse_us + driver.low_us:g}"
+        found.append(
+            error(joint.name, text, "lower speed_deg_s, or pulse_us and low_us as far as the driver allows")
+        )
+    if rate < _SLOW_STEPS_S:
+        text = f"{at_limit} the motor makes only {rate:.2g} steps/s"
+        found.append(
+            warning(joint.name, text, "check speed_deg_s, microsteps and gear_ratio for a slip of the unit")
+        )
+    if rpm > _FAST_RPM:
+        text = f"{at_limit} the motor turns at {rpm:.0f} rpm; few steppers have torque left above {_FAST_RPM:.0f}"
+        found.append(
+            warning(joint.name, text, "lower speed_deg_s, or check gear_ratio (motor turns a joint turn)")
+        )
+    if speed / joint.limits.acceleration_deg_s2 < _SUDDEN_S:
+        text = f"its acceleration limit reaches full speed in {1e3 * speed / joint.limits.acceleration_deg_s2:.2g} ms"
+        found.append(warning(joint.name, text, "lower acceleration_deg_s2 to what the motor can do"))
+    return found
+
+
+def _range(joint: DrivenJoint) -> list[Finding]:
+    low, high = joint.range_deg
+    steps = (high - low) * joint.steps_per_deg
+    if steps >= _FEWEST_STEPS:
+        return []
+    text = f"its whole range, {low:g} to {high:g} deg, is {steps:.2g} steps"
+    return [error(joint.name, text, "check range_deg, steps_per_rev, microsteps and gear_ratio")]

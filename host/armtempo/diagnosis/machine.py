@@ -1,0 +1,74 @@
+"""Python, the operating system, the packages that armtempo uses, and the serial ports."""
+
+from __future__ import annotations
+
+import os
+import platform
+import re
+import sys
+from importlib.metadata import PackageNotFoundError, requires, version
+
+from armtempo.diagnosis.item import Condition, Item
+from armtempo.ports.listing import Port, find_ports
+
+LEAST_PYTHON = (3, 11)
+_GROUP = "sudo usermod -a -G dialout $USER, then log in again"
+
+
+def examine_machine() -> list[Item]:
+    """Versions of armtempo, Python and the operating system."""
+    from armtempo import __version__
+
+    python = f"{platform.python_version()} ({platform.python_implementation()})"
+    fits = sys.version_info[:2] >= LEAST_PYTHON
+    least = ".".join(map(str, LEAST_PYTHON))
+    return [
+        Item("armtempo", __version__),
+        Item(
+            "Python",
+            python,
+            Condition.GOOD if fits else Condition.WRONG,
+            "" if fits else f"install Python {least} or newer",
+        ),
+        Item("system", f"{platform.system()} {platform.release()}, {platform.machine()}"),
+    ]
+
+
+def packages() -> list[Item]:
+    """Each package that armtempo needs or can use, with its version, or how to get it."""
+    found = []
+    for requirement in requires("armtempo") or []:
+        name = re.split(r"[^A-Za-z0-9._-]", requirement)[0]
+        extra = re.search(r"extra == ['\"](\w+)['\"]", requirement)
+        if extra is not None and extra[1] == "docs":  # for developers
+            continue
+        found.append(_package(name, extra[1] if extra else ""))
+    return found
+
+
+def _package(name: str, extra: str) -> Item:
+    """A package of the core (``extra`` = "") or of an extra."""
+    try:
+        return Item(name, version(name))
+    except PackageNotFoundError:
+        if extra:
+            return Item(
+                name, "not installed", Condition.NOTE, f"pip install 'armtempo[{extra}]' if you want it"
+            )
+        return Item(name, "missing", Condition.WRONG, "pip install --force-reinstall armtempo")
+
+
+def ports() -> list[Item]:
+    """The serial ports, each with whether it can be opened by this user."""
+    found = [_port(port) for port in find_ports()]
+    return found or [
+        Item("ports", "none", Condition.NOTE, "connect a board by its USB socket, or use --port sim")
+    ]
+
+
+def _port(port: Port) -> Item:
+    what = f"{port.description or 'serial port'}{', a MicroPython board' if port.board else ''}"
+    if sys.platform == "linux" and not os.access(port.device, os.R_OK | os.W_OK):
+        level = Condition.WRONG if port.board else Condition.NOTE
+        return Item(port.device, f"{what}; no permission to open it", level, _GROUP)
+    return Item(port.device, what)

@@ -1,0 +1,96 @@
+"""Channels and inputs of the board: what collides, what stays unused (board/docs/hardware.md has the pins)."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+from armtempo.diagnosis.finding import Finding, error, note, warning
+from armtempo.model.arm import Arm, DrivenJoint, Joint
+from armtempo.model.arm_file import shared_channels
+from armtempo.model.pin_use import problems as pin_problems
+
+BUTTON_CHANNEL = 6
+"""Its STEP pin is the one of the button."""
+
+
+def findings(arm: Arm) -> list[Finding]:
+    """Channels and pins used twice, switches that contradict each other or their joint's range."""
+    found = _channels(arm)
+    found += _levels(arm)
+    found += [error(problem.where, problem.what, problem.next_step) for problem in pin_problems(arm)]
+    found += [finding for joint in arm.driven for finding in _switches(joint)]
+    found += [_unused(joint) for joint in arm.joints if joint.motor is None and _has_switch(joint)]
+    if any(joint.motor and joint.motor.channel == BUTTON_CHANNEL for joint in arm.joints):
+        text = "channel 6 takes the pin of the board's button, which starts nothing then"
+        found.append(note("wiring", text, "use channels 1 to 5 if the button is to start motions"))
+    if not arm.safety.estop_fitted:
+        found.append(
+            note("safety", "no E-stop is fitted", "wire one and set estop_fitted = true: it is worth it")
+        )
+    return found
+
+
+def _channels(arm: Arm) -> list[Finding]:
+    return [
+        error(" and ".join(joints), f"share {key}.channel = {channel}", "give each its own channel")
+        for key, channel, joints in shared_channels(arm)
+    ]
+
+
+def _levels(arm: Arm) -> list[Finding]:
+    """One input cannot trip at both levels."""
+    levels: dict[int, set[str]] = defaultdict(set)
+    for joint in arm.joints:
+        for number in (joint.switches.low, joint.switches.high):
+            if number is not None:
+                levels[number].add(joint.switches.active)
+    return [
+        error(
+            "switches",
+            f"input {number} is to trip at low and at high level",
+            "give its joints the same 'active'",
+        )
+        for number, active in levels.items()
+        if len(active) > 1
+    ]
+
+
+def _switches(joint: DrivenJoint) -> list[Finding]:
+    switches, (low, high) = joint.switches, joint.range_deg
+    found = []
+    if (
+        switches.low_deg is not None
+        and switches.high_deg is not None
+        and switches.low_deg >= switches.high_deg
+    ):
+        text = f"its low switch trips at {switches.low_deg:g} deg, not below its high one at {switches.high_deg:g}"
+        found.append(error(joint.name, text, "correct low_deg and high_deg in its [switches]"))
+    for side, number, trip_deg in (
+        ("low", switches.low, switches.low_deg),
+        ("high", switches.high, switches.high_deg),
+    ):
+        if number is None and trip_deg is not None:
+            text = f"{side}_deg is given, but no input for that switch"
+            found.append(
+                warning(
+                    joint.name, text, f"give {side} = 1, 2 or 3 in its [switches], or leave {side}_deg out"
+                )
+            )
+        if number is not None and trip_deg is None:
+            text = f"its {side} switch protects, but cannot home: its angle is not known"
+            found.append(note(joint.name, text, f"measure where it trips and give {side}_deg"))
+        if number is not None and trip_deg is not None and low < trip_deg < high:
+            text = f"its {side} switch trips at {trip_deg:g} deg, within its range of {low:g} to {high:g}"
+            found.append(
+                warning(joint.name, text, "narrow range_deg to what the switch leaves, or correct the angle")
+            )
+    return found
+
+
+def _has_switch(joint: Joint) -> bool:
+    return joint.switches.low is not None or joint.switches.high is not None
+
+
+def _unused(joint: Joint) -> Finding:
+    text = "has switches but no motor: they are not looked at"
+    return warning(joint.name, text, "give it a motor, or leave its [switches] out")

@@ -1,0 +1,1 @@
+"""A project folder for a new arm: from answers, from a shipped arm, or from a URDF robot description."""

@@ -1,0 +1,103 @@
+"""The arm file of an imported chain, as TOML text."""
+
+from __future__ import annotations
+
+import json
+import math
+
+from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS
+
+from armtempo.new_arm.urdf_fitting import Fit
+from armtempo.new_arm.urdf_reader import Chain, TurningJoint
+from armtempo.new_arm.urdf_rows import DhRow
+
+_STILL_DEG = 0.001
+"""Half the range of a row that never moves: an arm file wants a range, and this one is none."""
+
+_HEAD = """\
+# Imported from {source}, robot {robot}: from link {base} to link {tip}.
+# Held against the URDF's own forward kinematics at {postures} random postures within the ranges: worst errors
+# {position_mm:.2g} mm and {rotation_deg:.2g} degrees. Joint angles are those of the URDF, in degrees.
+#
+# A URDF says nothing of motors, gears, encoders and wiring. Before the arm can be planned for:
+# 1. Take the '#' off the motor and limits lines of each driven joint and put its own figures in
+#    (the acceleration and jerk given are slow guesses).
+# 2. armtempo check --arm THIS_FILE says what is missing or looks wrong.
+name = {robot}
+"""
+
+_MOTOR = """\
+# limits = {{ speed_deg_s = {speed:g}, acceleration_deg_s2 = 30.0, jerk_deg_s3 = 120.0 }}{speed_source}
+# motor = {{ channel = {channel}, steps_per_rev = 200, microsteps = 16, gear_ratio = 1.0 }}  # put in your own
+"""
+_ENCODER = """\
+# encoder = {{ channel = {channel}, counts_per_rev = 4000, on = "joint", following_error_deg = 2.0 }}  # if fitted
+"""
+_NO_CHANNEL = f"# The board drives {MAX_JOINTS} joints: this one stands still, unless another one does.\n"
+
+
+def arm_text(chain: Chain, fit: Fit, source: str) -> str:
+    """The arm file for ``chain`` with the rows of ``fit``; ``source`` names the URDF file."""
+    head = _HEAD.format(
+        source=_text(source),
+        robot=_text(_one_line(chain.robot) or "imported arm"),
+        base=_text(chain.base),
+        tip=_text(chain.tip),
+        postures=fit.postures,
+        position_mm=fit.position_mm,
+        rotation_deg=fit.rotation_deg,
+    )
+    return "\n".join([head, *(_joint(row, chain, first=number == 0) for number, row in enumerate(fit.rows))])
+
+
+def _joint(row: DhRow, chain: Chain, first: bool) -> str:
+    if row.joint is None:
+        name = "base" if first else "tool"
+        return _row_text(name, row, (-_STILL_DEG, _STILL_DEG), "a constant row: it never moves")
+    joint = chain.joints[row.joint]
+    note = "continuous in the URDF: widen it if the cables allow" if joint.continuous else ""
+    name = _one_line(joint.name) or f"joint {row.joint + 1}"
+    return _row_text(name, row, _inside(joint.range_deg), note) + _placeholders(row.joint + 1, joint)
+
+
+def _row_text(name: str, row: DhRow, range_deg: tuple[float, float], note: str) -> str:
+    lines = ["[[joint]]", f"name = {_text(name)}"]
+    values = {
+        "d_mm": row.d_mm,
+        "a_mm": row.a_mm,
+        "alpha_deg": row.alpha_deg,
+        "theta_offset_deg": row.theta_deg,
+    }
+    lines += [f"{key} = {value!r}" for key, value in values.items()]
+    low, high = range_deg
+    lines.append(f"range_deg = [{low!r}, {high!r}]" + (f"  # {note}" if note else ""))
+    lines.append(f"home_deg = {0.0 if low <= 0.0 <= high else round((low + high) / 2, 1)!r}")
+    return "\n".join(lines) + "\n"
+
+
+def _placeholders(channel: int, joint: TurningJoint) -> str:
+    if channel > MAX_JOINTS:
+        return _NO_CHANNEL
+    speed = joint.speed_deg_s
+    motor = _MOTOR.format(
+        speed=20.0 if speed is None else round(speed, 3),
+        speed_source="" if speed is None else "  # the speed is the URDF's",
+        channel=channel,
+    )
+    return motor + (_ENCODER.format(channel=channel) if channel <= MAX_ENCODERS else "")
+
+
+def _inside(range_deg: tuple[float, float]) -> tuple[float, float]:
+    """The range with four decimals, never wider than it was (but for what rad and degrees lose)."""
+    low, high = range_deg
+    return math.ceil(low * 1e4 - 0.01) / 1e4 + 0.0, math.floor(high * 1e4 + 0.01) / 1e4 + 0.0
+
+
+def _one_line(name: str) -> str:
+    """A name as an arm file takes it: a blank for each character that does not show."""
+    return "".join(character if character.isprintable() else " " for character in name).strip()
+
+
+def _text(text: str) -> str:
+    """A TOML string, on one line whatever is in it."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -1,0 +1,117 @@
+"""The files of a new project folder, written all or none."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tempfile
+from pathlib import Path
+
+from armtempo.basics.errors import InputError
+from armtempo.formats.atomic_file import why
+from armtempo.model.arm import Arm
+from armtempo.new_arm.given_geometry import ArmText
+
+_SETTINGS = """\
+# What commands in this folder use where an option does not say otherwise; 'armtempo config' shows it.
+arm = "arm.toml"
+job = "first.toml"
+port = {port}
+"""
+
+_JOB = """\
+# A first motion: from the home posture through a sixth and a third of the way to the ends of the ranges.
+# Each via point has one angle for each joint with a motor, in degrees.
+name = "first"
+timing = "shared"
+via_deg = [
+{rows}]
+"""
+
+_SEQUENCE = """\
+# What the arm does again and again: the motion in first.toml, back home, half a second's rest, three times.
+name = "cycle"
+start = "home"
+
+[[step]]
+repeat = 3               # or "for ever"
+
+[[step]]
+run = "first.toml"
+
+[[step]]
+goto = "home"
+
+[[step]]
+wait_s = 0.5
+
+[[step]]
+end = "repeat"
+"""
+
+_PAGE = """\
+# {name}
+
+    armtempo check --picture arm.png    # what looks wrong about arm.toml
+    armtempo plan                       # the motion in first.toml, as short as the limits allow
+    armtempo deploy                     # once, for a real board: the board program
+    armtempo home --arm arm.toml        # "the arm stands in its home posture"; nothing moves
+    armtempo run first.json             # replay and record it
+    armtempo report runs/first-001      # how well the arm followed
+    armtempo plan sequence.toml         # a sequence: the motion, back home, again and again
+    armtempo goto home
+    armtempo run cycle.json
+
+`armtempo.toml` names arm, job and port; the port `sim:board` is a virtual board, its flash in the folder `board`.
+"""
+
+
+def write(folder: Path, arm: ArmText, port: str) -> list[Path]:
+    """Make ``folder`` with the files of a project; gives their paths.
+
+    Raises InputError where the folder is there and not empty, or cannot be written; nothing is left then.
+    """
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError(f"{folder}: is there already and not empty", "choose another name")
+    files = {"arm.toml": arm.text, "armtempo.toml": _SETTINGS.format(port=_quoted(port))}
+    if arm.arm.driven_indices:
+        files["first.toml"] = _JOB.format(rows=_rows(arm.arm))
+        files["sequence.toml"] = _SEQUENCE
+    files["README.md"] = _PAGE.format(name=arm.arm.name)
+    try:
+        _put(folder, files)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written: {why(error)}", "choose another place") from None
+    return [folder / name for name in files]
+
+
+def _put(folder: Path, files: dict[str, str]) -> None:
+    """Written beside the folder, then put in its place in one step."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    aside = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
+    try:
+        for name, text in files.items():
+            (aside / name).write_text(text, encoding="utf-8")
+        aside.chmod(0o755)
+        if folder.exists():
+            folder.rmdir()
+        aside.rename(folder)
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
+
+
+def _rows(arm: Arm) -> str:
+    """Via points: home, then towards the farther end of each range."""
+    rows = []
+    for share in (0.0, 1 / 6, 1 / 3):
+        angles = []
+        for joint in arm.driven:
+            low, high = joint.range_deg
+            end = high if high - joint.home_deg >= joint.home_deg - low else low
+            angles.append(round(joint.home_deg + share * (end - joint.home_deg), 3))
+        rows.append(f"    {angles},\n")
+    return "".join(rows)
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)

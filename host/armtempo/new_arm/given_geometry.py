@@ -1,0 +1,58 @@
+"""Where the arm file of a new project comes from: an arm that ships, a URDF, or joints one by one."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from armtempo.basics.errors import InputError
+from armtempo.formats import toml_table
+from armtempo.model import arm_file, shipped
+from armtempo.model.arm import Arm
+from armtempo.new_arm import joint_entry
+from armtempo.new_arm.joint_entry import JointEntry
+
+
+@dataclass(frozen=True)
+class ArmText:
+    """An arm file that is yet to be written."""
+
+    text: str
+    arm: Arm
+    """What the reader makes of it."""
+
+
+def from_shipped(name: str) -> ArmText:
+    """The file of an arm that ships, to be changed to the user's own motors and wiring.
+
+    Raises InputError, naming those that ship, for another name.
+    """
+    files = shipped.files()
+    if name not in files:
+        raise InputError(
+            f"{name}: no arm of that name ships with armtempo", f"give one of {', '.join(files)}"
+        )
+    return _checked(files[name].read_text(encoding="utf-8"))
+
+
+def from_urdf(urdf: Path) -> ArmText:
+    """The arm of a URDF; its motors are left as comments. Raises InputError as ``urdf.reader`` does."""
+    from armtempo.new_arm import arm_text
+    from armtempo.new_arm import urdf_fitting as fitting
+    from armtempo.new_arm import urdf_reader as reader
+
+    chain = reader.read(urdf, None, None)
+    return _checked(arm_text.arm_text(chain, fitting.fit(chain), urdf.name))
+
+
+def from_joints(name: str, joints: Sequence[JointEntry]) -> ArmText:
+    """An arm of these joints, base first. Raises InputError for what an arm file does not allow."""
+    tables = [joint_entry.table(joint, number, len(joints)) for number, joint in enumerate(joints, 1)]
+    return _checked("\n".join([f"name = {json.dumps(name, ensure_ascii=False)}\n", *tables]))
+
+
+def _checked(text: str) -> ArmText:
+    """Raises InputError for a text that could not be read again."""
+    return ArmText(text, arm_file.of_table(toml_table.parse(text, "arm.toml")))

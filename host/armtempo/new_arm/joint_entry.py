@@ -1,0 +1,100 @@
+"""One joint as a user gives it: the arm file's keys, with defaults and figures that help to choose."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, fields
+
+from armtempo_shared.limits import MAX_STEP_RATE, MAX_STEP_RATE_SUM
+
+from armtempo.basics.errors import InputError
+
+MOTOR_RPM = 300.0
+"""Speed up to which a common hybrid stepper (NEMA 17, 24 V) keeps most of its torque: a default, no promise."""
+
+
+@dataclass(frozen=True)
+class JointEntry:
+    """A joint: its Denavit-Hartenberg row, range, and drive; units as the names say."""
+
+    name: str
+    d_mm: float = 0.0
+    a_mm: float = 0.0
+    alpha_deg: float = 0.0
+    theta_offset_deg: float = 0.0
+    low_deg: float = -90.0
+    high_deg: float = 90.0
+    steps_per_rev: int = 200
+    microsteps: int = 16
+    gear_ratio: float = 1.0
+    speed_deg_s: float | None = None
+    """None: what ``most_speed_deg_s`` allows, or 60 if that is less."""
+    encoder_counts: int = 0
+    """Counts for a turn of the joint; 0: no encoder."""
+
+    @property
+    def steps_per_deg(self) -> float:
+        """Steps for a degree of the joint."""
+        return self.steps_per_rev * self.microsteps * self.gear_ratio / 360.0
+
+    def most_speed_deg_s(self, joints: int) -> float:
+        """The speed that the board's step rate, shared by so many joints, and MOTOR_RPM allow, degrees/s."""
+        rate = min(MAX_STEP_RATE, MAX_STEP_RATE_SUM / joints)
+        return min(rate / self.steps_per_deg, MOTOR_RPM * 6.0 / self.gear_ratio)
+
+
+NUMBERS = tuple(field.name for field in fields(JointEntry) if field.name != "name")
+"""Keys of a joint that take a number."""
+
+
+def parse(text: str, number: int) -> JointEntry:
+    """The joint in ``key=value,key=value``, the keys being ``name`` and NUMBERS.
+
+    Raises InputError, naming the key, for one that is unknown or given twice, or for a value that is no number.
+    """
+    values: dict[str, str] = {}
+    for part in filter(None, (part.strip() for part in text.split(","))):
+        key, equals, value = (word.strip() for word in part.partition("="))
+        if not equals or key not in ("name", *NUMBERS) or key in values:
+            why = "is given twice" if key in values else "is not one of the keys"
+            raise InputError(
+                f"joint {number}: {part!r} {why}",
+                f"give KEY=VALUE with {', '.join(('name', *NUMBERS))}",
+            )
+        values[key] = value
+    name = values.pop("name", f"joint {number}")
+    return JointEntry(name, **{key: _number(number, key, value) for key, value in values.items()})  # type: ignore[arg-type]
+
+
+def _number(number: int, key: str, value: str) -> float | int:
+    try:
+        if key in ("steps_per_rev", "microsteps", "encoder_counts"):
+            return int(value)
+        return float(value)
+    except ValueError:
+        raise InputError(
+            f"joint {number}: {key} = {value!r} is no number", "write it as 12 or -3.5"
+        ) from None
+
+
+def table(entry: JointEntry, channel: int, joints: int) -> str:
+    """The joint's ``[[joint]]`` table of an arm file of so many joints."""
+    most = entry.most_speed_deg_s(joints)
+    speed = min(60.0, float(f"{0.9 * most:.2g}")) if entry.speed_deg_s is None else entry.speed_deg_s
+    lines = [
+        "[[joint]]",
+        f"name = {json.dumps(entry.name, ensure_ascii=False)}",
+        f"d_mm = {entry.d_mm!r}",
+        f"a_mm = {entry.a_mm!r}",
+        f"alpha_deg = {entry.alpha_deg!r}",
+        f"theta_offset_deg = {entry.theta_offset_deg!r}",
+        f"range_deg = [{entry.low_deg!r}, {entry.high_deg!r}]",
+        f"# {entry.steps_per_deg:.5g} steps/deg; the board's step rate and {MOTOR_RPM:g} rpm allow {most:.4g} deg/s",
+        f"limits = {{ speed_deg_s = {speed:g}, acceleration_deg_s2 = {speed:g}, jerk_deg_s3 = {4 * speed:g} }}",
+        f"motor = {{ channel = {channel}, steps_per_rev = {entry.steps_per_rev}, microsteps = {entry.microsteps},"
+        f" gear_ratio = {entry.gear_ratio!r} }}",
+    ]
+    if entry.encoder_counts:
+        counts = entry.encoder_counts
+        lines.append(f'encoder = {{ channel = {channel}, counts_per_rev = {counts}, on = "joint" }}')
+    return "\n".join(lines) + "\n"

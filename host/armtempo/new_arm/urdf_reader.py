@@ -1,0 +1,222 @@
+"""A serial chain of revolute joints out of a URDF file, read by yourdfpy (the optional extra ``urdf``)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError, MissingPackageError
+from armtempo.formats.atomic_file import why
+from armtempo.model.arm_file import MAX_ANGLE_DEG
+
+MM = 1000.0
+"""Millimetres in the URDF's unit, the metre."""
+
+CONTINUOUS_DEG = (-180.0, 180.0)
+"""Range that a continuous joint gets: a URDF gives it none."""
+
+_REASONS = {
+    "prismatic": "it slides, and an arm file describes turning joints only",
+    "floating": "it is free in all directions, and a motor turns about one axis",
+    "planar": "it moves in a plane, and a motor turns about one axis",
+}
+
+
+@dataclass(frozen=True)
+class TurningJoint:
+    """One revolute joint where it stands while all joints are at 0, in the base link's frame."""
+
+    name: str
+    point_mm: Array
+    """(3,): a point of its axis."""
+    direction: Array
+    """(3,): along its axis, of length 1."""
+    range_deg: tuple[float, float]
+    speed_deg_s: float | None
+    continuous: bool
+
+
+@dataclass(frozen=True)
+class Chain:
+    """The joints from a base link to a tip link."""
+
+    robot: str
+    base: str
+    tip: str
+    joints: tuple[TurningJoint, ...]
+    zero_pose: Array
+    """(4, 4): the tip link's frame in the base link's, all joints at 0; lengths in mm."""
+    model: Any
+    """The reader's own robot, for its forward kinematics."""
+
+    def poses(self, angles_rad: Array) -> Array:
+        """The tip's poses by the reader's forward kinematics: (K, 4, 4) in mm for angles (K, joints) in rad."""
+        names = [joint.name for joint in self.joints]
+        poses = np.empty((len(angles_rad), 4, 4))
+        for number, angles in enumerate(angles_rad):
+            self.model.update_cfg(dict(zip(names, angles, strict=True)))
+            poses[number] = _transform(self.model, self.tip, self.base)
+        return poses
+
+
+def read(path: Path, base: str | None = None, tip: str | None = None) -> Chain:
+    """The chain from link ``base`` (None: the root) to link ``tip`` (None: the only end there is).
+
+    Raises MissingPackageError without yourdfpy, InputError where the file is no URDF, the chain is not one, or
+    a joint in it is of a kind that an arm file cannot describe: with every reason.
+    """
+    urdf = _reader()
+    _check_text(path)
+    try:
+        with np.errstate(all="ignore"):  # it divides by the length of an axis that has none
+            model = urdf.load(str(path), load_meshes=False, build_scene_graph=True)
+    except (
+        Exception
+    ) as error:  # the reader raises whatever its parts do: KeyError, ValueError, AttributeError
+        raise InputError(
+            f"{path}: is XML, but not a URDF that can be read ({type(error).__name__}: {error})",
+            "try it with another URDF tool, such as check_urdf, which names the place",
+        ) from None
+    if not model.robot.joints:
+        raise InputError(f"{path}: this robot has no joints, so there is no chain", "give another file")
+    joints = _path(path, model, base, tip)
+    _refuse(path, joints)
+    moving = [joint for joint in joints if joint.type != "fixed"]
+    if not moving:
+        raise InputError(
+            f"{path}: no joint between {joints[0].parent!r} and {joints[-1].child!r} turns",
+            "choose another chain with --base and --tip",
+        )
+    first, last = joints[0].parent, joints[-1].child
+    model.update_cfg({joint.name: 0.0 for joint in moving})
+    turning = tuple(_turning(model, first, joint) for joint in moving)
+    return Chain(model.robot.name, first, last, turning, _transform(model, last, first), model)
+
+
+def _reader() -> Any:
+    try:
+        from yourdfpy import URDF
+    except ImportError:
+        raise MissingPackageError("reading URDF", "yourdfpy", "urdf") from None
+    return URDF
+
+
+def _check_text(path: Path) -> None:
+    """Raise InputError unless the file is whole XML with a robot in it: the reader itself mends what is broken."""
+    try:
+        root = ElementTree.fromstring(path.read_bytes())
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file", "check the path") from None
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot be read: {why(error)}", "make it readable, or give a copy"
+        ) from None
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise InputError(f"{path}: not valid XML: {error}", "mend the file there") from None
+    if root.tag != "robot":
+        raise InputError(f"{path}: its outermost element is <{root.tag}>, not <robot>", "give a URDF file")
+    if root.get("name") is None:
+        raise InputError(f"{path}: its <robot> element has no name", 'give it one: <robot name="my_arm">')
+    if any("xacro" in element.tag for element in root.iter()):
+        raise InputError(f"{path}: is a xacro file", f"make a URDF of it first: xacro {path} > robot.urdf")
+
+
+def _path(path: Path, model: Any, base: str | None, tip: str | None) -> list[Any]:
+    """The joints from base to tip, base first."""
+    links = [link.name for link in model.robot.links]
+    for option, link in (("--base", base), ("--tip", tip)):
+        if link is not None and link not in links:
+            raise InputError(
+                f"{path}: has no link {link!r} for {option}", f"give one of its links: {', '.join(links)}"
+            )
+    above = {joint.child: joint for joint in model.robot.joints}
+    first = base or model.base_link
+    last = tip or _only_end(path, above, first)
+    joints: list[Any] = []
+    link = last
+    while link != first:
+        if link not in above or len(joints) > len(above):
+            raise InputError(
+                f"{path}: no chain leads from link {first!r} to {last!r}", "choose --base and --tip"
+            )
+        joints.insert(0, above[link])
+        link = above[link].parent
+    if not joints:
+        raise InputError(f"{path}: base and tip are the same link, {first!r}", "choose --base and --tip")
+    return joints
+
+
+def _only_end(path: Path, above: dict[str, Any], first: str) -> str:
+    """The one link below ``first`` that carries no other."""
+    parents = {joint.parent for joint in above.values()}
+    ends = [link for link in above if link not in parents and _is_below(above, link, first)]
+    if len(ends) != 1:
+        found = ", ".join(ends) or "none"
+        raise InputError(
+            f"{path}: which end of the robot is the tool is not clear", f"choose with --tip: {found}"
+        )
+    return ends[0]
+
+
+def _is_below(above: dict[str, Any], link: str, first: str) -> bool:
+    for _ in above:
+        if link == first or link not in above:
+            break
+        link = above[link].parent
+    return link == first
+
+
+def _refuse(path: Path, joints: list[Any]) -> None:
+    """Raise InputError naming every joint that an arm file cannot describe."""
+    reasons = [f"\n  joint {joint.name!r}: {reason}" for joint in joints if (reason := _reason(joint))]
+    if reasons:
+        raise InputError(
+            f"{path}: this chain does not fit an arm file:{''.join(reasons)}",
+            "choose another chain with --base and --tip, or change the URDF",
+        )
+
+
+def _reason(joint: Any) -> str:
+    """Why a joint does not fit; empty if it does."""
+    if joint.type == "fixed":
+        return ""
+    if joint.type not in ("revolute", "continuous"):
+        return _REASONS.get(joint.type, f"its type is {joint.type!r}")
+    if joint.mimic is not None:
+        return f"it mimics {joint.mimic.joint!r}, and every joint of an arm file moves by itself"
+    if joint.axis is not None and not 0.0 < np.linalg.norm(joint.axis) < math.inf:
+        return "its axis has no direction"
+    return "" if joint.type == "continuous" else _range_reason(joint.limit)
+
+
+def _range_reason(limit: Any) -> str:
+    if limit is None or limit.lower is None or limit.upper is None:
+        return "it has no limits; add <limit lower= upper=> with the angles in rad that it may turn to"
+    if not limit.lower < limit.upper:
+        return f"its limits {limit.lower:g} to {limit.upper:g} rad are no range; correct them"
+    if max(abs(limit.lower), abs(limit.upper)) > math.radians(MAX_ANGLE_DEG):
+        return f"its limits {limit.lower:g} to {limit.upper:g} rad are more than {MAX_ANGLE_DEG:g} degrees"
+    return ""
+
+
+def _turning(model: Any, base: str, joint: Any) -> TurningJoint:
+    frame = _transform(model, joint.child, base)
+    axis = np.array([1.0, 0.0, 0.0]) if joint.axis is None else np.asarray(joint.axis, dtype=np.float64)
+    limit, continuous = joint.limit, joint.type == "continuous"
+    low_high = CONTINUOUS_DEG if continuous else (math.degrees(limit.lower), math.degrees(limit.upper))
+    speed = math.degrees(limit.velocity) if limit is not None and limit.velocity else None
+    direction = frame[:3, :3] @ (axis / np.linalg.norm(axis))
+    return TurningJoint(joint.name, frame[:3, 3], direction, low_high, speed, continuous)
+
+
+def _transform(model: Any, link: str, base: str) -> Array:
+    """The frame of ``link`` in that of ``base``, in mm."""
+    pose: Array = np.array(model.get_transform(link, base), dtype=np.float64)
+    pose[:3, 3] *= MM
+    return pose

@@ -1,0 +1,320 @@
+"""A motion whose path is free between the via points, and the programs that make it faster."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from math import comb
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import PlanError
+from armtempo.optimise import interior_point
+from armtempo.optimise.interior_point import Schedule
+from armtempo.optimise.kkt import BandedKkt, Equalities
+from armtempo.planning import collocation
+from armtempo.planning.collocation import Curve, Points
+from armtempo.planning.free import angle_bounds
+from armtempo.planning.free.layout import DEGREE, DWELL_SEGMENTS, Layout, Vias
+from armtempo.planning.free.tool import Tool
+from armtempo.planning.free.tool_rows import ToolRows, ToolTargets
+from armtempo.planning.limit_rows import LimitRows
+from armtempo.planning.motion_program import Block, MotionProgram, mean_slopes, time_weights
+from armtempo.planning.variables import MotionVariables, time_points
+from armtempo.splines import bspline
+
+_PARTS = 4
+"""Points in a segment at which limits are watched, besides the peaks found."""
+_CORRIDOR_PARTS = 4
+"""Points in a segment at which the tool's corridor is watched."""
+_FINER = 4
+_WATCHED = 0.95
+_AWAY = 1.01
+"""Time is stretched by this before each solve, so that it starts within the limits."""
+_SMOOTHING, _SMOOTHED = 0.075, 0.1
+"""Weight of steps between time differences in the first solve, for one segment and via point; part of it later."""
+_LEAST_STEP = 1e-3
+"""Least difference of time control points, as a part of their mean: where time all but stands still, what rounding does
+to the angles is divided by its cube."""
+_FIRST = Schedule(first_barrier=1e-2, last_barrier=1e-4, curvature=False)
+_AGAIN = Schedule(first_barrier=1e-3, last_barrier=1e-4, curvature=False)
+_AT_END = 1e-6
+"""A via point this near to the end of a range, as a part of what its joint turns, is at it."""
+_NEAR = 1e-5
+"""Solves end where their points miss no more than this of a limit."""
+
+
+class Tolerance(NamedTuple):
+    """How far the tool may be from a pose."""
+
+    position_mm: float
+    rotation_deg: float
+
+
+@dataclass(frozen=True, eq=False)
+class Demand:
+    """What is asked of a free motion of J joints through n + 1 via points."""
+
+    names: tuple[str, ...]
+    """Of the joints."""
+    via_deg: Array
+    """(n + 1, J)."""
+    limits: Array
+    """Speed, acceleration, jerk: (J, 3)."""
+    low_deg: Array
+    high_deg: Array
+    """Ranges of the joints: (J,)."""
+    stops: Mapping[int, float]
+    """Dwell in seconds by via point where the motion rests, 0 for a rest without one."""
+    corridor_deg: float = np.inf
+    """How far any joint may leave the spline through the via points."""
+    corridor_mm: float = np.inf
+    """How far the tool may leave it."""
+    tool: Tool | None = None
+    """Of these joints; needed for ``corridor_mm`` and ``tolerances``."""
+    tolerances: Mapping[int, Tolerance] = field(default_factory=dict)
+    """By via point, where the tool need not be exactly where the angles bring it."""
+
+    @property
+    def size_deg(self) -> Array:
+        """How far the via points of each joint lie apart: (J,)."""
+        return np.asarray(np.ptp(self.via_deg, axis=0))
+
+    @property
+    def room_deg(self) -> Array:
+        """How far each via point is from the nearer end of its joint's range: (n + 1, J)."""
+        return np.minimum(self.via_deg - self.low_deg, self.high_deg - self.via_deg)
+
+    @property
+    def turning(self) -> NDArray[np.bool_]:
+        """Via points at the end of a joint's range, where the joint can but turn: (n + 1, J)."""
+        return np.asarray(self.room_deg <= _AT_END * self.size_deg)
+
+
+@dataclass(frozen=True, eq=False)
+class FreeMotion:
+    """Control points of the angles (S + 5, J) in degrees, and differences (S + 4,) of those of time in seconds."""
+
+    layout: Layout
+    angle_points_deg: Array
+    differences_s: Array
+
+    def curve(self, limits: Array) -> Curve:
+        """The motion by its polynomials."""
+        angle = np.moveaxis(bspline.polynomials(self.angle_points_deg, DEGREE), 2, 0)
+        time = bspline.polynomials(time_points(self.differences_s, DEGREE), DEGREE)
+        return Curve(np.ascontiguousarray(angle), time, limits)
+
+    @property
+    def total_s(self) -> float:
+        """Motion time."""
+        return float(time_weights(self.variables) @ self.differences_s)
+
+    @property
+    def variables(self) -> MotionVariables:
+        """How its variables are laid out."""
+        return MotionVariables(self.layout.segments, DEGREE, self.angle_points_deg.shape[1])
+
+    @property
+    def via_times_s(self) -> Array:
+        """When it arrives at each via point: (n + 1,)."""
+        times = bspline.polynomials(time_points(self.differences_s, DEGREE), DEGREE)
+        return np.append(times[self.layout.arrivals[:-1], 0], times[-1].sum())
+
+    @property
+    def stretch_times_s(self) -> Array:
+        """Time from each via point to the next, without dwells: (n,)."""
+        dwells = [self.layout.stops.get(via, 0.0) for via in range(len(self.layout.pieces))]
+        return np.asarray(np.diff(self.via_times_s) - np.array(dwells))
+
+    def stretched(self, limits: Array) -> FreeMotion:
+        """The same with time scaled until it just keeps every limit, proven."""
+        return self.slower(self.curve(limits).stretch())
+
+    def slower(self, factor: float) -> FreeMotion:
+        """The same with time scaled, but not in dwells, which the one difference that acts on them alone makes up for.
+
+        Where that would have to be below 0, the dwell lasts longer.
+        """
+        differences = self.differences_s * factor
+        weights = np.convolve(np.ones(DWELL_SEGMENTS), mean_slopes(DEGREE))
+        for knot, dwell_s in self.layout.dwells.items():
+            own = knot + DEGREE - 1
+            lasts_s = float(weights @ differences[knot : knot + len(weights)])
+            differences[own] = max(differences[own] + dwell_s - lasts_s, _LEAST_STEP * differences[own])
+        return replace(self, differences_s=differences)
+
+
+def bounds(demand: Demand, layout: Layout) -> tuple[Array, Array]:
+    """Lowest and highest Bernstein coefficients that ranges and corridor allow: two arrays (S, 6, J)."""
+    shape = (layout.segments, DEGREE + 1, len(demand.low_deg))
+    low, high = np.broadcast_to(demand.low_deg, shape), np.broadcast_to(demand.high_deg, shape)
+    if np.isfinite(demand.corridor_deg):
+        middle = through(demand, layout)
+        low = np.maximum(low, middle - demand.corridor_deg)
+        high = np.minimum(high, middle + demand.corridor_deg)
+    held = _held(demand, layout)
+    return np.where(held, -np.inf, low), np.where(held, np.inf, high)
+
+
+def _held(demand: Demand, layout: Layout) -> NDArray[np.bool_]:
+    """Bernstein coefficients (S, 6, J) that are those of a via point at the end of a range whatever the path."""
+    held = np.zeros((layout.segments, DEGREE + 1, demand.via_deg.shape[1]), dtype=bool)
+    last = len(layout.pieces)
+    for via, (arrives, leaves) in enumerate(zip(layout.arrivals, layout.departures(), strict=True)):
+        same = 3 if via in (0, last) or via in layout.stops else 2
+        joints = demand.turning[via]
+        held[max(arrives - 1, 0) : arrives, DEGREE + 1 - same :, joints] = True
+        held[arrives:leaves, :, joints] = True
+        held[leaves : leaves + 1, :same, joints] = True
+    return held
+
+
+def through(demand: Demand, layout: Layout) -> Array:
+    """Bernstein coefficients (S, 6, J) of the spline through the via points, at rest in dwells."""
+    points = bspline.fit(demand.via_deg, DEGREE)
+    pieces = bspline.polynomials(points, DEGREE)
+    parts = [_bernstein(piece[None], int(count)) for piece, count in zip(pieces, layout.pieces, strict=True)]
+    whole = []
+    for via, part in enumerate(parts):
+        if layout.stops.get(via, 0.0) > 0.0:
+            rest = (DWELL_SEGMENTS, DEGREE + 1, points.shape[1])
+            whole.append(np.broadcast_to(demand.via_deg[via], rest))
+        whole.append(part)
+    return np.concatenate(whole)
+
+
+def _targets(demand: Demand, layout: Layout) -> ToolTargets | None:
+    """Where the tool has to be near: at via points with a tolerance, and along a corridor."""
+    if demand.tool is None:
+        return None
+    parts = []
+    if demand.tolerances:
+        vias = sorted(demand.tolerances)
+        allowed = np.array([demand.tolerances[via] for via in vias])
+        knots = layout.arrivals[vias]
+        segment = np.minimum(knots, layout.segments - 1)
+        state = demand.tool.at(demand.via_deg[vias])
+        points = Points(segment, (knots - segment).astype(float))
+        parts.append(ToolTargets(points, state.position_mm, state.rotation, *allowed.T))
+    if np.isfinite(demand.corridor_mm):
+        points = collocation.grid(layout.segments, _CORRIDOR_PARTS, ends=False)
+        inner = Points(points.segment[1:-1], points.u[1:-1])
+        state = demand.tool.at(_at(through(demand, layout), inner))
+        most = np.full(len(inner.u), demand.corridor_mm)
+        parts.append(ToolTargets(inner, state.position_mm, state.rotation, most, np.full(len(most), np.inf)))
+    return sum(parts[1:], parts[0]) if parts else None
+
+
+def _at(pieces: Array, points: Points) -> Array:
+    """Values (P, J) of Bernstein coefficients (S, 6, J) at points."""
+    count = np.arange(DEGREE + 1)
+    u = points.u[:, None]
+    weights = np.array([comb(DEGREE, index) for index in count]) * u**count * (1.0 - u) ** (DEGREE - count)
+    return np.asarray(np.einsum("pb,pbj->pj", weights, pieces[points.segment]))
+
+
+def _bernstein(piece: Array, parts: int) -> Array:
+    """Bernstein coefficients (parts, 6, J) of one segment, power coefficients (1, 6, J), cut into parts."""
+    from armtempo.splines import bernstein
+
+    cut = np.moveaxis(bspline.subdivide(piece, parts), 1, 2)
+    return np.moveaxis(bernstein.unscale(bernstein.from_power(cut)), 2, 1)
+
+
+class Improver:
+    """Solves programs from a motion that keeps what is demanded to faster ones that keep it too."""
+
+    def __init__(self, demand: Demand, layout: Layout) -> None:
+        self.demand, self.layout = demand, layout
+        self.variables = MotionVariables(layout.segments, DEGREE, len(demand.limits))
+        self._size = demand.size_deg
+        self._low, self._high = bounds(demand, layout)
+        self._targets = _targets(demand, layout)
+
+    def improved(self, motion: FreeMotion, rounds: int) -> FreeMotion:
+        """After so many solves, each at the peaks that the one before showed; never slower than ``motion``."""
+        points = collocation.grid(self.layout.segments, _PARTS, ends=False)
+        best = here = motion.stretched(self.demand.limits)
+        for number in range(rounds):
+            here = self._solve(here, points, first=number == 0)
+            curve = here.curve(self.demand.limits)
+            stretch = curve.stretch()
+            points += collocation.peaks(curve, _FINER * _PARTS, _WATCHED)
+            here = here.slower(stretch)
+            best = min(best, here, key=lambda candidate: candidate.total_s)
+            if stretch < 1.0 + _NEAR:
+                break
+        return best
+
+    def equalities(self, unit_s: float) -> Equalities:
+        """What must hold exactly, with angles in parts of ``size_deg`` and times in ``unit_s``."""
+        via = Vias(self.demand.via_deg / self._size, self.demand.turning, frozenset(self.demand.tolerances))
+        return self.layout.equalities(self.variables, via, unit_s)
+
+    def angle_rows(self) -> Block:
+        """Inequalities of ranges and corridor, with angles in parts of ``size_deg``."""
+        return angle_bounds.forms(self.variables, self._low / self._size, self._high / self._size).rows(
+            self.variables
+        )
+
+    def _solve(self, motion: FreeMotion, points: Points, first: bool) -> FreeMotion:
+        unit_s = motion.total_s / self.layout.segments
+        limits = self.demand.limits * unit_s ** np.arange(1, 4) / self._size[:, None]
+        blocks: list[Block] = [LimitRows(self.variables, points, limits, None), self.angle_rows()]
+        if self._targets is not None and self.demand.tool is not None:
+            blocks.append(ToolRows(self.variables, self.demand.tool, self._targets, self._size))
+        smoothing = self._smoothing() * (1.0 if first else _SMOOTHED)
+        steps = motion.differences_s / unit_s * _AWAY
+        least = min(_LEAST_STEP, 0.5 * float(steps.min()))
+        program = MotionProgram(self.variables, blocks, self.equalities(unit_s), smoothing, least)
+        start = self.variables.pack(motion.angle_points_deg / self._size, steps)
+        x = interior_point.minimise(program, start, _FIRST if first else _AGAIN).x
+        x = met(self.variables, program.equalities, x)
+        return replace(
+            motion,
+            angle_points_deg=self.variables.angle_points(x) * self._size,
+            # A dwell far shorter than the segments beside it may be missed; then it lasts longer.
+            differences_s=np.maximum(self.variables.time_differences(x), least) * unit_s,
+        )
+
+    def _smoothing(self) -> Array:
+        """Weights of the steps between time differences; none where a dwell begins and ends."""
+        vias = len(self.demand.via_deg) - 1
+        weights = np.full(self.variables.differences - 1, _SMOOTHING * self.layout.segments / vias**2)
+        for knot in self.layout.dwells:
+            weights[knot + DWELL_SEGMENTS - 2 : knot + DWELL_SEGMENTS] = 0.0
+        return weights
+
+
+def met(variables: MotionVariables, equalities: Equalities, x: Array, smooth: bool = False) -> Array:
+    """``x`` changed so that the equalities hold, with the least third differences of the change.
+
+    With ``smooth`` the least of the angles themselves, whatever they were between the via points. Raises PlanError
+    where the equalities contradict each other.
+    """
+    control = np.concatenate([variables.angle_index(joint) for joint in range(variables.joints)])
+    starts = np.concatenate([variables.angle_index(joint)[:-3] for joint in range(variables.joints)])
+    window = starts[:, None] + np.arange(4)
+    third = np.array([-1.0, 3.0, -3.0, 1.0])
+    rows = np.concatenate([np.repeat(window, 4, axis=1).ravel(), np.arange(variables.size)])
+    columns = np.concatenate([np.tile(window, (1, 4)).ravel(), np.arange(variables.size)])
+    steady = np.ones(variables.size)
+    steady[control] = 1e-9
+    entries = np.concatenate([np.tile(np.outer(third, third).ravel(), len(window)), steady])
+    gradient = np.zeros(variables.size)
+    if smooth:
+        bent = x[window] @ third
+        np.add.at(gradient, window, np.outer(bent, third))
+    kkt = BandedKkt(variables.places, rows, columns, equalities)
+    try:
+        factor = kkt.factor(entries)
+    except np.linalg.LinAlgError:
+        raise PlanError(
+            "no motion was found that meets all via points, rests and dwells",
+            "raise refine, or set it to 'auto'; or bring times and angles closer together in size",
+        ) from None
+    return x + factor.solve(gradient, equalities.residual(x))

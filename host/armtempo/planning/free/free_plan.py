@@ -1,0 +1,198 @@
+"""The trajectory of a job whose path is free between its via points."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from armtempo_shared import motion as record
+from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS
+
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError
+from armtempo.basics.progress import Progress, part
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
+from armtempo.model.plan import Search
+from armtempo.model.tool_pose import Pose
+from armtempo.planning import checks, lower_bounds
+from armtempo.planning.free import corridor, free_path
+from armtempo.planning.free.angle_bounds import of_path
+from armtempo.planning.free.free_motion import Demand, FreeMotion, Tolerance, through
+from armtempo.planning.free.free_path import Effort, Shortest
+from armtempo.planning.free.layout import DEGREE, LEAST_PIECES, uniform
+from armtempo.planning.free.tool import Tool
+from armtempo.planning.planned import Planned
+from armtempo.planning.time_parameterization import MIN_DURATION_S
+from armtempo.planning.variables import time_points
+from armtempo.splines import extremes
+from armtempo.splines.trajectory import JointSpline, Trajectory
+
+_BEYOND = 2.0
+"""A free path is kept within so many times what its via points span on each side of them."""
+_WORTH_USING = 1e-3
+"""A tolerance of less than so many mm or degrees is not made use of."""
+_ROUNDED = 1.001
+"""Time is stretched by no more than this for what rounding does."""
+_WIDER = 0.5 * checks.TOLERANCE
+"""Ranges are widened by so much of themselves, so that a via point at their end is inside."""
+
+
+def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
+    """The motion through via angles (n + 1, J), which poses with a tolerance may be left by.
+
+    Raises InputError for a job that the board cannot hold, PlanError where no path stays within the ranges.
+    """
+    most = _most_segments(arm, job, len(via_deg))
+    moving = [int(joint) for joint in np.flatnonzero(np.ptp(via_deg, axis=0) > checks.TOLERANCE)]
+    groups = [moving] if job.timing == "shared" else [[joint] for joint in moving]
+    found = []
+    for number, joints in enumerate(groups):
+        demand = _demand(arm, job, via_deg, joints)
+        pieces = job.refine if isinstance(job.refine, int) else None
+        if pieces is None and len(groups) > 1:
+            pieces = free_path.automatic_pieces(len(via_deg) - 1, most)
+        effort = Effort(pieces, most, job.starts, np.random.default_rng([job.seed, joints[0]]))
+        found.append(free_path.shortest(demand, effort, part(progress, number, len(groups)) or progress))
+    trajectory = _kept(arm, _trajectory(job, via_deg, groups, found))
+    points = np.stack([joint.angle_points_deg for joint in trajectory.joints], axis=1)
+    checks.check_ranges(arm, points, DEGREE)
+    searches = tuple(
+        _search(arm, job, via_deg, joints, one) for joints, one in zip(groups, found, strict=True)
+    )
+    return Planned(trajectory, searches, _notes(arm, job, via_deg, groups, found))
+
+
+def _most_segments(arm: Arm, job: Job, vias: int) -> int:
+    """The most segments of a free path that the board's record can hold."""
+    shared, joints = job.timing == "shared", len(arm.driven)
+    most = MAX_SEGMENTS
+    while most > 1 and record.size(DEGREE, joints, shared, most, 1) > MAX_MOTION_BYTES:
+        most -= 1
+    pieces = job.refine if isinstance(job.refine, int) else LEAST_PIECES
+    needed = uniform(vias, pieces, {stop.via: stop.dwell_s for stop in job.stops}).segments
+    if needed > most:
+        raise InputError(
+            f"job {job.name!r}: a free path through {vias} via points with {pieces} pieces between any two needs "
+            f"{needed} segments, the board's record holds {most}",
+            'lower refine, use fewer via points or path = "through"',
+        )
+    return most
+
+
+def _demand(arm: Arm, job: Job, via_deg: Array, joints: list[int]) -> Demand:
+    """What the job asks of these joints."""
+    via = via_deg[:, joints]
+    driven = [arm.driven[joint] for joint in joints]
+    low, high = np.array([joint.range_deg for joint in driven]).T
+    room = _WIDER * np.maximum(1.0, np.maximum(np.abs(low), np.abs(high)))
+    span = np.ptp(via, axis=0)
+    tool = Tool(arm, joints, via_deg[0])
+    tolerances = _tolerances(job, via, tool)
+    return Demand(
+        names=tuple(joint.name for joint in driven),
+        via_deg=via,
+        limits=np.array([joint.limits.values for joint in driven]),
+        low_deg=np.maximum(low - room, via.min(axis=0) - _BEYOND * span),
+        high_deg=np.minimum(high + room, via.max(axis=0) + _BEYOND * span),
+        stops={stop.via: stop.dwell_s for stop in job.stops},
+        corridor_deg=np.inf if job.corridor_deg is None else job.corridor_deg,
+        corridor_mm=np.inf if job.corridor_mm is None else job.corridor_mm,
+        tool=tool if tolerances or job.corridor_mm is not None else None,
+        tolerances=tolerances,
+    )
+
+
+def _tolerances(job: Job, via_deg: Array, tool: Tool) -> dict[int, Tolerance]:
+    """How far the tool may pass from where via angles (n + 1, J) bring it; what they miss a pose by is taken off."""
+    allowed = {}
+    for number, pose in enumerate(job.via):
+        if number and isinstance(pose, Pose) and checks.is_wide(pose):
+            miss = tool.miss(via_deg[number], pose)
+            turn_deg = pose.tolerance_deg - miss.rotation_deg if pose.fixed else np.inf
+            left = Tolerance(pose.tolerance_mm - miss.position_mm, turn_deg)
+            if min(left) > _WORTH_USING:
+                allowed[number] = left
+    return allowed
+
+
+def _trajectory(job: Job, via_deg: Array, groups: list[list[int]], found: list[Shortest]) -> Trajectory:
+    """All joints; one that does not move stands still on the longest time axis."""
+    longest = max((one.motion for one in found), key=lambda motion: motion.total_s)
+    by_joint = {
+        joint: (one.motion, column)
+        for joints, one in zip(groups, found, strict=True)
+        for column, joint in enumerate(joints)
+    }
+    joints = []
+    for joint in range(via_deg.shape[1]):
+        if joint in by_joint:
+            joints.append(_joint(*by_joint[joint]))
+        else:
+            still = np.full(longest.layout.segments + DEGREE, via_deg[0, joint])
+            joints.append(_spline(longest, still))
+    return Trajectory(job.name, tuple(joints), job.timing == "shared")
+
+
+def _kept(arm: Arm, trajectory: Trajectory) -> Trajectory:
+    """The same, slower by the little that rounding of its control points may have done to its limits."""
+    factors = []
+    for spline, joint in zip(trajectory.joints, arm.driven, strict=True):
+        excess = extremes.of_joints((spline,))[0].values / np.array(joint.limits.values)
+        factors.append(float(np.max(excess ** (1.0 / np.arange(1, 4)))))
+    if trajectory.shared:
+        factors = [max(factors)] * len(factors)
+    joints = (
+        replace(spline, time_points_s=spline.time_points_s * factor) if 1.0 < factor < _ROUNDED else spline
+        for spline, factor in zip(trajectory.joints, factors, strict=True)
+    )
+    return replace(trajectory, joints=tuple(joints))
+
+
+def _joint(motion: FreeMotion, column: int) -> JointSpline:
+    return _spline(motion, np.ascontiguousarray(motion.angle_points_deg[:, column]))
+
+
+def _spline(motion: FreeMotion, angle_points_deg: Array) -> JointSpline:
+    stretch = max(1.0, MIN_DURATION_S / motion.total_s)
+    times = time_points(motion.differences_s * stretch, DEGREE)
+    return JointSpline(DEGREE, 1, angle_points_deg, times, tuple(map(int, motion.layout.arrivals)))
+
+
+def _search(arm: Arm, job: Job, via_deg: Array, joints: list[int], found: Shortest) -> Search:
+    limits = [arm.driven[joint].limits for joint in joints]
+    demand = _demand(arm, job, via_deg, joints)
+    floor = lower_bounds.of_vias(demand.via_deg, limits, demand.stops, demand.tolerances)
+    return Search(
+        joints=tuple(joints),
+        intervals_s=found.motion.differences_s,
+        total_s=max(found.motion.total_s, MIN_DURATION_S),
+        searched_s=float(found.starts_s.min()),
+        evaluations=len(found.starts_s),
+        history_s=np.minimum.accumulate(found.starts_s),
+        starts_s=found.starts_s,
+        optimum_s=0.0,
+        floor_s=floor.time_s,
+        floor_kind=floor.kind,
+    )
+
+
+def _notes(
+    arm: Arm, job: Job, via_deg: Array, groups: list[list[int]], found: list[Shortest]
+) -> tuple[str, ...]:
+    """How far a path in a corridor leaves the spline through the via points, proven."""
+    notes = []
+    for joints, one in zip(groups, found, strict=True):
+        demand = _demand(arm, job, via_deg, joints)
+        if job.corridor_deg is not None:
+            path = of_path(one.motion.angle_points_deg, DEGREE)
+            away = corridor.joint_deviation_deg(path, through(demand, one.motion.layout))
+            notes.append(
+                f"no joint leaves the spline through the via points by more than {away:.4g} deg (proven)"
+            )
+        if job.corridor_mm is not None:
+            away = free_path.tool_deviation_mm(demand, one.motion)
+            notes.append(
+                f"the tool leaves the spline through the via points by no more than {away:.4g} mm (proven)"
+            )
+    return tuple(notes)

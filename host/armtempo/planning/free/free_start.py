@@ -1,0 +1,116 @@
+"""Motions for a free path to start from: through all via points, at rest where asked, within ranges and corridor."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import PlanError
+from armtempo.optimise.kkt import Equalities
+from armtempo.planning.free import angle_bounds, inside_bounds
+from armtempo.planning.free.free_motion import Demand, FreeMotion, Improver, bounds, met
+from armtempo.planning.free.layout import DEGREE, Layout, Vias, uniform
+from armtempo.planning.variables import MotionVariables
+from armtempo.splines import bspline
+
+_LEAST_STEP = 1e-3
+"""Least difference of time control points, as a part of the largest."""
+
+
+def along_spline(demand: Demand, pieces: int, times_s: Array) -> FreeMotion:
+    """The spline through the via points, with as many segments between any two of them; for times (n,) there."""
+    layout = uniform(len(demand.via_deg), pieces, demand.stops)
+    points = bspline.refined(bspline.fit(demand.via_deg, DEGREE), pieces, DEGREE)
+    if demand.stops:
+        return smooth(demand, layout, times_s)
+    return _met(demand, layout, points, _differences(layout, times_s / pieces), smooth=False)
+
+
+def smooth(demand: Demand, layout: Layout, times_s: Array) -> FreeMotion:
+    """The path with the least third differences of its control points, for times (n,) between the via points."""
+    rough = np.empty((layout.segments + DEGREE, demand.via_deg.shape[1]))
+    place = np.arange(len(rough)) - 0.5 * (DEGREE - 1)
+    knots = np.stack([layout.arrivals, layout.departures()], axis=1).ravel()
+    for joint, angles in enumerate(demand.via_deg.T):
+        rough[:, joint] = np.interp(place, knots, np.repeat(angles, 2))
+    return _met(demand, layout, rough, _differences(layout, times_s / layout.pieces), smooth=True)
+
+
+def resampled(demand: Demand, layout: Layout, motion: FreeMotion) -> FreeMotion:
+    """A motion put onto another layout, with segments that take about the same time between two via points."""
+    curve = motion.curve(demand.limits)
+    times = motion.via_times_s
+    leaves = times + np.array([motion.layout.stops.get(via, 0.0) for via in range(len(times))])
+    steps_s = motion.stretch_times_s / layout.pieces
+    knots = [np.array([0.0])]
+    for via, (step, count) in enumerate(zip(steps_s, layout.pieces, strict=True)):
+        if layout.arrivals[via] < layout.departures()[via]:
+            knots.append(np.full(layout.departures()[via] - layout.arrivals[via], leaves[via]))
+        knots.append(leaves[via] + step * np.arange(1, count + 1))
+    times_s = np.concatenate(knots)
+    angles = curve.angles_at(np.minimum(times_s, times[-1]))
+    return _met(demand, layout, bspline.fit(angles, DEGREE), _passing(times_s), smooth=False)
+
+
+def _passing(times_s: Array) -> Array:
+    """Differences (S + 4,) of control points whose spline has these times (S + 1,) at its knots."""
+    variables = MotionVariables(len(times_s) - 1, DEGREE, 1)
+    weights = bspline.basis(DEGREE)[0, :DEGREE]
+    columns = np.arange(len(times_s))[:, None] + np.arange(DEGREE)
+    rows = Equalities(
+        np.repeat(np.arange(len(times_s)), DEGREE),
+        columns.ravel(),
+        np.tile(weights, len(times_s)),
+        times_s,
+        0.5 * (DEGREE - 1) + np.arange(len(times_s), dtype=np.float64),
+    )
+    x = met(variables, rows, np.zeros(variables.size), smooth=True)
+    return np.diff(variables.angle_points(x)[:, 0])
+
+
+def _differences(layout: Layout, steps_s: Array) -> Array:
+    """Differences of time control points for segments that take so long between the via points, (n,)."""
+    arrivals, departures = layout.arrivals, layout.departures()
+    segments = np.empty(layout.segments)
+    for via, step in enumerate(steps_s):
+        segments[arrivals[via] : arrivals[via + 1]] = step
+        if departures[via] > arrivals[via]:
+            segments[arrivals[via] : departures[via]] = layout.stops[via] / (departures[via] - arrivals[via])
+    own = np.clip(np.arange(layout.segments + DEGREE - 1) - (DEGREE - 1) // 2, 0, layout.segments - 1)
+    return segments[own]
+
+
+def _met(demand: Demand, layout: Layout, points: Array, differences_s: Array, smooth: bool) -> FreeMotion:
+    """The motion with its control points moved so that via points, rests and dwells are met."""
+    improver = Improver(demand, layout)
+    x = improver.variables.pack(points / demand.size_deg, differences_s)
+    x = met(improver.variables, improver.equalities(1.0), x, smooth)
+    steps = np.maximum(differences_s, _LEAST_STEP * differences_s.max())
+    motion = FreeMotion(layout, improver.variables.angle_points(x) * demand.size_deg, steps)
+    return _inside(demand, motion)
+
+
+def _inside(demand: Demand, motion: FreeMotion) -> FreeMotion:
+    """The motion, moved where it must be to keep ranges and corridor."""
+    layout, size = motion.layout, demand.size_deg
+    low, high = bounds(demand, layout)
+    points = motion.angle_points_deg.copy()
+    variables = MotionVariables(layout.segments, DEGREE, 1)
+    vias = Vias(demand.via_deg / size, demand.turning)
+    for joint, name in enumerate(demand.names):
+        one = slice(joint, joint + 1)
+        forms = angle_bounds.forms(variables, low[..., one] / size[joint], high[..., one] / size[joint])
+        fixed = layout.angle_equalities(variables, vias.joint(joint))
+        rooms = demand.room_deg[~demand.turning[:, joint], joint]
+        room = min(rooms.min(initial=np.inf), demand.corridor_deg) / size[joint]
+        found = inside_bounds.nearest(forms, room, fixed, points[:, joint] / size[joint])
+        if found is None:
+            raise PlanError(
+                f"{name}: no path with {layout.pieces.min()} pieces between via points stays within its range and "
+                "corridor",
+                "raise refine, widen the corridor, or move the via points away from the end of the range",
+            )
+        points[:, joint] = found * size[joint]
+    return replace(motion, angle_points_deg=points)

@@ -1,0 +1,1 @@
+"""Motions by hand: joints and tool, as long as a button is held."""

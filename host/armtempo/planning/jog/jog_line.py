@@ -1,0 +1,229 @@
+"""The postures along a straight line of the tool, or a turn of it about an axis, each next to the one before.
+
+The line ends where a joint reaches the end of its range, where the tool cannot follow, or near a singular posture,
+where small ways of the tool need large ways of the joints: the arm never changes its branch.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError
+from armtempo.kinematics.chain import all_angles_deg
+from armtempo.kinematics.forward import forward
+from armtempo.kinematics.solver import PoseSolver
+from armtempo.model.arm import Arm
+from armtempo.model.tool_pose import APPROACH, PITCH, ROLL, WHOLE, YAW, Pose
+
+TOLERANCE_MM, TOLERANCE_DEG = 0.02, 0.02
+"""A posture this near to the line is on it."""
+STEPS_OF_REACH, STEP_DEG = 250, 1.0
+"""The line is looked at in steps of the arm's reach by this, or of so many degrees."""
+MOST_GAIN = 5.0
+"""Radians of a joint for a radian of the tool, or for a way of the arm's reach; beyond, a posture is singular."""
+MARGIN_STEPS = 2.0
+"""So many steps of its motor are left to the end of a joint's range."""
+AXES = ("x", "y", "z", "tool-x", "tool-y", "tool-z")
+"""Axes of the base, and of the tool as it stands at the start."""
+_TRIED = (WHOLE, (APPROACH,), (PITCH,), (YAW,), (ROLL,), ())
+_PARALLEL = 0.99
+_HALVINGS = 8
+_STEPS_TO_JUDGE = 3
+
+
+@dataclass(frozen=True, eq=False)
+class ToolLine:
+    """A line of the tool from a posture of the arm."""
+
+    arm: Arm
+    start_deg: Array
+    """The driven joints, (J,)."""
+    axis: str
+    """One of AXES."""
+    about: bool
+    """Turn about the axis instead of moving along it."""
+    sign: int
+
+    @cached_property
+    def _solver(self) -> PoseSolver:
+        return PoseSolver(self.arm)
+
+    @cached_property
+    def _start(self) -> Array:
+        """Angles of all joints, rad."""
+        return np.radians(all_angles_deg(self.arm, self.start_deg))
+
+    @cached_property
+    def _pose(self) -> Array:
+        return forward(self._solver.geometry, self._start)
+
+    @cached_property
+    def reach_mm(self) -> float:
+        """All links in a row."""
+        return float(self._solver.geometry.reach) or 1.0
+
+    @cached_property
+    def step(self) -> float:
+        """Of the looks along the line, mm or deg."""
+        return STEP_DEG if self.about else self.reach_mm / STEPS_OF_REACH
+
+    @cached_property
+    def direction(self) -> Array:
+        """Of the axis in the frame of the base, (3,)."""
+        unit = np.eye(3)["xyz".index(self.axis[-1])]
+        return self.sign * np.asarray(self._pose[:3, :3] @ unit if self.axis.startswith("tool") else unit)
+
+    def pose(self, way: float) -> Array:
+        """The tool's pose after so many mm or deg, (4, 4)."""
+        pose = self._pose.copy()
+        if self.about:
+            pose[:3, :3] = _turn(self.direction, math.radians(way)) @ pose[:3, :3]
+        else:
+            pose[:3, 3] += way * self.direction
+        return pose
+
+    @cached_property
+    def fixed(self) -> tuple[str, ...]:
+        """What the arm can keep of the tool's orientation on this line; InputError where it cannot even begin."""
+        for fixed in _TRIED[:2] if self.about else _TRIED:
+            if self._turns(fixed) and self._begins(fixed):
+                return fixed
+        what = f"turn the tool about {self.axis}" if self.about else f"move the tool along {self.axis}"
+        raise InputError(
+            f"the arm cannot {what} from here",
+            "a joint is at the end of its range, or the arm has too few joints: jog single joints",
+        )
+
+    def _turns(self, fixed: tuple[str, ...]) -> bool:
+        """Whether a turn about the axis is one at all, of what is kept of the orientation."""
+        spins = abs(self.direction @ self._pose[:3, 2]) > _PARALLEL
+        return not (self.about and fixed == (APPROACH,) and spins)
+
+    def _begins(self, fixed: tuple[str, ...]) -> bool:
+        angles = self._start
+        for number in range(1, _STEPS_TO_JUDGE + 1):
+            found = self._near(
+                number * self.step / _STEPS_TO_JUDGE, angles, fixed, self.step / _STEPS_TO_JUDGE
+            )
+            if isinstance(found, str):
+                return False
+            angles = found
+        return True
+
+    def _near(self, way: float, before: Array, fixed: tuple[str, ...], step: float) -> Array | str:
+        """All joints on the line after ``way``, (joints,) in rad, next to the posture before; or why there is none."""
+        target = Pose(
+            tuple(map(tuple, self.pose(way).tolist())),
+            fixed=fixed,
+            tolerance_mm=TOLERANCE_MM,
+            tolerance_deg=TOLERANCE_DEG,
+        )
+        found = self._solver.nearest(target, before.tolist())
+        if not found.success:
+            return _short(found.reason)
+        angles = np.array(found.angles_rad)
+        if outside := self._outside(angles):
+            return f"{outside} is at the end of its range"
+        most = MOST_GAIN * (math.radians(step) if self.about else step / self.reach_mm)
+        worst = int(np.argmax(np.abs(angles - before)))
+        if abs(angles[worst] - before[worst]) > most + 1e-9:
+            return f"the posture is nearly singular: {self.arm.joints[worst].name} would turn too far"
+        return angles
+
+    def _outside(self, angles: Array) -> str:
+        """The first joint that is nearer to the end of its range than it may come, or stood already."""
+        for index, joint in zip(self.arm.driven_indices, self.arm.driven, strict=True):
+            margin = MARGIN_STEPS / joint.steps_per_deg
+            angle, start = math.degrees(angles[index]), math.degrees(self._start[index])
+            low, high = (min(joint.range_deg[0] + margin, start), max(joint.range_deg[1] - margin, start))
+            if not low - 1e-9 <= angle <= high + 1e-9:
+                return joint.name
+        return ""
+
+    def followed(self, length: float) -> FollowedLine:
+        """The line as far as the arm can follow it, at most ``length``."""
+        fixed = self.fixed
+        ways, postures = [0.0], [self._start]
+        ends = ""
+        step = min(self.step, length / _STEPS_TO_JUDGE)
+        while not ends and ways[-1] < length:
+            here = min(step, length - ways[-1])
+            found = self._near(ways[-1] + here, postures[-1], fixed, here)
+            for _ in range(_HALVINGS):
+                if not isinstance(found, str):
+                    break
+                ends, here = found, here / 2.0
+                found = self._near(ways[-1] + here, postures[-1], fixed, here)
+            if isinstance(found, str):
+                break
+            ways.append(ways[-1] + here)
+            postures.append(found)
+            if length - ways[-1] < 1e-9 * length:
+                break
+        return FollowedLine(self, np.array(ways), np.array(postures), ends)
+
+
+@dataclass(frozen=True, eq=False)
+class FollowedLine:
+    """What of a line the arm can follow."""
+
+    line: ToolLine
+    ways: Array
+    """(K,), from 0, mm or deg."""
+    angles_rad: Array
+    """All joints there, (K, joints)."""
+    ends: str
+    """Why the line ends before it was to, in words; "" where it does not."""
+
+    @property
+    def length(self) -> float:
+        """How far it goes."""
+        return float(self.ways[-1])
+
+    def at(self, ways: Array) -> Array:
+        """The driven joints at ways along the line, degrees (K, J); InputError where one of them is not on it."""
+        found = []
+        line = self.line
+        for way in ways:
+            near = np.array([np.interp(way, self.ways, column) for column in self.angles_rad.T])
+            angles = line._near(float(way), near, line.fixed, max(line.step, 1e-3))
+            if isinstance(angles, str):
+                raise InputError(f"the tool cannot follow the line: {angles}", "jog single joints")
+            found.append(np.degrees(angles[list(line.arm.driven_indices)]))
+        return np.array(found)
+
+    def off(self, driven_deg: Array, ways: Array) -> float:
+        """How far the tool leaves the line at postures (K, J) after about ``ways``: mm, or deg of a turn."""
+        line = self.line
+        poses = forward(line._solver.geometry, np.radians(all_angles_deg(line.arm, driven_deg)))
+        worst = 0.0
+        for pose, way in zip(poses, ways, strict=True):
+            gap = pose[:3, 3] - line._pose[:3, 3]
+            if line.about:
+                turned = line.pose(float(way))[:3, 2] @ pose[:3, 2]
+                worst = max(
+                    worst,
+                    float(np.linalg.norm(gap)),
+                    0.0 if turned > 1 else math.degrees(math.acos(turned)) - 1,
+                )
+            else:
+                worst = max(worst, float(np.linalg.norm(gap - (gap @ line.direction) * line.direction)))
+        return worst
+
+
+def _short(reason: str) -> str:
+    """Why a posture was not found, without the figures of the one that comes near."""
+    first = reason.partition(";")[0]
+    return "the arm reaches no further" if first.startswith("the arm does not reach") else first
+
+
+def _turn(axis: Array, angle_rad: float) -> Array:
+    """Rotation about a unit vector (Rodrigues)."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + math.sin(angle_rad) * cross + (1.0 - math.cos(angle_rad)) * (cross @ cross))

@@ -1,0 +1,252 @@
+"""A jog: one joint, or the tool along or about an axis, from where the arm stands; straight, and quick to stop."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError, PlanError
+from armtempo.model.arm import Arm, DrivenJoint
+from armtempo.planning import brake_time, point_to_point
+from armtempo.planning.jog import jog_law
+from armtempo.planning.jog.jog_law import DEGREE, WayLaw, WayLimits
+from armtempo.planning.jog.jog_line import AXES, FollowedLine, ToolLine
+from armtempo.splines import bspline, extremes
+from armtempo.splines.trajectory import JointSpline, Trajectory
+
+SPEED = 0.25
+"""Of the arm's speed limits, where nothing else is asked for."""
+SLOWEST = 0.01
+RAMP = 0.5
+"""Of the acceleration and jerk limits, what a jog uses itself: the rest is for braking at any moment."""
+STRAY_MM = 0.2
+"""How far the tool may leave its line."""
+LINE_PARTS = (8, 16, 32, 64)
+"""Into so many parts a line is cut, until the tool stays on it; then its ramps too, which takes longer."""
+_SHORTER = 0.98
+_TRIES = 6
+_INSIDE_STEPS = 1e-6
+
+
+@dataclass(frozen=True)
+class JogMove:
+    """What is to move, and how far."""
+
+    by: float
+    """deg or mm; infinite: as far as it goes."""
+    joint: int | None = None
+    """Place among the driven joints, from 0."""
+    axis: str = ""
+    """Of AXES, where it is no joint."""
+    about: bool = False
+    """Turn the tool about the axis instead of moving it along."""
+
+    @property
+    def unit(self) -> str:
+        """Of ``by``."""
+        return "deg" if self.joint is not None or self.about else "mm"
+
+    def words(self, arm: Arm) -> str:
+        """What it moves."""
+        if self.joint is not None:
+            return arm.driven[self.joint].name
+        return f"tool {'about' if self.about else 'along'} {self.axis}"
+
+
+@dataclass(frozen=True, eq=False)
+class JogMotion:
+    """A jog that is planned."""
+
+    trajectory: Trajectory
+    brake_s: float
+    """From anywhere on it the arm can come to rest in this time."""
+    ends: str
+    """Why it ends before it was to, in words; "" where it does not."""
+
+    @property
+    def end_deg(self) -> Array:
+        """Where it ends, (J,)."""
+        return self.trajectory(self.trajectory.duration_s)
+
+
+def move_of(
+    arm: Arm, joint: int | str | None, axis: str | None, by_deg: float | None, by_mm: float | None
+) -> JogMove:
+    """What is to move: a joint by degrees, or the tool along an axis by mm or about it by degrees.
+
+    Raises InputError where the arguments do not go together, or the arm has no such joint.
+    """
+    ways = [by for by in (by_deg, by_mm) if by is not None]
+    if (joint is None) == (axis is None) or len(ways) != 1 or (joint is not None and by_deg is None):
+        raise InputError(
+            "a jog moves a joint by degrees, or the tool along an axis by mm or about it by degrees",
+            "give joint and by_deg, axis and by_mm, or axis and by_deg",
+        )
+    if joint is not None:
+        return JogMove(ways[0], joint=number_of_joint(arm, joint))
+    return JogMove(ways[0], axis=axis or "", about=by_deg is not None)
+
+
+def plan(name: str, arm: Arm, here_deg: Sequence[float], move: JogMove, speed: float = SPEED) -> JogMotion:
+    """The jog from rest at ``here_deg`` (J,), at ``speed`` of the arm's speed limits.
+
+    It ends at the end of a range at the latest, and a line of the tool where the arm cannot follow it. Raises
+    InputError for a move that is none, or where there is no way to go.
+    """
+    start = np.array(here_deg, dtype=float)
+    if not SLOWEST <= speed <= 1.0:
+        raise InputError(
+            f"a speed of {speed:g} is not allowed", f"give a part of the limits, {SLOWEST:g} to 1"
+        )
+    if math.isnan(move.by) or move.by == 0.0:
+        raise InputError("a jog by 0 moves nothing", "say how far, in degrees or mm")
+    if (move.joint is None) == (not move.axis):
+        raise InputError("a jog moves a joint or the tool, one of both", "name a joint, or an axis")
+    found = (
+        _joint(name, arm, start, move, speed)
+        if move.joint is not None
+        else _tool(name, arm, start, move, speed)
+    )
+    trajectory, ends = found
+    limits = [joint.limits for joint in arm.driven]
+    return JogMotion(trajectory, brake_time.brake_time_s(trajectory, limits), ends)
+
+
+def number_of_joint(arm: Arm, joint: int | str) -> int:
+    """The place of a joint, from 0, by its number (from 1) or its name; InputError where there is none."""
+    names = [driven.name for driven in arm.driven]
+    if joint in names:
+        return names.index(str(joint))
+    if str(joint).isdecimal() and 1 <= int(joint) <= len(names):
+        return int(joint) - 1
+    raise InputError(
+        f"arm {arm.name!r} drives no joint {joint!r}",
+        f"give 1 to {len(names)}, or a name: {', '.join(names)}",
+    )
+
+
+def _joint(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tuple[Trajectory, str]:
+    assert move.joint is not None
+    joint = arm.driven[move.joint]
+    end, ends = _end_deg(joint, start[move.joint], move.by)
+    length = abs(end - start[move.joint])
+    if length * joint.steps_per_deg < _INSIDE_STEPS:
+        raise InputError(f"{joint.name} is at the end of its range, {end:g} degrees", "jog it the other way")
+    found = jog_law.law(length, _limits(joint, speed))
+    way = math.copysign(1.0, end - start[move.joint]) * found.way
+    rows = [
+        start[index] + (way if index == move.joint else np.zeros_like(way))
+        for index in range(len(arm.driven))
+    ]
+    return _trajectory(name, rows, found.time_s), ends
+
+
+def _end_deg(joint: DrivenJoint, here: float, by: float) -> tuple[float, str]:
+    """Where a joint is to end, on a whole step within its range if that is what ends it, and why there."""
+    low, high = joint.range_deg
+    wanted = here + by
+    if low <= wanted <= high:
+        return wanted, ""
+    edge = min(high, wanted) if by > 0 else max(low, wanted)
+    scale = joint.steps_per_deg
+    inside = math.floor(edge * scale + 1e-9) / scale if by > 0 else math.ceil(edge * scale - 1e-9) / scale
+    end = max(inside, here) if by > 0 else min(inside, here)
+    return end, f"{joint.name} is at the end of its range, {edge:g} degrees"
+
+
+def _limits(joint: DrivenJoint, speed: float) -> WayLimits:
+    most = joint.limits
+    return WayLimits(speed * most.speed_deg_s, RAMP * most.acceleration_deg_s2, RAMP * most.jerk_deg_s3)
+
+
+def _tool(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tuple[Trajectory, str]:
+    if move.axis not in AXES:
+        raise InputError(f"there is no axis {move.axis!r}", f"give one of {', '.join(AXES)}")
+    point_to_point.posture(start, arm)
+    line = ToolLine(arm, start, move.axis, move.about, 1 if move.by > 0 else -1)
+    longest = 360.0 if move.about else 2.0 * line.reach_mm
+    followed = line.followed(min(abs(move.by), longest))
+    ends = followed.ends
+    if followed.length < 1e-6:
+        raise InputError(f"the tool cannot move on: {ends}", "jog the other way, or single joints")
+    length = followed.length
+    for _ in range(_TRIES):
+        trajectory = _on_line(name, followed, length, speed)
+        if trajectory is not None:
+            return trajectory, ends
+        length *= _SHORTER
+        ends = ends or "the joints cannot follow the line any further"
+    raise PlanError("the tool cannot follow this line", "jog single joints")
+
+
+def _on_line(name: str, followed: FollowedLine, length: float, speed: float) -> Trajectory | None:
+    """The motion along the line; None where a joint would leave its range, or the tool the line."""
+    arm = followed.line.arm
+    limits = _line_limits(followed, length, speed)
+    for short_ramps, parts in itertools.product((False, True), LINE_PARTS):
+        law = jog_law.law(length, limits, length / parts, short_ramps)
+        angles = followed.at(np.clip(law.at_knots, 0.0, length))
+        trajectory = _trajectory(name, list(bspline.fit(angles, DEGREE).T), law.time_s)
+        if not _within(trajectory, arm):
+            return None
+        if _stray(trajectory, law, followed) <= STRAY_MM:
+            return _slowed(trajectory, arm, speed)
+    return None
+
+
+def _line_limits(followed: FollowedLine, length: float, speed: float) -> WayLimits:
+    """Of the way along the line, by the joint that turns most for it."""
+    arm = followed.line.arm
+    upto = followed.ways <= length * (1 + 1e-9)
+    angles = np.degrees(followed.angles_rad[upto][:, list(arm.driven_indices)])
+    ways = followed.ways[upto]
+    if len(ways) < 2:
+        angles, ways = np.degrees(followed.angles_rad[:2][:, list(arm.driven_indices)]), followed.ways[:2]
+    gains = np.abs(np.diff(angles, axis=0) / np.diff(ways)[:, None]).max(axis=0) + 1e-12
+    rows = [_limits(joint, speed) for joint in arm.driven]
+    return WayLimits(
+        min(row.speed / gain for row, gain in zip(rows, gains, strict=True)),
+        min(row.acceleration / gain for row, gain in zip(rows, gains, strict=True)),
+        min(row.jerk / gain for row, gain in zip(rows, gains, strict=True)),
+    )
+
+
+def _within(trajectory: Trajectory, arm: Arm) -> bool:
+    times = np.linspace(0.0, trajectory.duration_s, 8 * len(trajectory.joints[0].time_polynomials) + 1)
+    angles = trajectory(times)
+    low, high = np.array([joint.range_deg for joint in arm.driven]).T
+    low, high = np.minimum(low, angles[0]), np.maximum(high, angles[0])  # a whole step may lie just beyond
+    return bool(np.all(angles >= low - 1e-9) and np.all(angles <= high + 1e-9))
+
+
+def _stray(trajectory: Trajectory, law: WayLaw, followed: FollowedLine) -> float:
+    """How far the tool leaves the line, in mm (of a turn about an axis: its point)."""
+    way = JointSpline(DEGREE, 1, law.way, law.time_s)
+    knots = way.via_times_s
+    times = (knots[:-1, None] + np.diff(knots)[:, None] * (0.25, 0.5, 0.75)).ravel()
+    return followed.off(trajectory(times), way(times))
+
+
+def _slowed(trajectory: Trajectory, arm: Arm, speed: float) -> Trajectory:
+    """The same motion in such a time that every joint keeps its part of the limits."""
+    factor = 0.0
+    for reached, joint in zip(extremes.of_joints(trajectory.joints), arm.driven, strict=True):
+        limits = _limits(joint, speed)
+        factor = max(
+            factor,
+            reached.speed_deg_s / limits.speed,
+            math.sqrt(reached.acceleration_deg_s2 / limits.acceleration),
+            math.cbrt(reached.jerk_deg_s3 / limits.jerk),
+        )
+    joints = tuple(replace(joint, time_points_s=factor * joint.time_points_s) for joint in trajectory.joints)
+    return Trajectory(trajectory.name, joints, shared=True)
+
+
+def _trajectory(name: str, rows: Sequence[Array], time_s: Array) -> Trajectory:
+    ends = (0, len(time_s) - DEGREE)
+    return Trajectory(name, tuple(JointSpline(DEGREE, 1, row, time_s, ends) for row in rows), shared=True)

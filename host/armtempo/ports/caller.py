@@ -1,0 +1,181 @@
+"""The other end: who has a port, what it answers, what it hands out."""
+
+from __future__ import annotations
+
+import itertools
+import socket
+import time
+from collections.abc import Iterator
+from enum import Enum
+from types import TracebackType
+from typing import Any, Self
+
+from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, PortGivenUpError
+from armtempo.ports import claim as claims
+from armtempo.ports.claim import VERSION, PortClaim
+from armtempo.ports.lines import LineReader, Message, to_line
+
+HANGS_S = 2.0
+"""A program that has not answered ``hello`` for so long counts as hanging."""
+_REMEMBERED_S = 5.0
+"""That it hangs is not tried again for so long."""
+_END = "end that process, or let a command that needs the port take it over"
+_hung: dict[str, float] = {}
+"""When a claim's program was last found to hang, by the claim's number."""
+
+
+class Ownership(Enum):
+    """What became of a program that has claimed a port."""
+
+    LIVES = "lives"
+    HANGS = "hangs"
+    """It is there, and does not answer."""
+    DIED = "died"
+
+
+def ownership(claim: PortClaim) -> Ownership:
+    """Whether the program that has claimed a port answers, hangs or is gone."""
+    if time.monotonic() < _hung.get(claim.number, 0.0) + _REMEMBERED_S:
+        return Ownership.HANGS
+    try:
+        Caller(claim).close()
+        return Ownership.LIVES
+    except NoAnswerError:
+        return Ownership.HANGS
+    except LinkError:
+        return Ownership.DIED
+
+
+def remember_hanging(number: str) -> None:
+    """The program of this claim was just found to hang; who asks next need not find it out again."""
+    _hung[number] = time.monotonic()
+
+
+class Caller:
+    """A connection to the program that has a port; used as a context, or ended by ``close``.
+
+    Raises NoAnswerError where that program hangs, LinkError where it is gone.
+    """
+
+    def __init__(self, claim: PortClaim) -> None:
+        self.claim = claim
+        self._numbers = itertools.count(1)
+        self._published: list[Message] = []
+        self._socket = _connect(claim)
+        self._reader = LineReader(self._socket)
+        try:
+            self.ask("hello", HANGS_S, version=VERSION, token=claim.token)
+        except BaseException as error:
+            if isinstance(error, NoAnswerError):
+                remember_hanging(claim.number)
+            self.close()
+            raise
+
+    def ask(self, request: str, timeout_s: float, **fields: Any) -> Message:
+        """The answer to a request.
+
+        Raises NoAnswerError after ``timeout_s``, BoardError or LinkError with the text of a refusal, LinkError
+        where the program is gone.
+        """
+        number = next(self._numbers)
+        limit_s = time.monotonic() + timeout_s
+        self._send(to_line({"id": number, "request": request, **fields}))
+        while True:
+            message = self._receive(max(0.0, limit_s - time.monotonic()))
+            if message is None:
+                raise NoAnswerError(f"{self.claim.who} has {self.claim.port} and does not answer", _END)
+            if "topic" in message:
+                self._published.append(message)
+            elif message.get("id") in (number, None):
+                return _checked(message)
+
+    def subscribe(self, *topics: str) -> None:
+        """Choose what ``messages`` gives: some of ``server.TOPICS``."""
+        self.ask("subscribe", HANGS_S, topics=list(topics))
+
+    def messages(self, timeout_s: float | None = None) -> Iterator[Message]:
+        """What was subscribed to, as it comes, until the other program gives up the port.
+
+        ``timeout_s``: after so long without a message the iteration ends too.
+        """
+        while True:
+            while self._published:
+                yield self._published.pop(0)
+            try:
+                message = self._receive(timeout_s)
+            except LinkError:
+                return
+            if message is None:
+                return
+            if "topic" in message:
+                self._published.append(message)
+
+    def close(self) -> None:
+        """Hang up."""
+        self._socket.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _send(self, line: bytes) -> None:
+        try:
+            self._socket.settimeout(HANGS_S)
+            self._socket.sendall(line)
+        except TimeoutError:
+            raise NoAnswerError(
+                f"{self.claim.who} has {self.claim.port} and takes no requests", _END
+            ) from None
+        except OSError as error:
+            raise self._gone() from error
+
+    def _receive(self, timeout_s: float | None) -> Message | None:
+        """The next message; None after ``timeout_s``."""
+        try:
+            self._socket.settimeout(None if timeout_s is None else max(timeout_s, 1e-3))
+            message = self._reader.read()
+        except TimeoutError:
+            return None
+        except OSError as error:
+            raise self._gone() from error
+        if message is None:
+            raise self._gone()
+        return message
+
+    def _gone(self) -> LinkError:
+        return PortGivenUpError(
+            f"{self.claim.who} has given up {self.claim.port}", "try again: the port is free"
+        )
+
+
+def _connect(claim: PortClaim) -> socket.socket:
+    kind, address = (
+        (socket.AF_UNIX, claim.address)
+        if claims.LOCAL_SOCKETS
+        else (socket.AF_INET, ("127.0.0.1", int(claim.address)))
+    )
+    found = socket.socket(kind, socket.SOCK_STREAM)
+    found.settimeout(HANGS_S)
+    try:
+        found.connect(address)
+    except (TimeoutError, BlockingIOError):
+        found.close()
+        raise NoAnswerError(f"{claim.who} has {claim.port} and takes no connection", _END) from None
+    except OSError as error:
+        found.close()
+        raise LinkError(f"{claim.who} had {claim.port} and is gone", "try again: the port is free") from error
+    return found
+
+
+def _checked(message: Message) -> Message:
+    if message.get("ok"):
+        return message
+    text = str(message.get("error", "refused without a reason"))
+    hint = str(message.get("hint", ""))
+    if isinstance(message.get("code"), int):
+        raise BoardError(text, hint, message["code"])
+    raise LinkError(text, hint)

@@ -1,0 +1,215 @@
+"""The owner's end: answers requests of other programs, and hands out what they have subscribed to.
+
+Each connection has two threads, one that reads its requests and answers them, one that writes; so a reader that
+is slow, or asks for what takes long, holds up nobody else.
+"""
+
+from __future__ import annotations
+
+import os
+import queue
+import socket
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from hmac import compare_digest
+from threading import Lock, Thread
+
+from armtempo.basics.errors import ArmtempoError, BoardError, LinkError, PortError
+from armtempo.ports import claim as claims
+from armtempo.ports.claim import VERSION, PortClaim
+from armtempo.ports.lines import LineReader, Message, to_line
+
+Handler = Callable[[Message], Message]
+"""Answers one request; its ArmtempoError becomes an answer too."""
+
+TOPICS = ("sample", "status", "event", "traffic")
+_BACKLOG = 16
+_FLUSH_S = 0.5
+"""Time in which a caller must take the last messages."""
+_CHECK_S = 0.02
+"""Whether another program has taken the port over is looked up this often at most."""
+_QUEUE = 1000
+"""Messages that wait for a slow reader; those beyond are dropped, and their number is told."""
+
+
+class Server:
+    """Listens as the owner of a port, from the making on until ``close``.
+
+    ``handlers``: by the name of a request. OSError where nobody can be listened to.
+    """
+
+    def __init__(self, claim: PortClaim, handlers: Mapping[str, Handler]) -> None:
+        self._handlers = handlers
+        self._connections: set[_Connection] = set()
+        self._lock = Lock()
+        self._checked_s = 0.0
+        self._taken_by: PortClaim | None = None
+        self._socket = _listen(claim)
+        self.claim = claim if claim.address else claim._replace(address=str(self._socket.getsockname()[1]))
+        self.claim.write()
+        self._thread = Thread(target=self._accept, name="armtempo share", daemon=True)
+        self._thread.start()
+
+    def wanted(self, topic: str) -> bool:
+        """Whether anybody has subscribed to a topic."""
+        return any(topic in connection.topics for connection in self._all())
+
+    def publish(self, topic: str, content: Message) -> None:
+        """Send to all who have subscribed to a topic; never waits."""
+        listening = [connection for connection in self._all() if topic in connection.topics]
+        if listening:
+            line = to_line({"topic": topic, **content})
+            for connection in listening:
+                connection.send(line)
+
+    def check(self) -> None:
+        """Raise PortError where another program has taken the port over, because this one did not answer."""
+        now_s = time.monotonic()
+        if self._taken_by is None and now_s - self._checked_s >= _CHECK_S:
+            self._checked_s = now_s
+            self._taken_by = self.claim.taken_by()
+        if self._taken_by is not None:  # said each time: whoever tries to open the port again minds no error
+            raise PortError(
+                f"{self._taken_by.who} has taken {self.claim.port} over, as this program did not answer",
+                "ask 'armtempo status' what became of the motion",
+            )
+
+    def close(self) -> None:
+        """Give up the port and end all connections."""
+        self.claim.remove()
+        with suppress(OSError):
+            self._socket.shutdown(socket.SHUT_RDWR)  # wakes the thread that accepts
+        self._socket.close()
+        for connection in self._all():
+            connection.close()
+
+    def _all(self) -> list[_Connection]:
+        with self._lock:
+            return list(self._connections)
+
+    def _accept(self) -> None:
+        while True:
+            try:
+                accepted, _ = self._socket.accept()
+            except OSError:
+                return
+            connection = _Connection(accepted, self.claim, self._handlers)
+            with self._lock:
+                self._connections.add(connection)
+            Thread(target=self._serve, args=(connection,), name="armtempo reader", daemon=True).start()
+            connection.start_writing()  # after that: a stop need not wait for a second thread
+
+    def _serve(self, connection: _Connection) -> None:
+        try:
+            connection.serve()
+        finally:
+            with self._lock:
+                self._connections.discard(connection)
+            connection.close()
+
+
+class _Connection:
+    """One caller."""
+
+    def __init__(self, accepted: socket.socket, claim: PortClaim, handlers: Mapping[str, Handler]) -> None:
+        self.topics: frozenset[str] = frozenset()
+        self._socket = accepted
+        self._claim = claim
+        self._handlers = {"hello": self._hello, "subscribe": self._subscribe, **handlers}
+        self._known = not claim.token
+        self._lines: queue.Queue[bytes | None] = queue.Queue(_QUEUE)
+        self._dropped = 0
+        self._writer = Thread(target=self._write, name="armtempo writer", daemon=True)
+        self._starting = Lock()
+
+    def start_writing(self) -> None:
+        """Begin to send what waits; once begun, another call does nothing."""
+        with self._starting:
+            if self._writer.ident is None:
+                self._writer.start()
+
+    def serve(self) -> None:
+        """Answer requests until the caller hangs up or sends what is no message."""
+        reader = LineReader(self._socket)
+        try:
+            while (request := reader.read()) is not None:
+                self.send(to_line({"id": request.get("id"), **self._answer(request)}))
+        except LinkError as error:
+            self.send(to_line({"id": None, **_failed(error)}))
+        except OSError:
+            return
+
+    def send(self, line: bytes) -> None:
+        """Put a line into the queue; dropped where the caller does not keep up."""
+        try:
+            if self._dropped:
+                self._lines.put_nowait(to_line({"topic": "lost", "messages": self._dropped}))
+                self._dropped = 0
+            self._lines.put_nowait(line)
+        except queue.Full:
+            self._dropped += 1
+
+    def close(self) -> None:
+        """End the connection, once what waits is sent, but soon."""
+        self.start_writing()
+        with suppress(queue.Full):
+            self._lines.put_nowait(None)
+        self._writer.join(_FLUSH_S)
+        with suppress(OSError):
+            self._socket.shutdown(socket.SHUT_RDWR)
+        self._socket.close()
+
+    def _write(self) -> None:
+        with suppress(OSError):
+            while (line := self._lines.get()) is not None:
+                self._socket.sendall(line)
+
+    def _answer(self, request: Message) -> Message:
+        name = request.get("request")
+        if not self._known and name != "hello":
+            return _failed(LinkError("nobody has said hello yet", "say hello with the token first"))
+        handler = self._handlers.get(name) if isinstance(name, str) else None
+        if handler is None:
+            return _failed(
+                LinkError(f"no request {name!r}", f"there are {', '.join(sorted(self._handlers))}")
+            )
+        try:
+            return {"ok": True, **handler(request)}
+        except ArmtempoError as error:
+            return _failed(error)
+
+    def _hello(self, request: Message) -> Message:
+        if not compare_digest(str(request.get("token", "")).encode(), self._claim.token.encode()):
+            raise LinkError("wrong token", "take it from the file of the claim")
+        self._known = True
+        claim = self._claim
+        return {"version": VERSION, "port": claim.port, "program": claim.program, "pid": claim.pid}
+
+    def _subscribe(self, request: Message) -> Message:
+        topics = request.get("topics")
+        if not isinstance(topics, list) or not set(map(str, topics)) <= set(TOPICS):
+            raise LinkError("topics must be a list", f"give some of {', '.join(TOPICS)}")
+        self.topics = frozenset(topics)
+        return {"topics": sorted(self.topics)}
+
+
+def _listen(claim: PortClaim) -> socket.socket:
+    if claims.LOCAL_SOCKETS:
+        listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    else:
+        listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    try:
+        listening.bind(claim.address if claims.LOCAL_SOCKETS else ("127.0.0.1", 0))
+        if claims.LOCAL_SOCKETS:
+            os.chmod(claim.address, 0o600)
+        listening.listen(_BACKLOG)
+    except OSError:
+        listening.close()
+        raise
+    return listening
+
+
+def _failed(error: ArmtempoError) -> Message:
+    code = {"code": error.code} if isinstance(error, BoardError) else {}
+    return {"ok": False, "error": error.problem, "hint": error.hint, **code}

@@ -1,0 +1,91 @@
+"""The motors on the board's pins, as its arm record has them."""
+
+from armtempo_shared import armrecord
+from chip import gpio
+from firmware.external_interrupts import set_level
+
+from arm import switches
+from arm.ideal_motor import IdealMotor
+from arm.stepper import Stepper
+
+
+class Enable:
+    """The drivers' common ENABLE signal."""
+
+    def __init__(self, board, pin, active_high):
+        self._line = board.pins.line(pin)
+        self._active = 1 if active_high else 0
+
+    def on(self):
+        """Whether the drivers hold their motors."""
+        return self._line.level == self._active and self._line.mode() == gpio.OUTPUT
+
+
+class ArmOnPins:
+    """All motors, as the arm record in the flash has them.
+
+    ``record()`` gives (head, joints) or None; ``angles``: the joints' angles, else those in ``joints``.
+    """
+
+    def __init__(self, board, pins, record, seed, angles):
+        self._seed = seed
+        self._angles = angles
+        self._switches = ()
+        self.board = board
+        self._pins = pins
+        self._record = record
+        self._known = None
+        self.motors = []
+        self.watches_host = False
+        board.follow = self.follow
+        board.observers.append(self)
+        self.connect()
+
+    def connect(self):
+        """Put motors on the pins if the record has changed."""
+        found = self._record()
+        if found == self._known:
+            return
+        self._known = found
+        for motor in self.motors:
+            motor.disconnect()
+        head, joints = found or ({"flags": 0}, ())
+        self.watches_host = bool(head["flags"] & armrecord.FLAG_STOP_ON_LINK_LOSS)
+        enable = Enable(self.board, self._pins.ENABLE, head["flags"] & armrecord.FLAG_ENABLE_HIGH)
+        self.motors = [self._motor(number, joint, enable) for number, joint in enumerate(joints)]
+        if head["flags"] & armrecord.FLAG_ESTOP_FITTED:
+            set_level(self._pins.ESTOP, 0 if head["flags"] & armrecord.FLAG_ESTOP_ACTIVE_HIGH else 1)
+        self._switches = []
+        for motor, joint in zip(self.motors, joints):
+            self._switches.extend(switches.fitted(motor, joint, self._pins))
+        self.follow()
+
+    def _motor(self, number, joint, enable):
+        lines, pins = self.board.pins, self._pins
+        step, direction = pins.STEP[joint["channel"]][0], pins.DIR[joint["channel"]]
+        encoder = None
+        if joint["encoder"] < len(pins.ENCODER):
+            encoder = self.board.timers[pins.ENCODER[joint["encoder"]][0]]
+        step, direction = lines.line(step), lines.line(direction)
+        if number < len(self._angles):
+            joint = dict(joint, start_deg=self._angles[number])
+        if joint.get("model") and joint["model"]["holding_torque_nm"]:
+            return Stepper(step, direction, enable, encoder, joint, 100 * self._seed + number)
+        return IdealMotor(step, direction, enable, encoder, joint)
+
+    def follow(self):
+        """Time has passed."""
+        for motor in self.motors:
+            if motor.moved:
+                motor.follow(self.board.now)
+        for switch in self._switches:
+            switch.look()
+
+    def counting(self, timer, now):
+        """A timer started or stopped: motions begin with TIM2."""
+        if timer.number == 2 and timer.running:
+            for motor in self.motors:
+                motor.begin(now)
+
+    def input_changed(self, line, level, now):
+        """An input changed: nothing to do."""

@@ -1,0 +1,166 @@
+"""A stepper motor that is more than ideal: it lags, rings and, driven too hard, loses steps.
+
+The rotor hangs on the turning field as on a spring that slips (P. Acarnley, Stepping Motors, 4th ed., 2002,
+chapters 3 to 5)::
+
+    J x'' = T(v) sin(2 pi (c - x) / 4 m) - D (v - c') - T_load(x)
+
+with x the rotor's angle and c the command, both in microsteps, m microsteps a step. ``T(v)`` falls with speed
+as the winding's inductance holds the current back. Lag, ringing and lost steps come out of it. The joint
+follows the rotor through gear and backlash.
+
+It is integrated in steps of 1 ms from the start of each motion, drift-kick-drift, more finely where the rotor
+swings fast; each step sees the mean of what was commanded in it, so a pulse counts from its own moment on.
+"""
+
+from math import asin, ceil, cos, pi, sin, sqrt
+
+from arm.ideal_motor import IdealMotor
+from arm.noise import Noise
+
+_DT_TICKS = 84_000
+_DT_S = 0.001
+_FINEST = 0.25  # rad that the rotor's free swing may turn in one part of a step
+_REST_STEPS = 0.002
+_SCATTER_LENGTH_DEG = 2.0  # of motion, over which a new repetition's scatter fades in
+
+
+class Stepper(IdealMotor):
+    """``joint``: also what the arm file says of the joint's drive, and its ``model``."""
+
+    def __init__(self, step, direction, enable, encoder, joint, seed):
+        super().__init__(step, direction, enable, encoder, joint)
+        model = joint["model"]
+        gear = joint["gear_ratio"]
+        per_rad = self._steps_per_deg * 360 / gear / (2 * pi)  # of the motor shaft
+        self._electrical = 2 * pi / (4 * joint["microsteps"])
+        inertia = model["rotor_inertia_kg_m2"] + model["inertia_kg_m2"] / gear**2
+        self._pull = model["holding_torque_nm"] * per_rad / inertia
+        self._damping = model["damping_nm_s"] / inertia
+        self._gravity = model["gravity_torque_nm"] / gear * per_rad / inertia
+        self._corner = model["corner_speed_rad_s"] * per_rad
+        self._play = model["backlash_deg"] * self._steps_per_deg / 2
+        self._phase = model["encoder_phase_counts"]
+        self._ratio = self._num / self._den
+        self._parts = max(1, ceil(sqrt(self._pull * self._electrical) * _DT_S / _FINEST))
+        self._noise = Noise(seed)
+        self._scatter = model["scatter_deg"] * self._steps_per_deg
+        self._wanted = self._offset = 0.0
+        self._done = 0
+        self._commanded = 0
+        self._pending = []
+        self._x = self._rest(0)
+        self._v = 0.0
+        self._joint = self._x
+        self._counts = self._reading()
+
+    def edges(self, line, before, count, times, origin):
+        """STEP toggled: note the moments of its rising edges."""
+        rises = [origin + time for time in times[before::2]]
+        if not rises or not self._enable.on():
+            return
+        if not self.moved:
+            self.moved = True
+            self._done += (rises[0] - self._done) // _DT_TICKS * _DT_TICKS
+        way = 1 if self._dir.level ^ self._inverted else -1
+        for tick in rises:
+            self._pending.append((tick, way))
+        self.position += way * len(rises)
+
+    def angle_deg(self):
+        """The joint's angle."""
+        return self._start_deg + self._joint / self._steps_per_deg
+
+    def begin(self, now):
+        """A motion begins: the grid of time steps starts here, and a new scatter is drawn."""
+        self._done = now
+        self._wanted = self._noise.normal() * self._scatter
+
+    def follow(self, now):
+        """Time has passed."""
+        if now - self._done >= _DT_TICKS:
+            while self.moved and now - self._done >= _DT_TICKS:
+                self._step()
+            self._show()
+
+    def _step(self):
+        """One millisecond."""
+        before = self._commanded
+        mean = self._command() - self._offset
+        speed = (self._commanded - before) / _DT_S
+        x, v = self._x, self._v
+        part = _DT_S / self._parts
+        if self.blocked:
+            v = 0.0
+        else:
+            for _ in range(self._parts):
+                x += v * part / 2
+                v = self._kick(mean - x, x, v, speed, part)
+                x += v * part / 2
+        self._fade_in(x - self._x)
+        self._x, self._v = x, v
+        self._joint = min(max(self._joint, x - self._play), x + self._play)
+        if not self._pending and not speed and abs(v) * _DT_S < _REST_STEPS:
+            self._settle()
+
+    def _command(self):
+        """Mean of the command over the next step; takes the pulses in it."""
+        begun = self._commanded
+        end = self._done + _DT_TICKS
+        weight = taken = 0
+        for tick, way in self._pending:
+            if tick > end:
+                break
+            weight += way * (end - tick)
+            self._commanded += way
+            taken += 1
+        if taken:
+            self._pending = self._pending[taken:]
+        self._done = end
+        return begun + weight / _DT_TICKS
+
+    def _kick(self, lead, x, v, speed, part):
+        """The new speed after the torques at ``x`` have acted for ``part`` seconds."""
+        pull = self._pull
+        if self._corner:
+            pull /= sqrt(1 + (v / self._corner) ** 2)
+        v += (pull * sin(lead * self._electrical) - self._weight(x)) * part
+        return (v + self._damping * speed * part) / (1 + self._damping * part)
+
+    def _weight(self, x):
+        """Acceleration that gravity's torque gives the rotor at ``x``, in steps/s²."""
+        if not self._gravity:
+            return 0.0
+        return self._gravity * cos((self._start_deg + x / self._steps_per_deg) * pi / 180)
+
+    def _fade_in(self, moved):
+        """Fade in the scatter of this repetition as the joint moves."""
+        if self._offset != self._wanted:
+            share = min(1.0, abs(moved) / (_SCATTER_LENGTH_DEG * self._steps_per_deg))
+            self._offset += (self._wanted - self._offset) * share
+
+    def _rest(self, near):
+        """The rotor's rest position under its load: near the commanded microstep, or cycles of four steps away."""
+        cycle = 2 * pi / self._electrical
+        aim = self._commanded - self._offset
+        aim += round((near - aim) / cycle) * cycle
+        load = max(-1.0, min(1.0, self._weight(aim) / self._pull))
+        return aim - asin(load) / self._electrical
+
+    def _settle(self):
+        """Stop computing where the rotor has come to rest."""
+        rest = self._rest(self._x)
+        if self.blocked or abs(rest - self._x) < 20 * _REST_STEPS:
+            if not self.blocked:
+                self._x = rest
+            self._v = 0.0
+            self.moved = False
+
+    def _reading(self):
+        return int((self._joint * self._ratio + self._phase) // 1)
+
+    def _show(self):
+        counts = self._reading()
+        if self._encoder and counts != self._counts:
+            self._encoder.turn(counts - self._counts)
+        self._counts = counts

@@ -1,0 +1,50 @@
+"""A board without a launcher, for tests of hardware code: import this before the code under test.
+
+``start(edge_log=…)`` powers a new board up and returns it; its time passes in simulated calls, or by
+``board.spend(ticks)``. Options are those of ``ProcessOptions`` on the host; with ``flash`` the built-in ``open``
+sees that folder as ``/flash``.
+"""
+
+import builtins
+import sys
+
+if sys.implementation.name != "micropython":
+    import additions  # noqa: F401
+
+import machine_state
+import setup
+from chip import flash
+from firmware import builtin_modules
+from firmware.usb_serial import SilentPort
+
+DEFAULTS = {
+    "flash": ".",
+    "flash_blocks": 190,
+    "program": [],
+    "speed": 0,
+    "edge_log": None,
+    "unique_id": "000102030405060708090a0b",
+    "dma_preload": True,
+    "power_cut_at": 0,
+    "button_ms": 0,
+    "sd_card": None,
+    "damage": "",
+    "machine": "STM32F4DISC with STM32F407",
+    "turn_us": 1000,
+    "arm": None,
+    "faults": [],
+    "seed": 0,
+    "up": "",
+}
+
+
+def start(cause=1, line=None, **options):
+    """Power up; ``line`` is the serial port, with nobody at the other end by default."""
+    machine_state.serial = line or SilentPort()
+    machine_state.edges = machine_state.flash = None
+    setup.power_up(dict(DEFAULTS, **options), cause)
+    builtins.open = machine_state.flash.open if "flash" in options else flash.real_open
+    return machine_state.board
+
+
+builtin_modules.replace()

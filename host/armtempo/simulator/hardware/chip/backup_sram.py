@@ -1,0 +1,33 @@
+"""The backup SRAM (RM0090 5.1.2): without its clock it reads as 0, without write access it keeps what it had."""
+
+from chip import memory
+
+_AHB1ENR, _APB1ENR = 12, 16  # words of RCC
+_BKPSRAMEN, _PWREN, _DBP = 18, 28, 8  # bits
+
+
+class BackupSram:
+    """``is_open``: the program may write to it. Else ``undo`` takes back what it wrote."""
+
+    def __init__(self):
+        for word in range(memory.BACKUP_WORDS):
+            memory.backup[word] = (word + 1) * 0x9E3779B1 & memory.MASK  # whatever it has at power-up
+        self.is_open = True
+        self._kept = b""
+        self.sync()
+
+    def sync(self):
+        """RCC or PWR were written."""
+        if self.is_open:
+            self._kept = bytes(memory.raw_backup)
+        rcc, power = memory.index("RCC"), memory.index("PWR")
+        if not memory.words[rcc + _APB1ENR] >> _PWREN & 1:  # without its clock it takes nothing
+            memory.poke(power, memory.seen[power])
+        clocked = memory.words[rcc + _AHB1ENR] >> _BKPSRAMEN & 1
+        self._shown = self._kept if clocked else bytes(len(self._kept))
+        self.is_open = clocked and memory.words[power] >> _DBP & 1
+        self.undo()
+
+    def undo(self):
+        """What was written to it is lost."""
+        memory.raw_backup[0 : len(self._shown)] = self._shown

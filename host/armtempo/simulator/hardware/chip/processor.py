@@ -1,0 +1,244 @@
+"""The board: virtual time, interrupts, and what happens in between.
+
+Time is counted in ticks of 84 MHz since power-up and passes only in calls of simulated functions: each costs
+what its like costs on the chip, roughly. ``run_until`` brings the models to a time; interrupts are served
+on the way, each a little late, as on the chip.
+"""
+
+import sys
+
+from chip import backup_sram, dma, gpio, memory, timer_registers, timers
+
+TICKS_PER_MS = 84_000
+TICKS_PER_US = 84
+CALL_TICKS = 84
+"""A simulated function or register access: 1 us, about 130 instructions of the interpreter."""
+_MOST_OWED = 40 * CALL_TICKS
+INTERRUPT_TICKS = 160
+"""From an event to the first line of its callback: 1.9 us (an empty callback's instructions)."""
+CALLBACK_TICKS = 250
+"""What a callback takes on top of its own simulated calls."""
+NEVER = timer_registers.NEVER
+_RCC_TIMERS = {
+    1: (17, 0), 8: (17, 1), 2: (16, 0), 3: (16, 1), 4: (16, 2), 5: (16, 3), 6: (16, 4), 7: (16, 5),
+    9: (17, 16), 10: (17, 17), 11: (17, 18), 12: (16, 6), 13: (16, 7), 14: (16, 8),
+}  # fmt: skip
+
+
+class Chip:
+    """Everything between the program and what is connected to the pins.
+
+    ``observers`` are told of timers that start or stop and of inputs that change; ``follow()`` is called after
+    each stretch of time.
+    """
+
+    def __init__(self, dma_preload=True):
+        memory.clear()
+        self.now = 0
+        self.dma_preload = dma_preload
+        self.dma = dma.Controller()
+        self.pins = gpio.Pins()
+        self.backup = backup_sram.BackupSram()
+        self.timers = {}
+        for number, bits, rate in ((2, 32, 1), (5, 32, 1), (1, 16, 2), (8, 16, 2), (3, 16, 1), (4, 16, 1),
+                                   (6, 16, 1), (7, 16, 1), (9, 16, 2), (10, 16, 2), (11, 16, 2),
+                                   (12, 16, 1), (13, 16, 1), (14, 16, 1)):  # fmt: skip
+            self.timers[number] = timers.TimerUnit(self, number, bits, rate)
+        self.timers[2].follower = self.timers[5]
+        self.counting = []
+        self.pending = []
+        self.masked = False
+        self.serving = False
+        self.woken = False
+        self.next_happening = 0
+        self.happenings = []
+        self.callbacks = {}
+        self.scheduled = []
+        self.interrupted = False
+        self.api = {}
+        self.extints = {}
+        self.observers = []
+        self.follow = None
+        self.owed = 0
+        self.lost_ticks = 0
+        self.crash = False
+        self.watchdog_ticks = 0
+        self.watchdog_deadline = None
+        self.millisecond = None
+        self.next_ms = TICKS_PER_MS
+        memory.poke(memory.index("IWDG") + 2, 0xFFF)
+        for port, register, value in gpio.AT_RESET:
+            memory.poke(memory.index(port) + register, value)
+        self.sync(True)
+
+    # -- what the program wrote ------------------------------------------------------------------
+
+    def sync(self, everything=False):
+        """Look at the registers that the program has written since the last look."""
+        blocks = range(len(memory.BLOCKS)) if everything else memory.changed_blocks()
+        if not self.backup.is_open:
+            self.backup.undo()
+        if not blocks:
+            return
+        names = [memory.BLOCKS[block] for block in blocks]
+        if "RCC" in names:
+            names = memory.BLOCKS
+        self._sync_pins(names)
+        if "PWR" in names:
+            self.backup.sync()
+        if "DMA1" in names or "RCC" in names:
+            rcc = memory.words[memory.index("RCC") + 12]
+            self.dma.sync((rcc >> 21) & 1)
+        for number, timer in self.timers.items():
+            if "DMA1" in names or "TIM%d" % number in names:
+                register, bit = _RCC_TIMERS[number]
+                timer.clocked = bool(memory.words[memory.index("RCC") + register] >> bit & 1)
+                timer.sync(self.now)
+        for block in blocks:
+            memory.accept(block)
+        self._find_happening()
+
+    def _sync_pins(self, names):
+        routed = False
+        for port in self.pins.ports:
+            if "GPIO" + gpio.PORTS[port.index] in names:
+                routed = port.sync(self.now) or routed
+        if routed:
+            self.pins.route((self.timers[2], self.timers[5]))
+
+    def recount(self):
+        """A timer was started or stopped: find those that time moves."""
+        self.counting = [timer for timer in self.timers.values() if timer.counts_by_clock()]
+
+    # -- time ------------------------------------------------------------------------------------
+
+    def at(self, tick, action):
+        """Call ``action()`` when time comes to ``tick``."""
+        self.happenings.append((tick, action))
+        self.happenings.sort(key=lambda happening: happening[0])
+        self._find_happening()
+
+    def _find_happening(self):
+        due = self.happenings[0][0] if self.happenings else NEVER
+        for timer in self.counting:
+            due = min(due, timer.next_interrupt())
+        self.next_happening = due
+
+    def call(self):
+        """The program made a cheap call. The time of several is kept and spent together."""
+        self.owed += CALL_TICKS
+        if self.owed > _MOST_OWED:
+            self.spend(0)
+
+    def wrote(self):
+        """The program wrote a register: it acts at once."""
+        self.sync()
+        self.call()
+
+    def spend(self, ticks):
+        """The program takes so long."""
+        ticks += self.owed
+        self.owed = 0
+        self.run_until(self.now + ticks)
+
+    def run_until(self, target, wake=False):
+        """Let time pass to ``target``; with ``wake``, at most until an interrupt has been served."""
+        self._pass(target, wake)
+        if not self.serving:
+            self._between()
+
+    def _between(self):
+        """What comes to the main program between two of its steps: faults, the millisecond."""
+        if self.lost_ticks:
+            lost, self.lost_ticks = self.lost_ticks, 0
+            self._pass(self.now + lost, False)
+        if self.now >= self.next_ms and self.millisecond:
+            self.next_ms = (self.now // TICKS_PER_MS + 1) * TICKS_PER_MS
+            self.millisecond()
+
+    def _pass(self, target, wake):
+        self.sync()
+        self.woken = False
+        self._serve()
+        while self.next_happening <= target and not (wake and self.woken):
+            self._run(max(self.next_happening, self.now))
+            while self.happenings and self.happenings[0][0] <= self.now:
+                self.happenings.pop(0)[1]()
+            self._find_happening()
+            self._serve()
+        if target > self.now and not (wake and self.woken):
+            self._run(target)
+
+    def stand_still(self, ticks):
+        """The processor cannot do anything for so long, not even serve interrupts."""
+        self.sync()
+        self._run(self.now + ticks)
+
+    def _run(self, target):
+        """The hardware alone runs to ``target``."""
+        for timer in self.counting:
+            timer.run(target)
+        self.now = target
+        if self.follow:
+            self.follow()
+
+    def moving(self, horizon_ticks):
+        """Whether a timer will do something within so many ticks."""
+        limit = self.now + horizon_ticks
+        return any([timer.next_match() < limit for timer in self.counting])
+
+    def input_changed(self, line, level):
+        """The level of an input pin was changed from outside."""
+        for observer in self.observers:
+            observer.input_changed(line, level, self.now)
+
+    # -- interrupts ------------------------------------------------------------------------------
+
+    def pend(self, source, detail):
+        """An interrupt asks to be served."""
+        if (source, detail) not in self.pending:
+            self.pending.append((source, detail))
+
+    def schedule(self, function, argument):
+        """Call ``function(argument)`` soon, outside interrupts; eight can wait (MICROPY_SCHEDULER_DEPTH)."""
+        if len(self.scheduled) >= 8:
+            raise RuntimeError("schedule queue full")
+        self.scheduled.append((function, argument))
+
+    def _serve(self):
+        if self.serving or self.masked:
+            return
+        while self.scheduled:
+            function, argument = self.scheduled.pop(0)
+            function(argument)
+        while self.pending and not self.masked:
+            source, detail = self.pending.pop(0)
+            callback = self.callbacks.get((source, detail))
+            if callback:
+                self._interrupt(source, detail, *callback)
+
+    def _interrupt(self, source, detail, function, argument):
+        self.serving = True
+        self.woken = True
+        self._run(self.now + INTERRUPT_TICKS)
+        if source in self.timers:
+            self.timers[source].acknowledge(detail)
+        try:
+            function(argument)
+        except Exception as error:
+            # as the firmware: say it, and never call it again
+            sys.stderr.write("uncaught exception in interrupt handler\n")
+            print_exception(error)
+            del self.callbacks[(source, detail)]
+        self.sync()
+        self._run(self.now + CALLBACK_TICKS)
+        self.serving = False
+        self._find_happening()
+
+
+def print_exception(error):
+    """Traceback to stderr, on either interpreter."""
+    if hasattr(sys, "print_exception"):
+        sys.print_exception(error, sys.stderr)
+    else:
+        sys.excepthook(type(error), error, error.__traceback__)

@@ -1,0 +1,104 @@
+"""What the firmware does between reset and Python, after ports/stm32: boardctrl.c, main.c, factoryreset.c.
+
+The user button held at a reset chooses how to start; the file systems are mounted, and a flash without one
+gets a fresh one.
+"""
+
+import sys
+
+import machine_state
+from chip import flash
+from chip.processor import TICKS_PER_MS
+
+from firmware import external_interrupts
+from firmware.pin_api import Pin
+
+NORMAL, SAFE, FACTORY = 1, 2, 3
+BOOT_ERROR, MAIN_ERROR = 4, 3
+"""How often red and green flash in turn after an exception in boot.py, in main.py."""
+_BUTTON = "PA0"
+_RED, _GREEN, _ORANGE, _BLUE = "PD14", "PD12", "PD13", "PD15"
+_LOOKS = 30  # at the button, while a mode is shown
+_LOOK_MS = 20
+_FACTORY_FILES = {
+    "boot.py": "# run first, after every reset\n",
+    "main.py": "# run after boot.py\n",
+    "README.txt": "A fresh file system.\n",
+    "pybcdc.inf": "; the serial driver of old systems\n",
+}
+
+
+def choose_mode(board, held_ms):
+    """How to start, by the button that is held for so long from the reset on; the LEDs count along."""
+    if not held_ms:
+        return NORMAL
+    external_interrupts.set_level(_BUTTON, 1)
+    release = board.now + int(held_ms * TICKS_PER_MS)
+    mode = NORMAL
+    while _held(board, mode, release):
+        mode = mode % FACTORY + 1
+    for _ in range(6):
+        _show(board, 0, 50)
+        _show(board, mode, 50)
+    board.stand_still(400 * TICKS_PER_MS)
+    _show(board, 0, 0)
+    return mode
+
+
+def _held(board, mode, release):
+    """Show a mode; whether the button is still held at the end."""
+    _show(board, mode, 0)
+    for _ in range(_LOOKS):
+        board.stand_still(_LOOK_MS * TICKS_PER_MS)
+        if board.now >= release:
+            external_interrupts.set_level(_BUTTON, None)
+            return False
+    return True
+
+
+def _show(board, mode, ms):
+    """Green, orange and blue are the bits of the mode."""
+    for bit, name in enumerate((_GREEN, _ORANGE, _BLUE)):
+        Pin(name, Pin.OUT_PP).value(mode >> bit & 1)
+    board.stand_still(ms * TICKS_PER_MS)
+
+
+def flash_error(times):
+    """Red and green in turn."""
+    for _ in range(times):
+        for red in (1, 0):
+            Pin(_RED, Pin.OUT_PP).value(red)
+            Pin(_GREEN, Pin.OUT_PP).value(1 - red)
+            machine_state.board.stand_still(250 * TICKS_PER_MS)
+    Pin(_GREEN, Pin.OUT_PP).value(0)
+
+
+def mount(mode, path):
+    """Mount flash and SD card; ``path``: the folders before and behind theirs on ``sys.path``."""
+    if mode == FACTORY or machine_state.flash.damage == flash.NO_FILE_SYSTEM:
+        _make_file_system()
+    machine_state.flash.mounts = {"/flash": machine_state.flash.root}
+    machine_state.flash.cwd = "/flash"
+    card = machine_state.options["sd_card"]
+    if card and not flash.exists(machine_state.flash.root + "/SKIPSD"):
+        machine_state.flash.mounts["/sd"] = card
+        machine_state.flash.cwd = "/sd"
+    before, behind = path
+    sys.path[:] = before + _library_folders() + behind
+
+
+def _make_file_system():
+    machine_state.flash.format()
+    for name, text in _FACTORY_FILES.items():
+        with flash.real_open(machine_state.flash.root + "/" + name, "w") as file:
+            file.write(text)
+
+
+def _library_folders():
+    """Where the interpreter finds modules, the card first."""
+    folders = []
+    for point in ("/sd", "/flash"):
+        root = machine_state.flash.mounts.get(point)
+        if root and not (point == "/flash" and machine_state.flash.damage):
+            folders += [root, root + "/lib"]
+    return folders

@@ -1,0 +1,66 @@
+"""External interrupts (``pyb.ExtInt``) and levels that are put on input pins from outside."""
+
+import machine_state
+from chip.processor import CALL_TICKS
+
+from firmware.pin_api import Pin
+
+_RISING, _FALLING = 1, 2
+
+
+class ExtInt:
+    """Calls ``callback(line)`` at an edge of a pin; one object a line number."""
+
+    IRQ_RISING, IRQ_FALLING, IRQ_RISING_FALLING = 0x10110000, 0x10210000, 0x10310000
+    EVT_RISING, EVT_FALLING, EVT_RISING_FALLING = 0x10120000, 0x10220000, 0x10320000
+
+    def __init__(self, pin, mode, pull, callback):
+        if not isinstance(pin, Pin):
+            pin = Pin(pin)
+        pin.init(Pin.IN, pull)
+        self._line = pin.line.number
+        self._edges = (mode >> 20) & 3
+        known = machine_state.board.extints.get(self._line)
+        if known is not None and callback is not None and known.wired is not pin.line:
+            raise ValueError("ExtInt vector %d is already in use" % self._line)
+        self.wired = pin.line
+        self.enabled = callback is not None
+        machine_state.board.extints[self._line] = self
+        machine_state.board.callbacks[("exti", self._line)] = (callback, self._line)
+        machine_state.board.call()
+
+    def line(self):
+        """The line number."""
+        return self._line
+
+    def enable(self):
+        """Let the interrupt through."""
+        self.enabled = True
+
+    def disable(self):
+        """Hold the interrupt back."""
+        self.enabled = False
+
+    def swint(self):
+        """Trigger the callback by software."""
+        machine_state.board.pend("exti", self._line)
+        machine_state.board.spend(CALL_TICKS)
+
+    def edge(self, rising):
+        """The pin changed."""
+        if self.enabled and self._edges & (_RISING if rising else _FALLING):
+            machine_state.board.pend("exti", self._line)
+
+
+def set_level(name, level):
+    """Drive an input pin from outside to 0 or 1, or let go of it (None)."""
+    line = machine_state.board.pins.line(name)
+    before = line.read()
+    line.external = level
+    after = line.read()
+    line.port.refresh()
+    if before != after:
+        machine_state.board.input_changed(line, after)
+        extint = machine_state.board.extints.get(line.number)
+        if extint is not None and extint.wired is line:
+            extint.edge(after == 1)

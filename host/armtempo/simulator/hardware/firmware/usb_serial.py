@@ -1,0 +1,199 @@
+"""The USB serial port: ``pyb.USB_VCP`` with the firmware's buffers, on this process's stdin and stdout.
+
+The launcher makes both the master end of a pseudo terminal. Buffers and their habits are the firmware's
+(usbd_cdc_interface.c): 1024 bytes each way; input beyond that is lost unless RTS flow control holds the host
+back.
+"""
+
+import select
+
+import machine_state
+from chip.processor import TICKS_PER_US
+
+BUFFER = 1024
+_CHUNK = 512
+_POLLIN = 1
+
+
+class SilentPort:
+    """The port's buffers, and a host that neither sends nor reads.
+
+    ``attached``: the REPL has the port, and ``interrupt_char`` interrupts.
+    """
+
+    ended = False
+
+    def __init__(self):
+        self.reset()
+
+    def reset(self):
+        """The board was reset: what was under way is lost."""
+        self.silent = False
+        self.received = bytearray()
+        self.pieces = 0  # how often input has come
+        self.sending = bytearray()
+        self.rts = self.cts = False
+        self.attached = True
+        self.interrupt_char = -1  # until the REPL runs something
+
+    def wait(self, ms):
+        """Wait in real time for input, at most so long; True where there is some."""
+        return False
+
+    def pump(self):
+        """Move bytes between the buffers and the host."""
+
+    def stuck(self):
+        """Whether the host does not read what is there for it."""
+        return bool(self.sending) and not self.silent
+
+    def put(self, data):
+        """Queue bytes for the host; how many there was room for."""
+        count = min(len(data), BUFFER - len(self.sending))
+        self.sending.extend(memoryview(data)[:count])
+        return count
+
+    def take(self, count):
+        """Up to so many received bytes."""
+        data = bytes(self.received[:count])
+        self.received = self.received[count:]
+        return data
+
+
+class Serial(SilentPort):
+    """The line to the host that has the pseudo terminal open."""
+
+    def __init__(self):
+        super().__init__()
+        self._in = open(0, "rb", buffering=0)  # noqa: SIM115
+        self._out = open(1, "wb", buffering=0)  # noqa: SIM115
+        self._poll = select.poll()
+        self._poll.register(self._in, _POLLIN)
+        self._chunk = memoryview(bytearray(_CHUNK))
+
+    def wait(self, ms):
+        """Wait in real time for input, at most so long; True where there is some."""
+        return bool(self._poll.poll(ms))
+
+    def pump(self):
+        """Move bytes between the buffers and the host."""
+        if self.silent:
+            return
+        if self.sending:
+            written = self._out.write(self.sending)
+            if written:
+                self.sending = self.sending[written:]
+        while not self.ended:
+            room = BUFFER - 1 - len(self.received)
+            if self.rts and room < 65:
+                return
+            piece = self._chunk[: min(room, _CHUNK)] if self.rts else self._chunk
+            try:
+                count = self._in.readinto(piece)
+            except OSError:  # the other end of the pseudo terminal has gone
+                count = 0
+            if not count:
+                self.ended = count == 0
+                return
+            self.pieces += 1
+            self._take_in(bytes(piece[:count]), room)
+            if count < len(piece):
+                return
+
+    def _take_in(self, data, room):
+        if self.attached and self.interrupt_char >= 0:
+            found = data.find(bytes((self.interrupt_char,)))
+            if found >= 0:
+                data = data[:found] + data[found + 1 :]
+                machine_state.board.interrupted = True
+        self.received.extend(data if self.rts else data[:room])
+
+
+class USB_VCP:
+    """The firmware's virtual serial port object."""
+
+    RTS, CTS, IRQ_RX = 1, 2, 1
+
+    def __init__(self, id=0):
+        self._line = machine_state.serial
+
+    def init(self, flow=-1):
+        """Set flow control: RTS holds the host back, CTS makes ``write`` write only what fits."""
+        if flow >= 0:
+            self._line.rts = bool(flow & self.RTS)
+            self._line.cts = bool(flow & self.CTS)
+
+    def setinterrupt(self, char):
+        """Which byte interrupts the program while the REPL has the port; -1 none."""
+        self._line.interrupt_char = char
+
+    def isconnected(self):
+        """Whether a host has opened the port."""
+        machine_state.board.call()
+        return not machine_state.settings.get("cable_out", False)
+
+    def any(self):
+        """Whether bytes wait."""
+        machine_state.board.call()
+        return bool(self._line.received)
+
+    def recv(self, data, timeout=5000):
+        """Receive into a buffer, or so many bytes; the time-out is per byte, in ms."""
+        wanted = data if isinstance(data, int) else len(data)
+        waited = 0
+        while len(self._line.received) < wanted and waited < timeout:
+            before = len(self._line.received)
+            machine_state.pace.idle()
+            waited = waited + 1 if len(self._line.received) == before else 0
+        machine_state.board.call()
+        got = self._line.take(wanted)
+        if isinstance(data, int):
+            return got
+        data[: len(got)] = got
+        return len(got)
+
+    def send(self, data, timeout=5000):
+        """Send a buffer (or one byte); how many bytes went. The time-out is per byte, in ms."""
+        if isinstance(data, int):
+            data = bytes((data,))
+        sent = self._line.put(data)
+        waited = 0
+        while sent < len(data) and waited < timeout:
+            machine_state.pace.idle()
+            more = self._line.put(memoryview(data)[sent:])
+            sent += more
+            waited = 0 if more else waited + 1
+        machine_state.board.call()
+        return sent
+
+    def read(self, size=-1):
+        """What is there, up to ``size``; None where nothing is.
+
+        A program looks here once a turn of its main loop, so finding nothing also stands for the time that the turn's
+        own work takes on the chip (option ``turn_us``).
+        """
+        if not self._line.received:
+            machine_state.board.spend(machine_state.options["turn_us"] * TICKS_PER_US)
+            return None
+        there = len(self._line.received)
+        return self.recv(there if size < 0 else min(size, there), timeout=0)
+
+    def readinto(self, buffer, size=None):
+        """What is there, into a buffer; None where nothing is."""
+        got = self.read(len(buffer) if size is None else size)
+        if got is None:
+            return None
+        buffer[: len(got)] = got
+        return len(got)
+
+    def write(self, data, start=0, size=None):
+        """With CTS flow control: what fits at once, None where nothing does. Without: waits, then drops."""
+        if size is not None:
+            data = memoryview(data)[start : start + size]
+        if self._line.cts:
+            return self.send(data, timeout=0) or None
+        self.send(data, timeout=500)
+        return len(data)
+
+    def close(self):
+        """Nothing to do."""

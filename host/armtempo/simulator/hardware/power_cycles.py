@@ -1,0 +1,104 @@
+"""Power cycles: ``boot.py``, ``main.py``, the prompt, resets."""
+
+import builtins
+import sys
+
+import machine_state
+import setup
+from chip import memory, timer_registers
+from chip.reset import PowerOff, Reset
+from firmware import boot
+from firmware.repl import Repl, SoftReset, board_print
+
+_POWER_ON, _SOFT = 1, 0
+
+
+def run(options, hardware):
+    """Run the board until the launcher ends; ``hardware``: the folders of its built-in modules."""
+    setup.learn(options["sources"])
+    path = hardware, options["program"] + sys.path
+    before = list(sys.modules)
+    builtins.print = board_print
+    cause = _POWER_ON
+    while True:
+        mode = setup.power_up(options, cause)
+        builtins.open = machine_state.flash.open
+        try:
+            _live(options, before, mode, path)
+        except Reset as reset:
+            cause = reset.cause
+            _forget(before)
+        except PowerOff:
+            break
+    if machine_state.edges:
+        machine_state.edges.flush()
+
+
+def _live(options, before, mode, path):
+    """Run the program, then the prompt, again after each soft reset, which ends the safe mode."""
+    raw = False
+    while True:
+        boot.mount(mode, path)
+        if machine_state.arm is None or machine_state.arm.board is not machine_state.board:
+            setup.connect(machine_state.pins)
+        repl = Repl(raw)
+        try:
+            if mode != boot.SAFE:
+                _start(options, repl)
+        except SoftReset:
+            pass
+        repl.run()
+        raw = repl.raw
+        mode = boot.NORMAL
+        _soft_reset()
+        _forget(before)
+
+
+def _start(options, repl):
+    """boot.py, and where that went well main.py, unless the host talks to the raw REPL."""
+    if not _execute(options, repl, "boot.py"):
+        boot.flash_error(boot.BOOT_ERROR)
+    elif not repl.raw and not _execute(options, repl, "main.py"):
+        boot.flash_error(boot.MAIN_ERROR)
+
+
+def _execute(options, repl, name):
+    """Run a file of flash or card, or of the program that is not deployed; False where it raises."""
+    folders = [machine_state.flash.cwd] + [folder + "/armtempo_board" for folder in options["program"]]
+    for folder in folders:
+        try:
+            with machine_state.flash.open(folder + "/" + name) as file:
+                text = file.read()
+        except OSError:
+            continue
+        return repl.execute(text, name, log=True)
+    return True
+
+
+def _soft_reset():
+    """What the firmware does between two runs: timers it made stop, callbacks go; registers stay."""
+    board = machine_state.board
+    for number in board.api:
+        at = board.timers[number].at
+        memory.words[at + timer_registers.CR1] = memory.words[at + timer_registers.CCER] = memory.words[
+            at + timer_registers.DIER
+        ] = 0
+    for known in (board.api, board.callbacks, board.extints):
+        known.clear()
+    board.scheduled = []
+    board.pending = []
+    board.masked = False
+    board.sync()
+    machine_state.serial.attached = True
+    machine_state.serial.rts = machine_state.serial.cts = False
+    machine_state.settings["reset_cause"] = _SOFT
+
+
+def _forget(before):
+    """The program's modules are loaded afresh the next time."""
+    for name in list(sys.modules):
+        if name not in before:
+            del sys.modules[name]
+    caches = getattr(sys, "path_importer_cache", None)
+    if caches:  # CPython remembers which folders there were
+        caches.clear()

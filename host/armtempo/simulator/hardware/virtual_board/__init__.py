@@ -1,1 +1,0 @@
-"""The virtual board underneath the board program: the chip, MicroPython's firmware, and the arm."""

@@ -1,0 +1,153 @@
+"""``armtempo new``: what it writes can be planned at once, and nothing that is there is touched."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from armtempo.basics.errors import InputError
+from armtempo.cli import main
+from armtempo.model import arm_file, job_file, sequence_file, shipped
+from armtempo.new_arm import folder as project_folder
+from armtempo.new_arm import given_geometry, joint_entry
+from click.testing import CliRunner, Result
+
+FOUR = (
+    "d_mm=120,alpha_deg=90,low_deg=-170,high_deg=170,gear_ratio=20",
+    "name=shoulder,a_mm=200,low_deg=-10,high_deg=120,gear_ratio=40,speed_deg_s=30",
+    "a_mm=180,low_deg=-120,high_deg=0,gear_ratio=30,microsteps=8",
+    "a_mm=60,gear_ratio=10,encoder_counts=4000",
+)
+
+
+def new(*arguments: str, text: str | None = None) -> Result:
+    return CliRunner().invoke(main, ["new", *arguments], input=text)
+
+
+@pytest.mark.slow
+def test_an_own_arm_of_four_joints_is_planned_at_once(tmp_path: Path) -> None:
+    folder = tmp_path / "my arm"
+    done = new(str(folder), *(word for joint in FOUR for word in ("--joint", joint)))
+    assert done.exit_code == 0, done.output
+    arm = arm_file.load(folder / "arm.toml")
+    assert [joint.name for joint in arm.driven] == ["joint 1", "shoulder", "joint 3", "joint 4"]
+    assert arm.driven[1].limits.speed_deg_s == 30.0
+    assert arm.driven[2].motor.microsteps == 8
+    encoder = arm.driven[3].encoder
+    assert encoder is not None
+    assert encoder.counts_per_rev == 4000
+    out = tmp_path / "first.json"
+    planned = CliRunner().invoke(
+        main,
+        ["plan", "--arm", str(folder / "arm.toml"), "--job", str(folder / "first.toml"), "-o", str(out)],
+    )
+    assert planned.exit_code == 0, planned.output
+    assert out.exists()
+    assert "355.56" in done.output  # steps per degree of the shoulder: 200 * 16 * 40 / 360
+
+
+@pytest.mark.parametrize("name", list(shipped.files()))
+def test_the_first_job_of_every_arm_that_ships_is_within_its_ranges(name: str, tmp_path: Path) -> None:
+    project_folder.write(tmp_path / name, given_geometry.from_shipped(name), "sim:board")
+    arm = arm_file.load(tmp_path / name / "arm.toml")
+    job = job_file.load(tmp_path / name / "first.toml", arm)
+    sequence = sequence_file.load(tmp_path / name / "sequence.toml", arm)
+    assert sequence.name == "cycle"
+    assert len(job.via) == 3
+    for angles in job.via:
+        assert isinstance(angles, tuple)
+        for angle, joint in zip(angles, arm.driven, strict=True):
+            assert joint.range_deg[0] <= angle <= joint.range_deg[1]
+    assert job.via[0] == pytest.approx(arm.home_deg)
+    assert job.via[2] != job.via[1] != job.via[0]
+
+
+@pytest.mark.parametrize(
+    ("gear_ratio", "joints", "most"),
+    [(20.0, 1, 300.0 * 6 / 20), (1.0, 1, 1800.0), (1.0, 6, 1800.0)],
+)
+def test_speed_that_motor_and_board_allow(gear_ratio: float, joints: int, most: float) -> None:
+    entry = joint_entry.JointEntry("j", gear_ratio=gear_ratio)
+    assert entry.most_speed_deg_s(joints) == pytest.approx(most)
+    fine = joint_entry.JointEntry("j", microsteps=256, gear_ratio=gear_ratio)
+    assert fine.most_speed_deg_s(6) * fine.steps_per_deg <= 40_000.0 + 1e-6
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("gear=3", "'gear=3' is not one of the keys"),
+        ("a_mm", "'a_mm' is not one of the keys"),
+        ("a_mm=1,a_mm=2", "is given twice"),
+        ("a_mm=long", "a_mm = 'long' is no number"),
+        ("microsteps=1.5", "microsteps = '1.5' is no number"),
+    ],
+)
+def test_a_wrong_joint_is_named(text: str, named: str, tmp_path: Path) -> None:
+    done = new(str(tmp_path / "x"), "--joint", text)
+    assert done.exit_code == 2
+    assert named in done.output
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_the_arm_file_does_not_allow_leaves_nothing(tmp_path: Path) -> None:
+    done = new(str(tmp_path / "x"), "--joint", "low_deg=20,high_deg=10")
+    assert done.exit_code == 2
+    assert "range_deg" in done.output
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_with_something_in_it_is_kept(tmp_path: Path) -> None:
+    (tmp_path / "mine.txt").write_text("mine")
+    done = new(str(tmp_path), "--like", "ar4")
+    assert done.exit_code == 2
+    assert "not empty" in done.output
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_an_empty_folder_is_filled(tmp_path: Path) -> None:
+    (tmp_path / "here").mkdir()
+    assert new(str(tmp_path / "here"), "--like", "scara").exit_code == 0
+    assert (tmp_path / "here" / "armtempo.toml").exists()
+
+
+def test_nobody_to_ask_is_a_usage_error(tmp_path: Path) -> None:
+    done = new(str(tmp_path / "x"))
+    assert done.exit_code == 2
+    assert "which arm?" in done.output
+
+
+def test_two_beginnings_exclude_each_other(tmp_path: Path) -> None:
+    assert new(str(tmp_path / "x"), "--like", "ar4", "--joint", "a_mm=3").exit_code == 2
+
+
+def test_an_unknown_arm_lists_those_that_ship(tmp_path: Path) -> None:
+    done = new(str(tmp_path / "x"), "--like", "puma")
+    assert done.exit_code == 2
+    assert "parol6" in done.output
+
+
+def test_questions_at_a_terminal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("armtempo.cli.new._asked", lambda: True)
+    answers = ["own", "1", "turntable", "", "", "", "", "-180", "180", "", "", "5", "", "20", "sim:table"]
+    done = new(str(tmp_path / "x"), text="\n".join(answers) + "\n")
+    assert done.exit_code == 0, done.output
+    arm = arm_file.load(tmp_path / "x" / "arm.toml")
+    assert arm.driven[0].name == "turntable"
+    assert arm.driven[0].motor.gear_ratio == 5.0
+    assert arm.driven[0].limits.speed_deg_s == 20.0
+    assert 'port = "sim:table"' in (tmp_path / "x" / "armtempo.toml").read_text()
+
+
+def test_a_name_with_quotes_stays_one_line_and_control_characters_are_refused() -> None:
+    text = given_geometry.from_joints('a"', [joint_entry.JointEntry("b'\\")])
+    assert text.arm.name == 'a"'
+    assert text.arm.driven[0].name == "b'\\"
+    with pytest.raises(InputError, match="control characters"):
+        given_geometry.from_joints("a\n", [joint_entry.JointEntry("b")])
+
+
+def test_nothing_is_left_where_it_cannot_be_written(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="cannot be written"):
+        project_folder.write(tmp_path / "file" / "x", given_geometry.from_shipped("paper"), "sim")
