@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from armtempo.model import arm_file, job_file
+from armtempo.model import shipped
 from armtempo.simulator import LaunchOptions, launch
 
 from tests import forked, interpreters
@@ -66,8 +66,8 @@ BLOCKS = [(page.name, block) for page in PAGES if page.name in COMMANDS for bloc
 def started(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the files that the examples take for granted: arm, job, and a recorded run."""
     folder = tmp_path_factory.mktemp("examples")
-    (folder / "my_arm.toml").write_text(arm_file.default_path().read_text())
-    (folder / "my_job.toml").write_text(job_file.default_path().read_text())
+    (folder / "my_arm.toml").write_text(shipped.arm_path().read_text())
+    (folder / "my_job.toml").write_text(shipped.job_path().read_text())
     plan = small_plan(folder / "feed.json", name="feed")
     done = commandline.run("run", plan, "--repeat", "2", folder=folder)
     assert done.exit_code == 0, done.errors
