@@ -20,8 +20,8 @@ def checked(data: bytes, room_words: int, most_joints: int) -> "Record":
     """(head, joints, crc32, outputs, inputs) of an arm record, as ``armrecord`` unpacks them.
 
     ``room_words``, ``most_joints``: what an engine can have. Refused: BAD_RECORD where it is damaged, of another
-    version, or names what the board has not; PIN_TAKEN where an output, input or polled switch has what is taken; NO_ROOM
-    with the bytes needed.
+    version, or names what the board has not; PIN_TAKEN where an output, input or polled switch has what is taken;
+    NO_ROOM with the bytes needed.
     """
     try:
         head, joints, crc = armrecord.unpack(data)
