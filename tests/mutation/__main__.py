@@ -122,7 +122,7 @@ class Copy:
         shutil.copytree(ROOT, folder, ignore=NOT_COPIED)
         (folder / ".cache" / "micropython").mkdir(parents=True)
         for path in (ROOT / ".cache" / "micropython").glob("*"):
-            if path.name not in ("micropython-arm", "root-arm", "qemu"):
+            if path.name not in ("micropython-arm", "armhf"):
                 (folder / ".cache" / "micropython" / path.name).symlink_to(path)
         path = os.pathsep.join(str(folder / name) for name in ("host", "shared", "board"))
         self._environment = {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"}
