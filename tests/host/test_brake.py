@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from armtempo.basics.errors import InputError
-from armtempo.model.arm import Arm, Limits
+from armtempo.model.arm import Arm
+from armtempo.model.parts import Limits
 from armtempo.model.plan import Plan
 from armtempo.planning import brake_time, planner, point_to_point
 from armtempo.splines.trajectory import Trajectory

@@ -13,7 +13,7 @@ from armtempo.basics.errors import InputError
 from armtempo.cli import main
 from armtempo.cli.posture import NamedPosture
 from armtempo.kinematics.of_arm import forward
-from armtempo.model import arm_file, arm_json, posture_text
+from armtempo.model import arm_json, posture_text, shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import planner, via_points
@@ -27,7 +27,7 @@ POSE = "\n[posture.over]\nposition_mm = {}\ntolerance_mm = 0.01\n"
 def written(tmp_path: Path, more: str) -> Path:
     """The shipped arm file with more behind it."""
     path = tmp_path / "arm.toml"
-    path.write_text(arm_file.default_path().read_text() + more)
+    path.write_text(shipped.arm_path().read_text() + more)
     return path
 
 
@@ -111,7 +111,7 @@ def test_a_job_with_an_unknown_posture_says_which_is_meant(tmp_path: Path) -> No
     arm = Arm.load(written(tmp_path, PARK))
     file = tmp_path / "job.toml"
     file.write_text('name = "x"\n[[via]]\nposture = "parc"\n[[via]]\nposture = "home"\n')
-    with pytest.raises(InputError, match=r"via\[1\].*no posture 'parc'; did you mean 'park'"):
+    with pytest.raises(InputError, match=r"via P0.*no posture 'parc'; did you mean 'park'"):
         Job.load(file, arm)
     file.write_text(
         'name = "x"\n[[via]]\nposture = "park"\nangles_deg = [0, 0, 0]\n[[via]]\nposture = "home"\n'

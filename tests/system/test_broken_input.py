@@ -10,17 +10,17 @@ from pathlib import Path
 import pytest
 from armtempo import simulator
 from armtempo.link import open_board
-from armtempo.model import arm_file, job_file
+from armtempo.model import shipped
 
 from tests.system import commandline
 
 ANSWERS_WITHIN_S = 30.0
 """Far more than the 2 s in which a silent board is given up, for loaded machines."""
-SHIPPED = {"job": job_file.default_path(), "arm": arm_file.default_path()}
+SHIPPED = {"job": shipped.job_path(), "arm": shipped.arm_path()}
 WRONG_FILES = {
     "no via point": ("job", None, "via_deg = []", "via_deg = []", "at least 2"),
     "one via point": ("job", None, "via_deg = [[0.0, -60.0, 40.0]]", "1 via point", "at least 2"),
-    "NaN": ("job", "[90.0, -85.0, 40.0]", "[90.0, nan, 40.0]", "via_deg[4]", "nan"),
+    "NaN": ("job", "[90.0, -85.0, 40.0]", "[90.0, nan, 40.0]", "via_deg P3", "nan"),
     "unknown key": ("job", "degree = 5", "degree = 5\nsped = 3", "sped: unknown key", "did you mean"),
     "negative limit": (
         "arm",

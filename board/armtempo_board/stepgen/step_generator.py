@@ -216,6 +216,7 @@ class StepGenerator:
         start_kiticks = _kiticks(self._law_words[_REAL_START_HIGH], 0)
         reached = queue[_REACHED]
         if queue[_LATEST_KITICKS] >= start_kiticks and self.waits():
+            self.ended = False  # the last step may be among them
             if self._held_queued:
                 step_queue.withdraw(queue, queue[_IN] - 1 & 0xFFFF, start_kiticks)
                 self._held = True
@@ -227,6 +228,7 @@ class StepGenerator:
         if reached < 0:
             reached = 0
             self._first_waits = True
+            self._heading = self.direction  # it was in the queue, or held back behind what was
         queue[_REACHED] = reached
         # what was written last may have followed the law before, so no cubic begins there
         queue[_SINGLE_STEPS] = max(queue[_SINGLE_STEPS], 1)
@@ -240,6 +242,21 @@ class StepGenerator:
         self._is_last_law = is_last
         if is_last and self.halted:
             self.ended = True
+
+    def end_steps(self, at_rest: bool) -> int:
+        """Position at which the joint must stand once it has ended: where the record ends, or a last law stopped it.
+
+        ``at_rest``: the motion's time stands still, and it ends here.
+        """
+        if not (self._is_last_law or at_rest):
+            return self.subintervals.end_steps()
+        queue = self.queue
+        left = self.direction * (queue[_LAST_STEP] - queue[_REACHED])
+        if self._first_waits:
+            left = self._heading * (queue[_LAST_STEP] + 1)
+        if self._held:
+            left += self.direction
+        return self._position - _BIAS - left
 
     def next_kiticks(self) -> int:
         """Time of the next step to be written, or one before it while it is not known."""
@@ -260,6 +277,7 @@ class StepGenerator:
             if self._waits_for(found):
                 return
         if found == _END:
+            self._found = found  # nothing is looked for behind it
             self.ended = True
         elif found:
             self._found = _NOT_YET

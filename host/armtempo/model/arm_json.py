@@ -10,9 +10,9 @@ from armtempo.basics.errors import InputError
 from armtempo.formats import json_codec
 from armtempo.formats.atomic_file import replace_text, why
 from armtempo.model import boards, pin_use
-from armtempo.model import posture as named
-from armtempo.model.arm import Arm, Joint
+from armtempo.model.arm import Arm
 from armtempo.model.outputs import KINDS, SWITCH, Output
+from armtempo.model.parts import Joint
 
 FORMAT = "armtempo arm"
 VERSION = 1
@@ -55,7 +55,7 @@ def check(arm: Arm, where: str, hint: str) -> None:
         raise InputError(f"{where}: {pin.where}: {pin.what}", hint)
 
     for posture in arm.postures:
-        if problem := named.problem(arm, posture):
+        if problem := arm.posture_problem(posture):
             raise InputError(f"{where}: posture {posture.name!r}: {problem}", hint)
 
 
@@ -70,13 +70,8 @@ def _output_problem(output: Output) -> str:
 
 
 def _problem(joint: Joint) -> str:
-    motor, encoder = joint.motor, joint.encoder
-    if motor is None:
+    if joint.motor is None:
         return ""
     if joint.limits is None or min(joint.limits.values) <= 0:
         return "has no limits above 0"
-    if min(motor.steps_per_rev, motor.microsteps, motor.gear_ratio) <= 0:
-        return "its motor's figures must be above 0"
-    if encoder is not None and encoder.counts_per_rev <= 0:
-        return "its encoder's counts_per_rev must be above 0"
     return ""

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from armtempo.basics.errors import InputError
-from armtempo.model.arm import Limits
+from armtempo.model.parts import Limits
 from armtempo.splines.bspline import Array
 from armtempo.splines.trajectory import Trajectory
 

@@ -1,0 +1,199 @@
+"""The parts of an arm in its file: the tables of joints, drivers and safety, with the range of each key."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from armtempo.formats.toml_table import Table
+from armtempo.model import outputs_file
+from armtempo.model.parts import (
+    ENCODER,
+    MOTOR,
+    Driver,
+    Encoder,
+    Joint,
+    JointModel,
+    Limits,
+    LimitSwitches,
+    Motor,
+    Range,
+    Safety,
+)
+
+MAX_ANGLE_DEG = 36_000.0
+"""Largest angle, either way, that an arm file may give: a hundred turns."""
+
+MAX_LENGTH_MM = 1e6
+"""Longest link that an arm file may describe."""
+
+_LIMITS = {"speed_deg_s": 1e5, "acceleration_deg_s2": 1e7, "jerk_deg_s3": 1e9}
+_LEAST_LIMIT = 0.001
+_MODEL = {
+    "holding_torque_nm": (0.0, 1e3),
+    "rotor_inertia_kg_m2": (0.0, 1.0),
+    "inertia_kg_m2": (0.0, 1e4),
+    "damping_nm_s": (0.0, 1e3),
+    "corner_speed_rad_s": (0.0, 1e5),
+    "gravity_torque_nm": (-1e4, 1e4),
+    "backlash_deg": (0.0, 90.0),
+    "encoder_phase_counts": (0.0, 1.0),
+    "scatter_deg": (0.0, 90.0),
+}
+"""Bounds that no small arm comes near: what is beyond them is a slip of the unit or of the point."""
+
+
+def driver(table: Table | None) -> Driver:
+    """[driver]; errors of this and the other functions: InputError, naming file, key and value."""
+    if table is None:
+        return Driver()
+    times = {
+        key: table.number(key, getattr(Driver, key), least=0.1, most=500.0)
+        for key in ("pulse_us", "low_us", "dir_setup_us", "dir_hold_us")
+    }
+    active = table.choice("enable_active", ("low", "high"), Driver.enable_active)
+    table.done()
+    return Driver(**times, enable_active=active)
+
+
+def safety(table: Table | None) -> Safety:
+    """[safety]."""
+    if table is None:
+        return Safety()
+    found = Safety(
+        estop_fitted=table.boolean("estop_fitted", Safety.estop_fitted),
+        estop_active=table.choice("estop_active", ("low", "high"), Safety.estop_active),
+        estop_releases_enable=table.boolean("estop_releases_enable", Safety.estop_releases_enable),
+        on_link_loss=table.choice("on_link_loss", ("finish", "stop"), Safety.on_link_loss),
+        link_timeout_ms=table.integer("link_timeout_ms", Safety.link_timeout_ms, least=200, most=60_000),
+    )
+    table.done()
+    return found
+
+
+def joint(table: Table, number: int) -> Joint:
+    """A [[joint]] table; ``number`` from 1."""
+    low, high = table.numbers("range_deg", 2)
+    if not -MAX_ANGLE_DEG <= low < high <= MAX_ANGLE_DEG:
+        raise table.fail(
+            "range_deg", f"two angles, the smaller first, of at most {MAX_ANGLE_DEG:g} either way"
+        )
+    linkage = table.boolean("parallel_linkage", Joint.parallel_linkage)
+    if linkage and number == 1:
+        raise table.fail("parallel_linkage", "false for joint 1, which has no joint before it")
+    motor = _motor(table.table("motor"))
+    limits = _limits(table.table("limits"))
+    if motor is not None and limits is None:
+        raise table.fail("limits", "a table with speed_deg_s, acceleration_deg_s2 and jerk_deg_s3")
+    encoder = _encoder(table.table("encoder"))
+    if encoder is not None and motor is None:
+        raise table.fail("motor", "given where there is an encoder")
+    found = Joint(
+        name=table.text("name", f"joint {number}"),
+        d_mm=table.number("d_mm", least=-MAX_LENGTH_MM, most=MAX_LENGTH_MM),
+        a_mm=table.number("a_mm", least=-MAX_LENGTH_MM, most=MAX_LENGTH_MM),
+        alpha_deg=table.number("alpha_deg", least=-180.0, most=180.0),
+        theta_offset_deg=table.number("theta_offset_deg", 0.0, least=-360.0, most=360.0),
+        range_deg=(low, high),
+        home_deg=table.number("home_deg", min(max(0.0, low), high), least=low, most=high),
+        limits=limits,
+        motor=motor,
+        encoder=encoder,
+        switches=_switches(table.table("switches")),
+        model=_model(table.table("model")),
+        parallel_linkage=linkage,
+    )
+    table.done()
+    return found
+
+
+def _limits(table: Table | None) -> Limits | None:
+    if table is None:
+        return None
+    limits = Limits(
+        **{key: table.number(key, least=_LEAST_LIMIT, most=most) for key, most in _LIMITS.items()}
+    )
+    table.done()
+    return limits
+
+
+def _whole(table: Table, key: str, ranges: Mapping[str, Range]) -> int:
+    least, most = ranges[key]
+    return table.integer(key, least=int(least), most=int(most))
+
+
+def _number(table: Table, key: str, ranges: Mapping[str, Range], *default: float) -> float:
+    least, most = ranges[key]
+    return table.number(key, *default, least=least, most=most)
+
+
+def _motor(table: Table | None) -> Motor | None:
+    if table is None:
+        return None
+    motor = Motor(
+        channel=_whole(table, "channel", MOTOR),
+        steps_per_rev=_whole(table, "steps_per_rev", MOTOR),
+        microsteps=_whole(table, "microsteps", MOTOR),
+        gear_ratio=_number(table, "gear_ratio", MOTOR),
+        direction=table.choice("direction", (1, -1), 1),
+    )
+    table.done()
+    return motor
+
+
+def _encoder(table: Table | None) -> Encoder | None:
+    if table is None:
+        return None
+    encoder = Encoder(
+        channel=_whole(table, "channel", ENCODER),
+        counts_per_rev=_whole(table, "counts_per_rev", ENCODER),
+        on=table.choice("on", ("joint", "motor"), "joint"),
+        direction=table.choice("direction", (1, -1), 1),
+        following_error_deg=_number(table, "following_error_deg", ENCODER, 0.0),
+    )
+    table.done()
+    return encoder
+
+
+def _switches(table: Table | None) -> LimitSwitches:
+    if table is None:
+        return LimitSwitches()
+    switches = LimitSwitches(
+        low=_switch(table, "low"),
+        high=_switch(table, "high"),
+        active=table.choice("active", ("low", "high"), "low"),
+        low_deg=_angle(table, "low_deg"),
+        high_deg=_angle(table, "high_deg"),
+    )
+    table.done()
+    return switches
+
+
+def _switch(table: Table, key: str) -> int | str | None:
+    if table.is_text(key):
+        return outputs_file.pin(table, key, "an input from 1 to 3, or a free pin such as PD0 for homing only")
+    return table.integer(key, least=1, most=3) if table.has(key) else None
+
+
+def homing(top: Table, names: list[str]) -> tuple[tuple[str, ...], ...]:
+    """``homing``: names of joints, or lists of them, in the order in which they are homed."""
+    if not top.has("homing"):
+        return ()
+    allowed = f"a list of joints' names, each once, or of lists of them; the joints are {', '.join(names)}"
+    entries = top.array("homing", allowed)
+    groups = tuple(tuple(entry) if isinstance(entry, list) else (entry,) for entry in entries)
+    flat = [name for group in groups for name in group]
+    if not all(name in names for name in flat) or len(set(flat)) != len(flat) or not all(groups):
+        raise top.fail("homing", allowed)
+    return groups
+
+
+def _angle(table: Table, key: str) -> float | None:
+    return table.number(key, least=-MAX_ANGLE_DEG, most=MAX_ANGLE_DEG) if table.has(key) else None
+
+
+def _model(table: Table | None) -> JointModel:
+    if table is None:
+        return JointModel()
+    values = {key: table.number(key, 0.0, least=least, most=most) for key, (least, most) in _MODEL.items()}
+    table.done()
+    return JointModel(**values)
