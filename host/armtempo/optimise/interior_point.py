@@ -39,7 +39,7 @@ class Linearised(Protocol):
         """
 
 
-class Factor(Protocol):
+class Factorised(Protocol):
     """A factorised matrix of Newton's equations; see ``kkt.Factor``."""
 
     def solve(self, gradient: Array, residual: Array) -> Array: ...
@@ -48,7 +48,7 @@ class Factor(Protocol):
 class Kkt(Protocol):
     """Newton's equations; see ``kkt.BandedKkt``."""
 
-    def factor(self, entries: Array) -> Factor: ...
+    def factor(self, entries: Array) -> Factorised: ...
 
 
 class Program(Protocol):
@@ -179,7 +179,7 @@ class _Solver:
         self.exact = self.settings.curvature
         return _Step(0.0, self.x, self.g)
 
-    def _along(self, at: Linearised, factor: Factor, gradient: Array, step: Array) -> _Step:
+    def _along(self, at: Linearised, factor: Factorised, gradient: Array, step: Array) -> _Step:
         """The better of a straight and, where that is short, a bent step."""
         slope = float(
             np.sum(gradient * step)
