@@ -26,6 +26,7 @@ class RunTab:
         self._page = page
         self._operator = page.operator
         self._shown = (-1, 0)
+        self._busy = ""
         with ui.row().classes("items-center gap-2"):
             page.control(ui.button(words.TO_START, on_click=self._to_start))
             page.control(ui.button(words.RUN, icon="play_arrow", on_click=self._run))
@@ -61,18 +62,18 @@ class RunTab:
         self._page.do(words.RUN, run)
 
     def _look(self) -> None:
+        if self._busy and not self._operator.busy:  # a run has ended, and has its report
+            self._past.refresh()
+        self._busy = self._operator.busy
         curves = self._operator.curves
         state = (curves.run, len(curves.time_s))
         if state == self._shown or len(curves.time_s) < 2:
             return
-        new_run = state[0] != self._shown[0]
         self._shown = state
         times, commanded = np.array(curves.time_s), np.array(curves.commanded_deg)
         self._angles.show(times, commanded)
         measured = np.array(curves.angle_deg, dtype=float)
         self._errors.show(times, np.nan_to_num(measured - commanded))
-        if new_run:
-            self._past.refresh()
 
     @ui.refreshable_method
     def _past(self) -> None:

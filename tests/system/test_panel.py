@@ -1,0 +1,161 @@
+"""The panel in a real browser, on a virtual board in real time: the whole way, and what stops a held jog."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from armtempo.model import shipped
+
+from tests import browser
+from tests.system import commandline
+
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("panel")]
+_OPTIONS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+_WAIT_S = 120.0
+"""Nothing here takes longer, on however loaded a machine."""
+_REST_S = 2.0
+"""A jog rests within this time after its page has gone: 0.35 s until that is noticed, then it brakes."""
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    """A browser."""
+    browser.needed()
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as play:
+        made = play.chromium.launch(executable_path=browser.BROWSER, args=_OPTIONS)
+        yield made
+        made.close()
+
+
+@pytest.fixture
+def panel(tmp_path: Path) -> Iterator[tuple[str, subprocess.Popen[str], Path]]:
+    """(address, process, project folder) of a panel for the paper's arm and job."""
+    (tmp_path / "job.toml").write_text(shipped.job_path().read_text(encoding="utf-8"), encoding="utf-8")
+    process = commandline.start(
+        *("panel", "--arm", "paper", "--job", "job.toml", "--web-port", "0", "--no-show"), folder=tmp_path
+    )
+    assert process.stdout
+    address = process.stdout.readline().strip()
+    assert address.startswith("http://127.0.0.1:"), address
+    yield address, process, tmp_path
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=_WAIT_S)
+
+
+def state(page: Any) -> str:
+    return str(page.inner_text("#armtempo-state"))
+
+
+def wait_for(page: Any, *words: str) -> None:
+    """Until the line of the state has all the words."""
+    limit_s = time.monotonic() + _WAIT_S
+    while not all(word in state(page) for word in words):
+        assert time.monotonic() < limit_s, state(page)
+        page.wait_for_timeout(50)
+
+
+def opened(chromium: Any, address: str, **options: Any) -> Any:
+    page = chromium.new_page(**options)
+    page.set_default_timeout(_WAIT_S * 1000)
+    page.goto(address)
+    page.wait_for_selector("text=In control")
+    wait_for(page, "virtual board")
+    return page
+
+
+def home(page: Any) -> None:
+    page.get_by_role("button", name="The arm is at home").click()
+    page.get_by_role("dialog").get_by_role("button", name="The arm is at home").click()
+    wait_for(page, "idle")
+
+
+def test_the_whole_way(chromium: Any, panel: tuple[str, Any, Path]) -> None:
+    address, _, folder = panel
+    page = opened(chromium, address)
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    assert page.get_by_label("joint 1 +").is_disabled()  # not homed yet
+    home(page)
+    page.get_by_role("tab", name="Plan").click()
+    page.get_by_role("button", name="Plan", exact=True).click()
+    page.wait_for_selector("text=Motion time 6.79")
+    page.get_by_role("tab", name="Run").click()
+    page.get_by_role("button", name="Run", exact=True).click()
+    wait_for(page, "moving", "Run")
+    page.wait_for_timeout(1500)
+    page.keyboard.press("Escape")
+    wait_for(page, "idle")
+    page.get_by_role("tab", name="Board").click()
+    page.wait_for_selector("text=Stop: the arm brakes along its path.")
+    page.get_by_role("tab", name="Run").click()
+    page.get_by_role("button", name="Go to the start").click()
+    wait_for(page, "moving")
+    wait_for(page, "idle")
+    page.get_by_role("button", name="Run", exact=True).click()
+    wait_for(page, "moving")
+    wait_for(page, "idle")
+    with page.expect_popup() as popup:
+        page.get_by_role("link", name="Report").first.click()
+    popup.value.wait_for_selector("text=joint 1")
+    assert len(list((folder / "runs").glob("*/run.json"))) == 2
+    assert not errors
+
+
+@pytest.mark.parametrize("how", ["button", "tab", "browser"])
+def test_a_held_jog_ends_with_its_page(chromium: Any, panel: tuple[str, Any, Path], how: str) -> None:
+    address, process, _ = panel
+    watching = opened(chromium, address)
+    home(watching)
+    watching.close()
+    context = chromium.new_context()
+    page = opened(context, address)
+    box = page.get_by_label("joint 1 +").bounding_box()
+    page.mouse.move(box["x"] + 9, box["y"] + 9)
+    page.mouse.down()
+    wait_for(page, "moving", "jog")
+    if how == "button":
+        page.mouse.up()
+    elif how == "tab":
+        page.close()
+    else:
+        context.close()
+    time.sleep(_REST_S)
+    after = chromium.new_page()
+    after.goto(address)
+    wait_for(after, "idle")
+    angle = after.inner_text("#armtempo-angle-1")
+    time.sleep(0.5)
+    assert after.inner_text("#armtempo-angle-1") == angle
+    after.close()
+    assert process.poll() is None
+
+
+def test_a_page_says_so_when_the_server_has_gone(chromium: Any, panel: tuple[str, Any, Path]) -> None:
+    address, process, _ = panel
+    page = opened(chromium, address)
+    process.kill()
+    page.wait_for_selector("body.lost", timeout=_WAIT_S * 1000)
+    cover = page.evaluate("getComputedStyle(document.body, '::after').content")
+    assert "Nothing can be moved" in cover
+
+
+@pytest.mark.parametrize(("width", "height"), [(1280, 800), (820, 1180), (390, 844)])
+def test_it_fits_desktop_tablet_and_phone(
+    chromium: Any, panel: tuple[str, Any, Path], width: int, height: int
+) -> None:
+    page = opened(chromium, panel[0], viewport={"width": width, "height": height})
+    for tab in ("Move", "Plan", "Run", "Board"):
+        page.get_by_role("tab", name=tab).click()
+        page.wait_for_timeout(200)
+        over = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+        assert over <= 0, (tab, over)
+        assert page.get_by_role("button", name="Stop").is_visible()
+    page.close()
