@@ -62,7 +62,7 @@ class ArmScene:
 
     def __init__(self, shape: ArmShape) -> None:
         self._shape = shape
-        with ui.scene(width=800, height=500, grid=(4, 16), background_color="#ffffff", fps=30).classes(
+        with ui.scene(width=800, height=500, grid=(4, 16), background_color="#ffffff").classes(
             "w-full h-full"
         ) as self.scene:
             self._links = self._capsules(COLOUR, 1.0)
