@@ -184,7 +184,8 @@ COMMANDS: "dict[str, str]" = {
     "tail is the unique id in hex and the firmware.",
     "status": "What the board is doing. `known`: bit a joint, its position is known. `run`: number of the "
     "current or last run since the start. `ticks`: motion clock. `path`: the motion's own time, which is behind the "
-    "clock where the speed was below 100 %. `rate`: the speed that is wanted, in thousandths, 0 in a pause; while "
+    "clock where the speed was below 100 %. `fault_joint`: also the joint whose switch ended the last homing motion. "
+    "`rate`: the speed that is wanted, in thousandths, 0 in a pause; while "
     "nothing moves that of the next start. Tail: per joint commanded steps and encoder "
     "counts (two i32).",
     "put_begin": "Begins an upload of `size` bytes; the tail is the trajectory's name, or `/arm` for the arm "

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 
+from armtempo.basics.arguments import checked
 from armtempo.basics.errors import InputError, LinkError, NoProgramError, PortError
 from armtempo.basics.progress import Progress
 from armtempo.deploy import program_files
@@ -38,6 +39,7 @@ def _ignore(done: float, whole: float) -> None:
     """Where nobody asks for progress."""
 
 
+@checked
 def deploy(port: str, mpy: bool = False, tell: Tell = LOG.info, progress: Progress = _ignore) -> Hello:
     """Put the program on the board at ``port``, only what differs, and start it; what it then says of itself.
 
@@ -64,6 +66,7 @@ def deploy(port: str, mpy: bool = False, tell: Tell = LOG.info, progress: Progre
     return _confirm(port)
 
 
+@checked
 def undeploy(port: str, tell: Tell = LOG.info) -> None:
     """Take the program off the board; stored motions stay, and what ``deploy`` kept aside comes back."""
     end_program(port, tell)
