@@ -85,6 +85,21 @@ def home(page: Any) -> None:
     wait_for(page, "idle")
 
 
+def hold(page: Any) -> None:
+    """Hold a jog button until the arm moves; again if a busy browser was silent for too long, as then it lets go."""
+    box = page.get_by_label("joint 1 +").bounding_box()
+    page.mouse.move(box["x"] + 9, box["y"] + 9)
+    for _ in range(20):
+        page.mouse.down()
+        for _ in range(60):
+            if "moving" in state(page):
+                return
+            page.wait_for_timeout(50)
+        page.mouse.up()
+        wait_for(page, "idle")
+    raise AssertionError(state(page))
+
+
 def test_the_whole_way(browsing: Any, panel: tuple[str, Any, Path]) -> None:
     address, _, folder = panel
     page = opened(browsing, address)
@@ -125,10 +140,7 @@ def test_a_held_jog_ends_with_its_page(
     context = chromium.new_context()
     page = opened(context, address)
     home(page)
-    box = page.get_by_label("joint 1 +").bounding_box()
-    page.mouse.move(box["x"] + 9, box["y"] + 9)
-    page.mouse.down()
-    wait_for(page, "moving", "jog")
+    hold(page)
     if how == "button":
         page.mouse.up()
     elif how == "tab":

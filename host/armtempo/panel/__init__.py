@@ -6,7 +6,8 @@
     held_jog.py    a jog that lasts as long as a browser says that its button is held
     access.py      who may ask the server for anything
     arm_scene.py   the arm in 3-D
-    page.py        the layout: header with stop, scene, tabs
+    panel_page.py  what the tabs of a page share
+    layout.py      header with stop, scene, tabs
     move_tab.py, plan_tab.py, run_tab.py, board_tab.py
     desk.py        the job that is planned, and its file
     charts.py      curves of all joints

@@ -10,7 +10,7 @@ from nicegui import ui
 from armtempo.panel import words
 
 if TYPE_CHECKING:
-    from armtempo.panel.page import Page
+    from armtempo.panel.panel_page import PanelPage
 
 _SHOWN = (
     "port",
@@ -32,7 +32,7 @@ _SHOWN = (
 class BoardTab:
     """The tab of one page."""
 
-    def __init__(self, page: Page) -> None:
+    def __init__(self, page: PanelPage) -> None:
         self._page = page
         self._operator = page.operator
         ui.label(words.STATUS).classes("text-subtitle2")
@@ -90,6 +90,6 @@ class BoardTab:
             self._page.control(remove, moves=False)
 
 
-def build(page: Page) -> None:
+def build(page: PanelPage) -> None:
     """The tab."""
     BoardTab(page)

@@ -10,12 +10,12 @@ from armtempo.panel import words
 from armtempo.panel.held_jog import JogButton
 
 if TYPE_CHECKING:
-    from armtempo.panel.page import Page
+    from armtempo.panel.panel_page import PanelPage
 
 AXES = ("x", "y", "z")
 
 
-def build(page: Page) -> None:
+def build(page: PanelPage) -> None:
     """The tab."""
     _jog(page)
     _postures(page)
@@ -23,7 +23,7 @@ def build(page: Page) -> None:
     _outputs(page)
 
 
-def _hold_button(page: Page, button: JogButton, text: str, label: str) -> None:
+def _hold_button(page: PanelPage, button: JogButton, text: str, label: str) -> None:
     """A button that moves the arm while it is held."""
     page.buttons.append(button)
     number = len(page.buttons) - 1
@@ -36,7 +36,7 @@ def _hold_button(page: Page, button: JogButton, text: str, label: str) -> None:
     page.control(made)
 
 
-def _pair(page: Page, name: str, number_id: str, made: dict[str, object]) -> None:
+def _pair(page: PanelPage, name: str, number_id: str, made: dict[str, object]) -> None:
     """A row: minus, name and number, plus."""
     with ui.row().classes("items-center gap-2 no-wrap"):
         _hold_button(page, JogButton(**made, direction=-1), "−", f"{name} −")  # type: ignore[arg-type]
@@ -46,7 +46,7 @@ def _pair(page: Page, name: str, number_id: str, made: dict[str, object]) -> Non
             ui.label("").classes("armtempo-number").props(f'id="{number_id}"')
 
 
-def _jog(page: Page) -> None:
+def _jog(page: PanelPage) -> None:
     with ui.row().classes("gap-8 items-start"):
         with ui.column().classes("gap-1"):
             ui.label(words.JOINTS).classes("text-subtitle2")
@@ -68,7 +68,7 @@ def _jog(page: Page) -> None:
     slider.on_value_change(lambda event: setattr(page, "jog_percent", float(event.value)))
 
 
-def _postures(page: Page) -> None:
+def _postures(page: PanelPage) -> None:
     operator = page.operator
     names = ["home", *(posture.name for posture in operator.arm.postures)]
     with ui.row().classes("items-center gap-2"):
@@ -81,7 +81,7 @@ def _postures(page: Page) -> None:
             page.control(go)
 
 
-def _motion(page: Page) -> None:
+def _motion(page: PanelPage) -> None:
     operator = page.operator
 
     async def home() -> None:
@@ -105,7 +105,7 @@ def _motion(page: Page) -> None:
     speed.on("change", lambda event: page.attempt(lambda: operator.board.speed(float(event.args) / 100)))
 
 
-def _outputs(page: Page) -> None:
+def _outputs(page: PanelPage) -> None:
     operator = page.operator
     if operator.arm.outputs:
         ui.label(words.OUTPUTS).classes("text-subtitle2")

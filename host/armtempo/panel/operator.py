@@ -32,7 +32,7 @@ _LOG = logging.getLogger("armtempo")
 
 
 @dataclass
-class Curves:
+class LiveCurves:
     """What the samples of the motion that runs, or ran last, say: a row for each sample."""
 
     time_s: list[float] = field(default_factory=list)
@@ -62,7 +62,7 @@ class Operator:
         self.state: BoardState | None = None
         self.angles_deg: Array = np.array(arm.home_deg)
         """Where the joints were commanded to be, by the last message, (J,)."""
-        self.curves = Curves()
+        self.curves = LiveCurves()
         self.inputs: dict[str, bool] = {}
         """Whether each input of the arm is active."""
         self.trouble = ""

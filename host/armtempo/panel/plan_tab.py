@@ -18,7 +18,7 @@ from armtempo.panel.charts import CurveChart
 
 if TYPE_CHECKING:
     from armtempo.model.plan import Plan
-    from armtempo.panel.page import Page
+    from armtempo.panel.panel_page import PanelPage
 
 _POINTS = 200
 _PLAY_S = 0.05
@@ -27,7 +27,7 @@ _PLAY_S = 0.05
 class PlanTab:
     """The tab of one page; its plan is the panel's, so that every page can run it."""
 
-    def __init__(self, page: Page) -> None:
+    def __init__(self, page: PanelPage) -> None:
         self._page = page
         self._operator = page.operator
         self._rows: list[list[float]] = [list(row) for row in _rows_of(page)]
@@ -200,11 +200,11 @@ class PlanTab:
         self._slider.set_value(1000)
 
 
-def _rows_of(page: Page) -> list[list[float]]:
+def _rows_of(page: PanelPage) -> list[list[float]]:
     """The via points of the project's job, as angles."""
     return page.operator.desk.rows()
 
 
-def build(page: Page) -> None:
+def build(page: PanelPage) -> None:
     """The tab."""
     PlanTab(page)

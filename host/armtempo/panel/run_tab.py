@@ -13,7 +13,7 @@ from armtempo.panel import words
 from armtempo.panel.charts import CurveChart
 
 if TYPE_CHECKING:
-    from armtempo.panel.page import Page
+    from armtempo.panel.panel_page import PanelPage
 
 REPORT_PAGE = "report.html"
 _MOST_RUNS = 30
@@ -22,7 +22,7 @@ _MOST_RUNS = 30
 class RunTab:
     """The tab of one page."""
 
-    def __init__(self, page: Page) -> None:
+    def __init__(self, page: PanelPage) -> None:
         self._page = page
         self._operator = page.operator
         self._shown = (-1, 0)
@@ -112,6 +112,6 @@ def past_runs(folder: Path) -> list[Path]:
     return sorted(found, key=lambda path: path.stat().st_mtime, reverse=True)
 
 
-def build(page: Page) -> None:
+def build(page: PanelPage) -> None:
     """The tab."""
     RunTab(page)

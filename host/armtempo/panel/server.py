@@ -14,7 +14,7 @@ from nicegui import Client, app, ui
 from starlette.responses import FileResponse, PlainTextResponse
 
 from armtempo.basics.errors import InputError
-from armtempo.panel import page, words
+from armtempo.panel import layout, words
 from armtempo.panel.access import Access
 from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.held_jog import ButtonHold
@@ -50,7 +50,7 @@ class Panel:
         client = ui.context.client
         if not self._operator.holder:
             self._operator.take_control(client.id)
-        page.build(self._operator, self._hold, self._shape)
+        layout.build(self._operator, self._hold, self._shape)
         client.on_disconnect(lambda: self._gone(client.id))
 
     def _gone(self, client: str) -> None:
@@ -64,10 +64,10 @@ class Panel:
     async def _tell_all(self) -> None:
         """Compute a message once, and send it to every page."""
         while True:
-            await asyncio.sleep(page.TELL_S)
+            await asyncio.sleep(layout.TELL_S)
             if not any(client.has_socket_connection for client in Client.instances.values()):
                 continue
-            told = page.message(self._operator, self._shape)
+            told = layout.message(self._operator, self._shape)
             code = f"armtempo.hear({json.dumps(told)})"
             for client in list(Client.instances.values()):
                 if client.has_socket_connection:

@@ -3,90 +3,29 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from nicegui import ui
-from nicegui.element import Element
 
-from armtempo.basics.arrays import Array
-from armtempo.basics.errors import ArmtempoError, InputError
+from armtempo.basics.errors import InputError
 from armtempo.kinematics.of_arm import forward
 from armtempo.panel import board_tab, move_tab, plan_tab, run_tab, words
 from armtempo.panel.arm_scene import ArmScene, ArmShape
-from armtempo.panel.held_jog import ButtonHold, JogButton
+from armtempo.panel.held_jog import ButtonHold
 from armtempo.panel.operator import Operator
+from armtempo.panel.panel_page import LOOK_S, PanelPage
 
 TELL_S = 0.1
-_LOOK_S = 0.25
 _SCRIPT = Path(__file__).with_name("panel.js").read_text(encoding="utf-8")
 _STYLE = Path(__file__).with_name("panel.css").read_text(encoding="utf-8")
 
 
-@dataclass
-class Page:
-    """One browser's page: what its tabs share."""
-
-    operator: Operator
-    hold: ButtonHold
-    shape: ArmShape
-    client: str
-    controls: list[tuple[Element, bool]] = field(default_factory=list)
-    """What can be pressed, and whether that moves the arm."""
-    listeners: list[Callable[[], None]] = field(default_factory=list)
-    """Called every _LOOK_S: each tab looks at what has changed."""
-    buttons: list[JogButton] = field(default_factory=list)
-    jog_percent: float = 25.0
-    scene: ArmScene = field(init=False)
-    _reasons: tuple[str, str] = ("-", "-")
-
-    def control(self, element: Element, moves: bool = True) -> Any:
-        """An element that is greyed, with the reason as its hint, while it cannot be used."""
-        with element:
-            ui.tooltip("").classes("text-sm")
-        self.controls.append((element, moves))
-        return element
-
-    def do(self, what: str, call: Callable[[], object], moves: bool = True) -> None:
-        """Let the operator begin a command; what is refused is said."""
-        self.attempt(lambda: self.operator.do(what, self.client, call, moves))
-
-    def attempt(self, call: Callable[[], object]) -> None:
-        """Do something at once; an error is said in the words of the library."""
-        try:
-            call()
-        except ArmtempoError as error:
-            ui.notify(str(error), type="negative", multi_line=True, timeout=8000)
-
-    def show_ghost(self, angles_deg: Array) -> None:
-        """Show where the arm would be at these angles, (J,), besides where it is; on this page only."""
-        poses = json.dumps(self.shape.poses(angles_deg))
-        ui.run_javascript(f"armtempo.ghost = {poses}")
-
-    def refresh(self) -> None:
-        """Grey what cannot be used now, with the reason."""
-        operator = self.operator
-        reasons = operator.why_not(self.client), operator.why_not(self.client, moves=False)
-        if reasons != self._reasons:
-            self._reasons = reasons
-            for element, moves in self.controls:
-                reason = reasons[0] if moves else reasons[1]
-                element.set_enabled(not reason)  # type: ignore[attr-defined]
-                for hint in element.default_slot.children:
-                    if isinstance(hint, ui.tooltip):
-                        hint.set_text(reason or element.props.get("aria-label", ""))
-                        hint.set_visibility(bool(reason))
-        for listener in self.listeners:
-            listener()
-
-
-def build(operator: Operator, hold: ButtonHold, shape: ArmShape) -> Page:
+def build(operator: Operator, hold: ButtonHold, shape: ArmShape) -> PanelPage:
     """The page of the client that asks for it."""
     client = ui.context.client
-    page = Page(operator, hold, shape, client.id)
+    page = PanelPage(operator, hold, shape, client.id)
     ui.add_css(_STYLE)
     ui.add_body_html(f"<script>{_SCRIPT}</script>")
     ui.dark_mode(None)
@@ -102,11 +41,11 @@ def build(operator: Operator, hold: ButtonHold, shape: ArmShape) -> Page:
             _tabs(page)
     _events(page)
     page.refresh()
-    ui.timer(_LOOK_S, page.refresh)
+    ui.timer(LOOK_S, page.refresh)
     return page
 
 
-def _header(page: Page) -> None:
+def _header(page: PanelPage) -> None:
     operator = page.operator
     with ui.header().classes("items-center gap-3 py-1 no-wrap"):
         stop = ui.button(words.STOP, icon="front_hand", color="negative", on_click=lambda: operator.stop())
@@ -126,7 +65,7 @@ def _header(page: Page) -> None:
     page.listeners.append(look)
 
 
-def _tabs(page: Page) -> None:
+def _tabs(page: PanelPage) -> None:
     parts = {
         words.TAB_MOVE: move_tab.build,
         words.TAB_PLAN: plan_tab.build,
@@ -142,7 +81,7 @@ def _tabs(page: Page) -> None:
                 part(page)
 
 
-def _events(page: Page) -> None:
+def _events(page: PanelPage) -> None:
     """What the page's script says."""
     operator, hold = page.operator, page.hold
 
