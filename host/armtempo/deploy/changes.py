@@ -22,7 +22,7 @@ _RESERVE_BLOCKS = 8
 
 NO_PINS = (
     "its chip has 64 pins, and none of the ports D and E, on which the program has DIR, ENABLE, E-stop, limit "
-    "switches and an encoder (board/docs/hardware.md)"
+    "switches and an encoder ('armtempo help hardware')"
 )
 MORE_PINS = "use a board whose chip has 100 pins or more"
 _64_PINS = re.compile("F40[57]R")

