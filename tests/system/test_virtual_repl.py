@@ -41,7 +41,12 @@ def test_files(bare: VirtualBoard, tmp_path: Path) -> None:
     assert (tmp_path / "back.bin").read_bytes() == data
     assert "No such file" in mpremote(bare, "cat", ":absent", code=1)
     mpremote(bare, "rm", ":lib/there.bin", "+", "rmdir", "lib")
-    assert {path.name for path in bare.flash_dir.iterdir()} == {"boot.py", "main.py", "README.txt", "pybcdc.inf"}
+    assert {path.name for path in bare.flash_dir.iterdir()} == {
+        "boot.py",
+        "main.py",
+        "README.txt",
+        "pybcdc.inf",
+    }
 
 
 def test_a_full_flash_is_said(bare: VirtualBoard, tmp_path: Path) -> None:
