@@ -138,6 +138,11 @@ _ROWS = (
         "an input did not come in time in a sequence",
         "find out why, then 'armtempo clear'",
     ),
+    (
+        "wrong_steps",
+        "a joint made other steps than the motion's record has: a mistake in the board program",
+        "'armtempo clear', then home; report it with the log",
+    ),
     ("start_failed", "the timers did not start as set up", "power-cycle the board"),
 )
 ERRORS: "dict[int, tuple[str, str, str]]" = {}

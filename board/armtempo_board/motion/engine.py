@@ -10,6 +10,7 @@ limit switch           the same
 underrun               the same: the ring stops, no wrong step is made
 E-stop                 known, but unknown where the arm record releases the drivers
 following error        unknown for the joint that was lost
+wrong steps            unknown for the joint that made others than its record has
 DIR turned too late    unknown for all joints
 exception in service   unknown for all joints
 =====================  =============================================================
@@ -164,7 +165,8 @@ class Engine(EngineParts):
             self.block[isr.TURN_LATE] = 1
         if self.block[isr.TURN_LATE]:
             self._fail(codes.INTERNAL, NO_JOINT)
-        elif self._has_ended():
+        elif self._has_ended() and self.moving:  # not where an encoder has just ended it
+            self._check_end()
             self._finish(self.rates.duration_ticks)
 
     def _refill_queues(self) -> bool:
@@ -199,6 +201,17 @@ class Engine(EngineParts):
                     self.freeze()
                 return False
         return True
+
+    def _check_end(self, at_rest: bool = False) -> None:
+        """However a motion came to its end, each joint has made the steps of its record, or it is a fault.
+
+        ``at_rest``: it ends in a pause.
+        """
+        for number, joint in enumerate(self.drives):
+            if joint.is_astray(at_rest):
+                self.known &= ~(1 << number)
+                isr.set_fault(self.block, codes.WRONG_STEPS, number)
+                self._take_fault()
 
     def _check_following(self) -> None:
         """Compare one joint with its encoder; the next joint comes with the next call."""
@@ -236,6 +249,8 @@ class Engine(EngineParts):
         if not self.moving or rates.braked:
             return
         if not rates.brake():
+            if rates.stands():
+                self._check_end(True)
             self.freeze()
         elif rates.stands():
             for joint in self.drives:

@@ -308,7 +308,7 @@ def case_following():
             rig.arm.motors[0].slip(40)
         rig.run_to(MOTION.duration + TICK_HZ)
         assert (rig.engine.fault, rig.engine.fault_joint) == (codes.FOLLOWING, 0), rig.engine.fault
-        assert rig.engine.known == 6
+        assert rig.engine.known == 6, (harm, rig.engine.known)
         stopped(rig, codes.FOLLOWING, 0)
         assert rig.engine.clear()
         assert rig.refusal(MOTION) == (codes.UNHOMED, 0, 0)

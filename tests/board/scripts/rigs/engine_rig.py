@@ -76,6 +76,7 @@ class StepGenerator:
     def load(self, motion, joint, position, pulse, gap):
         """Stand before the first step."""
         self._steps = motion.joints[joint]
+        self._end_steps = position + self._steps.total()
         self._place = [0, 0]
         state = self.queue
         state[step_queue.PULSE] = pulse
@@ -89,6 +90,10 @@ class StepGenerator:
     def next_kiticks(self):
         """Time of the next step, in 1024 ticks."""
         return step_queue.next_kiticks(self.queue)
+
+    def end_steps(self, at_rest):
+        """Where the plan leads."""
+        return self._end_steps
 
     def turn(self):
         """Go on in the other direction."""
