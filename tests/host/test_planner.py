@@ -166,22 +166,20 @@ def with_limits(*limits: float) -> Arm:
     [
         (ARM, {"via": ((0.0, -60.0, 40.0),)}, "at least 2 via points with 3 angles"),
         (ARM, {"via": ((0.0, -60.0), (1.0, -60.0))}, "at least 2 via points with 3 angles"),
-        (ARM, {"via": ((0.0, -60.0, math.nan), (1.0, -60.0, 40.0))}, "not a finite number"),
+        (ARM, {"via": ((0.0, -60.0, math.nan), (1.0, -60.0, 40.0))}, "via is .*finite number"),
         (ARM, {"timing": "both"}, "'both'"),
         (ARM, {"refine": 0}, "refine 0"),
         (ARM, {"optimiser": "magic"}, "'magic'"),
         (ARM, {"parameters": {"fitness": "magic"}}, "'magic'"),
         (ARM, {"parameters": {"speed": 1.0}}, "'speed'"),
         (with_limits(-1.0, 50.0, 150.0), {}, "positive numbers"),
-        (with_limits(50.0, math.nan, 150.0), {}, "positive numbers"),
         (with_limits(50_000.0, 50.0, 150.0), {}, "1777778 steps/s"),
         (Arm("bare", ARM.joints[3:]), {}, "no joint has a motor"),
     ],
 )
 def test_refuses_wrong_input(arm: Arm, changes: dict[str, object], message: str) -> None:
-    job: Job = replace(JOB, **changes)
     with pytest.raises(InputError, match=message):
-        planner.plan(arm, job)
+        planner.plan(arm, replace(JOB, **changes))
 
 
 @pytest.mark.parametrize(

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS
+from collections.abc import Mapping
 
 from armtempo.formats.toml_table import Table
+from armtempo.model import outputs_file
 from armtempo.model.parts import (
+    ENCODER,
+    MOTOR,
     Driver,
     Encoder,
     Joint,
@@ -13,6 +16,7 @@ from armtempo.model.parts import (
     Limits,
     LimitSwitches,
     Motor,
+    Range,
     Safety,
 )
 
@@ -22,7 +26,6 @@ MAX_ANGLE_DEG = 36_000.0
 MAX_LENGTH_MM = 1e6
 """Longest link that an arm file may describe."""
 
-_GEAR_RATIO = (0.1, 10_000.0)
 _LIMITS = {"speed_deg_s": 1e5, "acceleration_deg_s2": 1e7, "jerk_deg_s3": 1e9}
 _LEAST_LIMIT = 0.001
 _MODEL = {
@@ -113,14 +116,24 @@ def _limits(table: Table | None) -> Limits | None:
     return limits
 
 
+def _whole(table: Table, key: str, ranges: Mapping[str, Range]) -> int:
+    least, most = ranges[key]
+    return table.integer(key, least=int(least), most=int(most))
+
+
+def _number(table: Table, key: str, ranges: Mapping[str, Range], *default: float) -> float:
+    least, most = ranges[key]
+    return table.number(key, *default, least=least, most=most)
+
+
 def _motor(table: Table | None) -> Motor | None:
     if table is None:
         return None
     motor = Motor(
-        channel=table.integer("channel", least=1, most=MAX_JOINTS),
-        steps_per_rev=table.integer("steps_per_rev", least=4, most=10_000),
-        microsteps=table.integer("microsteps", least=1, most=256),
-        gear_ratio=table.number("gear_ratio", least=_GEAR_RATIO[0], most=_GEAR_RATIO[1]),
+        channel=_whole(table, "channel", MOTOR),
+        steps_per_rev=_whole(table, "steps_per_rev", MOTOR),
+        microsteps=_whole(table, "microsteps", MOTOR),
+        gear_ratio=_number(table, "gear_ratio", MOTOR),
         direction=table.choice("direction", (1, -1), 1),
     )
     table.done()
@@ -131,11 +144,11 @@ def _encoder(table: Table | None) -> Encoder | None:
     if table is None:
         return None
     encoder = Encoder(
-        channel=table.integer("channel", least=1, most=MAX_ENCODERS),
-        counts_per_rev=table.integer("counts_per_rev", least=4, most=10_000_000),
+        channel=_whole(table, "channel", ENCODER),
+        counts_per_rev=_whole(table, "counts_per_rev", ENCODER),
         on=table.choice("on", ("joint", "motor"), "joint"),
         direction=table.choice("direction", (1, -1), 1),
-        following_error_deg=table.number("following_error_deg", 0.0, least=0.0, most=360.0),
+        following_error_deg=_number(table, "following_error_deg", ENCODER, 0.0),
     )
     table.done()
     return encoder
@@ -145,14 +158,33 @@ def _switches(table: Table | None) -> LimitSwitches:
     if table is None:
         return LimitSwitches()
     switches = LimitSwitches(
-        low=table.integer("low", least=1, most=3) if table.has("low") else None,
-        high=table.integer("high", least=1, most=3) if table.has("high") else None,
+        low=_switch(table, "low"),
+        high=_switch(table, "high"),
         active=table.choice("active", ("low", "high"), "low"),
         low_deg=_angle(table, "low_deg"),
         high_deg=_angle(table, "high_deg"),
     )
     table.done()
     return switches
+
+
+def _switch(table: Table, key: str) -> int | str | None:
+    if table.is_text(key):
+        return outputs_file.pin(table, key, "an input from 1 to 3, or a free pin such as PD0 for homing only")
+    return table.integer(key, least=1, most=3) if table.has(key) else None
+
+
+def homing(top: Table, names: list[str]) -> tuple[tuple[str, ...], ...]:
+    """``homing``: names of joints, or lists of them, in the order in which they are homed."""
+    if not top.has("homing"):
+        return ()
+    allowed = f"a list of joints' names, each once, or of lists of them; the joints are {', '.join(names)}"
+    entries = top.array("homing", allowed)
+    groups = tuple(tuple(entry) if isinstance(entry, list) else (entry,) for entry in entries)
+    flat = [name for group in groups for name in group]
+    if not all(name in names for name in flat) or len(set(flat)) != len(flat) or not all(groups):
+        raise top.fail("homing", allowed)
+    return groups
 
 
 def _angle(table: Table, key: str) -> float | None:

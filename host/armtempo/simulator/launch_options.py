@@ -9,12 +9,14 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from armtempo.basics.arguments import checked_fields
 from armtempo.basics.virtual_id import PREFIX
 from armtempo.model.arm import Arm
 
 DEFAULT_MACHINE = "STM32F4DISC with STM32F407"
 
 
+@checked_fields
 @dataclass(frozen=True)
 class InjectedFault:
     """Something that goes wrong ``at_s`` seconds into the ``run``-th motion since power-up.
@@ -35,6 +37,7 @@ class InjectedFault:
     counts: int = 0
 
 
+@checked_fields
 @dataclass(frozen=True)
 class LaunchOptions:
     """What a virtual board may be started with; the defaults make one that is new and undamaged."""
