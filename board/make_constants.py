@@ -1,8 +1,8 @@
 """Write the numbers of constants that board modules have from others: ``python board/make_constants.py``.
 
 ``const`` folds within a module only, so each compiled module has its own ``_NAME = const(n)`` of what it uses of
-others. From a line ``# as in HOME.py`` to the next empty one, or on a line that ends so, n is that of HOME's constant of
-the same name, underscore or not, or what a comment ``# = FIRST_NODE + NODE_TIME`` says of HOME's constants.
+others. From a line ``# as in HOME.py`` to the next empty one, or on a line that ends so, n is that of HOME's constant
+of the same name, underscore or not, or what a comment ``# = FIRST_NODE + NODE_TIME`` says of HOME's constants.
 """
 
 from __future__ import annotations
