@@ -90,6 +90,12 @@ def load_job(path: Path | None, arm: Arm) -> Job:
     return Job.load(setting.path, arm)
 
 
+def job_file(path: Path | None) -> Path | None:
+    """The file of the job that is named; None without one."""
+    setting = ProjectSettings().get(JOB, path)
+    return setting.path if setting else None
+
+
 def arm_and_job(arm_path: Path | None, job_path: Path | None) -> tuple[Arm, Job]:
     """What to plan: both as they are named, or, where neither is, the demo's.
 
