@@ -38,11 +38,12 @@ GROUPS = {
         "watch",
         "fetch",
         "report",
+        "panel",
     ),
     "Board": (
         *("ports", "deploy", "undeploy", "firmware", "flash", "configure"),
         *("upload", "list", "show", "remove", "rename"),
-        *("virtual-board", "monitor", "config", "doctor"),
+        *("virtual-board", "monitor", "config", "doctor", "help"),
     ),
     "Develop": ("paper", "completion"),
 }

@@ -32,6 +32,7 @@ EXAMPLES = {
     "status": ("status", "status --json"),
     "watch": ("watch", "watch --json > samples.jsonl"),
     "fetch": ("fetch", "fetch first.json"),
+    "panel": ("panel", "panel --port sim --arm ar4"),
     "report": ("report runs/first-001", "report runs/first-001 runs/first-002 --out both.html"),
     "ports": ("ports",),
     "deploy": ("deploy --port /dev/ttyACM0", "deploy --mpy"),
@@ -49,6 +50,7 @@ EXAMPLES = {
     "config": ("config",),
     "doctor": ("doctor", "doctor --port /dev/ttyACM0"),
     "paper": ("paper --quick",),
+    "help": ("help", "help recovery"),
     "completion": ("completion bash >> ~/.bashrc",),
 }
 
