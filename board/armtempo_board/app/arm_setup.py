@@ -11,7 +11,7 @@ from armtempo_shared import codes
 from armtempo_shared.messages import ARM_RECORD_NAME
 from pyb import Pin, Timer
 
-from armtempo_board import heap
+from armtempo_board import features, heap
 from armtempo_board.app.arm_state import NEVER_MS
 from armtempo_board.buffers import COMMANDED
 from armtempo_board.errors import Refused
@@ -110,7 +110,7 @@ def _take(board: "ArmState", record: "Record") -> None:
     board.arm_crc = crc
     board.raw = array("i", [0] * (COMMANDED + 2 * board.joints))
     board.samples.configure(board.joints)
-    if outputs or inputs:
+    if features.OUTPUTS and (outputs or inputs):
         from armtempo_board.app import output_setup  # here, so that it can be forgotten
 
         output_setup.attach(board, outputs, inputs)
@@ -134,7 +134,7 @@ def _drop_engine(board: "ArmState") -> None:
     """Before another takes its place: the heap is to be as it was without one."""
     if board.engine:
         board.engine.close()
-    if board.outputs:
+    if features.OUTPUTS and board.outputs:
         drop_outputs(board)
     board.engine = None
     board.joints = board.arm_crc = 0

@@ -10,7 +10,7 @@ from armtempo_shared import codes
 from armtempo_shared.messages import NO_JOINT
 from micropython import const
 
-from armtempo_board import heap
+from armtempo_board import features, heap
 from armtempo_board.app.sample_buffer import SampleBuffer
 from armtempo_board.buffers import COMMANDED, pack_offsets, sample_to_wire
 from armtempo_board.errors import Refused
@@ -116,7 +116,9 @@ class ArmState:
 
     def moving(self) -> bool:
         """Whether steps may still come; a sequence has more to come while it waits."""
-        return self.engine is not None and (self.engine.moving or self.sequence is not None)
+        return self.engine is not None and (
+            self.engine.moving or (features.SEQUENCES and self.sequence is not None)
+        )
 
     def known(self) -> int:
         """Bit a joint: its position is known."""

@@ -5,6 +5,7 @@ from armtempo_shared.limits import MAX_ENCODERS
 from armtempo_shared.messages import NO_JOINT
 from micropython import const
 
+from armtempo_board import features
 from armtempo_board.errors import Refused
 from armtempo_board.hardware import pins
 
@@ -33,6 +34,8 @@ def checked(data: bytes, room_words: int, most_joints: int) -> "Record":
         if not _is_fit(row) or row["channel"] in [other["channel"] for other in joints[:number]]:
             raise Refused(codes.BAD_RECORD, number)
     outputs, inputs = armrecord.unpack_outputs(data)
+    if (outputs or inputs) and not features.OUTPUTS:
+        raise Refused(codes.NEEDS_FIRMWARE)
     _check_pins(head, joints, outputs, inputs)
     rates = [row["max_rate"] for row in joints]
     beside = engine_memory.output_bytes(len(outputs), len(inputs))

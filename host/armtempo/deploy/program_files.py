@@ -38,9 +38,6 @@ _TOGETHER = {
         f"{PACKAGES[0]}.app.run_start",
     ],
     f"{_MOTION}.arm_check": [f"{PACKAGES[1]}.armrecord"],
-    f"{PACKAGES[0]}.app.output_commands": [
-        f"{PACKAGES[0]}.hardware.{name}" for name in ("outputs", "digital_inputs")
-    ],
     f"{PACKAGES[0]}.app.room": [f"{PACKAGES[1]}.engine_memory", f"{PACKAGES[0]}.hardware.backup_sram"],
     f"{PACKAGES[0]}.app.command_rows": [f"{PACKAGES[0]}.app.store_commands"],
     f"{PACKAGES[1]}.table": [f"{PACKAGES[1]}.program_hash"],
@@ -48,11 +45,17 @@ _TOGETHER = {
     f"{PACKAGES[0]}.storage.motion_file": [f"{PACKAGES[1]}.motion"],
 }
 """Modules that are imported later, with those that come and go with them: each costs memory for names and a table."""
+_FEATURES = f"{PACKAGES[0]}.features"
+_NO_FEATURES = "".join(f"{name} = 0\n" for name in ("SEQUENCES", "OUTPUTS", "JOG", "SPEED", "ALL", "BITS"))
 _IN_FIRMWARE = (
     f"{_MOTION}.next_motion",
+    *(f"{PACKAGES[0]}.hardware.{name}" for name in ("outputs", "digital_inputs")),
+    *(f"{PACKAGES[0]}.app.output_{name}" for name in ("commands", "setup")),
+    f"{PACKAGES[0]}.storage.sequence_file",
+    *(f"{PACKAGES[1]}.sequence{name}" for name in ("", "_check")),
     *(f"{PACKAGES[0]}.app.sequence{name}" for name in ("_ahead", "_command", "_start", "r")),
 )
-"""Modules that compiled files are without, as there is no heap beside those for sequences (board/docs/memory.md)."""
+"""Modules of what the core is without: features of which there is no heap beside files (board/docs/memory.md)."""
 _AT_REST = {
     "start_up": (
         "app.arm_state.ArmState.__init__",
@@ -177,6 +180,7 @@ def compact_program(hash_module: str = "") -> Compact:
         for module, file in files.items()
         if module not in _IN_FIRMWARE
     }
+    sources[_FEATURES] = _NO_FEATURES
     if hash_module:
         sources[f"{PACKAGES[1]}.program_hash"] = hash_module
     board = package_folder(PACKAGES[0])
