@@ -20,6 +20,7 @@ NO_REPORT = {
     "demo": "shows a newcomer around",
     "teach": "a screen with keys, and a line on the file",
     "completion": "prints a script",
+    "help": "prints a page",
     "virtual-board": "prints its port, and stays",
 }
 JOB = """

@@ -146,6 +146,7 @@ REFUSED = [
     ("no_limits", [], ["joint 'j2': it has no limits", "<limit lower="]),
     ("broken", [], ["not valid XML", "line"]),
     ("xacro", [], ["make a URDF of it first: xacro"]),
+    ("optenv", [], ["'$(optenv LENGTH 0.3) 0 0' still to be filled in", "make a URDF of it first: xacro"]),
     (
         "does_not_fit",
         [],

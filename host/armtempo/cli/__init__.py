@@ -42,7 +42,7 @@ GROUPS = {
     "Board": (
         *("ports", "deploy", "undeploy", "firmware", "flash", "configure"),
         *("upload", "list", "show", "remove", "rename"),
-        *("virtual-board", "monitor", "config", "doctor"),
+        *("virtual-board", "monitor", "config", "doctor", "help"),
     ),
     "Develop": ("paper", "completion"),
 }

@@ -49,6 +49,7 @@ EXAMPLES = {
     "config": ("config",),
     "doctor": ("doctor", "doctor --port /dev/ttyACM0"),
     "paper": ("paper --quick",),
+    "help": ("help", "help recovery"),
     "completion": ("completion bash >> ~/.bashrc",),
 }
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from armtempo.basics.errors import InputError
-from armtempo.diagnosis import drives, encoders, geometry, resolution, torque, wiring
+from armtempo.diagnosis import drives, encoders, geometry, resolution, torque, units, wiring
 from armtempo.diagnosis.finding import Finding, Level, error, note
 from armtempo.diagnosis.item import Condition, Item
 from armtempo.model.arm import Arm
@@ -40,7 +40,7 @@ def check_arm(arm: Arm) -> list[Finding]:
 
     It need not be ready to be driven: ``Arm.read`` reads one without motors.
     """
-    found = [*geometry.findings(arm), *_motors(arm)]
+    found = [*units.findings(arm), *geometry.findings(arm), *_motors(arm)]
     if arm.driven:
         for part in (drives, resolution, encoders, torque, wiring):
             found += part.findings(arm)

@@ -123,8 +123,14 @@ def _check_text(path: Path) -> None:
         raise InputError(f"{path}: its outermost element is <{root.tag}>, not <robot>", "give a URDF file")
     if root.get("name") is None:
         raise InputError(f"{path}: its <robot> element has no name", 'give it one: <robot name="my_arm">')
-    if any("xacro" in element.tag for element in root.iter()):
-        raise InputError(f"{path}: is a xacro file", f"make a URDF of it first: xacro {path} > robot.urdf")
+    values = [value for element in root.iter() for value in element.attrib.values()]
+    unfilled = next((value for value in values if "$(" in value or "${" in value), "")
+    if unfilled or any("xacro" in element.tag for element in root.iter()):
+        left = f", with {unfilled!r} still to be filled in" if unfilled else ""
+        raise InputError(
+            f"{path}: is a xacro file{left}",
+            f"make a URDF of it first: xacro {path} > robot.urdf (xacro is a part of ROS)",
+        )
 
 
 def _path(path: Path, model: Any, base: str | None, tip: str | None) -> list[Any]:

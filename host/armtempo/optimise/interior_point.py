@@ -16,7 +16,7 @@ from typing import Protocol
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.optimise.kkt import BandedKkt, Equalities, Factor
+from armtempo.optimise.kkt import Equalities
 
 
 class Linearised(Protocol):
@@ -39,10 +39,24 @@ class Linearised(Protocol):
         """
 
 
+class Factorised(Protocol):
+    """A factorised matrix of Newton's equations; see ``kkt.Factor``."""
+
+    def solve(self, gradient: Array, residual: Array) -> Array: ...
+
+
+class Kkt(Protocol):
+    """Newton's equations; see ``kkt.BandedKkt``."""
+
+    def factor(self, entries: Array) -> Factorised: ...
+
+
 class Program(Protocol):
     """What is minimised."""
 
-    kkt: BandedKkt
+    @property
+    def kkt(self) -> Kkt: ...
+
     equalities: Equalities
 
     def objective(self, x: Array) -> float:
@@ -165,9 +179,11 @@ class _Solver:
         self.exact = self.settings.curvature
         return _Step(0.0, self.x, self.g)
 
-    def _along(self, at: Linearised, factor: Factor, gradient: Array, step: Array) -> _Step:
+    def _along(self, at: Linearised, factor: Factorised, gradient: Array, step: Array) -> _Step:
         """The better of a straight and, where that is short, a bent step."""
-        slope = float(gradient @ step)
+        slope = float(
+            np.sum(gradient * step)
+        )  # not by @, for which BLAS starts threads from 10 000 elements on
         if not np.all(np.isfinite(step)) or slope >= 0.0:
             return _Step(0.0, self.x, self.g)
         change = at.forward(step)
