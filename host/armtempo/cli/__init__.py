@@ -38,6 +38,7 @@ GROUPS = {
         "watch",
         "fetch",
         "report",
+        "panel",
     ),
     "Board": (
         *("ports", "deploy", "undeploy", "firmware", "flash", "configure"),

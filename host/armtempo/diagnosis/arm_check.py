@@ -10,10 +10,7 @@ from armtempo.basics.errors import InputError
 from armtempo.diagnosis import drives, encoders, geometry, resolution, torque, units, wiring
 from armtempo.diagnosis.finding import Finding, Level, error, note
 from armtempo.diagnosis.item import Condition, Item
-from armtempo.model.arm import Arm
-
-_CONSTANT_DEG = 0.01
-"""A joint of so narrow a range is a constant row of the table, such as a tool's."""
+from armtempo.model.arm import STILL_DEG, Arm
 
 
 def check(arm_file: Path, job_file: Path | None = None) -> tuple[Arm | None, list[Finding]]:
@@ -71,7 +68,7 @@ def _motors(arm: Arm) -> list[Finding]:
         next_step = "give each driven joint a motor and a limits table; imported files have them as '#' lines"
         return [error("motors", "no joint has a motor, so nothing can move", next_step)]
     still = [
-        joint.name for joint in arm.joints if joint.motor is None and np.ptp(joint.range_deg) > _CONSTANT_DEG
+        joint.name for joint in arm.joints if joint.motor is None and np.ptp(joint.range_deg) > STILL_DEG
     ]
     if not still:
         return []

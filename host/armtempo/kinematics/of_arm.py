@@ -53,7 +53,7 @@ def forward(arm: Arm | Path | str, angles_deg: ArrayLike) -> Array:
     ``arm``: or its file or name. ``angles_deg``: of all joints, (..., joints), or of the driven ones, (..., J), with
     the others at home. Raises InputError for another number of angles.
     """
-    arm = Arm.of(arm)
+    arm = Arm.shape(arm)
     return forward_rad(Geometry.of(arm), np.radians(spread_deg(arm, angles_deg)))
 
 
@@ -70,7 +70,7 @@ def inverse(
     move the one that the search comes to first, else all, but at most 16 where one turns into the next, as at a
     singular pose. Raises InputError for a matrix that is no pose.
     """
-    arm = Arm.of(arm)
+    arm = Arm.shape(arm)
     near = PoseSolver(arm).home_rad if near_deg is None else _posture(arm, near_deg)
     target = pose.exact() if isinstance(pose, Pose) else Pose.of_matrix(checked_pose(pose))
     solutions = _solutions(PoseSolver(arm).solve(target, tuple(near)))

@@ -17,11 +17,13 @@ from armtempo.formats.toml_table import Table
 from armtempo.model import boards, outputs_file, parts_file, pin_use, pose_table, shipped
 from armtempo.model import posture as named
 from armtempo.model.outputs import Input, Output
-from armtempo.model.parts import DrivenJoint, Driver, Joint, Motor, Safety
+from armtempo.model.parts import DrivenJoint, Driver, Joint, Limits, Motor, Safety
 from armtempo.model.posture import ArmPosture
 from armtempo.model.tool_pose import Pose
 
 _REACHES_MM = 1e-6
+STILL_DEG = 0.01
+"""A joint of so narrow a range is a constant row of the table, such as a tool's."""
 
 
 @checked
@@ -74,6 +76,25 @@ class Arm:
         for problem in pin_use.problems(arm):
             raise InputError(f"{path}: {problem.where}: {problem.what}", problem.next_step)
         return arm
+
+    @classmethod
+    def shape(cls, arm: Arm | Path | str) -> Arm:
+        """The arm for its kinematics: as ``of``, but where no joint has a motor yet, each that can turn gets one."""
+        if not isinstance(arm, Arm):
+            path = shipped.find(arm).path
+            arm = cls.read(path)
+            if arm.driven_indices:
+                return cls.load(path)
+        if arm.driven_indices:
+            return arm
+        motor, limits = Motor(1, 200, 16, 1.0), Limits(1.0, 1.0, 1.0)
+        turning = [
+            replace(joint, motor=motor, limits=limits)
+            if joint.range_deg[1] - joint.range_deg[0] > STILL_DEG
+            else joint
+            for joint in arm.joints
+        ]
+        return replace(arm, joints=tuple(turning))
 
     @classmethod
     def read(cls, path: Path | str) -> Arm:

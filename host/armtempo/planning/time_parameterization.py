@@ -136,7 +136,7 @@ def _searched(group: Group, job: Job, stages: _Stages, last: bool) -> Timed:
 def _refined(group: Group, job: Job, axis: Timed, before: int, refine: int) -> Timed:
     """The same axis cut finer, then improved, so that it is never slower."""
     differences = np.diff(axis.time_points_s)
-    start = _cut(differences, before, refine, job.degree)
+    start = time_axis.cut(differences, before, refine, job.degree)
     path = FixedPath(group.angle_points_deg, job.degree, group.limits, refine)
     optimum = path.optimum(start, _REFINED_GAP)
     return replace(
@@ -147,15 +147,6 @@ def _refined(group: Group, job: Job, axis: Timed, before: int, refine: int) -> T
         total_s=optimum.total_s,
         optimum_s=optimum.bound_s,
     )
-
-
-def _cut(differences_s: Array, before: int, refine: int, degree: int) -> Array:
-    """The axis with ``refine`` instead of ``before`` segments; the same where that is a multiple, else much like it."""
-    if refine % before == 0:
-        return time_axis.refined(differences_s, refine // before, degree)
-    fine = time_axis.refined(differences_s, refine, degree)
-    count = (len(differences_s) - degree + 1) // before * refine + degree - 1
-    return np.asarray(np.interp(np.linspace(0, 1, count), np.linspace(0, 1, len(fine)), fine) * before)
 
 
 def _long_enough(axis: Timed) -> Timed:

@@ -420,6 +420,14 @@ class Board:
         """
         stored_motion.stop(self.client, now)
 
+    def request_stop(self, now: bool = False, by: str = "another thread") -> bool:
+        """Stop what moves from another thread than the one that waits for it, which gets Stopped; whether
+        something moved. Does not wait for rest.
+
+        ``by``: who asks for it, in words. NoAnswerError if the board is silent.
+        """
+        return stored_motion.request_stop(self.client, self.stops, now, by)
+
     def speed(self, fraction: float) -> None:
         """Run at a fraction of the planned speed, 0.01 to 1: what this object starts from now on, and what moves.
 

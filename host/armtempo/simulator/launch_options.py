@@ -85,8 +85,8 @@ class ProcessOptions:
     """Folders with the packages of the board program: how its pins are wired, what an arm record says."""
     program: list[str]
     """Folders with the board's packages, as if they were deployed; empty: only what the flash has."""
-    flash_blocks: int = 190
-    """Size of the flash: what an STM32F4DISC's file system has for files."""
+    flash_blocks: int | None
+    """Size of the flash; None: what an STM32F4DISC's file system has for files."""
     speed: float
     """Motions run at this multiple of real time; 0: as fast as they can."""
     edge_log: str | None
