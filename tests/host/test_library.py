@@ -249,7 +249,7 @@ def test_goto_takes_a_speed_and_a_closed_board_says_so(arm: armtempo.Arm, tmp_pa
             board.speed(50)
         with pytest.raises(armtempo.InputError, match=r"missing\.json"):
             board.run("missing.json")
-        with pytest.raises(armtempo.InputError, match=r"keeps no motion 'x\.jsn'"):
+        with pytest.raises(armtempo.InputError, match=r"'x\.jsn' is no name for a motion"):
             board.run("x.jsn")
     with pytest.raises(armtempo.LinkError, match="the board on sim was closed; open it again"):
         board.status()

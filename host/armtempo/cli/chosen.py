@@ -149,9 +149,24 @@ def source_words(name: str, source: str) -> str:
 
 
 def is_file(what: str) -> bool:
-    """Whether an argument names a trajectory file rather than a motion on the board."""
+    """Whether an argument names a trajectory file rather than a motion on the board.
+
+    InputError, naming the nearest file, for what is no file and can be no name of a motion either.
+    """
+    from armtempo.formats.spelling import did_you_mean
+    from armtempo.model.job import is_name
+
     path = Path(what)
-    return path.suffix == ".json" or path.is_file()
+    if path.is_file():
+        return True
+    if path.suffix != ".json" and is_name(what):
+        return False
+    beside = [str(path.with_name(one.name)) for one in path.parent.glob("*.json")]
+    near = did_you_mean(what, beside)
+    raise InputError(
+        f"{what}: there is no such file{near}",
+        "check the path; 'armtempo plan' makes one, 'armtempo list' shows the board's",
+    )
 
 
 def load_plan(path: Path, arm_path: Path | None, altered: bool = False) -> Plan:
