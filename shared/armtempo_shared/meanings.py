@@ -28,7 +28,7 @@ _ROWS = (
         "the flash has no room; what was stored is kept",
         "remove motions that are no longer needed: 'armtempo remove'",
     ),
-    ("flash_error", "the flash could not be written or read", "see host/docs/recovery.md"),
+    ("flash_error", "the flash could not be written or read", "see 'armtempo help recovery'"),
     ("bad_record", "the record is damaged or of an unknown kind", "upload it again"),
     ("bad_offset", "a piece of the upload is out of order", "upload it again"),
     ("bad_checksum", "the upload does not match its checksum", "upload it again"),
@@ -86,7 +86,7 @@ _ROWS = (
     (
         "pin_taken",
         "an output or input of the arm has a pin or timer that is taken",
-        "give another pin ('armtempo check' names the arm file's key; board/docs/hardware.md lists what is free)",
+        "give another pin ('armtempo check' names the arm file's key; 'armtempo help hardware' lists what is free)",
     ),
     ("is_sequence", "this is a sequence, not a motion", "run it with 'armtempo run' and its name"),
     (
@@ -184,7 +184,8 @@ COMMANDS: "dict[str, str]" = {
     "tail is the unique id in hex and the firmware.",
     "status": "What the board is doing. `known`: bit a joint, its position is known. `run`: number of the "
     "current or last run since the start. `ticks`: motion clock. `path`: the motion's own time, which is behind the "
-    "clock where the speed was below 100 %. `rate`: the speed that is wanted, in thousandths, 0 in a pause; while "
+    "clock where the speed was below 100 %. `fault_joint`: also the joint whose switch ended the last homing motion. "
+    "`rate`: the speed that is wanted, in thousandths, 0 in a pause; while "
     "nothing moves that of the next start. Tail: per joint commanded steps and encoder "
     "counts (two i32).",
     "put_begin": "Begins an upload of `size` bytes; the tail is the trajectory's name, or `/arm` for the arm "

@@ -294,13 +294,13 @@ class Rig:
         """Board time of the motion's time 0."""
         return self._zero
 
-    def start(self, motion, homing=False):
-        """Load and start a motion."""
+    def start(self, motion, homing=0):
+        """Load and start a motion; ``homing``: see ``Engine.load``."""
         self.samples = []
         for pulses, steps in zip(self.pulses, motion.joints):
             pulses.expect(steps)
-        self.engine.load(motion)
-        self.engine.start(homing)
+        self.engine.load(motion, homing=homing)
+        self.engine.start()
 
     def refusal(self, motion):
         """(code, joint, value) where it cannot be loaded, else None."""

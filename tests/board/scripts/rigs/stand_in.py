@@ -97,6 +97,8 @@ def install():
     ends = Module()
     ends.duration_ticks = lambda motion: 84000
     ends.start_offset = lambda motion, joint, position: 7 - position
+    ends.at_start = lambda motion, joint: 7 * 64
+    ends.at_end = lambda motion, joint: 8 * 64
     checks = Module()
     checks.check_splines = lambda motion, engine, limits: engine.check_splines()
     ahead = Module()
@@ -201,7 +203,7 @@ class Engine:
 
             raise Refused(*self.unfit)
 
-    def load(self, motion, rate=1000, ready=None):
+    def load(self, motion, rate=1000, ready=None, homing=0):
         if ready:
             assert ready.is_ready and ready.motion is motion and ready.rate == rate
         self.calls.append("load ready" if ready else "load judged" if self.judged else "load")
@@ -211,7 +213,7 @@ class Engine:
 
             raise Refused(*self.refusal)
 
-    def start(self, homing=False):
+    def start(self):
         self.calls.append("start")
         self.moving = True
         self.ticks = 0
