@@ -35,26 +35,6 @@ def test_the_shipped_job_is_table_3_with_its_misprint_mended() -> None:
     assert job.bounds_s == (0.1, 3.0)
 
 
-@pytest.mark.parametrize(
-    ("keys", "defaults"),
-    [
-        ("`degree`", [5]),
-        ("`timing`", ["shared"]),
-        ("`optimiser`", ["acs"]),
-        ("`population`, `iterations`", [10, 500]),
-        ("`starts`", [3]),
-        ("`seed`", [1]),
-    ],
-)
-def test_what_is_left_out_is_as_the_page_says(keys: str, defaults: list[object], tmp_path: Path) -> None:
-    page = (Path(__file__).parents[2] / "host" / "docs" / "files.md").read_text(encoding="utf-8")
-    (row,) = [line for line in page.splitlines() if line.startswith(f"| {keys} |")]
-    words = row.rstrip(" |").rpartition("| ")[2].replace("`", "").replace('"', "")
-    assert words == ", ".join(map(str, defaults))
-    job = Job.load(written(tmp_path, TWO), ARM)
-    assert [getattr(job, key.strip("`")) for key in keys.split(", ")] == defaults
-
-
 def test_poses_and_angles_may_be_mixed(tmp_path: Path) -> None:
     matrix = "[[0, 0, -1, -536.404], [0, 1, 0, 0], [1, 0, 0, 434.698], [0, 0, 0, 1]]"
     text = f"[[via]]\nangles_deg = [0, -60, 40]\n[[via]]\nmatrix = {matrix}\n"
