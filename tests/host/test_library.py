@@ -287,7 +287,7 @@ def test_a_stop_that_is_asked_for_ends_a_run_early(
     stop = armtempo.StopRequest()
 
     class Impatient(armtempo.Watcher):
-        def sample(self, sample: Sample, duration_s: float) -> None:
+        def on_sample(self, sample: Sample, duration_s: float) -> None:
             stop.wanted = True
 
     with armtempo.connect("sim", arm) as board:

@@ -215,7 +215,7 @@ def with_slow_emit(motion, moment):
     def slow_emit(rings, *arguments):
         for rig in slow:
             if rings & 1:
-                rig.board.stand_still(84 * 30_000)
+                rig.board.stall(84 * 30_000)
         return emit(rings, *arguments)
 
     ring_feeder.emit = slow_emit

@@ -251,7 +251,7 @@ def case_interrupt_delayed(world):
         for late_us in (40, 90, 130, 400, 3000):
             trial.what = "turn at %d, %d us late" % (turn, late_us)
             at = turn - zero - 84 * 5
-            yield from trial.begin(at, lambda late_us=late_us: machine_state.board.stand_still(84 * late_us))
+            yield from trial.begin(at, lambda late_us=late_us: machine_state.board.stall(84 * late_us))
             status = yield from trial.end("internal", "")
             assert late_us >= 90 or not status["fault"], trial.what
             assert late_us <= 110 or (status["fault"] and status["known"] == 0), trial.what
