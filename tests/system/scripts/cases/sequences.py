@@ -4,6 +4,8 @@ Random ones of the motions in the flash, which lead from each of some postures t
 and what a stop, a fault or a change of speed leaves. Arguments: see ``whole_board.arguments``.
 """
 
+# all cases: not emulated, not on CPython, not compiled
+
 import cases
 import machine_state
 import whole_board
@@ -201,7 +203,7 @@ def whole(world, watch, crc):
     return watch.motions(), said(world), counted
 
 
-def case_the_pins_do_the_same(world):
+def case_the_pins_do_the_same(world):  # emulated, on CPython
     """With and without a motion that is prepared; nested repeats, waits and counters between."""
     watch = yield from ready(world)
     numbers = whole_board.Numbers(SEED)
@@ -232,7 +234,7 @@ THERE_AND_BACK = [
 ]
 
 
-def case_whatever_ends_it_at_any_moment(world):
+def case_whatever_ends_it_at_any_moment(world):  # on CPython
     """A stop, one that freezes, an E-stop, a loop that is away too long: at any moment of the work, and between.
 
     What the board says of its position is what the pins did, and nothing moves behind the end.
@@ -328,7 +330,7 @@ def case_motion_away(world):
     return end
 
 
-def case_compiled_files_refuse_it(world):
+def case_compiled_files_refuse_it(world):  # compiled
     """They are without what runs one; a motion runs."""
     watch = yield from ready(world)
     crc = store(THERE_AND_BACK)
