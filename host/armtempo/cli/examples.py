@@ -38,7 +38,7 @@ EXAMPLES = {
     "deploy": ("deploy --port /dev/ttyACM0", "deploy --mpy"),
     "undeploy": ("undeploy",),
     "firmware": ("firmware --board STM32F4DISC --micropython ~/micropython",),
-    "flash": ("flash firmware-STM32F4DISC --port /dev/ttyACM0",),
+    "flash": ("flash", "flash --image armtempo-firmware-STM32F4DISC.zip --port /dev/ttyACM0"),
     "configure": ("configure --arm my_arm.toml",),
     "upload": ("upload first.json", "upload first.json --name pick --default"),
     "list": ("list",),

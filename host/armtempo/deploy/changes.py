@@ -76,8 +76,7 @@ def check_version(firmware_crc: int | None) -> None:
         raise LinkError(
             f"a new firmware is due: the board's has another version of the program in it ({firmware_crc:08x}, "
             f"here {own_crc():08x}), and files in the flash do not replace it",
-            "build and flash it (see 'armtempo firmware --help'), or flash MicroPython's own, then "
-            "deploy again",
+            "flash one of this version: 'armtempo flash'; or MicroPython's own, then deploy again",
         )
 
 

@@ -68,6 +68,8 @@ class Board:
         """The arm that the board was last set up for through this object."""
         self.stops: list[StopRequest] = []
         """The stop requests of what this object has under way."""
+        self.last_jog_ends = ""
+        """Why the last jog ended before it was to, in words; "" where it did not."""
         self._stack = stack or ExitStack()
         self._start = StartPosition(client, port)
         self._last_folder: Path | None = None
@@ -177,7 +179,7 @@ class Board:
         """The name, where it can be one: InputError with what is meant else."""
         if not is_name(name):
             raise InputError(
-                f"the board keeps no motion {name!r}",
+                f"{name!r} is no name for a motion on the board",
                 f"give the name of one that it keeps: {NAME_RULE}; armtempo.Plan.load reads a file",
             )
         return name
@@ -265,14 +267,14 @@ class Board:
         ``joint``: number, from 1, or name; ``axis``: "x", "y", "z" of the base or "tool-x", "tool-y", "tool-z", along
         which the tool moves by ``by_mm``, or about which it turns by ``by_deg``; ``speed``: part of the speed limits,
         0.01 to 1. The jog ends at the end of a range, or where the tool cannot go on along the line, at the latest.
-        Gives the posture in degrees, (J,). Raises LinkError where the position is unknown, InputError where nothing
-        can move that way.
+        Gives the posture in degrees, (J,); ``last_jog_ends`` says why it ended early. Raises LinkError where the
+        position is unknown, InputError where nothing can move that way.
         """
         arm = self._known_arm()
         move = move_of(arm, joint, axis, by_deg, by_mm)
         with self._stoppable(stop) as wanted:
             self._start.home_virtual_arm(arm)
-            jog.step(self.client, arm, move, speed, wanted)
+            self.last_jog_ends = jog.step(self.client, arm, move, speed, wanted).ends
         return self.posture_deg()
 
     def held_jog(
