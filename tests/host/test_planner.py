@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
+from armtempo.basics import progress
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
@@ -153,6 +155,39 @@ def test_progress_grows_to_the_whole(refine: int, polish: bool) -> None:
     assert seen == sorted(seen)
     assert 0.0 < seen[0] <= 0.1  # the first of five iterations, in the first of the stages
     assert seen[-1] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{}, {"path": "free", "refine": 4, "starts": 1}, {"path": "free", "corridor_mm": 0.01, "refine": 4}],
+    ids=["through", "free", "corridor"],
+)
+def test_a_plan_can_be_ended_at_any_time(changes: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    """By an exception out of its progress, called in each step of a solve 0.05 s after the last."""
+    monkeypatch.setattr(progress, "_EVERY_S", 0.0)
+    job = replace(JOB, timing="shared", iterations=5, **{"refine": 8, **changes})
+    watch = Ends(at=10**9)
+    planner.plan(ARM, job, watch)
+    assert watch.calls > 40
+    assert len(set(watch.stages)) >= 2
+    for at in (1, watch.calls // 3, watch.calls // 2, watch.calls - 1):
+        with pytest.raises(InterruptedError):
+            planner.plan(ARM, job, Ends(at))
+
+
+class Ends:
+    """A progress that ends the work with its call number ``at``."""
+
+    def __init__(self, at: int) -> None:
+        self.at, self.calls, self.stages = at, 0, list[str]()
+
+    def __call__(self, done: float, whole: float) -> None:
+        self.calls += 1
+        if self.calls >= self.at:
+            raise InterruptedError
+
+    def stage(self, name: str) -> None:
+        self.stages.append(name)
 
 
 def with_limits(*limits: float) -> Arm:

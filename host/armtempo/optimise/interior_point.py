@@ -16,6 +16,7 @@ from typing import Protocol
 import numpy as np
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.progress import alive
 from armtempo.optimise.kkt import Equalities
 
 
@@ -148,6 +149,7 @@ class _Solver:
         if not np.all(self.g > 0.0):
             return self._solution(0, False)
         for number in range(1, self.settings.iterations + 1):
+            alive()
             step = self._step()
             size = self.barrier * np.sqrt(self.count)
             if self.barrier <= self.last and (step.length == 0.0 or step.decrement < _DONE * size):

@@ -11,7 +11,7 @@ from armtempo_shared import motion
 from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.progress import Progress
+from armtempo.basics.progress import Progress, stage
 from armtempo.model.job import REFINE, Job
 from armtempo.model.parts import Limits
 from armtempo.optimise.tracker import Result
@@ -109,6 +109,7 @@ def _longest_s(timed: Sequence[Timed]) -> float:
 
 def _searched(group: Group, job: Job, stages: _Stages, last: bool) -> Timed:
     """The axis that the search finds, polished where no finer one follows."""
+    stage("searching")
     rng = np.random.default_rng([job.seed, group.joints[0]])
     found = interval_search.search(group.angle_points_deg, group.limits, job, rng, stages.within)
     stages.done()
@@ -117,6 +118,7 @@ def _searched(group: Group, job: Job, stages: _Stages, last: bool) -> Timed:
     searched = path.duration_s(differences)
     optimum = Optimum(differences, searched, 0.0)
     if job.polish and last:
+        stage("polishing")
         optimum = path.optimum(differences, _POLISHED_GAP)
     stages.done()
     intervals = path.intervals(optimum.differences_s)
@@ -135,6 +137,7 @@ def _searched(group: Group, job: Job, stages: _Stages, last: bool) -> Timed:
 
 def _refined(group: Group, job: Job, axis: Timed, before: int, refine: int) -> Timed:
     """The same axis cut finer, then improved, so that it is never slower."""
+    stage(f"refining to {refine}")
     differences = np.diff(axis.time_points_s)
     start = time_axis.cut(differences, before, refine, job.degree)
     path = FixedPath(group.angle_points_deg, job.degree, group.limits, refine)

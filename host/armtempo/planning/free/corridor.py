@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.progress import alive
 from armtempo.planning.free.tool import Tool
 from armtempo.splines import bernstein
 
@@ -32,6 +33,7 @@ def tool_deviation_mm(path: Array, through: Array, tool: Tool) -> float:
     """
     best = 0.0
     while True:
+        alive()
         places = np.stack([path[:, 0], _middle(path), path[:, -1]], axis=1)
         others = np.stack([through[:, 0], _middle(through), through[:, -1]], axis=1)
         shape = len(path), 3, 3

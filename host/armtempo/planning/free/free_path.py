@@ -10,7 +10,7 @@ import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import PlanError
-from armtempo.basics.progress import Progress
+from armtempo.basics.progress import Progress, alive, stage
 from armtempo.planning import rest_to_rest
 from armtempo.planning.free import angle_bounds, corridor, free_start, layout
 from armtempo.planning.free.free_motion import Demand, FreeMotion, Improver, through
@@ -74,6 +74,7 @@ def shortest(demand: Demand, effort: Effort, progress: Progress) -> Shortest:
     times: list[float] = []
     problem: PlanError | None = None
     for number, start in enumerate(ways):
+        stage(f"start {number + 1} of {len(ways)}")
         try:
             motion = start()
             found = Improver(_tightened(demand), motion.layout).improved(motion, 1)
@@ -85,6 +86,7 @@ def shortest(demand: Demand, effort: Effort, progress: Progress) -> Shortest:
         progress(number + 1, whole)
     if best is None:
         raise problem or PlanError("a free path needs at least one start", "set starts to 1 or more")
+    stage("improving the best")
     final = _finished(demand, best, effort, even)
     progress(whole, whole)
     return Shortest(final, np.array(times))
@@ -156,7 +158,9 @@ def _within_corridor(demand: Demand, motion: FreeMotion) -> FreeMotion:
     if not np.isfinite(demand.corridor_mm) or demand.tool is None:
         return motion
     middle = bspline.refined(bspline.fit(demand.via_deg, DEGREE), int(motion.layout.pieces[0]), DEGREE)
+    stage("proving the corridor")
     for _ in range(_DRAWN):
+        alive()
         reached = tool_deviation_mm(demand, motion)
         if reached <= demand.corridor_mm:
             return motion

@@ -49,7 +49,10 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
     Raises InputError for a job that the board cannot hold, PlanError where no path stays within the ranges.
     """
     most = _most_segments(arm, job, len(via_deg))
-    spline = _on_spline(arm, job, via_deg, progress) if _in_corridor(job) and not job.stops else None
+    spline = None
+    if _in_corridor(job) and not job.stops:
+        spline = _on_spline(arm, job, via_deg, part(progress, 0, 2) or progress)
+        progress = part(progress, 1, 2) or progress
     moving = [int(joint) for joint in np.flatnonzero(np.ptp(via_deg, axis=0) > checks.TOLERANCE)]
     groups = [moving] if job.timing == "shared" else [[joint] for joint in moving]
     found = []
