@@ -14,7 +14,7 @@ DOCUMENT = "armtempo.document"
 def show(error: ArmtempoError, who: str = "armtempo", as_json: bool = False) -> None:
     """Write an error to stderr, ``who`` before it; characters that would steer the terminal are spelt out.
 
-    ``as_json``: as a document on stdout instead, with ``error``, ``hint`` and the ``exit_code``, unless one was printed.
+    ``as_json``: as a document on stdout, with ``error``, ``hint`` and the ``exit_code``, unless one was printed there.
     """
     if as_json and DOCUMENT not in click.get_current_context().meta:
         import json
