@@ -70,6 +70,7 @@ __all__ = [
     "find_ports",
     "forward",
     "inverse",
+    "inverse_many",
     "optimise",
     "plan",
     "plan_sequence",
@@ -92,6 +93,7 @@ if TYPE_CHECKING:
         PlanError,
         RunFolderError,
     )
+    from armtempo.kinematics.many import inverse_many
     from armtempo.kinematics.of_arm import forward, inverse
     from armtempo.model.arm import Arm
     from armtempo.model.job import Job, Stop
@@ -125,6 +127,7 @@ _HOMES = {
         "PlanError",
         "RunFolderError",
     ),
+    "armtempo.kinematics.many": ("inverse_many",),
     "armtempo.kinematics.of_arm": ("forward", "inverse"),
     "armtempo.ports.listing": ("find_ports",),
     "armtempo.model.arm": ("Arm",),

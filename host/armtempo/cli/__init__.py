@@ -86,6 +86,11 @@ class LazyGroup(click.Group):
         module = import_module(f"{__name__}.{name.replace('-', '_')}{'_' * iskeyword(name)}")
         command: click.Command = module.command
         command.epilog = examples.of(name)
+        for parameter in command.params:
+            if isinstance(parameter, click.Option) and isinstance(
+                parameter.type, click.IntRange | click.FloatRange
+            ):
+                parameter.metavar = parameter.metavar or "NUMBER"
         return command
 
     def resolve_command(

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from armtempo.robot.shared_board import SharedBoard
 
 
+_ANEW = ", started for this command: its arm begins at home; 'armtempo virtual-board' keeps one running"
+
+
 def tell(text: str) -> None:
     """Say something beside the command's output, unless ``armtempo --quiet``."""
     if not is_quiet():
@@ -273,6 +276,8 @@ def board_state(port: str, log_traffic: Path | None = None) -> BoardState:
 
 def virtual_words(port: str) -> str:
     """What kind of virtual board is on a port."""
-    from armtempo.ports.names import SIM
+    from armtempo.ports.names import SIM, is_sim
 
-    return "a virtual board, which ends with this command" if port == SIM else "a virtual board"
+    if port == SIM:
+        return "a virtual board, which ends with this command"
+    return f"a virtual board{_ANEW}" if is_sim(port) else "a virtual board"

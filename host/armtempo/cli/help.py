@@ -26,9 +26,12 @@ TOPICS = {
 
 
 @click.command()
-@click.argument("topic", required=False, type=click.Choice([*TOPICS]))
+@click.argument("topic", metavar="[TOPIC]", required=False, type=click.Choice([*TOPICS]))
 def command(topic: str | None) -> None:
-    """Show a page of the documentation; without TOPIC list them."""
+    """Show a page of the documentation, or list them.
+
+    TOPIC: a name of the list.
+    """
     if topic is None:
         for name in TOPICS:
             title = page(name).partition("\n")[0].lstrip("# ")

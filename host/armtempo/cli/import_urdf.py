@@ -30,6 +30,8 @@ from armtempo.cli import options, results
 def command(urdf: Path, out: Path, base: str | None, tip: str | None, force: bool, as_json: bool) -> None:
     """Make an arm file of a URDF's chain of revolute joints: its Denavit-Hartenberg rows and ranges.
 
+    URDF: the robot's description, a .urdf or .xacro file.
+
     The rows are held against the URDF's own forward kinematics at 1000 random postures before anything is
     written. Motors, which a URDF does not describe, are left as comments to fill in. Needs the extra 'urdf'.
     """

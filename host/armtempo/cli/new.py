@@ -49,6 +49,8 @@ def command(
 ) -> None:
     """Make a project folder: arm file, first job, settings, and a page with the next commands.
 
+    FOLDER: a folder that is not there yet, or is empty.
+
     Asks for what no option says, if there is somebody at the terminal to ask: '?' explains, '<' goes back.
     """
     from armtempo.new_arm import folder as project_folder
