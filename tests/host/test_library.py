@@ -81,7 +81,7 @@ def test_a_plan_is_computed_without_plots_and_ports() -> None:
         "job = armtempo.Job('x', via_deg=[[0, -60, 40], [1, -60, 40]], population=4, iterations=1)\n"
         "armtempo.plan(arm, job)"
     )
-    assert not modules_after(code) & {"matplotlib", "click"}
+    assert not modules_after(code) & {"matplotlib", "click", "scipy.interpolate"}
 
 
 def test_every_public_name_is_there_and_described() -> None:
@@ -287,7 +287,7 @@ def test_a_stop_that_is_asked_for_ends_a_run_early(
     stop = armtempo.StopRequest()
 
     class Impatient(armtempo.Watcher):
-        def sample(self, sample: Sample, duration_s: float) -> None:
+        def on_sample(self, sample: Sample, duration_s: float) -> None:
             stop.wanted = True
 
     with armtempo.connect("sim", arm) as board:

@@ -48,7 +48,7 @@ def _enough(places: Array, points: Array, tolerance_deg: float) -> NDArray[np.in
 
 def _errors_deg(places: Array, points: Array, kept: NDArray[np.int64]) -> Array:
     """How far off each point is from the spline through those kept, the largest of its joints: (n,)."""
-    from scipy.interpolate import CubicSpline  # here, because it takes longer to load than most commands
+    from scipy.interpolate import CubicSpline  # here, because loading it takes longer than a plan
 
     spline = CubicSpline(places[kept], points[kept], bc_type="clamped")
     return np.asarray(np.abs(spline(places) - points).max(axis=1))

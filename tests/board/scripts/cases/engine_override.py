@@ -5,6 +5,8 @@ motion's own time. What is expected are the steps of the same motion without a c
 many motions are tried.
 """
 
+# all cases: slow on CPython
+
 import random
 import sys
 
@@ -189,7 +191,7 @@ def some_place():
     return [random.randrange(-200, 200) + random.choice((-0.45, 0.1, 0.45)) for _ in range(3)]
 
 
-def case_prepared():
+def case_prepared():  # not emulated
     """Motions prepared while others move, at every speed: on the pins each ends where its record does."""
     random.seed(SEED + 1)
     rig = Rig(joints(), planned=False)
@@ -234,7 +236,7 @@ def case_step_at_the_start():
             assert [len(recorder.steps) for recorder in recorders] == [1, 0, 0]
 
 
-def case_stops():
+def case_stops():  # not emulated
     """A stop, whatever the speed is and is becoming, ends on the path."""
     random.seed(SEED)
     for number in range(max(MOTIONS // 2, 1)):
@@ -280,7 +282,7 @@ def case_wrong_steps():
             assert rig.engine.clear() and rig.engine.fault == 0
 
 
-def case_long_pause():
+def case_long_pause():  # not emulated
     """A pause longer than the counter's round, then on; and one that is too long ends the run."""
     motion = record(BRAKE_TICKS)
     plain, recorders = begin(motion)
@@ -304,7 +306,7 @@ def case_long_pause():
     assert check_steps(rig, recorders, expected) == [len(steps) for steps in expected]
 
 
-def case_refused():
+def case_refused():  # not emulated
     """What cannot change its speed says so, and goes on."""
     rig, _ = begin(record(0))
     for rate in (0, 500, RESUME):
