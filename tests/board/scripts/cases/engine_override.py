@@ -137,7 +137,7 @@ def change(rig):
     rig.run_to(rig.board.now - rig.zero() + random.randrange(TICK_HZ // 3))
 
 
-def case_whole_path():
+def case_whole_path():  # slow
     """Whatever the speed, the whole path is stepped."""
     random.seed(SEED)
     for number in range(MOTIONS):
@@ -191,7 +191,7 @@ def some_place():
     return [random.randrange(-200, 200) + random.choice((-0.45, 0.1, 0.45)) for _ in range(3)]
 
 
-def case_prepared():  # not emulated
+def case_prepared():  # not emulated, slow
     """Motions prepared while others move, at every speed: on the pins each ends where its record does."""
     random.seed(SEED + 1)
     rig = Rig(joints(), planned=False)
@@ -274,7 +274,7 @@ def case_stops():  # not emulated
         check_samples(rig)
 
 
-def case_wrong_steps():
+def case_wrong_steps():  # slow
     """A step that is not in the record is found out however the motion ends, and makes its joint unknown."""
     for rates in ((), (700,), (0, RESUME), (BRAKE,), (500, BRAKE), (0, BRAKE)):
         for wrong in (0, 1):
