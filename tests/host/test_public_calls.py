@@ -38,7 +38,7 @@ GIVEN_BY_US |= {"StopRequest", "Trajectory", "Watcher", "Result", "VirtualBoard"
 USERS_OWN = {"minimise.function", "minimise.rng", "launch.options"}
 """What these raise or start is the user's affair."""
 NO_CALLS = {"BoardState.of_json", "Job.of_table", "Arm.of_table", "StopRequest.ask", "StopRequest.check"}
-NO_CALLS |= {f"Watcher.{name}" for name in ("begin", "sample", "end")}
+NO_CALLS |= {f"Watcher.{name}" for name in ("begin", "on_sample", "end")}
 
 
 class Gone:
@@ -97,6 +97,7 @@ def good(plan: armtempo.Plan) -> dict[str, Any]:
         "folders": [NOWHERE],
         "angles_deg": [0, -60, 40],
         "pose": np.eye(4),
+        "poses": np.eye(4)[None],
         "points": [0, 1, 2],
         "control_points": [0] * 8,
         "motion": plan,

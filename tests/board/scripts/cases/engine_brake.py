@@ -1,5 +1,7 @@
 """Braking a real motion at many moments: every joint comes to rest at the same point of the path."""
 
+# all cases: slow on CPython
+
 import random
 
 import cases
@@ -15,7 +17,7 @@ def joints():
     return rows
 
 
-def case_whole_motion():
+def case_whole_motion():  # not emulated
     """Without braking it ends at the last points."""
     rig = Rig(joints(), planned=False)
     begin(rig, BRAKE_TICKS)
@@ -32,7 +34,7 @@ def begin(rig, brake_ticks):
     rig.engine.start()
 
 
-def case_anywhere():
+def case_anywhere():  # slow
     """The stop is on the path, the samples go on to it, and nothing comes after it."""
     random.seed(SEED)
     for number in range(15 // FEWER):
@@ -57,7 +59,7 @@ def case_anywhere():
         assert rig.samples[-1][4:7] == rig.commanded()
 
 
-def case_too_late():
+def case_too_late():  # not emulated
     """Asked for when the motion is nearly over, it ends as planned."""
     rig = Rig(joints(), planned=False)
     begin(rig, BRAKE_TICKS)
@@ -69,7 +71,7 @@ def case_too_late():
     assert [abs(a - b) <= 0.5 for a, b in zip(rig.commanded(), path(10.0))] == [True] * 3
 
 
-def case_not_planned_for():
+def case_not_planned_for():  # not emulated
     """A motion without a braking time is frozen."""
     rig = Rig(joints(), planned=False)
     begin(rig, 0)
