@@ -184,7 +184,7 @@ COMMANDS: "dict[str, str]" = {
     "hello": "Begins a session; `session` is a number that differs between hosts, so that the board knows a "
     "new one. Refused with `protocol` where the versions differ. Answer: who the board is; `joints` and "
     "`arm_crc` are 0 without an arm record; `boot` differs after every start of the program; "
-    "`engine_room`, `engine_joints`: bytes of heap (beside the chip's backup SRAM) and joints that an engine can have; "
+    "`engine_room`: bytes of heap (beside the chip's backup SRAM) that an engine and its objects can have; "
     "`features`: what the program can do beyond one motion at a time, 1 sequences, 2 outputs and inputs, 4 held motions, "
     "8 other speeds; "
     "`arm_problem`: code of "

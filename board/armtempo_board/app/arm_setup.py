@@ -86,7 +86,7 @@ def _judged(board: "ArmState", data: bytes) -> "Record":
     """An arm record that can be taken, unpacked; else Refused."""
     from armtempo_board.motion import arm_check  # here, so that it can be forgotten
 
-    return arm_check.checked(data, board.workspace.words, board.workspace.joints)
+    return arm_check.checked(data, board.workspace.room)
 
 
 def _take(board: "ArmState", record: "Record") -> None:
@@ -99,7 +99,7 @@ def _take(board: "ArmState", record: "Record") -> None:
         known = board.engine.known
         steps = [board.engine.commanded(joint) for joint in range(board.joints)]
     _drop_engine(board)
-    _share_room(board, len(outputs), len(inputs))
+    _share_room(board, len(joints))
     heap.forget("room", "engine_memory")
     board.make_engine(head, joints)
     board.all_but_limits = all_but_limits
@@ -124,10 +124,10 @@ def _facts(record: "Record") -> "tuple[int, int]":
     return armrecord.without_limits(head, joints), head["flags"] & armrecord.FLAG_STOP_ON_LINK_LOSS
 
 
-def _share_room(board: "ArmState", outputs: int, inputs: int) -> None:
+def _share_room(board: "ArmState", joints: int) -> None:
     from armtempo_board.app import room  # here, so that it can be forgotten
 
-    room.share(board.workspace, outputs, inputs)
+    room.share(board.workspace, joints)
 
 
 def _drop_engine(board: "ArmState") -> None:

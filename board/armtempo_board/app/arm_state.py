@@ -100,12 +100,8 @@ class ArmState:
     # what it knows
 
     def engine_room(self) -> int:
-        """Bytes of memory that an engine can have (``armtempo_shared.engine_memory``)."""
-        return int(4 * self.workspace.words)
-
-    def engine_joints(self) -> int:
-        """Joints that an engine can have."""
-        return int(self.workspace.joints)
+        """Bytes that an engine can have (``armtempo_shared.engine_memory``)."""
+        return int(self.workspace.room)
 
     def check_ready(self) -> None:
         """Refuses while a fault is pending or no arm is configured."""

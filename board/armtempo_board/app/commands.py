@@ -184,7 +184,6 @@ class Commands:
             controller.program_crc,
             controller.boot,
             controller.engine_room(),
-            controller.engine_joints(),
             features.BITS,
             controller.arm_problem,
             controller.arm_value,

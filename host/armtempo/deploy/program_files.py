@@ -29,8 +29,8 @@ ARCHIVE = "armtempo.z"
 _READER = "archive.py"
 """File of the board package that finds modules in the archive."""
 _READER_NAME = "armtempo_archive"
-_FOR_MOTIONS = f"{PACKAGES[0]}/override.mpy"
-"""What is imported when memory is shortest, and left as it is, as inflating takes 2.4 KB."""
+_AT_START = [f"{PACKAGES[0]}/{name}.mpy" for name in ("override", "motion_check", "endpoints", "motion_file")]
+"""Modules that are imported when a motion starts, when memory is shortest; left as they are, as inflating takes 2.4 KB."""
 _HASH = f"{PACKAGES[1]}/program_hash.py"
 _MAIN = f"{PACKAGES[0]}.app.program"
 _STEPGEN, _MOTION = f"{PACKAGES[0]}.stepgen", f"{PACKAGES[0]}.motion"
@@ -166,7 +166,7 @@ def _compile(compiler: str, architecture: str) -> dict[str, bytes]:
             _run(compiler, f"-march={architecture}", "-O3", "-s", name, "-o", str(target), str(source))
             compiled[f"{path[:-3]}.mpy"] = target.read_bytes()
     outside = f"{_READER_NAME}.mpy"
-    return {outside: compiled.pop(outside), ARCHIVE: archive.pack(compiled, [_FOR_MOTIONS])}
+    return {outside: compiled.pop(outside), ARCHIVE: archive.pack(compiled, _AT_START)}
 
 
 def compact_files(hash_module: str = "") -> dict[str, str]:
