@@ -1,8 +1,8 @@
 """Becomes ``/flash/lib/armtempo_archive.mpy``: finds the program's modules in one file, most of them deflated.
 
 For MicroPython's own firmware, in whose flash they have no room otherwise; ``boot.py`` imports it. The file begins with
-the length of its index in two bytes, then the index, a line "PATH OFFSET" for each module, the offset below 0 where it
-is not deflated. It is written by ``deploy/archive.py`` on the host.
+the length of its index in two bytes, then the index, a line "PACKAGE/MODULE OFFSET" for each, the package without
+"armtempo_", the offset below 0 where the module is not deflated. It is written by ``deploy/archive.py`` on the host.
 """
 
 import sys
@@ -22,6 +22,8 @@ _FOLDER = const(0x4000)
 _REGULAR = const(0x8000)
 _ENOENT = const(2)
 _LENGTH_BYTES = const(2)
+_BEFORE = const(10)  # letters of "/armtempo_"
+_ENDING = ".mpy"
 
 
 class Archive:
@@ -39,27 +41,36 @@ class Archive:
 
     def stat(self, path: str) -> "tuple[int, ...]":
         """Whether a module or a folder is there; OSError."""
-        kind = _REGULAR if self._find(path + " ") >= 0 else _FOLDER
-        if kind == _FOLDER and self._find(path + "/") < 0:
+        if self._offset(path):
+            return (_REGULAR,) + (0,) * 9
+        if self._find(path[_BEFORE:] + "/") < 0:
             raise OSError(_ENOENT)
-        return (kind,) + (0,) * 9
+        return (_FOLDER,) + (0,) * 9
 
     def open(self, path: str, mode: str) -> "Any":
         """A module's bytes."""
-        at = self._find(path + " ")
-        if at < 0:
+        offset = self._offset(path)
+        if not offset:
             raise OSError(_ENOENT)
-        begin = at + len(path) + 1
-        offset = int(self._index[begin : self._index.find(b"\n", begin)])
         file = open(_FILE, "rb")
         file.seek(abs(offset))
         if offset < 0:
             return file
         return deflate.DeflateIO(file, deflate.RAW, _WINDOW_BITS, True)
 
+    def _offset(self, path: str) -> int:
+        """Where a module begins, 0: it is not there."""
+        name = path[_BEFORE : -len(_ENDING)] + " "
+        at = self._find(name)
+        if at < 0 or not path.endswith(_ENDING):
+            return 0
+        begin = at + len(name)
+        return int(self._index[begin : self._index.find(b"\n", begin)])
+
     def _find(self, text: str) -> int:
-        """Where a line of the index begins so."""
-        return self._index.find(b"\n" + text.encode()) + 1 or -1
+        """Where a line of the index begins so, or -1."""
+        at = self._index.find(b"\n" + text.encode())
+        return at + 1 if at >= 0 else -1
 
 
 try:

@@ -17,7 +17,6 @@ from typing import Any
 
 import pytest
 from armtempo.simulator import LaunchOptions, VirtualBoard, launch
-from armtempo.simulator.launcher import _DEPLOYED_BLOCKS
 
 from tests import interpreters
 from tests.system import commandline
@@ -191,7 +190,7 @@ def half_deployed(bench: Bench) -> None:
 
 def full_flash(bench: Bench) -> None:
     shutil.rmtree(bench.flash / "lib")
-    (bench.flash / "data.csv").write_bytes(bytes(512 * (_DEPLOYED_BLOCKS - 40)))
+    (bench.flash / "data.csv").write_bytes(bytes(512 * (190 - 40)))
 
 
 def full_of_motions(bench: Bench) -> None:

@@ -17,7 +17,7 @@ from armtempo_shared.messages import RESUME, SAMPLE_BRAKING, START_HELD, START_H
 from micropython import const
 
 from armtempo_board import features, heap
-from armtempo_board.app.arm_state import ArmState
+from armtempo_board.app.arm_state import MOTION_CODE_BYTES, ArmState
 from armtempo_board.errors import Refused
 
 TYPE_CHECKING = False
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from armtempo_board.storage.motion_file import MotionFile
 
 _PERMILLE = const(1000)
-_PIECES_BYTES = (2_416, 2_192, 1_648, 1_584, 1_360, 1_088, 1_008, 512)
 
 
 class Controller(ArmState):
@@ -66,7 +65,11 @@ class Controller(ArmState):
             elif silent_ms > self.silence_ms and self._by_host and not self._braking:
                 self.pending = codes.LINK_LOST
                 self.stop(0)
-            elif features.JOG and self._held and time.ticks_diff(time.ticks_ms(), self._hold_ms) > HOLD_TIMEOUT_MS:
+            elif (
+                features.JOG
+                and self._held
+                and time.ticks_diff(time.ticks_ms(), self._hold_ms) > HOLD_TIMEOUT_MS
+            ):
                 self.stop(0)
         if features.SEQUENCES and self.sequence:
             if self.engine.moving:
@@ -202,7 +205,7 @@ class Controller(ArmState):
         """Keep pieces for the code that a motion needs, before anything that its start needs can lie in them."""
         self.tidy()
         if self.workspace.is_short:
-            heap.hold(*_PIECES_BYTES)
+            heap.hold(MOTION_CODE_BYTES)
 
     def begin_motion(self, name: str, crc: "int | None", rate: int, flags: int = 0, unknown: int = 0) -> None:
         """Start a stored motion at ``rate`` thousandths of its speed, or refuse.

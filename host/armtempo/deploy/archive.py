@@ -17,7 +17,8 @@ def pack(files: Mapping[str, bytes], plain: Collection[str]) -> bytes:
         at = 2 + len(index)
         lines = []
         for path, data in packed.items():
-            lines.append(f"\n/{path} {-at if path in plain else at}")
+            name = path.removeprefix("armtempo_").removesuffix(".mpy")
+            lines.append(f"\n{name} {-at if path in plain else at}")
             at += len(data)
         made = "".join(lines) + "\n"
         if len(made) == len(index):

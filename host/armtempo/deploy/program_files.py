@@ -29,7 +29,9 @@ ARCHIVE = "armtempo.z"
 _READER = "archive.py"
 """File of the board package that finds modules in the archive."""
 _READER_NAME = "armtempo_archive"
-_AT_START = [f"{PACKAGES[0]}/{name}.mpy" for name in ("override", "motion_check", "endpoints", "motion_file")]
+_AT_START = [
+    f"{PACKAGES[0]}/{name}.mpy" for name in ("override", "motion_check", "endpoints", "motion_file", "store")
+]
 """Modules that are imported when a motion starts, when memory is shortest; left as they are, as inflating takes 2.4 KB."""
 _HASH = f"{PACKAGES[1]}/program_hash.py"
 _MAIN = f"{PACKAGES[0]}.app.program"

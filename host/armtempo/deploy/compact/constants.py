@@ -184,9 +184,13 @@ class _Decided(ast.NodeTransformer):
     def visit_If(self, node: ast.If) -> ast.AST | list[ast.stmt]:
         """The branch that is taken."""
         self.generic_visit(node)
-        return (node.body if node.test.value else node.orelse) if isinstance(node.test, ast.Constant) else node
+        return (
+            (node.body if node.test.value else node.orelse) if isinstance(node.test, ast.Constant) else node
+        )
 
     def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
         """The same within an expression."""
         self.generic_visit(node)
-        return (node.body if node.test.value else node.orelse) if isinstance(node.test, ast.Constant) else node
+        return (
+            (node.body if node.test.value else node.orelse) if isinstance(node.test, ast.Constant) else node
+        )

@@ -174,18 +174,4 @@ def case_a_record_of_another_version_is_refused():
     assert host.ask("inputs")[0] == "ok"
 
 
-def case_what_has_no_room_is_refused():
-    """Outputs and inputs come out of the engine's memory."""
-    _, host = wired()
-    most = stand_in.Workspace.words
-    stand_in.Workspace.words = engine_memory.words([1, 1]) + engine_memory.output_bytes(8, 7) // 4
-    eight = [dict(PUMP, pin=0x30 + number) for number in range(8)]
-    inputs = [dict(PART, pin=0x20 + number) for number in (0, 1, 2, 3, 4, 5, 8, 9)]
-    answer = host.upload("/arm", stand_in.arm(outputs=eight, inputs=inputs))[-1]
-    stand_in.Workspace.words = most
-    assert answer[:2] == ("error", "no_room")
-    assert host.ask("inputs")[0] == "ok"
-    assert host.upload("/arm", stand_in.arm(outputs=eight, inputs=inputs))[-1][0] == "ok"
-
-
 cases.run(globals())

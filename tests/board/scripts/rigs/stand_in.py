@@ -121,9 +121,8 @@ def install():
 class Workspace:
     """Says only how large it is."""
 
-    words = engine_memory.LARGEST_WORDS
+    room = engine_memory.LARGEST_BYTES
     is_short = False
-    joints = 6
 
 
 class Rates:
