@@ -101,7 +101,6 @@ def good(plan: armtempo.Plan) -> dict[str, Any]:
         "folders": [NOWHERE],
         "angles_deg": [0, -60, 40],
         "pose": np.eye(4),
-        "poses": np.eye(4)[None],
         "points": [0, 1, 2],
         "control_points": [0] * 8,
         "motion": encoded,
