@@ -22,6 +22,7 @@ NO_REPORT = {
     "completion": "prints a script",
     "help": "prints a page",
     "virtual-board": "prints its port, and stays",
+    "panel": "prints its address, and stays",
 }
 JOB = """
 name = "short"

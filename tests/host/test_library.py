@@ -106,6 +106,7 @@ def test_public_functions_are_typed() -> None:
         assert all(one.annotation is not inspect.Parameter.empty for one in signature.parameters.values())
 
 
+@pytest.mark.slow
 def test_the_errors_are_the_tree_that_is_drawn() -> None:
     for found in pkgutil.walk_packages(armtempo.__path__, "armtempo."):
         if "simulator." not in found.name and not found.name.endswith(("__main__", "firmware.manifest")):

@@ -208,7 +208,8 @@ class Owner:
     """What ``Sharing`` needs of a client; keeps what the board would have been told."""
 
     def __init__(self) -> None:
-        self.session = SimpleNamespace(transport=SimpleNamespace(name="/dev/p"), in_a_hurry=self._turn)
+        transport = SimpleNamespace(name="/dev/p")
+        self.session = SimpleNamespace(transport=transport, in_a_hurry=self._turn, listeners=[])
         self.told: list[tuple[object, ...]] = []
         self.rate = 1000
 

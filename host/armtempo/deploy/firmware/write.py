@@ -169,7 +169,7 @@ def _put(folder: Path, firmware: Image, tool: str, progress: Progress) -> None:
                         f"flash again: {_REACH[tool]}",
                     )
                 done += size
-                if reading and back.read_bytes() != file.read_bytes():
+                if reading and back.read_bytes()[:size] != file.read_bytes():  # st-flash reads whole words
                     raise ToolError(
                         f"what was read back at {piece.address:#010x} is not what was written",
                         f"flash again, with a shorter cable if it comes again; {_REACH[tool]}",
