@@ -52,7 +52,7 @@ class Archive:
         offset = self._offset(path)
         if not offset:
             raise OSError(_ENOENT)
-        file = open(_FILE, "rb")
+        file = open(_FILE, "rb")  # noqa: SIM115  the import closes it
         file.seek(abs(offset))
         if offset < 0:
             return file

@@ -264,7 +264,7 @@ class Controller(ArmState):
     if features.SPEED:
 
         def change_speed(self, rate: int) -> None:
-            """What moves goes on at ``rate`` thousandths (0: pause, RESUME: as before), or a host's next run begins so."""
+            """``rate`` thousandths (0: pause, RESUME: as before) for what moves, or for a host's next run."""
             if self.moving():
                 (self.sequence or self.engine).change_rate(rate)
             elif rate in (0, RESUME):

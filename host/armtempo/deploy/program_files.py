@@ -32,7 +32,7 @@ _READER_NAME = "armtempo_archive"
 _AT_START = [
     f"{PACKAGES[0]}/{name}.mpy" for name in ("override", "motion_check", "endpoints", "motion_file", "store")
 ]
-"""Modules that are imported when a motion starts, when memory is shortest; left as they are, as inflating takes 2.4 KB."""
+"""Modules that are imported when a motion starts; not deflated, as inflating takes 2.4 KB and memory is shortest."""
 _HASH = f"{PACKAGES[1]}/program_hash.py"
 _MAIN = f"{PACKAGES[0]}.app.program"
 _STEPGEN, _MOTION = f"{PACKAGES[0]}.stepgen", f"{PACKAGES[0]}.motion"

@@ -8,7 +8,7 @@ import stand_in
 from app_rig import connected, flash, start, state  # isort: skip  it puts the stand-ins into place
 
 from armtempo_board.app.app import App
-from armtempo_shared import armrecord, engine_memory
+from armtempo_shared import armrecord
 from pin_rows import GRIPPER, PART, PUMP
 
 DOOR = {"pin": 0x32, "active_high": 1, "debounce_ms": 0}
