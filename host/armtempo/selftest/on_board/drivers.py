@@ -3,7 +3,7 @@
 
 def measure(record):
     """``record``: file of the arm record."""
-    import armtempo_board.hardware.pins  # noqa: F401  not where the program lies in files
+    import armtempo_board.hardware.pins
 
     active = None
     joints = []
