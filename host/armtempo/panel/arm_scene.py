@@ -9,7 +9,6 @@ from itertools import pairwise
 
 import numpy as np
 from nicegui import ui
-from scipy.spatial.transform import Rotation
 
 from armtempo.basics.arrays import Array
 from armtempo.kinematics.chain import all_angles_deg, outline_mm
@@ -20,6 +19,7 @@ COLOUR, GHOST, PATH, RUN, VIA = "#4477aa", "#999999", "#228833", "#ee6677", "#cc
 _THICK = 0.03
 """Radius of a link as a share of the arm's reach, for arms whose file gives none."""
 _SHORT_MM = 1e-6
+_OPPOSITE = 1e-9
 _GHOST_OPACITY = 0.25
 
 
@@ -47,13 +47,14 @@ class ArmShape:
 
     def poses(self, angles_deg: Array) -> list[list[float]]:
         """x, y, z and the quaternion x, y, z, w of each piece's middle: its y axis points along it."""
-        points = self.outline(angles_deg)
-        found = []
-        for index, _ in self.pieces:
-            begin, end = points[index], points[index + 1]
-            along = (end - begin) / np.linalg.norm(end - begin)
-            turn, _ = Rotation.align_vectors([along], [[0.0, 1.0, 0.0]])
-            found.append([*((begin + end) / 2).round(5).tolist(), *turn.as_quat().round(5).tolist()])
+        points, first = self.outline(angles_deg), [index for index, _ in self.pieces]
+        begin, end = points[first], points[np.array(first) + 1]
+        along = (end - begin) / np.linalg.norm(end - begin, axis=1, keepdims=True)
+        zero = np.zeros(len(along))
+        turns = np.column_stack((along[:, 2], zero, -along[:, 0], 1.0 + along[:, 1]))  # from y, the short way
+        turns[turns[:, 3] < _OPPOSITE] = (1.0, 0.0, 0.0, 0.0)
+        turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+        found: list[list[float]] = np.hstack(((begin + end) / 2, turns)).round(5).tolist()
         return found
 
 
@@ -62,9 +63,7 @@ class ArmScene:
 
     def __init__(self, shape: ArmShape) -> None:
         self._shape = shape
-        with ui.scene(width=800, height=500, grid=(4, 16), background_color="#ffffff").classes(
-            "w-full h-full"
-        ) as self.scene:
+        with ui.scene(width=800, height=500, grid=(4, 16), background_color="#ffffff") as self.scene:
             self._links = self._capsules(COLOUR, 1.0)
             self._ghost = self._capsules(GHOST, _GHOST_OPACITY)
         self._lines: dict[str, list[object]] = {}

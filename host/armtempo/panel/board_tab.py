@@ -38,12 +38,12 @@ class BoardTab:
         ui.label(words.STATUS).classes("text-subtitle2")
         columns = [{"name": name, "label": "", "field": name, "align": "left"} for name in ("key", "value")]
         self._state = ui.table(columns=columns, rows=[]).props("dense flat hide-header wrap-cells")
-        with ui.row().classes("items-center gap-2"):
+        with ui.row():
             ui.label(words.STORED).classes("text-subtitle2")
             page.control(ui.button(icon="refresh", on_click=self._read).props("flat dense"), moves=False)
-        self._stored = ui.column().classes("gap-1")
+        self._stored = ui.column()
         ui.label(words.LOG).classes("text-subtitle2")
-        self._log = ui.log(max_lines=200).classes("w-full h-48")
+        self._log = ui.log(max_lines=200).classes("armtempo-chart")
         self._logged = 0
         page.listeners.append(self._look)
 
@@ -76,7 +76,7 @@ class BoardTab:
 
     def _row(self, name: str, duration_s: float) -> None:
         operator = self._operator
-        with ui.row().classes("items-center gap-2"):
+        with ui.row():
             ui.label(f"{name} · {duration_s:.3f} s")
             run = ui.button(words.RUN).props("outline dense no-caps")
             run.on_click(

@@ -28,7 +28,7 @@ class CurveChart:
             "yAxis": {"type": "value", "scale": True},
             "series": [],
         }
-        self.chart = ui.echart(options).classes("w-full h-48")
+        self.chart = ui.echart(options).classes("armtempo-chart")
 
     def show(self, times_s: Array, values: Array) -> None:
         """A curve for each joint: times (N,), values (N, J)."""

@@ -30,14 +30,14 @@ def build(operator: Operator, hold: ButtonHold, shape: ArmShape) -> PanelPage:
     ui.add_body_html(f"<script>{_SCRIPT}</script>")
     ui.dark_mode(None)
     _header(page)
-    with ui.element("div").classes("w-full flex flex-col lg:flex-row gap-2 no-wrap"):
-        with ui.column().classes("w-full lg:w-1/2 gap-1"):
-            with ui.element("div").classes("w-full h-[38vh] lg:h-[75vh] min-h-[240px]"):
+    with ui.element("div").classes("armtempo-page"):
+        with ui.column().classes("armtempo-half"):
+            with ui.element("div").classes("armtempo-scene"):
                 page.scene = ArmScene(shape)
-            with ui.row().classes("gap-1"):
+            with ui.row():
                 for view, text in words.VIEWS.items():
                     ui.button(text, on_click=lambda view=view: page.scene.look(view)).props("flat dense")
-        with ui.column().classes("w-full lg:w-1/2 gap-1"):
+        with ui.column().classes("armtempo-half"):
             _tabs(page)
     _events(page)
     page.refresh()
@@ -47,12 +47,12 @@ def build(operator: Operator, hold: ButtonHold, shape: ArmShape) -> PanelPage:
 
 def _header(page: PanelPage) -> None:
     operator = page.operator
-    with ui.header().classes("items-center gap-3 py-1 no-wrap"):
+    with ui.header().classes("items-center no-wrap"):
         stop = ui.button(words.STOP, icon="front_hand", color="negative", on_click=lambda: operator.stop())
         stop.classes("armtempo-stop").tooltip(words.STOP_HINT)
-        with ui.column().classes("gap-0 grow overflow-hidden"):
-            ui.label(f"{words.TITLE} · {operator.arm.name}").classes("text-lg leading-tight ellipsis")
-            ui.label("").classes("text-sm leading-tight ellipsis").props('id="armtempo-state" role="status"')
+        with ui.column().classes("armtempo-title"):
+            ui.label(f"{words.TITLE} · {operator.arm.name}").classes("text-subtitle1 ellipsis")
+            ui.label("").classes("ellipsis").props('id="armtempo-state" role="status"')
         take = ui.button(words.TAKE_CONTROL, on_click=lambda: operator.take_control(page.client)).props(
             "outline color=white"
         )
@@ -72,13 +72,20 @@ def _tabs(page: PanelPage) -> None:
         words.TAB_RUN: run_tab.build,
         words.TAB_BOARD: board_tab.build,
     }
-    with ui.tabs().classes("w-full") as tabs:
+    with ui.tabs().classes("full-width") as tabs:
         for name in parts:
             ui.tab(name)
-    with ui.tab_panels(tabs, value=words.TAB_MOVE, animated=False, keep_alive=True).classes("w-full"):
-        for name, part in parts.items():
-            with ui.tab_panel(name).classes("p-2"):
+    with ui.tab_panels(tabs, value=words.TAB_MOVE, animated=False, keep_alive=True).classes("full-width") as shown:
+        places = {name: ui.tab_panel(name) for name in parts}
+
+    def build(name: str) -> None:
+        """Each tab is built when it is first shown: the first view does not wait for charts and tables."""
+        if part := parts.pop(name, None):
+            with places[name]:
                 part(page)
+
+    shown.on_value_change(lambda event: build(event.value))
+    build(words.TAB_MOVE)
 
 
 def _events(page: PanelPage) -> None:

@@ -36,13 +36,22 @@ class PanelPage:
     jog_percent: float = 25.0
     scene: ArmScene = field(init=False)
     _reasons: tuple[str, str] = ("-", "-")
+    """Why what moves the arm cannot be used, and what does not; at first nothing can."""
 
     def control(self, element: Element, moves: bool = True) -> Any:
         """An element that is greyed, with the reason as its hint, while it cannot be used."""
         with element:
-            ui.tooltip("").classes("text-sm")
+            ui.tooltip("")
         self.controls.append((element, moves))
+        self._grey(element, self._reasons[not moves])
         return element
+
+    def _grey(self, element: Element, reason: str) -> None:
+        element.set_enabled(not reason)  # type: ignore[attr-defined]
+        for hint in element.default_slot.children:
+            if isinstance(hint, ui.tooltip):
+                hint.set_text(reason)
+                hint.set_visibility(bool(reason))
 
     def do(self, what: str, call: Callable[[], object], moves: bool = True) -> None:
         """Let the operator begin a command; what is refused is said."""
@@ -66,12 +75,8 @@ class PanelPage:
         reasons = operator.why_not(self.client), operator.why_not(self.client, moves=False)
         if reasons != self._reasons:
             self._reasons = reasons
+            self.controls = [(element, moves) for element, moves in self.controls if not element.is_deleted]
             for element, moves in self.controls:
-                reason = reasons[0] if moves else reasons[1]
-                element.set_enabled(not reason)  # type: ignore[attr-defined]
-                for hint in element.default_slot.children:
-                    if isinstance(hint, ui.tooltip):
-                        hint.set_text(reason or element.props.get("aria-label", ""))
-                        hint.set_visibility(bool(reason))
+                self._grey(element, reasons[not moves])
         for listener in self.listeners:
             listener()

@@ -34,19 +34,19 @@ class PlanTab:
         self._cancelled = False
         self._played: Plan | None = None
         self._table()
-        with ui.row().classes("items-center gap-2"):
+        with ui.row():
             ui.button(words.NEW_VIA, on_click=self._add_via).props("outline no-caps")
             ui.button(words.FROM_ARM, on_click=self._take_posture).props("outline no-caps")
             ui.button(words.PASTE, on_click=self._paste).props("outline no-caps")
             ui.button(words.SAVE, on_click=self._save).props("outline no-caps")
-        with ui.row().classes("items-center gap-2"):
+        with ui.row():
             self._path = ui.select(words.PATHS, value=page.operator.desk.job.path, label=words.PATH).classes(
                 "min-w-[14rem]"
             )
             self._go = ui.button(words.PLAN, on_click=self._plan)
             self._stop = ui.button(words.CANCEL, on_click=self._cancel).props("flat")
             self._stop.set_visibility(False)
-        self._bar = ui.linear_progress(0.0, show_value=False).classes("w-full")
+        self._bar = ui.linear_progress(0.0, show_value=False).classes("full-width")
         self._bar.set_visibility(False)
         self._result = ui.label("")
         self._slider = ui.slider(min=0, max=1000, value=0, on_change=self._show_time).props("label")
@@ -103,7 +103,7 @@ class PlanTab:
 
     async def _paste(self) -> None:
         with ui.dialog() as asked, ui.card():
-            text = ui.textarea(words.PASTE_HINT).classes("min-w-[24rem]")
+            text = ui.textarea(words.PASTE_HINT).style("min-width: min(24rem, 80vw)")
             with ui.row():
                 ui.button(words.PASTE, on_click=lambda: asked.submit(text.value))
                 ui.button(words.CANCEL, on_click=lambda: asked.submit(None)).props("flat")

@@ -27,7 +27,7 @@ class RunTab:
         self._operator = page.operator
         self._shown = (-1, 0)
         self._busy = ""
-        with ui.row().classes("items-center gap-2"):
+        with ui.row():
             page.control(ui.button(words.TO_START, on_click=self._to_start))
             page.control(ui.button(words.RUN, icon="play_arrow", on_click=self._run))
             self._repeat = ui.number(words.REPEAT, value=1, min=1, max=10_000, precision=0).props(
@@ -80,7 +80,7 @@ class RunTab:
         folders = past_runs(self._operator.runs)
         chosen: list[Path] = []
         for folder in folders[:_MOST_RUNS]:
-            with ui.row().classes("items-center gap-2"):
+            with ui.row():
                 ui.checkbox(
                     folder.name, on_change=lambda event, folder=folder: _choose(chosen, folder, event.value)
                 )

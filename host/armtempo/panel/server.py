@@ -11,6 +11,7 @@ from typing import Any
 import uvicorn
 from fastapi import FastAPI
 from nicegui import Client, app, ui
+from starlette.middleware.gzip import GZipMiddleware
 from starlette.responses import FileResponse, PlainTextResponse
 
 from armtempo.basics.errors import InputError
@@ -34,7 +35,14 @@ class Panel:
         self._api.get("/runs/{name}/{file}")(self._run_file)
         ui.page("/")(self._page)
         app.on_startup(self._tell)
-        ui.run_with(self._api, title=words.TITLE, dark=None, reconnect_timeout=2.0)
+        ui.run_with(
+            self._api,
+            title=words.TITLE,
+            dark=None,
+            reconnect_timeout=2.0,
+            tailwind=False,
+            gzip_middleware_factory=lambda inner: GZipMiddleware(inner, compresslevel=1),
+        )
 
     def serve(self, listening: socket.socket, token: str) -> None:
         """Answer on a socket that is bound; a client needs the ``token``, unless that is ""."""
