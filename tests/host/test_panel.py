@@ -122,6 +122,12 @@ class Board:
         self.jog = Jog()
         self.stops: list[tuple[bool, str]] = []
 
+    def configure(self, arm: Arm) -> None:
+        """It has this arm."""
+
+    def close(self) -> None:
+        """Nothing is open."""
+
     def held_jog(self, *_: object) -> Jog:
         return self.jog
 
@@ -133,7 +139,8 @@ class Board:
 @pytest.fixture
 def operator(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Operator]:
     monkeypatch.setattr("armtempo.panel.operator.LOOK_S", 1000.0)  # it is never asked for its state
-    made = Operator(Board(), ARM, Desk(ARM, tmp_path, None), tmp_path / "runs")  # type: ignore[arg-type]
+    board = Board()
+    made = Operator(lambda sink: board, "sim", Desk(ARM, tmp_path, None), tmp_path / "runs")  # type: ignore[arg-type, return-value]
     made.take_control(ME)
     yield made
     made.close()

@@ -75,7 +75,9 @@ def _tabs(page: PanelPage) -> None:
     with ui.tabs().classes("full-width") as tabs:
         for name in parts:
             ui.tab(name)
-    with ui.tab_panels(tabs, value=words.TAB_MOVE, animated=False, keep_alive=True).classes("full-width") as shown:
+    with ui.tab_panels(tabs, value=words.TAB_MOVE, animated=False, keep_alive=True).classes(
+        "full-width"
+    ) as shown:
         places = {name: ui.tab_panel(name) for name in parts}
 
     def build(name: str) -> None:
@@ -116,7 +118,9 @@ def message(operator: Operator, shape: ArmShape) -> dict[str, Any]:
         texts["armtempo-tool"] = f"x {x:.1f}  y {y:.1f}  z {z:.1f} mm"
     except InputError:
         pass
-    return {"links": shape.poses(np.asarray(angles)), "texts": texts}
+    target = operator.target_deg
+    ghost = None if target is None else shape.poses(target)
+    return {"links": shape.poses(np.asarray(angles)), "ghost": ghost, "texts": texts}
 
 
 def state_line(operator: Operator) -> str:

@@ -8,6 +8,7 @@ from nicegui import ui
 
 from armtempo.panel import words
 from armtempo.panel.held_jog import JogButton
+from armtempo.panel.operator import Needs
 
 if TYPE_CHECKING:
     from armtempo.panel.panel_page import PanelPage
@@ -75,9 +76,7 @@ def _postures(page: PanelPage) -> None:
         ui.label(words.POSTURES).classes("text-subtitle2")
         for name in names:
             go = ui.button(name).props("outline no-caps")
-            go.on_click(
-                lambda name=name: page.do(name, lambda: operator.board.goto(name, progress=operator.part))
-            )
+            go.on_click(lambda name=name: page.do(name, lambda: operator.go(name)))
             page.control(go)
 
 
@@ -91,18 +90,23 @@ def _motion(page: PanelPage) -> None:
                 ui.button(words.HOME, on_click=lambda: sure.submit(True))
                 ui.button(words.CANCEL, on_click=lambda: sure.submit(False)).props("flat")
         if await sure:
-            page.do(words.HOME, lambda: operator.board.home(operator.arm), moves=False)
+            page.do(words.HOME, lambda: operator.board.home(operator.arm), Needs.COMMAND)
 
     with ui.row():
-        page.control(ui.button(words.HOME, on_click=home).props("outline no-caps"), moves=False)
+        page.control(ui.button(words.HOME, on_click=home).props("outline no-caps"), Needs.COMMAND)
         clear = ui.button(words.CLEAR).props("outline no-caps")
-        clear.on_click(lambda: page.do(words.CLEAR, operator.board.clear, moves=False))
-        page.control(clear, moves=False)
-        ui.button(words.PAUSE, on_click=lambda: page.attempt(operator.board.pause)).props("outline no-caps")
-        ui.button(words.RESUME, on_click=lambda: page.attempt(operator.board.resume)).props("outline no-caps")
+        clear.on_click(lambda: page.do(words.CLEAR, lambda: operator.board.clear(), Needs.COMMAND))
+        page.control(clear, Needs.COMMAND)
+        for text, call in (
+            (words.PAUSE, lambda: operator.board.pause()),
+            (words.RESUME, lambda: operator.board.resume()),
+        ):
+            button = ui.button(text, on_click=lambda call=call: page.at_once(call)).props("outline no-caps")
+            page.control(button, Needs.BOARD)
     ui.label(words.SPEED_OF_MOTION).classes("text-caption")
     speed = ui.slider(min=1, max=100, value=100).props("label").classes("armtempo-slider")
-    speed.on("change", lambda event: page.attempt(lambda: operator.board.speed(float(event.args) / 100)))
+    speed.on("change", lambda event: page.at_once(lambda: operator.board.speed(float(event.args) / 100)))
+    page.control(speed, Needs.BOARD)
 
 
 def _outputs(page: PanelPage) -> None:
@@ -117,11 +121,11 @@ def _outputs(page: PanelPage) -> None:
                     "outline no-caps"
                 )
                 button.on_click(
-                    lambda name=output.name, state=state: page.attempt(
+                    lambda name=output.name, state=state: page.at_once(
                         lambda: operator.board.output(name).set(state)
                     )
                 )
-                page.control(button, moves=False)
+                page.control(button, Needs.BOARD)
     if operator.arm.inputs:
         ui.label(words.INPUTS).classes("text-subtitle2")
         lamps = {one.name: ui.badge(one.name, color="grey") for one in operator.arm.inputs}

@@ -4,7 +4,9 @@ window.armtempo = {
   parts: null,
   from: null,
   to: null,
-  ghost: null,
+  ghost: null, // where the plan is played
+  target: null, // where the arm goes
+  changes: 0,
   since: 0,
   heard: performance.now(),
   held: null,
@@ -30,8 +32,11 @@ window.armtempo = {
   hear(message) {
     this.heard = performance.now();
     document.body.classList.remove("lost");
-    this.from = this.now();
-    this.to = message.links;
+    this.target = message.ghost;
+    if (JSON.stringify(message.links) !== JSON.stringify(this.to)) {
+      this.from = this.now();
+      this.to = message.links;
+    }
     this.since = performance.now();
     for (const [id, text] of Object.entries(message.texts || {})) {
       const element = document.getElementById(id);
@@ -42,7 +47,8 @@ window.armtempo = {
   now() {
     if (!this.to) return null;
     if (!this.from) return this.to;
-    const part = Math.min(1, (performance.now() - this.since) / this.SMOOTH_MS);
+    const part = (performance.now() - this.since) / this.SMOOTH_MS;
+    if (part >= 1) return this.to;
     return this.to.map((pose, i) => pose.map((value, k) => {
       const before = this.from[i];
       const sign = k > 2 && [3, 4, 5, 6].reduce((sum, n) => sum + before[n] * pose[n], 0) < 0 ? -1 : 1;
@@ -53,11 +59,27 @@ window.armtempo = {
   draw() {
     const scene = this.parts && getElement(this.parts.scene);
     if (scene && scene.objects) {
-      if (scene.renderer) scene.renderer.setClearColor(0x000000, 0); // as the page, light or dark
+      this.begin_scene(scene);
       this.place(scene, this.parts.links, this.now());
-      this.place(scene, this.parts.ghost, this.ghost);
+      this.place(scene, this.parts.ghost, this.ghost || this.target);
     }
     requestAnimationFrame(() => this.draw());
+  },
+
+  // The scene draws 20 times a second; what has not changed is drawn once a second, which spares a tablet's battery.
+  begin_scene(scene) {
+    if (scene.renderer === this.renderer || !scene.renderer) return;
+    const renderer = (this.renderer = scene.renderer);
+    const render = renderer.render.bind(renderer);
+    let shown = "", drawn = 0;
+    renderer.setClearColor(0x000000, 0); // as the page, light or dark
+    renderer.render = (what, camera) => {
+      const size = renderer.domElement.width + "x" + renderer.domElement.height;
+      const state = [size, scene.objects.size, this.changes, ...camera.matrix.elements].join();
+      if (state === shown && performance.now() - drawn < 1000) return;
+      [shown, drawn] = [state, performance.now()];
+      render(what, camera);
+    };
   },
 
   place(scene, ids, poses) {
@@ -65,7 +87,9 @@ window.armtempo = {
       const found = scene.objects.get(id);
       if (!found || !found.mesh) return;
       found.mesh.visible = Boolean(poses);
-      if (!poses) return;
+      if (!poses || poses[i] === found.placed) return;
+      found.placed = poses[i];
+      this.changes += 1;
       found.mesh.position.set(...poses[i].slice(0, 3));
       found.mesh.quaternion.set(...poses[i].slice(3)).normalize();
     });

@@ -11,10 +11,11 @@ from nicegui import ui
 from nicegui.element import Element
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.errors import ArmtempoError
+from armtempo.basics.errors import ArmtempoError, InputError
+from armtempo.panel import words
 from armtempo.panel.arm_scene import ArmScene, ArmShape
 from armtempo.panel.held_jog import ButtonHold, JogButton
-from armtempo.panel.operator import Operator
+from armtempo.panel.operator import Needs, Operator
 
 LOOK_S = 0.25
 """Interval at which a page looks at what has changed, but for what moves."""
@@ -28,22 +29,22 @@ class PanelPage:
     hold: ButtonHold
     shape: ArmShape
     client: str
-    controls: list[tuple[Element, bool]] = field(default_factory=list)
-    """What can be pressed, and whether that moves the arm."""
+    controls: list[tuple[Element, Needs]] = field(default_factory=list)
+    """What can be pressed, and what that needs."""
     listeners: list[Callable[[], None]] = field(default_factory=list)
     """Called every LOOK_S: each tab looks at what has changed."""
     buttons: list[JogButton] = field(default_factory=list)
     jog_percent: float = 25.0
     scene: ArmScene = field(init=False)
-    _reasons: tuple[str, str] = ("-", "-")
-    """Why what moves the arm cannot be used, and what does not; at first nothing can."""
+    _reasons: dict[Needs, str] = field(default_factory=dict)
+    """Why what needs this cannot be used."""
 
-    def control(self, element: Element, moves: bool = True) -> Any:
+    def control(self, element: Element, needs: Needs = Needs.MOVE) -> Any:
         """An element that is greyed, with the reason as its hint, while it cannot be used."""
         with element:
             ui.tooltip("")
-        self.controls.append((element, moves))
-        self._grey(element, self._reasons[not moves])
+        self.controls.append((element, needs))
+        self._grey(element, self.operator.why_not(self.client, needs))
         return element
 
     def _grey(self, element: Element, reason: str) -> None:
@@ -53,9 +54,9 @@ class PanelPage:
                 hint.set_text(reason)
                 hint.set_visibility(bool(reason))
 
-    def do(self, what: str, call: Callable[[], object], moves: bool = True) -> None:
+    def do(self, what: str, call: Callable[[], object], needs: Needs = Needs.MOVE) -> None:
         """Let the operator begin a command; what is refused is said."""
-        self.attempt(lambda: self.operator.do(what, self.client, call, moves))
+        self.attempt(lambda: self.operator.do(what, self.client, call, needs))
 
     def attempt(self, call: Callable[[], object]) -> None:
         """Do something at once; an error is said in the words of the library."""
@@ -63,6 +64,16 @@ class PanelPage:
             call()
         except ArmtempoError as error:
             ui.notify(str(error), type="negative", multi_line=True, timeout=8000)
+
+    def at_once(self, call: Callable[[], object], needs: Needs = Needs.BOARD) -> None:
+        """Do what is quick and needs no turn, also while something is under way."""
+
+        def checked() -> None:
+            if reason := self.operator.why_not(self.client, needs):
+                raise InputError(reason, words.WAIT)
+            call()
+
+        self.attempt(checked)
 
     def show_ghost(self, angles_deg: Array) -> None:
         """Show where the arm would be at these angles, (J,), besides where it is; on this page only."""
@@ -72,11 +83,11 @@ class PanelPage:
     def refresh(self) -> None:
         """Grey what cannot be used now, with the reason."""
         operator = self.operator
-        reasons = operator.why_not(self.client), operator.why_not(self.client, moves=False)
+        self.controls = [(element, needs) for element, needs in self.controls if not element.is_deleted]
+        reasons = {needs: operator.why_not(self.client, needs) for _, needs in self.controls}
         if reasons != self._reasons:
             self._reasons = reasons
-            self.controls = [(element, moves) for element, moves in self.controls if not element.is_deleted]
-            for element, moves in self.controls:
-                self._grey(element, reasons[not moves])
+            for element, needs in self.controls:
+                self._grey(element, reasons[needs])
         for listener in self.listeners:
             listener()

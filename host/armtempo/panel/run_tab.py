@@ -45,7 +45,7 @@ class RunTab:
             ui.notify(words.NO_PLAN)
             return
         operator = self._operator
-        self._page.do(words.TO_START, lambda: operator.board.goto(plan, progress=operator.part))
+        self._page.do(words.TO_START, lambda: operator.go(plan))
 
     def _run(self) -> None:
         plan = self._operator.desk.plan

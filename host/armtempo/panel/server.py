@@ -65,6 +65,7 @@ class Panel:
         """A page was closed, or its connection broke: what it holds is released."""
         self._hold.release(client)
         self._operator.release(client)
+        self._operator.monitors.discard(client)
 
     async def _tell(self) -> None:
         asyncio.create_task(self._tell_all())  # noqa: RUF006  it lives as long as the server
