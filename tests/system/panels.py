@@ -31,21 +31,22 @@ SMALL = {"width": 640, "height": 900}
 
 
 @contextmanager
-def chromium() -> Iterator[Any]:
-    """A browser."""
+def playwright() -> Iterator[Any]:
+    """Playwright, which a process can have once."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as play:
-        made = play.chromium.launch(executable_path=browser.BROWSER, args=OPTIONS)
-        yield made
-        made.close()
+        yield play
+
+
+def chromium(play: Any) -> Any:
+    """A browser, that ends with Playwright."""
+    return play.chromium.launch(executable_path=browser.BROWSER, args=OPTIONS)
 
 
 @contextmanager
-def chromium_to_kill(folder: Path) -> Iterator[tuple[Any, subprocess.Popen[bytes]]]:
+def chromium_to_kill(play: Any, folder: Path) -> Iterator[tuple[Any, subprocess.Popen[bytes]]]:
     """A browser with its process, for a context of its own."""
-    from playwright.sync_api import sync_playwright
-
     assert browser.BROWSER
     told = folder / "DevToolsActivePort"
     process = subprocess.Popen(
@@ -61,11 +62,7 @@ def chromium_to_kill(folder: Path) -> Iterator[tuple[Any, subprocess.Popen[bytes
     )
     try:
         commandline.wait_for(lambda: told.is_file() and "\n" in told.read_text(), "the browser's port")
-        with sync_playwright() as play:
-            yield (
-                play.chromium.connect_over_cdp(f"http://127.0.0.1:{told.read_text().split()[0]}"),
-                process,
-            )
+        yield play.chromium.connect_over_cdp(f"http://127.0.0.1:{told.read_text().split()[0]}"), process
     finally:
         process.kill()
         process.wait()
@@ -116,6 +113,7 @@ class Panels:
     def __call__(self) -> Panel:
         """One that runs."""
         if self._last is None or not self._last.running:
+            self.close()
             options = ("--arm", "paper", "--job", "job.toml", "--web-port", "0", "--no-show")
             process = commandline.start("panel", *options, "--port", self._port, folder=self._folder)
             assert process.stdout

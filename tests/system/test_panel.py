@@ -16,11 +16,19 @@ pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("panel")]
 
 
 @pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    """A browser."""
+def play() -> Iterator[Any]:
+    """Playwright."""
     browser.needed()
-    with panels.chromium() as made:
+    with panels.playwright() as made:
         yield made
+
+
+@pytest.fixture(scope="module")
+def chromium(play: Any) -> Iterator[Any]:
+    """A browser."""
+    made = panels.chromium(play)
+    yield made
+    made.close()
 
 
 @pytest.fixture(scope="module")
@@ -75,11 +83,13 @@ def test_the_whole_way(window: Any, panel: Panel) -> None:
 
 
 @pytest.mark.parametrize("how", ["button", "tab", "browser", "cable", "server"])
-def test_a_held_jog_ends_with_what_holds_it(window: Any, running: Panels, tmp_path: Path, how: str) -> None:
+def test_a_held_jog_ends_with_what_holds_it(
+    play: Any, window: Any, running: Panels, tmp_path: Path, how: str
+) -> None:
     """The arm rests before the end of its range, where it would else have gone."""
     panel = running()
     if how == "browser":
-        with panels.chromium_to_kill(tmp_path) as (made, process):
+        with panels.chromium_to_kill(play, tmp_path) as (made, process):
             page = opened(made.new_context(viewport=panels.SMALL), panel.address)
             home(page)
             hold(page)
@@ -109,11 +119,31 @@ def test_a_held_jog_ends_with_what_holds_it(window: Any, running: Panels, tmp_pa
     assert panel.running == (how != "server")
 
 
+def test_a_sequence_is_edited_saved_and_run(window: Any, panel: Panel) -> None:
+    file = panel.folder / "day.toml"
+    file.write_text('name = "day"  # my name\n[[step]]\ngoto = "home"\n[[step]]\nwait_s = 9  # it settles\n')
+    page = opened(window, panel.address)
+    home(page)
+    page.get_by_role("tab", name="Sequence").click()
+    page.get_by_role("combobox", name="Sequence").click()
+    page.get_by_role("option", name="day.toml").click()
+    page.get_by_label("step 2: wait_s").fill("600")
+    page.get_by_label("step 2: wait_s").press("Tab")
+    page.get_by_role("button", name="Save the sequence").click()
+    page.wait_for_selector("text=Saved")
+    assert "wait_s = 600  # it settles" in file.read_text()
+    page.get_by_role("button", name="Run", exact=True).click()
+    page.wait_for_selector(".armtempo-lit:has-text('2')")
+    page.keyboard.press("Escape")
+    page.wait_for_selector("text=cycle 0: stopped")
+    assert page.locator(".armtempo-lit").count() == 0
+
+
 def test_it_fits_desktop_tablet_and_phone(window: Any, panel: Panel) -> None:
     page = opened(window, panel.address)
     for width, height in ((1280, 800), (820, 1180), (390, 844)):
         page.set_viewport_size({"width": width, "height": height})
-        for tab in ("Move", "Plan", "Run", "Board"):
+        for tab in ("Move", "Plan", "Run", "Sequence", "Board"):
             page.get_by_role("tab", name=tab).click()
             page.wait_for_selector(f".q-tab--active:has-text('{tab}')")
             over = page.evaluate(

@@ -69,7 +69,7 @@ class BoardTab:
             )
         self._traffic = _Lines(lambda: (operator.traffic, operator.messages))
         self._traffic.log.set_visibility(False)
-        page.listeners.append(self._look)
+        page.on_look(self._look)
 
     def _look(self) -> None:
         state = self._operator.state

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from nicegui import ui
 
 from armtempo.basics.arrays import Array
@@ -19,35 +20,38 @@ class CurveChart:
     def __init__(self, arm: Arm, title: str, order: int) -> None:
         self._arm, self._order = arm, order
         options = {
-            "title": {"text": title, "textStyle": {"fontSize": 13}},
+            "title": {"text": title, "left": 0, "textStyle": {"fontSize": 13}},
             "animation": False,
             "grid": {"left": 55, "right": 15, "top": 35, "bottom": 25},
             "legend": {"top": 2, "right": 5},
             "tooltip": {"trigger": "axis"},
-            "xAxis": {"type": "value", "max": "dataMax"},
+            "xAxis": {"type": "value", "max": "dataMax", "axisLabel": {"showMaxLabel": False}},
             "yAxis": {"type": "value", "scale": True},
             "series": [],
         }
         self.chart = ui.echart(options).classes("armtempo-chart")
 
-    def show(self, times_s: Array, values: Array) -> None:
-        """A curve for each joint: times (N,), values (N, J)."""
-        self.chart.options["series"] = [
-            {
-                "name": joint.name,
-                "type": "line",
-                "showSymbol": False,
-                "color": COLOURS[number % len(COLOURS)],
-                "lineStyle": {"type": DASHES[number // len(COLOURS)]},
-                "data": [
-                    [round(float(t), 4), round(float(v), 4)]
-                    for t, v in zip(times_s, values[:, number], strict=True)
-                ],
-                **self._limit(number),
-            }
-            for number, joint in enumerate(self._arm.driven)
-        ]
+    def show(self, times_s: Array, values: Array, reference: Array | None = None) -> None:
+        """A curve for each joint: times (N,), values (N, J); ``reference``, (N, J), is dotted."""
+        joints = range(values.shape[1])
+        series = [self._curve(number, times_s, values[:, number]) for number in joints]
+        if reference is not None:
+            series += [self._curve(number, times_s, reference[:, number], of_plan=True) for number in joints]
+        self.chart.options["series"] = series
         self.chart.update()
+
+    def _curve(self, number: int, times_s: Array, values: Array, of_plan: bool = False) -> dict[str, object]:
+        points = np.column_stack((times_s, values)).round(4).tolist()
+        curve: dict[str, object] = {
+            "name": self._arm.driven[number].name,  # one entry of the legend for both
+            "type": "line",
+            "showSymbol": False,
+            "color": COLOURS[number % len(COLOURS)],
+            "data": points,
+        }
+        if of_plan:
+            return {**curve, "lineStyle": {"type": "dotted", "width": 4, "opacity": 0.5}}
+        return {**curve, "lineStyle": {"type": DASHES[number // len(COLOURS)]}, **self._limit(number)}
 
     def _limit(self, number: int) -> dict[str, object]:
         """Lines at a joint's limit, both ways."""

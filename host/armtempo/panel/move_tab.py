@@ -135,4 +135,4 @@ def _outputs(page: PanelPage) -> None:
                 active = operator.inputs.get(name)
                 lamp.props(f"color={'green' if active else 'grey'}")
 
-        page.listeners.append(look)
+        page.on_look(look)

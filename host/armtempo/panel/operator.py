@@ -16,10 +16,13 @@ import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError, InputError, LinkError, PortInUseError
+from armtempo.kinematics.chain import chains_mm
 from armtempo.link.board_messages import Event, Sample, SequenceState
 from armtempo.link.traffic import Chunk, Sink
+from armtempo.model.plan import Plan
 from armtempo.panel import words
 from armtempo.panel.desk import Desk
+from armtempo.panel.sequence_desk import SequenceDesk
 from armtempo.robot.board import Board
 from armtempo.robot.board_state import BoardState
 from armtempo.robot.sharing import sample_json
@@ -30,6 +33,8 @@ LOOK_S = 0.25
 """Interval of the board's states while no samples come."""
 FREEZE_AFTER_S = 5.0
 """A second press of stop within this time freezes the outputs instead of braking."""
+_MOST_POINTS = 300
+"""Of the path of a run that is shown."""
 _LOG = logging.getLogger("armtempo")
 
 
@@ -51,6 +56,7 @@ class LiveCurves:
     """What the samples of the motion that runs, or ran last, say: a row for each sample."""
 
     time_s: list[float] = field(default_factory=list)
+    path_s: list[float] = field(default_factory=list)
     commanded_deg: list[list[float]] = field(default_factory=list)
     angle_deg: list[list[float | None]] = field(default_factory=list)
     run: int = -1
@@ -59,9 +65,38 @@ class LiveCurves:
         """Add a sample, as ``sharing.sample_json`` gives it; a new run begins anew."""
         if sample["run"] != self.run:
             self.__init__(run=sample["run"])  # type: ignore[misc]
-        self.time_s.append(sample["time_s"])  # type: ignore[arg-type]
-        self.commanded_deg.append(sample["commanded_deg"])  # type: ignore[arg-type]
-        self.angle_deg.append(sample["angle_deg"])  # type: ignore[arg-type]
+        for name in (
+            "path_s",
+            "commanded_deg",
+            "angle_deg",
+            "time_s",
+        ):  # the times last: all rows are there then
+            getattr(self, name).append(sample[name])
+
+    def thinned(self, most: int) -> LiveArrays:
+        """At most so many samples, evenly chosen."""
+        count = len(self.time_s)
+        chosen = slice(0, count, max(1, -(-count // most)))
+        commanded = np.array(self.commanded_deg[chosen])
+        measured = np.array(self.angle_deg[chosen], dtype=float)
+        return LiveArrays(
+            np.array(self.time_s[chosen]),
+            np.array(self.path_s[chosen]),
+            commanded,
+            np.where(np.isnan(measured), commanded, measured),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class LiveArrays:
+    """The same as arrays."""
+
+    time_s: Array
+    path_s: Array
+    """The motion's own time, (N,)."""
+    commanded_deg: Array
+    angle_deg: Array
+    """By the encoders, (N, J); as commanded for a joint without one."""
 
 
 class Operator:
@@ -83,8 +118,15 @@ class Operator:
         self.angles_deg: Array = np.array(self.arm.home_deg)
         """Where the joints were commanded to be, by the last message, (J,)."""
         self.curves = LiveCurves()
+        self.plan_run: Plan | None = None
+        """The plan that runs, or ran last."""
+        self.run_path_mm: Array = np.empty((0, 3))
+        """Of the tool, by ``curves``; another object whenever it has changed."""
+        self.ended = 0
+        """How many commands have ended."""
         self.inputs: dict[str, bool] = {}
         """Whether each input of the arm is active."""
+        self.sequences = SequenceDesk(desk.arm, desk.folder)
         self.sequence: SequenceState | None = None
         """Where the sequence that was started last is."""
         self.target_deg: Array | None = None
@@ -219,6 +261,13 @@ class Operator:
             self.say(f"{what}: {type(error).__name__}: {error}")
         finally:
             self.busy = ""
+            self.ended += 1
+
+    def run(self, plan: Plan, times: int) -> None:
+        """Load a plan, run it and write the report."""
+        self.board.upload(plan, replace=True)
+        self.plan_run = plan
+        self.board.run(plan, times, self.runs, self.part).report()
 
     def part(self, done: float, whole: float) -> None:
         """The progress of what is under way."""
@@ -259,7 +308,10 @@ class Operator:
             self.traffic.extend(f"{chunk.time_s:9.3f} {chunk.direction} {frame}" for frame in frames)
 
     def _look(self) -> None:
+        seen = (-1, 0)
         while not self._closed.wait(LOOK_S):
+            if seen != (seen := (self.curves.run, len(self.curves.time_s))) and seen[1] > 1:
+                self.run_path_mm = chains_mm(self.arm, self.curves.thinned(_MOST_POINTS).angle_deg)[:, -1]
             board = self._board
             if board is None:
                 continue

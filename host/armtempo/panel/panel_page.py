@@ -22,6 +22,27 @@ LOOK_S = 0.25
 
 
 @dataclass
+class _Control:
+    """Something that can be pressed, and what that needs."""
+
+    element: Element
+    needs: Needs
+    reason: str = "-"
+    """Why it cannot be pressed."""
+
+    def grey(self, reason: str) -> None:
+        """Grey it, with the reason as its hint, unless that is \"\"."""
+        if reason == self.reason:
+            return
+        self.reason = reason
+        self.element.set_enabled(not reason)  # type: ignore[attr-defined]
+        for hint in self.element.default_slot.children:
+            if isinstance(hint, ui.tooltip):
+                hint.set_text(reason)
+                hint.set_visibility(bool(reason))
+
+
+@dataclass
 class PanelPage:
     """One browser's page: what its tabs share."""
 
@@ -29,30 +50,28 @@ class PanelPage:
     hold: ButtonHold
     shape: ArmShape
     client: str
-    controls: list[tuple[Element, Needs]] = field(default_factory=list)
-    """What can be pressed, and what that needs."""
-    listeners: list[Callable[[], None]] = field(default_factory=list)
-    """Called every LOOK_S: each tab looks at what has changed."""
+    controls: list[_Control] = field(default_factory=list)
+    """What can be pressed."""
+    shown: str = ""
+    """The tab that is shown."""
+    listeners: list[tuple[str, Callable[[], None]]] = field(default_factory=list)
+    """Called every LOOK_S while their tab is shown; those of no tab always."""
     buttons: list[JogButton] = field(default_factory=list)
     jog_percent: float = 25.0
     scene: ArmScene = field(init=False)
-    _reasons: dict[Needs, str] = field(default_factory=dict)
-    """Why what needs this cannot be used."""
 
     def control(self, element: Element, needs: Needs = Needs.MOVE) -> Any:
         """An element that is greyed, with the reason as its hint, while it cannot be used."""
         with element:
             ui.tooltip("")
-        self.controls.append((element, needs))
-        self._grey(element, self.operator.why_not(self.client, needs))
+        control = _Control(element, needs)
+        control.grey(self.operator.why_not(self.client, needs))
+        self.controls.append(control)
         return element
 
-    def _grey(self, element: Element, reason: str) -> None:
-        element.set_enabled(not reason)  # type: ignore[attr-defined]
-        for hint in element.default_slot.children:
-            if isinstance(hint, ui.tooltip):
-                hint.set_text(reason)
-                hint.set_visibility(bool(reason))
+    def on_look(self, listener: Callable[[], None]) -> None:
+        """Let what is built now, in the tab that is shown, look at what has changed."""
+        self.listeners.append((self.shown, listener))
 
     def do(self, what: str, call: Callable[[], object], needs: Needs = Needs.MOVE) -> None:
         """Let the operator begin a command; what is refused is said."""
@@ -82,12 +101,13 @@ class PanelPage:
 
     def refresh(self) -> None:
         """Grey what cannot be used now, with the reason."""
-        operator = self.operator
-        self.controls = [(element, needs) for element, needs in self.controls if not element.is_deleted]
-        reasons = {needs: operator.why_not(self.client, needs) for _, needs in self.controls}
-        if reasons != self._reasons:
-            self._reasons = reasons
-            for element, needs in self.controls:
-                self._grey(element, reasons[needs])
-        for listener in self.listeners:
-            listener()
+        self.controls = [control for control in self.controls if not control.element.is_deleted]
+        reasons = {
+            needs: self.operator.why_not(self.client, needs)
+            for needs in {control.needs for control in self.controls}
+        }
+        for control in self.controls:
+            control.grey(reasons[control.needs])
+        for tab, listener in self.listeners:
+            if tab in ("", self.shown):
+                listener()

@@ -21,6 +21,8 @@ from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.held_jog import ButtonHold
 from armtempo.panel.operator import Operator
 
+_RECONNECT_S = 3.0
+"""A page whose connection breaks keeps control if it is back within this time; what it holds is released at once."""
 _SUFFIXES = (".html", ".svg", ".png", ".csv", ".json")
 
 
@@ -39,7 +41,7 @@ class Panel:
             self._api,
             title=words.TITLE,
             dark=None,
-            reconnect_timeout=2.0,
+            reconnect_timeout=_RECONNECT_S,
             tailwind=False,
             gzip_middleware_factory=lambda inner: GZipMiddleware(inner, compresslevel=1),
         )
@@ -59,11 +61,11 @@ class Panel:
         if not self._operator.holder:
             self._operator.take_control(client.id)
         layout.build(self._operator, self._hold, self._shape)
-        client.on_disconnect(lambda: self._gone(client.id))
+        client.on_disconnect(lambda: self._hold.release(client.id))
+        client.on_delete(lambda: self._gone(client.id))
 
     def _gone(self, client: str) -> None:
-        """A page was closed, or its connection broke: what it holds is released."""
-        self._hold.release(client)
+        """A page was closed, or its connection did not come back: another one may take control."""
         self._operator.release(client)
         self._operator.monitors.discard(client)
 
