@@ -11,6 +11,7 @@ from armtempo.model.arm import Arm
 COLOURS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377")
 """Paul Tol's bright scheme."""
 DASHES = ("solid", "dashed", "dotted")
+_GRID = {"lineStyle": {"color": "rgba(128, 128, 128, 0.3)"}}
 ORDER_LIMIT = {1: "speed_deg_s", 2: "acceleration_deg_s2", 3: "jerk_deg_s3"}
 
 
@@ -25,11 +26,16 @@ class CurveChart:
             "grid": {"left": 55, "right": 15, "top": 35, "bottom": 25},
             "legend": {"top": 2, "right": 5},
             "tooltip": {"trigger": "axis"},
-            "xAxis": {"type": "value", "max": "dataMax", "axisLabel": {"showMaxLabel": False}},
-            "yAxis": {"type": "value", "scale": True},
+            "xAxis": {
+                "type": "value",
+                "max": "dataMax",
+                "axisLabel": {"showMaxLabel": False},
+                "splitLine": _GRID,
+            },
+            "yAxis": {"type": "value", "scale": True, "splitLine": _GRID},
             "series": [],
         }
-        self.chart = ui.echart(options).classes("armtempo-chart")
+        self.chart = ui.echart(options, renderer="svg").classes("armtempo-chart")
 
     def show(self, times_s: Array, values: Array, reference: Array | None = None) -> None:
         """A curve for each joint: times (N,), values (N, J); ``reference``, (N, J), is dotted."""

@@ -80,6 +80,8 @@ window.armtempo = {
     const render = renderer.render.bind(renderer);
     let shown = "", drawn = 0;
     renderer.setClearColor(0x000000, 0); // as the page, light or dark
+    const ground = scene.scene.children.find((child) => child.object_id === "ground");
+    if (ground) scene.scene.remove(ground);
     renderer.render = (what, camera) => {
       const tool = this.follow && this.now()?.at(-1);
       if (tool) scene.controls.target.set(...tool.slice(0, 3));

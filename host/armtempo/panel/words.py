@@ -12,7 +12,7 @@ MOVING = "The arm is moving."
 NO_BOARD, NO_BOARD_HINT = "The board is not connected.", "wait until it is"
 WAIT = "try again when that is over"
 DONE = "{what}: done"
-STOPPED = "{what}: stopped {why}"
+STOPPED = "{what}: stopped: {why}"
 BRAKING = "Stop: the arm brakes along its path."
 FREEZING = "Stop pressed twice: the outputs are frozen."
 
