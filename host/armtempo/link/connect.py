@@ -82,6 +82,7 @@ def open_board(
             return transport
 
         board = _greeted(stack, open_transport())
+        board.session.open_transport = open_transport
         if not any_program:
             _check_program(board)
         if not names.is_sim(port):  # a virtual board does not come back

@@ -49,6 +49,8 @@ from armtempo.robot.start_position import StartPosition
 from armtempo.robot.stop_request import StopRequest, stoppable
 from armtempo.robot.where import Where, posture_deg
 from armtempo.runs.sequence_reader import SequenceRun
+from armtempo.selftest import selftest
+from armtempo.selftest.result import SelfTest
 
 
 @checked
@@ -444,6 +446,14 @@ class Board:
     def resume(self) -> None:
         """Go on along the path at the speed before the pause; BoardError where nothing moves."""
         change_speed(self.client, RESUME)
+
+    def selftest(self, progress: Progress | None = None) -> SelfTest:
+        """The board measures itself with its drivers off; ``progress`` tells how far it is.
+
+        The board is reset at the end, so its positions are unknown. Raises LinkError where the drivers are on,
+        something moves, or the program is not a part of the board's firmware; nothing was done then.
+        """
+        return selftest.run(self.client, progress)
 
     def clear(self) -> None:
         """Clear a fault; BoardError while its cause is still there."""

@@ -7,12 +7,14 @@ on the way, each a little late, as on the chip.
 
 import sys
 
-from chip import backup_sram, dma, gpio, memory, timer_registers, timers
+from chip import backup_sram, cycle_counter, dma, gpio, memory, timer_registers, timers
 
 TICKS_PER_MS = 84_000
 TICKS_PER_US = 84
 CALL_TICKS = 84
 """A simulated function or register access: 1 us, about 130 instructions of the interpreter."""
+FLASH_ACR = 0x705
+"""What the firmware sets: 5 wait states, prefetch and both caches on (RM0090 3.9.1)."""
 _MOST_UNSPENT_TICKS = 40 * CALL_TICKS
 INTERRUPT_TICKS = 160
 """From an event to the first line of its callback: 1.9 us (an empty callback's instructions)."""
@@ -39,6 +41,7 @@ class Chip:
         self.dma = dma.Controller()
         self.pins = gpio.Pins()
         self.backup = backup_sram.BackupSram()
+        self.cycles = cycle_counter.CycleCounter(self)
         self.timers = {}
         for number, bits, rate in ((2, 32, 1), (5, 32, 1), (1, 16, 2), (8, 16, 2), (3, 16, 1), (4, 16, 1),
                                    (6, 16, 1), (7, 16, 1), (9, 16, 2), (10, 16, 2), (11, 16, 2),
@@ -67,6 +70,7 @@ class Chip:
         self.millisecond = None
         self.next_ms = TICKS_PER_MS
         memory.poke(memory.index("IWDG") + 2, 0xFFF)
+        memory.poke(memory.index("FLASH"), FLASH_ACR)
         for port, register, value in gpio.AT_RESET:
             memory.poke(memory.index(port) + register, value)
         self.sync(True)
@@ -86,6 +90,8 @@ class Chip:
         self._sync_pins(names)
         if "PWR" in names:
             self.backup.sync()
+        if "DWT" in names or "SCS" in names:
+            self.cycles.sync()
         if "DMA1" in names or "RCC" in names:
             rcc = memory.words[memory.index("RCC") + 12]
             self.dma.sync((rcc >> 21) & 1)
