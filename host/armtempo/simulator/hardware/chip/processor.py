@@ -1,7 +1,7 @@
 """The board: virtual time, interrupts, and what happens in between.
 
 Time is counted in ticks of 84 MHz since power-up and passes only in calls of simulated functions: each costs
-what its like costs on the chip, roughly. ``run_until`` brings the models to a time; interrupts are served
+what its like costs on the chip, roughly. ``run_until`` advances the models to a time; interrupts are served
 on the way, each a little late, as on the chip.
 """
 
@@ -40,7 +40,7 @@ _RCC_TIMERS = {
 class Chip:
     """Everything between the program and what is connected to the pins.
 
-    ``observers`` are told of timers that start or stop and of inputs that change; ``follow()`` is called after
+    ``observers`` are notified of timers that start or stop and of inputs that change; ``follow()`` is called after
     each stretch of time.
     """
 
@@ -207,7 +207,7 @@ class Chip:
             self.follow()
 
     def moving(self, horizon_ticks):
-        """Whether a timer will do something within so many ticks."""
+        """Whether a timer will do something within that many ticks."""
         limit = self.now + horizon_ticks
         return any([timer.next_match() < limit for timer in self.counting])
 
