@@ -76,12 +76,12 @@ def ahead_bytes(joints: int) -> int:
 
 
 def blocks(memory_words: int) -> "list[int]":
-    """The blocks, in words, of a memory of so many words."""
+    """The blocks, in words, of a memory of that many words."""
     return [min(_BLOCK_WORDS, memory_words - begin) for begin in range(0, memory_words, _BLOCK_WORDS)]
 
 
 def lasting_ms(rates: "list[int]", memory_words: int) -> int:
-    """How long the rings can last in a memory of so many words, one of LASTING_MS; 0 where the engine does not fit."""
+    """How long the rings can last in that many words, one of LASTING_MS; 0 where the engine does not fit."""
     for lasts_ms in LASTING_MS:
         if _find_place(rates, memory_words, lasts_ms):
             return lasts_ms

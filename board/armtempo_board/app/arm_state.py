@@ -117,11 +117,11 @@ class ArmState:
         )
 
     def known(self) -> int:
-        """Bit a joint: its position is known."""
+        """One bit per joint: its position is known."""
         return self.engine.known if self.engine else 0
 
     def everyone(self) -> int:
-        """Bit a joint, all set."""
+        """One bit per joint, all set."""
         return (1 << self.joints) - 1
 
     def fault(self) -> int:

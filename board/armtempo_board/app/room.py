@@ -36,9 +36,9 @@ def workspace() -> "Workspace":
 
 
 def share(workspace: "Workspace", joints: int) -> None:
-    """Make the memory for an engine of so many joints, whose objects take of the room too; nobody uses it now.
+    """Make the memory for an engine of that many joints, whose objects take of the room too; nobody uses it now.
 
-    What the heap has not in one piece any more, the engine goes without, until the program starts again.
+    What the heap no longer has in one piece, the engine goes without, until the program starts again.
     """
     words = engine_memory.room_words(joints, workspace.room)
     while workspace.memory.size != words:

@@ -287,7 +287,7 @@ class Board:
         turn: bool = False,
         speed: float = SPEED,
     ) -> HeldJog:
-        """A jog to the end of the range that goes on only while its ``hold`` is called, in a ``with`` statement.
+        """A jog to the end of the range that continues only while its ``hold`` is called, in a ``with`` statement.
 
         ``direction``: 1 or -1; ``turn``: about ``axis`` instead of along it; the rest as in ``jog``. Where the calls
         cease the board brakes; leaving the context brakes too, and waits for rest.
@@ -433,7 +433,7 @@ class Board:
     def speed(self, fraction: float) -> None:
         """Run at a fraction of the planned speed, 0.01 to 1: what this object starts from now on, and what moves.
 
-        The path stays as it is; while it moves, the speed goes over smoothly in the motion's brake time: from a
+        The path is unchanged; while it moves, the speed goes over smoothly in the motion's brake time: from a
         ``Watcher``, from another thread than the one that waits in ``run``, or for what the button started.
         Raises InputError for another fraction, BoardError where the board refuses.
         """
