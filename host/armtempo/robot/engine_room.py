@@ -56,7 +56,7 @@ IN_FIRMWARE = Room(engine_memory.LARGEST_BYTES)
 
 Measured: ``python -m tests.benchmark.room MICROPYTHON``.
 """
-_BUILD = "see 'armtempo firmware --help'"
+_BUILD = "'armtempo flash'"
 
 
 def check(arm: Arm, info: Hello) -> None:
@@ -67,7 +67,7 @@ def check(arm: Arm, info: Hello) -> None:
     raise InputError(
         f"arm {arm.name!r} needs {engine_memory.needed_bytes(rates)} bytes for its engine; the board has {room.size}",
         f"lower its top speeds (its joints step up to {', '.join(map(str, rates))} steps/s; slower ones have "
-        f"smaller rings), drive fewer joints{_or_firmware(arm, room)}",
+        f"smaller rings), drive fewer joints{_or_firmware(arm)}",
     )
 
 
@@ -80,7 +80,7 @@ def of_arm(arm: Arm, info: Hello | None = None) -> str:
         return (
             f"{needs} of {room.size}"
             if room.holds_arm(arm)
-            else f"{needs}, too much{_or_firmware(arm, room)}"
+            else f"{needs}, too much{_or_firmware(arm)}"
         )
     if AS_FILES.holds_arm(arm):
         return f"{needs}: fits with the program as files or in the firmware"
@@ -100,8 +100,8 @@ def of_board(info: Hello) -> list[str]:
     return lines
 
 
-def _or_firmware(arm: Arm, room: Room) -> str:
+def _or_firmware(arm: Arm) -> str:
     """The firmware as a way out, where it is one."""
-    if room.size >= IN_FIRMWARE.size or not IN_FIRMWARE.holds_arm(arm):
+    if not IN_FIRMWARE.holds_arm(arm):
         return ""
     return f", or put the program into the board's firmware, where this arm fits ({_BUILD})"
