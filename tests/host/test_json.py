@@ -166,6 +166,6 @@ def test_the_program_on_a_board(project: Path, monkeypatch: pytest.MonkeyPatch) 
 
 @pytest.mark.slow
 def test_firmware(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("armtempo.deploy.firmware.flash.flash", lambda *_: None)
+    monkeypatch.setattr("armtempo.deploy.firmware.write.flash", lambda *_: None)
     assert said("flash", "--image", "folder", "--port", "x") == {"image": "folder", "port": "x"}
     assert Path(said("firmware", "--program", "program")["manifest"]).exists()
