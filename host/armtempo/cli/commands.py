@@ -181,6 +181,12 @@ GROUPS: dict[str, dict[str, Entry]] = {
             "flash",
             "flash --image armtempo-firmware-STM32F4DISC.zip --port /dev/ttyACM0",
         ),
+        "selftest": Entry(
+            "selftest:selftest",
+            "Let the board measure itself: clocks, flash, memory, link.",
+            "selftest --port /dev/ttyACM0",
+            "selftest --json > selftest.json",
+        ),
         "configure": Entry(
             "deploy:configure",
             "Set the board up for an arm, also in the place of another one.",

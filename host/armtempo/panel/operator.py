@@ -93,7 +93,7 @@ class Operator:
     # who is in control
 
     def take_control(self, client: str) -> None:
-        """Give ``client`` control; a motion of the one before goes on, a jog that it holds ends."""
+        """Give ``client`` control; a motion of the one before continues, a jog that it holds ends."""
         self.holder = client
 
     def release(self, client: str) -> None:
@@ -122,7 +122,7 @@ class Operator:
     def do(self, what: str, client: str, call: Callable[[], object], moves: bool = True) -> None:
         """Begin ``call`` in a thread of its own; InputError, with the reason, if it cannot be now.
 
-        What it raises goes to the log and to whoever watches.
+        What it raises goes to the log and to all watching clients.
         """
         with self._lock:
             if reason := self.why_not(client, moves):
@@ -138,7 +138,7 @@ class Operator:
             self.say(words.STOPPED.format(what=what, why=stopped))
         except ArmtempoError as error:
             self.say(f"{what}: {error}")
-        except Exception as error:  # a fault of ours: said, and the panel goes on
+        except Exception as error:  # a fault of ours: said, and the panel continues
             _LOG.exception("panel: %s", what)
             self.say(f"{what}: {type(error).__name__}: {error}")
         finally:
@@ -149,7 +149,7 @@ class Operator:
         self.progress = done / whole if whole else 0.0
 
     def stop(self, by: str = words.PANEL) -> None:
-        """Brake along the path; a second time within FREEZE_AFTER_S: freeze. Whoever asks, in control or not."""
+        """Brake along the path; a second time within FREEZE_AFTER_S: freeze. Any client may, in control or not."""
         now_s = time.monotonic()
         freeze = now_s - self._stopped_s < FREEZE_AFTER_S
         self._stopped_s = now_s
