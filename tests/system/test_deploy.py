@@ -7,11 +7,12 @@ import sys
 from pathlib import Path
 
 import pytest
-from armtempo.basics.errors import LinkError, MissingPackageError
+from armtempo.basics.errors import BoardError, LinkError, MissingPackageError
 from armtempo.deploy import deploy, package, remote
 from armtempo.deploy.firmware import frozen
 from armtempo.link import open_board
 from armtempo.simulator import LaunchOptions, VirtualBoard, edgelog, launch
+from armtempo_shared.messages import START_HELD
 
 from tests import interpreters
 from tests.system import commandline
@@ -74,7 +75,7 @@ def test_from_an_empty_board_and_back(tmp_path: Path, name: str) -> None:
         assert "up to date" in again
         assert "memory for an arm:" in again
         assert "bytes for 3 joints of" in again
-        damaged = next((flash / "lib" / "armtempo_board").rglob("program.*py"))
+        damaged = next((flash / "lib").rglob("program.*py" if name == "cpython" else "armtempo.z"))
         damaged.write_bytes(b"")
         assert "1 files of the library written" in armtempo("deploy", "--port", port, cwd=tmp_path)
         armtempo("home", "--arm", "paper", "--port", port, cwd=tmp_path)
@@ -85,8 +86,52 @@ def test_from_an_empty_board_and_back(tmp_path: Path, name: str) -> None:
         assert "armtempo deploy" in armtempo("status", "--port", port, cwd=tmp_path, code=1)
     assert (flash / "main.py").read_text() == "print('somebody else')\n"
     assert not (flash / "boot.py").exists()
-    assert not (flash / "lib" / "armtempo_board").exists(), "its packages are gone too"
+    assert not (flash / "lib").exists(), "its packages are gone too"
     assert (flash / "armtempo" / "small.atm").exists()
+
+
+@pytest.mark.slow
+def test_on_a_stock_flash_as_it_comes(tmp_path: Path) -> None:
+    """All that fits, refusals by name, a power cycle, and at the end the flash as it was."""
+    flash = tmp_path / "flash"
+    with board(INTERPRETERS[-1], flash) as found:
+        before = {path.name: path.read_bytes() for path in flash.iterdir()}
+        assert {"boot.py", "main.py", "README.txt", "pybcdc.inf"} == set(before)
+        armtempo("deploy", "--mpy", "--port", found.port, cwd=tmp_path)
+        file = small_plan(tmp_path / "small.json")
+        armtempo("home", "--arm", "paper", "--port", found.port, cwd=tmp_path)
+        armtempo("upload", file, "--default", "--port", found.port, cwd=tmp_path)
+        with open_board(found.port) as link:
+            assert not link.info.features
+            for command, values in (("speed", (500,)), ("hold", ()), ("output", (0, 1)), ("inputs", ())):
+                with pytest.raises(BoardError, match="armtempo flash"):
+                    link.session.command(command, values)
+            with pytest.raises(BoardError, match="armtempo flash"):
+                link.session.command("start", (START_HELD, 0), "small")
+            data = (flash / "armtempo" / "small.atm").read_bytes()
+            stored = 0
+            with pytest.raises(BoardError, match="room"):
+                for stored in range(100):
+                    link.upload(f"more{stored}", data)
+            assert stored > 3
+            with pytest.raises(BoardError, match="room"):
+                link.upload("small", data)
+            assert link.fetch("small") == data
+            for number in range(stored):
+                link.remove(f"more{number}")
+        for feature, command in (
+            ("another speed", ("run", file, "--speed", "50")),
+            ("moving by hand", ("jog", "1", "5", "--arm", "paper")),
+        ):
+            refused = armtempo(*command, "--port", found.port, cwd=tmp_path, code=1)
+            assert feature in refused
+            assert "armtempo flash" in refused
+    with board(INTERPRETERS[-1], flash) as found:
+        armtempo("home", "--arm", "paper", "--port", found.port, cwd=tmp_path)
+        assert "complete" in armtempo("run", file, "--port", found.port, cwd=tmp_path)
+        armtempo("undeploy", "--port", found.port, cwd=tmp_path)
+    shutil.rmtree(flash / "armtempo")
+    assert {path.name: path.read_bytes() for path in flash.iterdir()} == before
 
 
 @pytest.mark.parametrize("cut", [30, 110])
