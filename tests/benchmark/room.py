@@ -24,6 +24,7 @@ from armtempo.deploy import program_files
 from armtempo.deploy.firmware import frozen
 from armtempo.deploy.package import STM32F4
 from armtempo_shared import armrecord, engine_memory, wire
+from armtempo_shared.limits import MAX_MOTION_BYTES
 
 from tests.benchmark import firmware
 from tests.board import motions
@@ -33,6 +34,7 @@ ARMS = tuple((joints, rate) for joints in (1, 3, 6) for rate in (5_000, 25_000, 
 ARMS += ((1, 240_000), (2, 120_000), (3, 60_000), (6, 40_000))
 LIMIT_S = 300.0
 _STAGE = 0x8000
+_BLOCK = 512
 _MOST_ARMS = 10  # whose frames the emulated flash has room for; more come from sending them again
 _PIECE = 200
 OWN = 2_400
@@ -205,6 +207,17 @@ def table(elf: Path, with_library: bool) -> None:
             print(f"    {cells}; {outcome.refusals}", flush=True)
 
 
+def blocks(with_library: bool) -> None:
+    """Print the blocks of the flash that are in use beside MicroPython's own after each stage."""
+    files = {**program_files.start_files(), **(program_files.library(STM32F4) if with_library else {})}
+    folders = 1 + with_library
+    sizes = {"deployed": [len(data) for data in files.values()], "the largest motion": [MAX_MOTION_BYTES]}
+    sizes["an arm"] = [len(arm_record([25_000] * 3))]
+    found = {stage: sum(-(-size // _BLOCK) for size in each) for stage, each in sizes.items()}
+    found["deployed"] += folders
+    print("blocks of the flash: " + ", ".join(f"{stage} {count}" for stage, count in found.items()))
+
+
 def changes(elf: Path, with_library: bool, count: int, seed: int = 12) -> None:
     """Print what is left after so many random arms."""
     rng = random.Random(seed)
@@ -237,6 +250,7 @@ def main(micropython: Path, count: int) -> None:
             elf = build(micropython, folder, manifest)
             print(f"{title}: in use / largest free block, bytes")
             table(elf, manifest is None)
+            blocks(manifest is None)
             if count > 1:
                 changes(elf, manifest is None, count)
 

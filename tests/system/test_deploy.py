@@ -10,7 +10,7 @@ import pytest
 from armtempo.basics.errors import BoardError, LinkError, MissingPackageError
 from armtempo.deploy import deploy, package, remote
 from armtempo.deploy.firmware import frozen
-from armtempo.link import open_board
+from armtempo.link import Client, open_board
 from armtempo.simulator import LaunchOptions, VirtualBoard, edgelog, launch
 from armtempo_shared.messages import START_HELD
 
@@ -90,6 +90,17 @@ def test_from_an_empty_board_and_back(tmp_path: Path, name: str) -> None:
     assert (flash / "armtempo" / "small.atm").exists()
 
 
+def fill(link: Client, data: bytes) -> list[str]:
+    """Store a motion under one name after the other, until the board refuses; the names."""
+    for number in range(100):
+        try:
+            link.upload(f"more{number}", data)
+        except BoardError as full:
+            assert "the flash has no room" in str(full)
+            return [f"more{before}" for before in range(number)]
+    raise AssertionError("the flash never was full")
+
+
 @pytest.mark.slow
 def test_on_a_stock_flash_as_it_comes(tmp_path: Path) -> None:
     """All that fits, refusals by name, a power cycle, and at the end the flash as it was."""
@@ -109,15 +120,13 @@ def test_on_a_stock_flash_as_it_comes(tmp_path: Path) -> None:
             with pytest.raises(BoardError, match="armtempo flash"):
                 link.session.command("start", (START_HELD, 0), "small")
             data = (flash / "armtempo" / "small.atm").read_bytes()
-            stored = link.info.free_flash // 512 // (-(-len(data) // 512)) - 1
-            assert stored > 3
-            for number in range(stored):
-                link.upload(f"more{number}", data)
+            more = fill(link, data)
+            assert len(more) > 3
             with pytest.raises(BoardError, match="room"):
                 link.upload("small", data)
             assert link.fetch("small") == data
-            for number in range(stored):
-                link.remove(f"more{number}")
+            for name in more:
+                link.remove(name)
         slow = armtempo("run", file, "--speed", "50", "--port", found.port, cwd=tmp_path, code=1)
         assert "another speed" in slow
         assert "armtempo flash" in slow

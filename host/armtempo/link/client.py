@@ -257,6 +257,8 @@ class Client:
 
     def speed(self, rate: int) -> None:
         """Let what moves go on at ``rate`` thousandths of its planned speed; 0: pause, RESUME: as before it."""
+        if rate == PERMILLE and not self.info.can("speed"):
+            return
         self.need("speed", "another speed than planned")
         self.session.command("speed", (rate,))
 

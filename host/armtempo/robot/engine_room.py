@@ -77,11 +77,7 @@ def of_arm(arm: Arm, info: Hello | None = None) -> str:
     needs = f"memory on the board: {engine_memory.needed_bytes(rates)} bytes for {len(rates)} joints"
     if info is not None:
         room = Room.of_board(info)
-        return (
-            f"{needs} of {room.size}"
-            if room.holds_arm(arm)
-            else f"{needs}, too much{_or_firmware(arm)}"
-        )
+        return f"{needs} of {room.size}" if room.holds_arm(arm) else f"{needs}, too much{_or_firmware(arm)}"
     if AS_FILES.holds_arm(arm):
         return f"{needs}: fits with the program as files or in the firmware"
     if IN_FIRMWARE.holds_arm(arm):
