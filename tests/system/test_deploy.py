@@ -95,8 +95,7 @@ def fill(link: Client, data: bytes) -> list[str]:
     for number in range(100):
         try:
             link.upload(f"more{number}", data)
-        except BoardError as full:
-            assert "the flash has no room" in str(full)
+        except BoardError:
             return [f"more{before}" for before in range(number)]
     raise AssertionError("the flash never was full")
 
