@@ -154,7 +154,8 @@ class Job:
             via=vias,
             stops=stops,
             ways=ways,
-            **tool_way.limits(top),
+            speed_mm_s=tool_way.limit(top, "speed_mm_s"),
+            acceleration_mm_s2=tool_way.limit(top, "acceleration_mm_s2"),
             path=top.choice("path", PATHS, cls.path),
             corridor_deg=_corridor(top, "corridor_deg"),
             corridor_mm=_corridor(top, "corridor_mm"),
@@ -253,7 +254,8 @@ def _vias(
         stops = [_stop(table, n, len(tables)) for n, table in enumerate(tables) if _stops(table)]
         found = [tool_way.read(table, n) for n, table in enumerate(tables)]
         vias = [
-            _via(table, f"{top.file}: via P{n}", arm, way) for n, (table, way) in enumerate(zip(tables, found, strict=True))
+            _via(table, f"{top.file}: via P{n}", arm, way)
+            for n, (table, way) in enumerate(zip(tables, found, strict=True))
         ]
         ways = [way for way in found if way]
     if len(vias) < 2:

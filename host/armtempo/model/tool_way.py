@@ -45,15 +45,21 @@ class ToolWay:
         if self.via < 1:
             raise InputError(f"{where}: nothing leads there", "give line at a later via point")
         if self.arc_through_mm is not None and (not self.line or len(self.arc_through_mm) != 3):
-            raise InputError(f"{where}: an arc goes through a point x, y, z", "give 3 numbers, and line = true")
+            raise InputError(
+                f"{where}: an arc goes through a point x, y, z", "give 3 numbers, and line = true"
+            )
         if self.blend_mm and not self.line:
             raise InputError(f"{where}: blend_mm cuts the corner at the end of a line", "add line = true")
         for key, (least, most) in (("tolerance_mm", TOLERANCE_MM), ("tolerance_deg", TOLERANCE_DEG)):
             if not least <= getattr(self, key) <= most:
-                raise InputError(f"{where}: {key} {getattr(self, key):g} is not allowed", f"give {least:g} to {most:g}")
+                raise InputError(
+                    f"{where}: {key} {getattr(self, key):g} is not allowed", f"give {least:g} to {most:g}"
+                )
         for key in ("blend_mm", "speed_mm_s", "acceleration_mm_s2"):
             value = getattr(self, key)
-            if value and not LEAST <= value <= MOST or value == 0.0 and key != "blend_mm":
+            if value is None or (key == "blend_mm" and value == 0.0):
+                continue
+            if not LEAST <= value <= MOST:
                 raise InputError(f"{where}: {key} {value:g} is not allowed", f"give {LEAST:g} to {MOST:g}")
 
 
@@ -71,19 +77,25 @@ def read(table: Table, via: int) -> ToolWay | None:
         raise table.fail("line", "true with arc_through_mm")
     if table.has("blend_mm") and not line:
         raise table.fail("blend_mm", "given with line = true only")
-    tolerances = {}
-    if line:
-        for key, (least, most) in (("tolerance_mm", TOLERANCE_MM), ("tolerance_deg", TOLERANCE_DEG)):
-            if table.has(key):
-                tolerances[key] = table.number(key, least=least, most=most)
-    blend = table.number("blend_mm", least=LEAST, most=MOST) if table.has("blend_mm") else 0.0
-    return ToolWay(via, line, arc, blend_mm=blend, **tolerances, **limits(table))
+    return ToolWay(
+        via,
+        line,
+        arc,
+        _tolerance(table, "tolerance_mm", TOLERANCE_MM, LINE_TOLERANCE_MM) if line else LINE_TOLERANCE_MM,
+        _tolerance(table, "tolerance_deg", TOLERANCE_DEG, LINE_TOLERANCE_DEG) if line else LINE_TOLERANCE_DEG,
+        table.number("blend_mm", least=LEAST, most=MOST) if table.has("blend_mm") else 0.0,
+        limit(table, "speed_mm_s"),
+        limit(table, "acceleration_mm_s2"),
+    )
 
 
-def limits(table: Table) -> dict[str, float | None]:
-    """The tool's limits in a table, by their names."""
-    keys = ("speed_mm_s", "acceleration_mm_s2")
-    return {key: table.number(key, least=LEAST, most=MOST) if table.has(key) else None for key in keys}
+def _tolerance(table: Table, key: str, allowed: tuple[float, float], default: float) -> float:
+    return table.number(key, default, least=allowed[0], most=allowed[1])
+
+
+def limit(table: Table, key: str) -> float | None:
+    """A limit of the tool, None where it is not given."""
+    return table.number(key, least=LEAST, most=MOST) if table.has(key) else None
 
 
 def at(ways: Sequence[ToolWay], via: int) -> ToolWay | None:

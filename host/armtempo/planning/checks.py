@@ -113,12 +113,14 @@ def _check_ways(job: Job, where: str) -> None:
         )
     if job.timing != "shared" or job.degree != 5:
         raise InputError(
-            f"{where}: lines and speeds of the tool need timing = \"shared\" and degree 5",
+            f'{where}: lines and speeds of the tool need timing = "shared" and degree 5',
             "leave timing and degree out",
         )
     vias = [way.via for way in job.ways]
     if vias != sorted(set(vias)) or (vias and vias[-1] >= len(job.via)):
-        raise InputError(f"{where}: its ways lead to via points {vias}", "give each via point one way, in order")
+        raise InputError(
+            f"{where}: its ways lead to via points {vias}", "give each via point one way, in order"
+        )
     led = {way.via for way in job.ways if way.line}
     for way in job.ways:
         if way.blend_mm and way.via + 1 not in led:
@@ -133,7 +135,9 @@ def _check_ways(job: Job, where: str) -> None:
                 "leave dwell_s out, or wait in a sequence",
             )
         if any(way.blend_mm and way.via == stop.via for way in job.ways):
-            raise InputError(f"{where}: the motion cannot rest at P{stop.via} and cut its corner", "leave one out")
+            raise InputError(
+                f"{where}: the motion cannot rest at P{stop.via} and cut its corner", "leave one out"
+            )
 
 
 def is_free(job: Job) -> bool:

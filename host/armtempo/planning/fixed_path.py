@@ -50,8 +50,8 @@ class Optimum:
 class Along:
     """What has limits along a path besides its joints: the way of the tool, and parts of it.
 
-    ``pieces``: power coefficients on each segment of the time axis, (V, m, degree + 1), of which only derivatives count;
-    ``limits``: of its first three derivatives by time, (V, 3).
+    ``pieces``: power coefficients on each segment of the time axis, (V, m, degree + 1), of which only derivatives
+    count; ``limits``: of its first three derivatives by time, (V, 3).
     """
 
     pieces: Array

@@ -65,7 +65,7 @@ def proven(
 
 
 def _at_ends(angles_deg: Array, ways: Array, tool: Tool, path: ToolPath, fixed: tuple[str, ...]) -> Array:
-    """Larger deviation at both ends of pieces: position in mm, and norm of what the orientation's axes differ: (N, 2)."""
+    """Larger deviation at both ends of pieces, (N, 2): position in mm, and the chord of the turn."""
     found = []
     for end in (0, -1):
         state = tool.at(angles_deg[:, end])
@@ -74,7 +74,7 @@ def _at_ends(angles_deg: Array, ways: Array, tool: Tool, path: ToolPath, fixed: 
         axes = slice(2, 3) if fixed == (APPROACH,) else slice(0, 3)
         turned = (state.rotation - rotation)[:, :, axes]
         found.append(np.stack([away, _per_axis(fixed) * np.linalg.norm(turned, axis=(1, 2))], axis=1))
-    return np.maximum(*found)
+    return np.asarray(np.maximum(found[0], found[1]))
 
 
 def _per_axis(fixed: tuple[str, ...]) -> float:

@@ -21,7 +21,7 @@ from armtempo.model.tool_pose import APPROACH, WHOLE
 from armtempo.planning.line.tool_path import ToolPath, rotation_vectors
 from armtempo.planning.tool import Tool
 
-STEPS = 64
+STEPS = 32
 """Places at which a way is looked at, at least."""
 _MOST_STEP_DEG = 4.0
 """No joint turns farther from one posture to the next."""
@@ -35,7 +35,7 @@ _DROPPED = 1e-9
 _SINGULAR = 0.02
 """Least singular value of the Jacobian, lengths as parts of the reach: below, a posture is called singular."""
 _STRAIGHT = 0.05
-"""Sine of the elbow's or wrist's angle, or reach of the wrist over that of the arm, from which it counts as singular."""
+"""rad; where a joint's turn by so much changes the branch, that part of the arm is straight."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,9 @@ class Followed:
         """The postures at any ways (N,) within it, exactly on it: (N, J)."""
         near = np.stack([np.interp(ways, self.ways, column) for column in self.angles_deg.T], axis=1)
         if _is_loose(self.course, self.tool):
-            from scipy.interpolate import CubicSpline  # here, because loading it takes longer than most commands
+            from scipy.interpolate import (
+                CubicSpline,
+            )  # here, because loading it takes longer than most commands
 
             near = CubicSpline(self.ways, self.angles_deg)(ways)
         angles, missed = _corrected(self.course, self.tool, ways, near)
@@ -125,7 +127,7 @@ def _corrected(course: Course, tool: Tool, ways: Array, near_deg: Array) -> tupl
     for _ in range(_NEWTON_STEPS):
         gap, slope = _gap(course, tool, position, rotation, angles)
         missed = np.abs(gap).max(axis=1)
-        if not np.all(np.isfinite(gap)) or missed.max() <= 1e-3 * _ON_IT:
+        if not np.all(np.isfinite(gap)) or missed.max() <= 1e-2 * _ON_IT:
             break
         step = np.linalg.pinv(slope, rcond=_DROPPED) @ gap[:, :, None]
         angles = angles + np.clip(step[:, :, 0], -10.0 * _MOST_STEP_DEG, 10.0 * _MOST_STEP_DEG)
@@ -156,7 +158,7 @@ def _rank(fixed: tuple[str, ...]) -> int:
 
 def _is_loose(course: Course, tool: Tool) -> bool:
     """Whether the arm can take many postures at a place."""
-    return tool.turns.shape[1] > _rank(course.fixed)
+    return bool(tool.turns.shape[1] > _rank(course.fixed))
 
 
 def singular_value(course: Course, tool: Tool, ways: Array, angles_deg: Array) -> Array:
@@ -196,6 +198,33 @@ def _stuck(course: Course, tool: Tool, way: float, angles_deg: Array) -> PlanErr
             "move the line away from it, turn the tool otherwise, or leave line out between these via points",
         )
     return PlanError(f"{place}: the arm reaches no further", "move the line nearer to the arm")
+
+
+def passed(found: Followed) -> list[str]:
+    """Where the arm changes its branch on the way, or comes near to a singular posture, in words."""
+    course, words = found.course, []
+    geometry = Geometry.of(course.arm)
+    if not refusals(geometry):
+        postures = np.radians(all_angles_deg(course.arm, found.angles_deg))
+        before = branch_of(geometry, postures[0])
+        for way, posture in zip(found.ways[1:], postures[1:], strict=True):
+            here = branch_of(geometry, posture).after(before)
+            if parts := before.differs(here):
+                words.append(
+                    f"{course.place(float(way))}: the arm changes its branch ({', '.join(parts)}), from {before} to "
+                    f"{here}, through a singular posture"
+                )
+            before = here
+    if not _is_loose(course, found.tool):
+        values = singular_value(course, found.tool, found.ways, found.angles_deg)
+        least = int(np.argmin(values))
+        if values[least] < _SINGULAR and not words:
+            posture = found.angles_deg[least]
+            words.append(
+                f"{course.place(float(found.ways[least]))}: the arm comes near to a singular posture"
+                f"{_which(course.arm, posture)}, so its joints turn far there"
+            )
+    return words
 
 
 def _which(arm: Arm, angles_deg: Array) -> str:

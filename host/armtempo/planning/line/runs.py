@@ -90,8 +90,8 @@ def course(arm: Arm, job: Job, run: Run, first_deg: Array) -> Course:
     here = pose_at(tool, first_deg)
     pieces: list[Piece] = []
     for way in run.ways:
-        via = job.via[way.via]
-        end = np.array(via.matrix) if isinstance(via, Pose) else pose_at(tool, np.array(via))
+        target = job.via[way.via]
+        end = np.array(target.matrix) if isinstance(target, Pose) else pose_at(tool, np.array(target))
         pieces.append(_piece(way, here, end, fixed))
         last = pieces[-1]
         length = np.array([last.length])

@@ -119,7 +119,7 @@ def _corner(part: Array) -> Array:
     """0 up to -1, its argument from 1 on, between with a second derivative 15/16 (1 - x^2)^2: twice smooth."""
     x = np.clip(part, -1.0, 1.0)
     inner = (5.0 + 16.0 * x + 15.0 * x**2 - 5.0 * x**4 + x**6) / 32.0
-    return np.where(part > 1.0, part, inner)
+    return np.asarray(np.where(part > 1.0, part, inner))
 
 
 def line(start: Array, end: Array, turn: Array, where: str) -> Piece:
@@ -130,7 +130,9 @@ def line(start: Array, end: Array, turn: Array, where: str) -> Piece:
         return Piece(start, length, way / length, np.zeros(3), turn / length)
     turned_deg = float(np.degrees(np.linalg.norm(turn)))
     if turned_deg <= _STILL_DEG:
-        raise PlanError(f"{where}: the tool is there already", "leave line out, or move one of the via points")
+        raise PlanError(
+            f"{where}: the tool is there already", "leave line out, or move one of the via points"
+        )
     return Piece(start, turned_deg, np.zeros(3), np.zeros(3), turn / turned_deg)
 
 
@@ -157,7 +159,7 @@ def arc(start: Array, through: Sequence[float], end: Array, turn: Array, where: 
 
 def turn_between(start: Array, end: Array, where: str) -> Array:
     """Rotation vector of the base that turns one orientation (3, 3) into another, (3,) in rad."""
-    vector = rotation_vectors((end @ start.T)[None])[0]
+    vector = np.asarray(rotation_vectors((end @ start.T)[None])[0])
     _check_turn(vector, where)
     return vector
 
