@@ -13,6 +13,7 @@ from armtempo.cli.progress import ProgressBar
 
 @click.command(context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
 @click.argument("where", nargs=-1, required=True, shell_complete=options.files)
+@click.option("--line", is_flag=True, help="The tool goes in a straight line and turns evenly.")
 @options.job
 @options.arm_of_board
 @options.replace_arm
@@ -22,6 +23,7 @@ from armtempo.cli.progress import ProgressBar
 @options.as_json
 def command(
     where: tuple[str, ...],
+    line: bool,
     job_path: Path | None,
     arm_path: Path | None,
     replace_arm: bool,
@@ -33,8 +35,8 @@ def command(
     """Move straight to a posture.
 
     WHERE: 'home' or another posture of the arm file, angles such as '0,-60,40', a via point of the job such as P0,
-    or a trajectory file or a planned sequence for its start. All joints move together, within their limits. The arm
-    must be homed. Ctrl-C brakes, and so does 'armtempo stop' in another terminal.
+    or a trajectory file or a planned sequence for its start. All joints move together, within their limits; with
+    --line so that the tool goes in a straight line. The arm must be homed. Ctrl-C brakes, and so does 'armtempo stop' in another terminal.
     """
     from armtempo.robot.stop_request import Stopped
 
@@ -50,7 +52,7 @@ def command(
         board.configure(arm, replace=replace_arm)
         try:
             with ProgressBar("moving") as progress:
-                board.goto(target_deg, progress)
+                board.goto(target_deg, progress, line=line)
         except Stopped:
             posture.say_where_it_is(board, as_json)
             raise
