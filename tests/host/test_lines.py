@@ -19,6 +19,7 @@ from armtempo.planning.line import deviation, line_path, tool_path
 from armtempo.planning.line.deviation import Deviation
 from armtempo.planning.line.follow import Course, follow, passed
 from armtempo.planning.line.tool_path import ToolPath
+from armtempo.robot import goto
 from armtempo.splines import bspline
 
 from tests.benchmark.lines import line_faults, random_lines, tool_poses
@@ -192,6 +193,19 @@ def test_jobs_that_do_not_fit_are_refused(change: dict[str, object], message: st
     with pytest.raises(InputError) as raised:
         planner.plan(ARM, replace(JOB, **change))  # type: ignore[arg-type]
     assert message in f"{raised.value.problem} {raised.value.hint}"
+
+
+def test_goto_in_a_line_is_as_slow_as_asked() -> None:
+    end = tuple(np.array(START) + np.array([2.0, 2.0, -2.0, 0.0, 1.0, 0.0]))
+    whole, half = (
+        goto.motion(ARM, np.array(START), np.array(end), goto.Pace(speed, True)) for speed in (1.0, 0.5)
+    )
+    assert half.duration_s == pytest.approx(2.0 * whole.duration_s)
+    assert half(half.duration_s) == pytest.approx(np.array(end), abs=1e-6)
+    times = np.linspace(0.0, half.duration_s, 301)
+    way = tool_poses(ARM, half(times))[:, :3, 3]
+    along = (way[-1] - way[0]) / np.linalg.norm(way[-1] - way[0])
+    assert np.abs(np.cross(way - way[0], along)).max() < 0.5
 
 
 FILE = """

@@ -36,7 +36,8 @@ def command(
 
     WHERE: 'home' or another posture of the arm file, angles such as '0,-60,40', a via point of the job such as P0,
     or a trajectory file or a planned sequence for its start. All joints move together, within their limits; with
-    --line so that the tool goes in a straight line. The arm must be homed. Ctrl-C brakes, and so does 'armtempo stop' in another terminal.
+    --line so that the tool goes in a straight line. The arm must be homed. Ctrl-C brakes, and so does 'armtempo
+    stop' in another terminal.
     """
     from armtempo.robot.stop_request import Stopped
 

@@ -138,16 +138,19 @@ class _Compiler:
             return [], here
         key = ("line", here.angles_deg, target.angles_deg if target else pose, step.speed_mm_s)
         if key not in self._known:
-            end = target.angles_deg if target else pose
-            assert end is not None
+            to = target.angles_deg if target else pose
+            assert to is not None
             try:
-                found = line_move.straight_line(self.arm, here.angles_deg, end, step.speed_mm_s, self.progress)
+                found = line_move.straight_line(self.arm, here.angles_deg, to, step.speed_mm_s, self.progress)
             except ArmtempoError as error:
                 raise type(error)(f"{step.where}goto: {error.problem}", error.hint) from error
             self._known[key] = self._add(found)
-        leg = self.legs[self._known[key]]
-        name = target.name if target else posture.name if isinstance(posture, ArmPosture) else ""
-        return [_move(self._known[key], step.step, f"line to {name}")], _End(_angles(leg(leg.duration_s)), name)
+        if target:
+            end = _End(target.angles_deg, target.name)
+        else:
+            leg = self.legs[self._known[key]]
+            end = _End(_angles(leg(leg.duration_s)), posture.name if isinstance(posture, ArmPosture) else "")
+        return [_move(self._known[key], step.step, f"line to {end.name}")], end
 
     def _run(self, step: kinds.RunMotion, here: _End) -> tuple[list[SequenceRow], _End]:
         motion = self._motion(step.motion)

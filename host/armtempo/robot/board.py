@@ -246,9 +246,9 @@ class Board:
     ) -> None:
         """Move straight to a posture, all joints together within their limits; ``progress`` counts seconds.
 
-        ``where``: also the file of a plan, for where it begins. ``speed``: part of the quickest, 0.01 to 1. ``line``: the
-        tool goes in a straight line. Raises LinkError where the position is unknown, InputError for a posture that does
-        not fit the arm, PlanError where the arm cannot follow the line.
+        ``where``: also the file of a plan, for where it begins. ``speed``: part of the quickest, 0.01 to 1.
+        ``line``: the tool goes in a straight line. Raises LinkError where the position is unknown, InputError for a
+        posture that does not fit the arm, PlanError where the arm cannot follow the line.
         """
         permille(speed)  # InputError for one that is none
         arm = self._known_arm()

@@ -47,11 +47,12 @@ def go_to(
     """
     if not arm_state.is_at(client, arm, target_deg):
         here = arm_state.posture_deg(client, arm)
-        trajectory = _motion(arm, here, target_deg, pace or Pace())
+        trajectory = motion(arm, here, target_deg, pace or Pace())
         move_once(client, encoded_motion.of_trajectory(trajectory, arm), stop, progress)
 
 
-def _motion(arm: Arm, here_deg: Array, target_deg: Array, pace: Pace) -> Trajectory:
+def motion(arm: Arm, here_deg: Array, target_deg: Array, pace: Pace) -> Trajectory:
+    """The motion from one posture (J,) to another; errors as in ``go_to``."""
     name = TEMPORARY + "goto"
     if not pace.line:
         return point_to_point.straight(name, here_deg, target_deg, arm, pace.speed)
