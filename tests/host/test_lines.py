@@ -16,7 +16,7 @@ from armtempo.model.tool_way import ToolWay
 from armtempo.planning import planner
 from armtempo.planning.free.angle_bounds import of_path
 from armtempo.planning.line import deviation, line_path, tool_path
-from armtempo.planning.line.deviation import Deviation
+from armtempo.planning.line.deviation import LineDeviation
 from armtempo.planning.line.follow import Course, follow, passed
 from armtempo.planning.line.tool_path import ToolPath
 from armtempo.robot import goto
@@ -85,7 +85,7 @@ def test_the_bound_holds_and_is_sharp() -> None:
     """Random splines beside a line: no sample of them is beyond the bound, and it is near to the largest."""
     seed = 31
     rng = np.random.default_rng(seed)
-    led = line_path.led_runs(ARM, replace(JOB, via=JOB.via[:2], ways=JOB.ways[:1]), _via(JOB)[:2])[0]
+    led = line_path.led_stretches(ARM, replace(JOB, via=JOB.via[:2], ways=JOB.ways[:1]), _via(JOB)[:2])[0]
     course, tool = led.followed.course, led.followed.tool
     for size in (0.03, 1.0, 5.0):
         angles = bspline.fit(led.followed.at(led.ways(8)), 5)
@@ -97,7 +97,7 @@ def test_the_bound_holds_and_is_sharp() -> None:
             tool,
             course.path,
             course.fixed,
-            Deviation(0.5, 0.5),
+            LineDeviation(0.5, 0.5),
         )
         u = np.linspace(0.0, 1.0, 201)
         powers = u[:, None] ** np.arange(6)
@@ -198,7 +198,7 @@ def test_jobs_that_do_not_fit_are_refused(change: dict[str, object], message: st
 def test_goto_in_a_line_is_as_slow_as_asked() -> None:
     end = tuple(np.array(START) + np.array([2.0, 2.0, -2.0, 0.0, 1.0, 0.0]))
     whole, half = (
-        goto.motion(ARM, np.array(START), np.array(end), goto.Pace(speed, True)) for speed in (1.0, 0.5)
+        goto.motion(ARM, np.array(START), np.array(end), goto.MovePace(speed, True)) for speed in (1.0, 0.5)
     )
     assert half.duration_s == pytest.approx(2.0 * whole.duration_s)
     assert half(half.duration_s) == pytest.approx(np.array(end), abs=1e-6)

@@ -255,7 +255,7 @@ class Board:
         target_deg = posture_deg(where, arm)
         with self._stoppable(stop) as wanted:
             self._start.home_virtual_arm(arm)
-            goto.go_to(self.client, arm, target_deg, wanted, progress, goto.Pace(speed, line))
+            goto.go_to(self.client, arm, target_deg, wanted, progress, goto.MovePace(speed, line))
 
     def jog(
         self,

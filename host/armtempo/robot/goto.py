@@ -23,7 +23,7 @@ from armtempo.splines.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
-class Pace:
+class MovePace:
     """How to go to a posture."""
 
     speed: float = 1.0
@@ -38,7 +38,7 @@ def go_to(
     target_deg: Array,
     stop: StopRequest,
     progress: Progress | None = None,
-    pace: Pace | None = None,
+    pace: MovePace | None = None,
 ) -> None:
     """Move straight to a posture (J,); nothing happens if it is there.
 
@@ -47,11 +47,11 @@ def go_to(
     """
     if not arm_state.is_at(client, arm, target_deg):
         here = arm_state.posture_deg(client, arm)
-        trajectory = motion(arm, here, target_deg, pace or Pace())
+        trajectory = motion(arm, here, target_deg, pace or MovePace())
         move_once(client, encoded_motion.of_trajectory(trajectory, arm), stop, progress)
 
 
-def motion(arm: Arm, here_deg: Array, target_deg: Array, pace: Pace) -> Trajectory:
+def motion(arm: Arm, here_deg: Array, target_deg: Array, pace: MovePace) -> Trajectory:
     """The motion from one posture (J,) to another; errors as in ``go_to``."""
     name = TEMPORARY + "goto"
     if not pace.line:

@@ -23,7 +23,7 @@ _SHARP = 0.02
 _MOST_PIECES = 20_000
 
 
-class Deviation(NamedTuple):
+class LineDeviation(NamedTuple):
     """No place of the way is left by more."""
 
     position_mm: float
@@ -38,8 +38,8 @@ class _Bends(NamedTuple):
 
 
 def proven(
-    angles_deg: Array, ways: Array, tool: Tool, path: ToolPath, fixed: tuple[str, ...], enough: Deviation
-) -> Deviation:
+    angles_deg: Array, ways: Array, tool: Tool, path: ToolPath, fixed: tuple[str, ...], enough: LineDeviation
+) -> LineDeviation:
     """Bounds on the deviation of a spline from its way.
 
     ``angles_deg``: Bernstein coefficients (S, 6, J), ``ways``: (S, 6). Found to 2 %, or to that part of ``enough``.
@@ -60,7 +60,7 @@ def proven(
             found = np.maximum(best * (1.0 + _SHARP) + floor, most.max(axis=0) if open_.any() else 0.0)
             beyond_deg = float(np.degrees(bounds.turn)) * outside
             turned_deg = _degrees(float(found[1])) + beyond_deg
-            return Deviation(float(found[0]) + bounds.slope * outside, turned_deg if fixed else 0.0)
+            return LineDeviation(float(found[0]) + bounds.slope * outside, turned_deg if fixed else 0.0)
         angles_deg, ways = halved(angles_deg[open_]), halved(ways[open_, :, None])[:, :, 0]
 
 

@@ -1,6 +1,6 @@
 """The joints' spline of a job that leads the tool, of as many segments as prove that the tool stays near its way.
 
-Each run from rest to rest is a spline of its own: at a rest between two, five control points are the same.
+Each stretch from rest to rest is a spline of its own: at a rest between two, five control points are the same.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import checks
 from armtempo.planning.free.angle_bounds import of_path
-from armtempo.planning.line import runs as cut
-from armtempo.planning.line.deviation import Deviation, proven
+from armtempo.planning.line import stretches as cut
+from armtempo.planning.line.deviation import LineDeviation, proven
 from armtempo.planning.line.follow import Followed, follow
-from armtempo.planning.line.runs import Run
+from armtempo.planning.line.stretches import Stretch
 from armtempo.splines import bspline
 
 DEGREE = 5
@@ -38,9 +38,9 @@ _TABLE = 512
 
 @dataclass(frozen=True, eq=False)
 class Led:
-    """A run with the postures along its way."""
+    """A stretch with the postures along its way."""
 
-    run: Run
+    stretch: Stretch
     followed: Followed
     places: Array
     """Where its knots are: parts of the way at equal steps of u, (_TABLE + 1,)."""
@@ -51,54 +51,54 @@ class Led:
         parts = np.interp(steps, np.linspace(0.0, 1.0, _TABLE + 1), self.places)
         return np.asarray(parts * self.followed.course.path.length)
 
-    def keeps(self, away: Deviation) -> bool:
+    def keeps(self, away: LineDeviation) -> bool:
         """Whether the tool is as near to its way as the job asks."""
-        enough = self.run.enough
+        enough = self.stretch.enough
         return away.position_mm <= enough.position_mm and away.rotation_deg <= enough.rotation_deg
 
 
 @dataclass(frozen=True, eq=False)
 class LinePath:
-    """The joints' spline of all runs."""
+    """The joints' spline of all stretches."""
 
     angle_points_deg: Array
     """(S + 5, J)."""
     way_points: Array
-    """Of the ways of all runs one after the other, as a spline with the same knots: (S + 5,)."""
+    """Of the ways of all stretches one after the other, as a spline with the same knots: (S + 5,)."""
     knots: tuple[int, ...]
-    """Segments before each run, and all."""
+    """Segments before each stretch, and all."""
     arrivals: tuple[int, ...]
     """Segments before each via point; where a corner is cut, nearly."""
 
-    def deviation(self, number: int, led: Led) -> Deviation:
-        """How far the tool leaves its way in a run at most."""
+    def deviation(self, number: int, led: Led) -> LineDeviation:
+        """How far the tool leaves its way in a stretch at most."""
         first, last = self.knots[number], self.knots[number + 1]
         angles = of_path(self.angle_points_deg, DEGREE)[first:last]
         ways = of_path(self.way_points[:, None], DEGREE)[first:last, :, 0]
         course, tool = led.followed.course, led.followed.tool
-        return proven(angles, ways - ways[0, 0], tool, course.path, course.fixed, led.run.enough)
+        return proven(angles, ways - ways[0, 0], tool, course.path, course.fixed, led.stretch.enough)
 
 
-def led_runs(arm: Arm, job: Job, via_deg: Array) -> dict[int, Led]:
-    """The runs of a job in which the tool is led, by their number; PlanError where the arm cannot follow."""
+def led_stretches(arm: Arm, job: Job, via_deg: Array) -> dict[int, Led]:
+    """The stretches of a job in which the tool is led, by their number; PlanError where the arm cannot follow."""
     speeds = np.array([limit.speed_deg_s for limit in checks.limits_of(arm)])
     found = {}
-    for number, run in enumerate(cut.of_job(job)):
-        if run.ways:
-            followed = _followed(arm, job, run, via_deg)
-            found[number] = Led(run, followed, _places(followed, speeds))
+    for number, stretch in enumerate(cut.of_job(job)):
+        if stretch.ways:
+            followed = _followed(arm, job, stretch, via_deg)
+            found[number] = Led(stretch, followed, _places(followed, speeds))
     return found
 
 
-def _followed(arm: Arm, job: Job, run: Run, via_deg: Array) -> Followed:
-    found = follow(cut.course(arm, job, run, via_deg[run.first]), via_deg[run.first])
-    off = np.abs(found.end_deg - via_deg[run.last])
+def _followed(arm: Arm, job: Job, stretch: Stretch, via_deg: Array) -> Followed:
+    found = follow(cut.course(arm, job, stretch, via_deg[stretch.first]), via_deg[stretch.first])
+    off = np.abs(found.end_deg - via_deg[stretch.last])
     worst = int(np.argmax(off))
     if off[worst] > _SAME_DEG:
         raise PlanError(
-            f"{run.name}: along the line the arm comes to P{run.last} with {arm.driven[worst].name} at "
-            f"{found.end_deg[worst]:.4g} degrees, not {via_deg[run.last, worst]:.4g}",
-            f"give P{run.last} as a pose, or the angles of the branch of P{run.first}; or leave line out",
+            f"{stretch.name}: along the line the arm comes to P{stretch.last} with {arm.driven[worst].name} at "
+            f"{found.end_deg[worst]:.4g} degrees, not {via_deg[stretch.last, worst]:.4g}",
+            f"give P{stretch.last} as a pose, or the angles of the branch of P{stretch.first}; or leave line out",
         )
     return found
 
@@ -125,15 +125,16 @@ def _places(found: Followed, speeds: Array) -> Array:
 
 def proven_path(
     arm: Arm, job: Job, via_deg: Array, led: Mapping[int, Led]
-) -> tuple[LinePath, dict[int, Deviation]]:
-    """The spline with as few segments as prove that the tool stays near its way, and how near in each run.
+) -> tuple[LinePath, dict[int, LineDeviation]]:
+    """The spline with as few segments as prove that the tool stays near its way, and how near in each stretch.
 
     Raises PlanError where the board could not hold so many.
     """
-    runs = cut.of_job(job)
+    stretches = cut.of_job(job)
     most = _most_segments(arm)
     pieces = [
-        _LINE_PIECES * len(run.ways) if run.ways else _THROUGH_PIECES * (run.last - run.first) for run in runs
+        _LINE_PIECES * len(stretch.ways) if stretch.ways else _THROUGH_PIECES * (stretch.last - stretch.first)
+        for stretch in stretches
     ]
     if sum(pieces) > most:
         raise PlanError(
@@ -142,7 +143,7 @@ def proven_path(
             "use fewer via points, or plan the stretches between rests one by one with --split",
         )
     while True:
-        path = _path(runs, pieces, via_deg, led)
+        path = _path(stretches, pieces, via_deg, led)
         found = {number: path.deviation(number, one) for number, one in led.items()}
         wide = [number for number, one in led.items() if not one.keeps(found[number])]
         if not wide:
@@ -151,9 +152,9 @@ def proven_path(
             pieces[number] *= 2
         if sum(pieces) > most:
             raise PlanError(
-                f"{led[wide[0]].run.name}: with {pieces[wide[0]] // 2} segments the tool is only proven to stay within "
-                f"{found[wide[0]].position_mm:.3g} mm and {found[wide[0]].rotation_deg:.3g} deg of its way, and the "
-                f"board holds {most} in all",
+                f"{led[wide[0]].stretch.name}: with {pieces[wide[0]] // 2} segments the tool is only proven to stay "
+                f"within {found[wide[0]].position_mm:.3g} mm and {found[wide[0]].rotation_deg:.3g} deg of its way, and "
+                f"the board holds {most} in all",
                 "widen tolerance_mm and tolerance_deg, keep away from singular postures, or plan with --split",
             )
 
@@ -166,23 +167,25 @@ def _most_segments(arm: Arm) -> int:
     return most
 
 
-def _path(runs: Sequence[Run], pieces: Sequence[int], via_deg: Array, led: Mapping[int, Led]) -> LinePath:
-    """The spline through postures of all runs, with a rest between each two."""
+def _path(
+    stretches: Sequence[Stretch], pieces: Sequence[int], via_deg: Array, led: Mapping[int, Led]
+) -> LinePath:
+    """The spline through postures of all stretches, with a rest between each two."""
     knots, arrivals = [0], [0]
     rows = []
     before = 0.0
-    for number, (run, count) in enumerate(zip(runs, pieces, strict=True)):
+    for number, (stretch, count) in enumerate(zip(stretches, pieces, strict=True)):
         if number in led:
             ways = led[number].ways(count)
             angles = led[number].followed.at(ways)
             passed = _passed(led[number], ways)
         else:
-            points = bspline.fit(via_deg[run.first : run.last + 1], DEGREE)
+            points = bspline.fit(via_deg[stretch.first : stretch.last + 1], DEGREE)
             fine = bspline.polynomials(bspline.refined(points, _THROUGH_PIECES, DEGREE), DEGREE)
             angles = np.concatenate([fine[:, 0], fine[-1:].sum(axis=1)])
             ways = np.linspace(0.0, 1.0, count + 1)
-            passed = [_THROUGH_PIECES * via for via in range(1, run.last - run.first + 1)]
-        angles[[0, -1]] = via_deg[[run.first, run.last]]
+            passed = [_THROUGH_PIECES * via for via in range(1, stretch.last - stretch.first + 1)]
+        angles[[0, -1]] = via_deg[[stretch.first, stretch.last]]
         rows.append(np.column_stack([angles, before + ways])[0 if number == 0 else 1 :])
         before += float(ways[-1])
         arrivals += [knots[-1] + knot for knot in passed]
@@ -192,7 +195,7 @@ def _path(runs: Sequence[Run], pieces: Sequence[int], via_deg: Array, led: Mappi
 
 
 def _passed(one: Led, ways: Array) -> list[int]:
-    """The knots of a run nearest to each of its via points but the first, increasing."""
+    """The knots of a stretch nearest to each of its via points but the first, increasing."""
     found: list[int] = []
     for place in one.followed.course.path.starts[1:]:
         nearest = int(np.argmin(np.abs(ways - place)))

@@ -17,9 +17,9 @@ from armtempo.model.plan import Search
 from armtempo.planning import checks, lower_bounds, time_parameterization
 from armtempo.planning.fixed_path import FixedPath
 from armtempo.planning.free.angle_bounds import of_path
-from armtempo.planning.line.deviation import Deviation
+from armtempo.planning.line.deviation import LineDeviation
 from armtempo.planning.line.follow import passed
-from armtempo.planning.line.line_path import DEGREE, Led, LinePath, led_runs, proven_path
+from armtempo.planning.line.line_path import DEGREE, Led, LinePath, led_stretches, proven_path
 from armtempo.planning.line.tool_limits import ToolLimits, along, excess, reached
 from armtempo.planning.lower_bounds import Floor
 from armtempo.planning.planned import Planned
@@ -40,7 +40,7 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
     its way.
     """
     stage("following the tool's way")
-    led = led_runs(arm, job, via_deg)
+    led = led_stretches(arm, job, via_deg)
     path, away = proven_path(arm, job, via_deg, led)
     checks.check_ranges(arm, path.angle_points_deg, DEGREE)
     notes = [_away(led[number], found) for number, found in away.items()]
@@ -48,11 +48,9 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
     return _timed(arm, job, path, notes, progress)
 
 
-def _away(led: Led, found: Deviation) -> str:
+def _away(led: Led, found: LineDeviation) -> str:
     turned = f" and {found.rotation_deg:.2g} deg" if led.followed.course.fixed else ""
-    return (
-        f"{led.run.name}: the tool leaves its way by no more than {found.position_mm:.2g} mm{turned} (proven)"
-    )
+    return f"{led.stretch.name}: the tool leaves its way by no more than {found.position_mm:.2g} mm{turned} (proven)"
 
 
 def _timed(arm: Arm, job: Job, path: LinePath, notes: list[str], progress: Progress) -> Planned:
@@ -124,14 +122,14 @@ def _levels(most: int) -> list[int]:
 
 
 def _floor(points: Array, knots: Sequence[int], limits: Sequence[Limits], about_s: float) -> Floor:
-    """No time law along the path that rests between its runs takes less."""
+    """No time law along the path that rests between its stretches takes less."""
     parts = []
     for first, last in pairwise(knots):
-        run = points[first : last + DEGREE]
-        moving = np.ptp(run, axis=0) > checks.TOLERANCE
+        stretch = points[first : last + DEGREE]
+        moving = np.ptp(stretch, axis=0) > checks.TOLERANCE
         own = [limit for limit, moves in zip(limits, moving, strict=True) if moves]
         share = about_s * (last - first) / knots[-1]
-        parts.append(lower_bounds.of_path(run[:, moving], DEGREE, own, share))
+        parts.append(lower_bounds.of_path(stretch[:, moving], DEGREE, own, share))
     return Floor(sum(part.time_s for part in parts), parts[0].kind)
 
 

@@ -23,7 +23,7 @@ _CORNER_BEND = 15.0 / 16.0
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class ToolPiece:
     """A straight line, or an arc, with the tool turning evenly about one axis of the base."""
 
     start: Array
@@ -64,7 +64,7 @@ class Bounds:
 class ToolPath:
     """Pieces one after the other; ``cuts``: the way before and after each corner that is cut there, in mm."""
 
-    pieces: tuple[Piece, ...]
+    pieces: tuple[ToolPiece, ...]
     cuts: tuple[float, ...] = ()
 
     @property
@@ -122,21 +122,21 @@ def _corner(part: Array) -> Array:
     return np.asarray(np.where(part > 1.0, part, inner))
 
 
-def line(start: Array, end: Array, turn: Array, where: str) -> Piece:
+def line(start: Array, end: Array, turn: Array, where: str) -> ToolPiece:
     """The straight line between two poses (4, 4), turning by a rotation vector, (3,) in rad."""
     way = end[:3, 3] - start[:3, 3]
     length = float(np.linalg.norm(way))
     if length > _STILL_MM:
-        return Piece(start, length, way / length, np.zeros(3), turn / length)
+        return ToolPiece(start, length, way / length, np.zeros(3), turn / length)
     turned_deg = float(np.degrees(np.linalg.norm(turn)))
     if turned_deg <= _STILL_DEG:
         raise PlanError(
             f"{where}: the tool is there already", "leave line out, or move one of the via points"
         )
-    return Piece(start, turned_deg, np.zeros(3), np.zeros(3), turn / turned_deg)
+    return ToolPiece(start, turned_deg, np.zeros(3), np.zeros(3), turn / turned_deg)
 
 
-def arc(start: Array, through: Sequence[float], end: Array, turn: Array, where: str) -> Piece:
+def arc(start: Array, through: Sequence[float], end: Array, turn: Array, where: str) -> ToolPiece:
     """The arc from a pose (4, 4) through a point to another one."""
     first, middle, last = start[:3, 3], np.array(through), end[:3, 3]
     one, other = middle - first, last - first
@@ -154,7 +154,7 @@ def arc(start: Array, through: Sequence[float], end: Array, turn: Array, where: 
     to_end = other - centre
     angle = float(np.arctan2(to_end @ direction, to_end @ (-centre / radius))) % (2.0 * np.pi)
     length = radius * angle
-    return Piece(start, length, direction, centre / radius**2, turn / length)
+    return ToolPiece(start, length, direction, centre / radius**2, turn / length)
 
 
 def turn_between(start: Array, end: Array, where: str) -> Array:

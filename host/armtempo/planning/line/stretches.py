@@ -1,4 +1,4 @@
-"""A job's via points cut into runs from rest to rest: on the spline through them, or led along a way of the tool."""
+"""A job's via points cut into stretches from rest to rest: on the spline through them, or the tool led along a way."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from armtempo.model.job import Job
 from armtempo.model.tool_pose import APPROACH, WHOLE, Pose
 from armtempo.model.tool_way import ToolWay
 from armtempo.planning.line import tool_path
-from armtempo.planning.line.deviation import Deviation
+from armtempo.planning.line.deviation import LineDeviation
 from armtempo.planning.line.follow import Course, follow
-from armtempo.planning.line.tool_path import Piece, ToolPath
+from armtempo.planning.line.tool_path import ToolPath, ToolPiece
 from armtempo.planning.tool import Tool
 
 _CUT = 0.5
@@ -24,7 +24,7 @@ _CUT = 0.5
 
 
 @dataclass(frozen=True)
-class Run:
+class Stretch:
     """Via points ``first`` to ``last``, at both of which the motion rests; ``ways`` where the tool is led."""
 
     first: int
@@ -37,18 +37,18 @@ class Run:
         return f"P{self.first} to P{self.last}"
 
     @property
-    def enough(self) -> Deviation:
+    def enough(self) -> LineDeviation:
         """How far the tool may leave its way."""
-        return Deviation(
+        return LineDeviation(
             min(way.tolerance_mm for way in self.ways), min(way.tolerance_deg for way in self.ways)
         )
 
 
-def of_job(job: Job) -> list[Run]:
-    """The runs of a job in order."""
+def of_job(job: Job) -> list[Stretch]:
+    """The stretches of a job in order."""
     led = {way.via: way for way in job.ways if way.line}
     stops = {stop.via for stop in job.stops}
-    runs: list[Run] = []
+    stretches: list[Stretch] = []
     first, ways = 0, []
     for via in range(1, len(job.via)):
         if via in led:
@@ -57,9 +57,9 @@ def of_job(job: Job) -> list[Run]:
         else:
             goes_on = via + 1 not in led and via not in stops
         if via == len(job.via) - 1 or not goes_on:
-            runs.append(Run(first, via, tuple(ways)))
+            stretches.append(Stretch(first, via, tuple(ways)))
             first, ways = via, []
-    return runs
+    return stretches
 
 
 def kept(arm: Arm, end: tuple[float, ...] | Pose) -> tuple[str, ...]:
@@ -73,23 +73,23 @@ def kept(arm: Arm, end: tuple[float, ...] | Pose) -> tuple[str, ...]:
     return WHOLE if count >= 6 else (APPROACH,) if count == 5 else ()
 
 
-def course(arm: Arm, job: Job, run: Run, first_deg: Array) -> Course:
-    """The way of the tool in a run that begins at angles ``first_deg``, (J,).
+def course(arm: Arm, job: Job, stretch: Stretch, first_deg: Array) -> Course:
+    """The way of the tool in a stretch that begins at angles ``first_deg``, (J,).
 
     Raises PlanError for a way that is none.
     """
     tool = Tool(arm, list(range(len(arm.driven))), first_deg)
-    fixed = kept(arm, job.via[run.last])
-    for via in range(run.first + 1, run.last):
+    fixed = kept(arm, job.via[stretch.last])
+    for via in range(stretch.first + 1, stretch.last):
         if kept(arm, job.via[via]) != fixed:
             raise PlanError(
-                f"P{run.first} to P{run.last}: the corner at P{via} cannot be cut, as the lines beside it keep "
+                f"P{stretch.first} to P{stretch.last}: the corner at P{via} cannot be cut, as the lines beside it keep "
                 "different parts of the tool's orientation",
                 "leave blend_mm out, or give both via points the same kind of pose",
             )
     here = pose_at(tool, first_deg)
-    pieces: list[Piece] = []
-    for way in run.ways:
+    pieces: list[ToolPiece] = []
+    for way in stretch.ways:
         target = job.via[way.via]
         end = np.array(target.matrix) if isinstance(target, Pose) else pose_at(tool, np.array(target))
         pieces.append(_piece(way, here, end, fixed))
@@ -97,10 +97,10 @@ def course(arm: Arm, job: Job, run: Run, first_deg: Array) -> Course:
         length = np.array([last.length])
         here = end.copy()
         here[:3, :3] = last.turned(length)[0] @ last.start[:3, :3]
-    cuts = tuple(way.blend_mm for way in run.ways[:-1])
+    cuts = tuple(way.blend_mm for way in stretch.ways[:-1])
     path = ToolPath(tuple(pieces), cuts)
-    _check_cuts(run, path)
-    return Course(arm, path, fixed, run.name)
+    _check_cuts(stretch, path)
+    return Course(arm, path, fixed, stretch.name)
 
 
 def pose_at(tool: Tool, angles_deg: Array) -> Array:
@@ -111,7 +111,7 @@ def pose_at(tool: Tool, angles_deg: Array) -> Array:
     return pose
 
 
-def _piece(way: ToolWay, start: Array, end: Array, fixed: tuple[str, ...]) -> Piece:
+def _piece(way: ToolWay, start: Array, end: Array, fixed: tuple[str, ...]) -> ToolPiece:
     where = f"P{way.via - 1} to P{way.via}"
     turn = np.zeros(3)
     if fixed == WHOLE:
@@ -123,20 +123,20 @@ def _piece(way: ToolWay, start: Array, end: Array, fixed: tuple[str, ...]) -> Pi
     return tool_path.line(start, end, turn, where)
 
 
-def _check_cuts(run: Run, path: ToolPath) -> None:
+def _check_cuts(stretch: Stretch, path: ToolPath) -> None:
     """PlanError where corners are cut over more of a line than there is."""
     ways = [0.0, *path.cuts, 0.0]
     for number, piece in enumerate(path.pieces):
+        name = f"P{stretch.first + number} to P{stretch.first + number + 1}"
         if path.cuts and not np.any(piece.direction):
             raise PlanError(
-                f"P{run.first + number} to P{run.first + number + 1}: the tool only turns, so no corner is cut there",
+                f"{name}: the tool only turns, so no corner is cut there",
                 "leave blend_mm out at both",
             )
         for cut in ways[number : number + 2]:
             if cut > _CUT * piece.length:
                 raise PlanError(
-                    f"P{run.first + number} to P{run.first + number + 1}: blend_mm = {cut:g} is more than half of its "
-                    f"{piece.length:.4g} mm",
+                    f"{name}: blend_mm = {cut:g} is more than half of its {piece.length:.4g} mm",
                     f"give at most {_CUT * piece.length:.4g}, or 0 to rest there",
                 )
 
@@ -145,4 +145,4 @@ def end_deg(arm: Arm, job: Job, via: int, before_deg: Array) -> Array:
     """Where the line to a via point leads to from the posture before, (J,): angles (J,)."""
     way = tool_way.at(job.ways, via)
     assert way is not None
-    return follow(course(arm, job, Run(via - 1, via, (way,)), before_deg), before_deg).end_deg
+    return follow(course(arm, job, Stretch(via - 1, via, (way,)), before_deg), before_deg).end_deg
