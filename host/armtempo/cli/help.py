@@ -10,6 +10,7 @@ import click
 TOPICS = {
     "first-hour": "host",
     "first-hour-board": "host",
+    "first-power-on": "host",
     "day": "host",
     "files": "host",
     "arms": "host",

@@ -15,17 +15,31 @@ if TYPE_CHECKING:
 
 
 @click.command()
+@click.option(
+    "--out",
+    "-o",
+    type=click.Path(file_okay=False, path_type=Path),
+    metavar="FOLDER",
+    help="Write selftest.json and a page with figures, selftest.html, to FOLDER.",
+)
+@options.force("the files of an earlier self-test in FOLDER")
 @options.port
 @options.log_traffic
 @options.as_json
-def command(port: str | None, log_traffic: Path | None, as_json: bool) -> None:
-    """Let the board measure itself: clocks, flash, memory, link.
+def command(out: Path | None, force: bool, port: str | None, log_traffic: Path | None, as_json: bool) -> None:
+    """Let the board measure itself: clocks, flash, memory, link, pulses, E-stop.
 
     Nothing needs to be connected, and nothing moves: the drivers must be off, and stay so. The board is reset at the
     end, so the arm's position is unknown then. Exit code 1 where anything is wrong.
     """
+    from armtempo.selftest import page
+
+    if out is not None:
+        page.check_free(out, force)
     with chosen.board(chosen.port(port), log_traffic) as board, ProgressBar("self-test") as progress:
         found = board.selftest(progress)
+    if out is not None:
+        page.write(found, out)
     results.show(as_json, found.to_json(), _lines(found))
     if found.failed:
         raise SystemExit(1)
