@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from armtempo.cli import chosen, options, results
+from armtempo.cli.options import BoardOptions
 from armtempo.cli.progress import ProgressBar
+from armtempo.selftest import page
+from armtempo.selftest.result import Measurement, SelfTest
 
-if TYPE_CHECKING:
-    from armtempo.selftest.result import Measurement, SelfTest
 
-
-@click.command()
+@click.command("selftest")
 @click.option(
     "--out",
     "-o",
@@ -23,24 +23,21 @@ if TYPE_CHECKING:
     help="Write selftest.json and a page with figures, selftest.html, to FOLDER.",
 )
 @options.force("the files of an earlier self-test in FOLDER")
-@options.port
-@options.log_traffic
-@options.as_json
-def command(out: Path | None, force: bool, port: str | None, log_traffic: Path | None, as_json: bool) -> None:
+@options.board()
+def selftest(given: BoardOptions, out: Path | None, force: bool) -> None:
     """Let the board measure itself: clocks, flash, memory, link, pulses, E-stop.
 
     Nothing needs to be connected, and nothing moves: the drivers must be off, and stay so. The board is reset at the
     end, so the arm's position is unknown then. Exit code 1 where anything is wrong.
     """
-    from armtempo.selftest import page
-
     if out is not None:
         page.check_free(out, force)
-    with chosen.board(chosen.port(port), log_traffic) as board, ProgressBar("self-test") as progress:
+    given = replace(given, port=chosen.port(given.port))
+    with chosen.board(given) as board, ProgressBar("self-test") as progress:
         found = board.selftest(progress)
     if out is not None:
         page.write(found, out)
-    results.show(as_json, found.to_json(), _lines(found))
+    results.show(given.as_json, found.to_json(), _lines(found))
     if found.failed:
         raise SystemExit(1)
 
