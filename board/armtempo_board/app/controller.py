@@ -224,7 +224,7 @@ class Controller(ArmState):
         self.duration_ticks = self.engine.rates.duration_ticks
         self.run_number += 1
         self._braking = False
-        self._can_brake = motion.brake_ticks > 0
+        self._can_brake = motion.can_brake
         heap.tidy()
         heap.collect_often(0)
         self.running = True

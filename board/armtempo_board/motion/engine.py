@@ -107,7 +107,7 @@ class Engine(EngineParts):
         except MemoryError:  # what the first attempt left free lies otherwise
             gc.collect()
             override = self._new_override()
-        override.begin(rate, motion.brake_ticks, duration_ticks)
+        override.begin(rate, motion, duration_ticks)
         if override.end_ticks() > LONGEST_RUN_TICKS:
             raise Refused(codes.TOO_LONG)
         return override

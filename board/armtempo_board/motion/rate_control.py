@@ -31,7 +31,7 @@ class RateControl:
         self.override: "Any" = None
         self.wanted = self._before_pause = _PERMILLE
         self.duration_ticks = 0
-        self._can_brake = self._can_change = False
+        self._can_brake = False
         self.braked = self.end_moves = self.waits = False
 
     def begin(self, override: "Any", motion: "MotionHead") -> None:
@@ -39,8 +39,7 @@ class RateControl:
         self.override = override
         self.wanted = self._before_pause = override.rate
         self.duration_ticks = override.end_ticks()
-        self._can_brake = motion.brake_ticks > 0
-        self._can_change = self._can_brake and motion.ramps
+        self._can_brake = motion.can_brake
         self.braked = self.end_moves = self.waits = False
 
     def brake(self) -> bool:
@@ -62,7 +61,7 @@ class RateControl:
         """Want another rate, in thousandths; 0: pause, RESUME: as before it."""
         if self.braked:
             raise Refused(codes.BUSY)
-        if not self._can_change:
+        if not self._can_brake:
             raise Refused(codes.FIXED_SPEED)
         if rate == RESUME:
             rate = self._before_pause
@@ -82,17 +81,36 @@ class RateControl:
     def ramp(self, ahead_kiticks: int) -> "array[int] | None":
         """Begin the change, behind what is in the rings: the law that all joints are to follow; None: it ends before.
 
-        ``ahead_kiticks``: how far ahead steps are in them.
+        ``ahead_kiticks``: how far ahead steps are in them. Where it would come to rest later than it ends by itself,
+        it does that.
         """
-        ahead_kiticks = max(LOOKAHEAD_KITICKS + _LAW_MARGIN_KITICKS, ahead_kiticks)
-        start_ticks = (self._clock.kiticks() + ahead_kiticks) << 10
+        start_ticks = self._start_ticks(ahead_kiticks)
         self.waits = False
-        if start_ticks >= self.duration_ticks:
+        if start_ticks >= self.duration_ticks or (
+            self.braked and self.override.ramp_end_ticks(start_ticks, 0) >= self.duration_ticks
+        ):
             return None
         self.override.ramp(start_ticks, self.wanted)
         self._end_at(self.override.steady_ticks() if self.braked else self.override.end_ticks())
         law: "array[int]" = self.override.law
         return law
+
+    def _start_ticks(self, ahead_kiticks: int) -> int:
+        """When a change can begin."""
+        ahead_kiticks = max(LOOKAHEAD_KITICKS + _LAW_MARGIN_KITICKS, ahead_kiticks)
+        return (self._clock.kiticks() + ahead_kiticks) << 10
+
+    def rest_ticks(self, ahead_kiticks: int) -> int:
+        """How long from now it takes to come to rest after a stop: one that came before, or one now; 0 by freezing."""
+        now = self._clock.ticks()
+        end = self.duration_ticks
+        if not self.braked or self.waits:
+            if not self._can_brake:
+                return 0
+            override = self.override
+            start = max(self._start_ticks(ahead_kiticks), override.steady_ticks())
+            end = override.steady_ticks() if self.stands() else min(override.ramp_end_ticks(start, 0), end)
+        return max(end - now, 0)
 
     def _end_at(self, ticks: int) -> None:
         self.duration_ticks = ticks
