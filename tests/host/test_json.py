@@ -85,10 +85,6 @@ def test_without_a_board(project: Path) -> None:
     assert "ports" in said("ports")
     urdf = ROOT / "tests" / "data" / "urdf" / "six_rounded.urdf"
     assert said("import-urdf", urdf, "-o", "arm.toml")["joints"] == 6
-    bench = said(
-        "bench", "--algorithms", "acs", "--populations", "5", "--seeds", "1", "--iterations", "2", "--no-plot"
-    )
-    assert bench["rows"][0]["best_s"] > 0
 
 
 def test_what_goes_to_stdout_itself_has_no_document(project: Path) -> None:

@@ -7,10 +7,8 @@ import re
 import numpy as np
 import pytest
 from armtempo.kinematics import chain
+from armtempo.paper import searches
 from armtempo.report import arm_figure, drawing, html_page, plan_section, plots
-from armtempo.research.bench import result_plot
-from armtempo.research.bench.cases import Case, Trial
-from armtempo.research.bench.result_table import rows
 from armtempo.runs import analysis
 
 from tests.host.made_runs import shipped_plan
@@ -68,7 +66,7 @@ def figure(name: str) -> str:
     limits = [joint.limits for joint in plan.arm.driven if joint.limits]
     seen = curves()
     times, theory = seen.times_s, seen.mean
-    runs = [Trial(Case("acs", 10, seed), (), 1, 1.0, ((0, 6.0 + seed),)) for seed in (1, 2)]
+    runs = [(("acs", 10, seed), np.full(6, 6.0 + seed)) for seed in (1, 2)]
     chains = chain.chains_mm(plan.arm, plan.via_deg)
     drawn = {
         "motion": lambda: plots.motion(plan.trajectory, limits, names),
@@ -77,7 +75,7 @@ def figure(name: str) -> str:
         "overlay": lambda: plots.overlay({"one": (times, theory[:, :, 0], times)}),
         "convergence": lambda: plots.convergence({"one": np.arange(9.0)}),
         "postures": lambda: arm_figure.postures(chains, chain.tool_path_mm(plan.arm, plan.trajectory, times)),
-        "searches": lambda: result_plot.convergence(rows(runs, 5)),
+        "searches": lambda: searches.figure(searches.rows(runs)),
     }
     return drawing.inline_svg(drawn[name](), name, "what it shows")
 

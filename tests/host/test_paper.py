@@ -6,10 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from armtempo.research.bench.cases import Case, Trial
-from armtempo.research.bench.result_table import rows
-from armtempo.research.paper import motions, postures, printed, searches
-from armtempo.research.paper.claims import BETTER, DIFFERS, SAME, compared
+from armtempo.paper import motions, postures, printed, searches
+from armtempo.paper.claims import BETTER, DIFFERS, SAME, compared
 
 pytestmark = pytest.mark.xdist_group("paper")  # what they share is made once
 
@@ -56,8 +54,8 @@ def test_a_plan_that_is_slower_differs_and_says_why(made: motions.Plans) -> None
 
 @pytest.mark.parametrize(("best", "verdict"), [(6.034, SAME), (6.2, DIFFERS)])
 def test_table_4_is_judged_by_the_median(best: float, verdict: str) -> None:
-    runs = [Trial(Case("acs", 10, seed), (), 1, 1.0, ((0, best + 0.001 * seed),)) for seed in (-1, 0, 1)]
-    (claim,) = searches.claims(rows(runs, 5))
+    runs = [(("acs", 10, seed), np.full(6, best + 0.001 * seed)) for seed in (-1, 0, 1)]
+    (claim,) = searches.claims(searches.rows(runs))
     assert claim.verdict == verdict
     assert claim.printed == "6.034"
 
@@ -70,3 +68,33 @@ def test_numbers_are_compared_at_the_printed_precision() -> None:
 def test_the_printed_sums_are_those_of_the_printed_intervals() -> None:
     np.testing.assert_allclose([sum(row) for row in printed.INTERVALS_S], printed.TOTALS_S, atol=1e-9)
     assert 1 - sum(printed.TOTALS_S) / 36 == pytest.approx(printed.REDUCTION, abs=5e-4)
+
+
+def test_searches_of_a_joint_come_in_the_order_of_table_4(
+    made: motions.Plans, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(searches, "ITERATIONS", 3)
+    search = searches._Search.of(made.arm, made.job)
+    found = [search((name, population, 1)) for population in (6, 4) for name in ("acs", "pso", "ga")]
+    rows = searches.rows(found)
+    assert [(row.algorithm, row.population) for row in rows] == [
+        (name, population) for name in ("ga", "pso", "acs") for population in (4, 6)
+    ]
+    assert all(row.curves.shape == (5, 4) and (np.diff(row.curves[2]) <= 0).all() for row in rows)
+
+
+def test_searches_get_the_paper_s_problem(made: motions.Plans) -> None:
+    fitness, _ = searches._Search.of(made.arm, made.job).problem()
+    assert fitness.penalised(np.array([printed.INTERVALS_S[0]]))[0] == pytest.approx(6.033, abs=0.02)
+
+
+@pytest.mark.slow
+def test_searches_on_all_cores(made: motions.Plans, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(searches, "QUICK_POPULATIONS", (4,))
+    monkeypatch.setattr(searches, "QUICK_SEEDS", 1)
+    told: list[tuple[int, int]] = []
+    rows = searches.run(made.arm, made.job, True, lambda done, whole: told.append((done, whole)))
+    assert [row.algorithm for row in rows] == list(printed.SEARCHES_S)
+    assert told[-1] == (6, 6)
+    search = searches._Search.of(made.arm, made.job)
+    assert rows[-1].curves[2] == pytest.approx(search(("acs", 4, 1))[1])

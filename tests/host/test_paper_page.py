@@ -6,15 +6,14 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from armtempo.basics.errors import LinkError
 from armtempo.model.arm import Limits
+from armtempo.paper import experiment, motions, searches, sheet
+from armtempo.paper.claims import DIFFERS, SAME, Claim
+from armtempo.paper.experiment import CUBIC, QUINTIC, UNOPTIMISED, Series
 from armtempo.report.evaluation import evaluate
-from armtempo.research.bench.cases import Case, Trial
-from armtempo.research.bench.result_table import Row, rows
-from armtempo.research.paper import experiment, motions, sheet
-from armtempo.research.paper.claims import DIFFERS, SAME, Claim
-from armtempo.research.paper.experiment import CUBIC, QUINTIC, UNOPTIMISED, Series
 from armtempo.robot.stop_request import StopRequest
 
 from tests import browser
@@ -43,11 +42,9 @@ def series(folder: Path, scatter_deg: dict[str, float]) -> list[Series]:
     ]
 
 
-def searched() -> list[Row]:
+def searched() -> list[searches.Row]:
     """Two searches of two seeds."""
-    return rows(
-        [Trial(Case("acs", n, seed), (), 1, 1.0, ((0, 6.0),)) for n in (10, 50) for seed in (1, 2)], 5
-    )
+    return searches.rows((("acs", n, seed), np.full(6, 6.0)) for n in (10, 50) for seed in (1, 2))
 
 
 @pytest.mark.slow

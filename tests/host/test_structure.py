@@ -35,7 +35,7 @@ ORDER = (
     "report",  # pages, plots, tables
     "robot",  # a board in use: home, go, run, stop
     "pipeline",  # plan, load, run, report
-    "research",  # comparison of searches, the paper repeated
+    "paper",  # its tables and figures, repeated
     "cli",
 )
 """Each package or module imports from those before it in this list, never from those behind."""

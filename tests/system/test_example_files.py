@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -18,11 +20,13 @@ LEAVES = {
     "pen.py": "pen.png",
     "ros_trajectory.py": "feed.yaml",
     "sweep.py": "sweep.csv",
+    "compare_searches.py": "searches.csv",
     "animate.py": "arm.gif",
     "plan_and_plot.ipynb": "reach.png",
     "pick_and_place.py": "two-parts.toml",
 }
-ARGUMENTS = {"sweep.py": ["--jobs", "6"]}
+FEW = ["--populations", "4", "--seeds", "2", "--iterations", "3"]
+ARGUMENTS = {"sweep.py": ["--jobs", "6"], "compare_searches.py": FEW}
 
 
 @pytest.mark.parametrize("name", LEAVES)
@@ -39,6 +43,20 @@ def test_example(name: str, tmp_path: Path) -> None:
     done = forked.run(script, *ARGUMENTS.get(name, []), cwd=tmp_path, timeout=commandline.SLOW_S)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / LEAVES[name]).stat().st_size > 0
+
+
+def test_searches_on_a_cluster_give_the_same(tmp_path: Path) -> None:
+    import distributed  # takes long, and every process that collects the tests would do it
+
+    script = EXAMPLES / "compare_searches.py"
+    found = []
+    with distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None) as cluster:
+        for where in ([], ["--scheduler", cluster.scheduler_address]):
+            command = [sys.executable, str(script), *FEW, *where]
+            subprocess.run(command, cwd=tmp_path, check=True, timeout=commandline.SLOW_S)
+            found.append((tmp_path / "searches.csv").read_text())
+    assert found[0] == found[1]
+    assert found[0].count("\n") == 13
 
 
 def test_none_is_left_out() -> None:

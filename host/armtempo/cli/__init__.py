@@ -44,7 +44,7 @@ GROUPS = {
         *("upload", "list", "show", "remove", "rename"),
         *("virtual-board", "monitor", "config", "doctor"),
     ),
-    "Develop": ("bench", "paper", "completion"),
+    "Develop": ("paper", "completion"),
 }
 """Commands in the order of the help page. Each is ``command`` in its module: '-' as '_', a keyword with '_' behind."""
 COMMANDS = tuple(name for names in GROUPS.values() for name in names)

@@ -48,7 +48,6 @@ EXAMPLES = {
     "monitor": ("monitor", "monitor traffic.log"),
     "config": ("config",),
     "doctor": ("doctor", "doctor --port /dev/ttyACM0"),
-    "bench": ("bench --algorithms cs,acs --populations 10 --seeds 3",),
     "paper": ("paper --quick",),
     "completion": ("completion bash >> ~/.bashrc",),
 }

@@ -12,7 +12,7 @@ from armtempo.cli import options, results
 from armtempo.cli.progress import ProgressBar
 
 if TYPE_CHECKING:
-    from armtempo.research.paper.claims import Claim
+    from armtempo.paper.claims import Claim
 
 
 @click.command()
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     default=Path("paper"),
     show_default=True,
     metavar="FOLDER",
-    help="Where page, searches and run folders go; finished searches are not repeated.",
+    help="Where page and run folders go.",
 )
 @options.as_json
 def command(quick: bool, out: Path, as_json: bool) -> None:
@@ -32,11 +32,11 @@ def command(quick: bool, out: Path, as_json: bool) -> None:
     The replays run on the virtual board.
     """
     from armtempo.formats.atomic_file import replace_text
-    from armtempo.research.paper import experiment, motions, postures, searches, sheet
+    from armtempo.paper import experiment, motions, postures, searches, sheet
 
     made = motions.plans()
     with ProgressBar("searching") as progress:
-        searched = searches.run(made.arm, made.job, out / "searches", quick, progress)
+        searched = searches.run(made.arm, made.job, quick, progress)
     with ProgressBar("replaying") as progress:
         series = experiment.run(made, out / "runs", quick, progress)
     claims = [

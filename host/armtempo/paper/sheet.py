@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armtempo.kinematics import chain
+from armtempo.paper import motions, searches
+from armtempo.paper.claims import DIFFERS, Claim
+from armtempo.paper.experiment import CUBIC, QUINTIC, Series
+from armtempo.paper.searches import Row
 from armtempo.report import arm_figure, drawing, html_page, plan_section, plots, run_report
-from armtempo.research.bench import result_plot
-from armtempo.research.bench.result_table import Row
-from armtempo.research.paper import motions
-from armtempo.research.paper.claims import DIFFERS, Claim
-from armtempo.research.paper.experiment import CUBIC, QUINTIC, Series
 from armtempo.splines.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -74,7 +73,7 @@ def _figures(
     drawn = [
         ("fig4", unoptimised(3, 1), "Fig. 4: joint 1 before optimisation, cubic."),
         ("fig5", unoptimised(5, len(names)), "Fig. 5: the joints before optimisation, quintic."),
-        ("fig6", result_plot.convergence(searched), "Fig. 6: the searches' convergence over their seeds."),
+        ("fig6", searches.figure(searched), "Fig. 6: the searches' convergence over their seeds."),
         ("fig7", plots.motion(made.quintic.trajectory, limits, names), "Fig. 7: the optimised motion."),
         ("fig10", _postures(made), "Fig. 10: the arm at the via points and the path of its tool."),
     ]

@@ -10,9 +10,9 @@ import numpy as np
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
+from armtempo.paper import printed
+from armtempo.paper.claims import BETTER, DIFFERS, SAME, Claim, compared
 from armtempo.planning import planner
-from armtempo.research.paper import printed
-from armtempo.research.paper.claims import BETTER, DIFFERS, SAME, Claim, compared
 from armtempo.splines import bspline, extremes, time_axis
 from armtempo.splines.trajectory import JointSpline
 

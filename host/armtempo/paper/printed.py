@@ -46,3 +46,13 @@ REDUCTION = 0.464
 
 CUBIC_GAIN = 0.069
 """Share by which the cubic motion of joint 1 is shorter than the quintic; section 4.2."""
+
+SEARCHES_S = {
+    "ga": {10: 10.491, 50: 8.498, 100: 6.766, 500: 6.161},
+    "iaga": {10: 10.550, 50: 7.411, 100: 6.416, 500: 6.304},
+    "pso": {10: 6.722, 50: 6.338, 100: 6.250, 500: 6.146},
+    "hpso": {10: 6.469, 50: 6.162, 100: 6.126, 500: 6.129},
+    "cs": {10: 6.047, 50: 6.069, 100: 6.064, 500: 6.058},
+    "acs": {10: 6.034, 50: 6.045, 100: 6.047, 500: 6.054},
+}
+"""Table 4: fitness that each algorithm reached, by population, for joint 1."""

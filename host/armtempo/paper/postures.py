@@ -8,8 +8,8 @@ from armtempo.basics.arrays import Array
 from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.inverse import inverse
 from armtempo.model.arm import Arm
-from armtempo.research.paper import printed
-from armtempo.research.paper.claims import DIFFERS, SAME, Claim
+from armtempo.paper import printed
+from armtempo.paper.claims import DIFFERS, SAME, Claim
 
 _ROUNDING_DEG = 0.1
 """The table prints one decimal; sums of such angles differ by up to this."""

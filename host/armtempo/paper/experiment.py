@@ -12,10 +12,10 @@ import numpy as np
 
 from armtempo.basics.progress import Progress
 from armtempo.model.plan import Plan
+from armtempo.paper import motions, printed
+from armtempo.paper.claims import DIFFERS, SAME, Claim
 from armtempo.ports.names import SIM
 from armtempo.report.evaluation import Evaluation, evaluate
-from armtempo.research.paper import motions, printed
-from armtempo.research.paper.claims import DIFFERS, SAME, Claim
 from armtempo.robot.connect import connect
 from armtempo.robot.stop_request import StopRequest
 from armtempo.runs import analysis, peaks

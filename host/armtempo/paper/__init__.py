@@ -1,0 +1,1 @@
+"""The paper repeated: every printed number next to the one found here."""
