@@ -45,6 +45,8 @@ _RAMPS = "<%dH" % RAMP_ENTRIES
 _RAMPS_SIZE = struct.calcsize(_RAMPS)
 _RAMPS_AT = struct.calcsize(_HEAD)
 HEAD_SIZE = _RAMPS_AT + 2 * _RAMPS_SIZE
+NO_RAMPS = (0,) * RAMP_ENTRIES, (0,) * RAMP_ENTRIES
+"""Of a motion that can neither brake nor change its speed."""
 
 
 class MotionError(ValueError):
@@ -120,7 +122,7 @@ class MotionHead:
             first, part = divmod(max(at_ticks, 0) * (RAMP_ENTRIES - 1), duration_ticks)
         at = 0 if to_rest else _RAMPS_SIZE
         before, after = struct.unpack_from("<HH", self.ramps, at + 2 * first)
-        return RAMP_UNIT_TICKS * before - RAMP_UNIT_TICKS * (before - after) * part // duration_ticks
+        return int(RAMP_UNIT_TICKS * before - RAMP_UNIT_TICKS * (before - after) * part // duration_ticks)
 
     def angle_offset(self, joint: int) -> int:
         """Byte offset of the joint's first angle control point."""

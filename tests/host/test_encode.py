@@ -10,11 +10,13 @@ import pytest
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.model.arm import Arm, Limits
 from armtempo.planning import checks
+from armtempo.planning.brake_time import BrakeTimes
 from armtempo.records import encode
 from armtempo.splines.trajectory import JointSpline, Trajectory
 from armtempo_shared import armrecord, limits, motion
 
 ARM = Arm.paper()
+BRAKES = BrakeTimes(1.0, np.arange(5.0, 37.0), np.arange(100.0, 420.0, 10.0))
 
 
 def trajectory(shared: bool) -> Trajectory:
@@ -28,10 +30,14 @@ def trajectory(shared: bool) -> Trajectory:
 
 @pytest.mark.parametrize("shared", [False, True])
 def test_control_points_arrive_as_steps_and_ticks(shared: bool) -> None:
-    record = motion.Motion(encode.motion_record(trajectory(shared), ARM, brake_s=0.5))
+    record = motion.Motion(encode.motion_record(trajectory(shared), ARM, BRAKES))
     assert (record.degree, record.joints, record.segments, record.refine) == (5, 3, 2, 2)
     assert record.shared == shared
-    assert record.brake_ticks == limits.TICK_HZ // 2
+    unit, end = motion.RAMP_UNIT_TICKS, 1_000_000
+    assert [record.ramp_ticks(end * place // 31, end, True) // unit for place in range(32)] == list(
+        range(5, 37)
+    )
+    assert [record.ramp_ticks(at, end, False) // unit for at in (-5, 0, end, end + 1)] == [100, 100, 410, 410]
     for joint, per_deg in enumerate((6400 / 180, 32000 / 360, 6400 / 180)):
         angles = np.frombuffer(record.data, "<i8", 7, record.angle_offset(joint)) / 2.0**28
         np.testing.assert_allclose(angles, (np.arange(7) + 10 * joint) * per_deg, atol=2.0**-28)

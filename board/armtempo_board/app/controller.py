@@ -277,6 +277,10 @@ class Controller(ArmState):
         """The rate that is wanted of the motion's own time, in thousandths; 0 in a pause."""
         return self.engine.rates.wanted if self.moving() else self._next_rate
 
+    def rest_ms(self) -> int:
+        """In how many milliseconds what moves rests after a stop, now or before; 0: at once."""
+        return self.engine.rest_ms() if self.engine and self.engine.moving else 0
+
     def state(self) -> int:
         """Number of the state (messages.STATES)."""
         if self.moving():

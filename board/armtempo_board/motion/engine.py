@@ -43,6 +43,8 @@ LEAD_TICKS = const(1680000)
 _PREFILLS = const(32)
 _ROUNDS = const(8)  # of filling the queues, before other work gets its turn
 _PERMILLE = const(1000)
+_TICKS_PER_MS = const(84000)
+_MOST_MS = const(65535)
 # work beside the filling of queues: one of these in each call of ``service``
 _POLL_SWITCHES = const(0)
 _CHECK_FOLLOWING = const(1)
@@ -229,8 +231,8 @@ class Engine(EngineParts):
         """Come to rest along the path; freeze where the motion's record has no time for it, or at rest in a pause.
 
         Over that time acceleration and jerk stay within 1.25 times the arm's limits. Braking begins behind what is
-        in the rings, about 75 ms from now; where the rate is changing, behind that. A motion that is over by then ends
-        by itself.
+        in the rings, about 75 ms from now; where the rate is changing, behind that. A motion that ends by itself before
+        it would have come to rest does that.
         """
         rates = self.rates
         if not self.moving or rates.braked:
@@ -243,10 +245,18 @@ class Engine(EngineParts):
         else:
             self._change_rate()
 
+    def rest_ms(self) -> int:
+        """In how many milliseconds it rests after ``brake``, which came before or comes now; 0: at once."""
+        return min(self.rates.rest_ticks(self._ahead_kiticks()) // _TICKS_PER_MS + 1, _MOST_MS)
+
+    def _ahead_kiticks(self) -> int:
+        """How far ahead steps are in the rings."""
+        return max([joint.ahead_kiticks() for joint in self.drives])
+
     def change_rate(self, rate: int) -> None:
         """Let the motion's own time go on at another rate, in thousandths; 0: pause, RESUME: as before it.
 
-        Each change takes the record's brake time, with acceleration and jerk as in ``brake``. It begins as braking
+        Each change takes as long as the record says, with acceleration and jerk as in ``brake``. It begins as braking
         does; one that comes while the rate is changing waits until that has ended, and only the last one counts.
         """
         if not self.moving:
@@ -260,7 +270,7 @@ class Engine(EngineParts):
         if not rates.is_due():
             return
         self._readings.convert()  # by the law that they were taken under
-        law = rates.ramp(max([joint.ahead_kiticks() for joint in self.drives]))
+        law = rates.ramp(self._ahead_kiticks())
         if law is None:
             return
         for joint in self.drives:

@@ -49,7 +49,11 @@ class Override:
     def ramp_end_ticks(self, from_ticks: int, rate: int) -> int:
         """Real time at which a ramp to another rate would end that begins at a real time, behind the last ramp."""
         thousands = self._thousands(from_ticks)
-        return self._real_ticks + PERMILLE * thousands + self._ramp_ticks(self._motion_ticks + self.rate * thousands, rate)
+        return (
+            self._real_ticks
+            + PERMILLE * thousands
+            + self._ramp_ticks(self._motion_ticks + self.rate * thousands, rate)
+        )
 
     def _thousands(self, from_ticks: int) -> int:
         """Thousands of ticks from the last ramp's end, rounded up."""

@@ -26,7 +26,16 @@ jerk of the path."""
 
 Rates = tuple[tuple[float, float], ...]
 TO_REST: Rates = ((1.0, 0.0), (0.75, 0.0), (0.5, 0.0), (0.25, 0.0), (0.1, 0.0))
-OTHERS: Rates = ((0.0, 1.0), (1.0, 0.01), (1.0, 0.5), (0.5, 1.0), (1.0, 0.75), (0.75, 1.0), (0.9, 0.2), (0.2, 0.9))
+OTHERS: Rates = (
+    (0.0, 1.0),
+    (1.0, 0.01),
+    (1.0, 0.5),
+    (0.5, 1.0),
+    (1.0, 0.75),
+    (0.75, 1.0),
+    (0.9, 0.2),
+    (0.2, 0.9),
+)
 """Rates before and after, for which the times are found; between others less is needed. The first one of TO_REST and
 the first two of OTHERS need most."""
 
@@ -43,7 +52,10 @@ _NEGLIGIBLE = 1e-6  # of RAMP_UNIT_TICKS
 
 @dataclass(frozen=True, eq=False)
 class BrakeTimes:
-    """Lengths of ramps that begin at RAMP_ENTRIES equal steps of the motion's time, in RAMP_UNIT_TICKS; linear between."""
+    """How long changes take that begin at RAMP_ENTRIES equal steps of a motion's time, in RAMP_UNIT_TICKS.
+
+    Linear in between. ``to_rest``, ``others``: (RAMP_ENTRIES,), whole numbers.
+    """
 
     duration_s: float
     to_rest: Array
@@ -86,7 +98,10 @@ def _table(ramps: _Ramps, rates: Rates, worst: Rates, least: Array) -> Array:
     """Entries from ``least`` on; ``worst``: the rates that need most."""
     parts = RAMP_ENTRIES - 1
     place = np.arange(_STARTS * parts + 1) / _STARTS
-    needed = ramps.shortest_s(place / parts, worst, UNIT_S * np.interp(place, np.arange(RAMP_ENTRIES), least)) / UNIT_S
+    needed = (
+        ramps.shortest_s(place / parts, worst, UNIT_S * np.interp(place, np.arange(RAMP_ENTRIES), least))
+        / UNIT_S
+    )
     table = np.maximum(needed[::_STARTS], least)
     _lift(table, place, needed)
     table = np.minimum(np.ceil(table), _LONGEST)

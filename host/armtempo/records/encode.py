@@ -68,7 +68,7 @@ def motion_record(trajectory: Trajectory, arm: Arm, brakes: BrakeTimes | None = 
 def _ramps(brakes: BrakeTimes | None) -> motion.Ramps:
     """The lengths of ramps as whole numbers."""
     if brakes is None:
-        return ((0,) * motion.RAMP_ENTRIES,) * 2
+        return motion.NO_RAMPS
     return [int(entry) for entry in brakes.to_rest], [int(entry) for entry in brakes.others]
 
 
