@@ -133,22 +133,13 @@ def __getattr__(name: str) -> Any:
     if name in _MODULES:
         return import_module(f"{__name__}.{name}")
     if name == "__version__":
-        value = _installed_version()
+        value = import_module("armtempo.basics.version").installed_version()
     elif name in _HOME_OF:
         value = getattr(import_module(_HOME_OF[name]), name)
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = value
     return value
-
-
-def _installed_version() -> str:
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return version("armtempo")
-    except PackageNotFoundError:  # run from a folder that was never installed
-        return "0+unknown"
 
 
 def __dir__() -> list[str]:

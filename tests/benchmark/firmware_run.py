@@ -30,8 +30,9 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError
 from armtempo.deploy import program_files
-from armtempo.model.arm import Arm, LimitSwitches, Safety
+from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.model.parts import LimitSwitches, Safety
 from armtempo.planning import planner
 from armtempo.robot.board import Board
 from armtempo.robot.connect import connect

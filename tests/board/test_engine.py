@@ -16,7 +16,14 @@ SCRIPTS = [
 
 NOT_EMULATED = {
     *("case_estop_anywhere", "case_interrupt_gone", "case_long_pause", "case_long_rest", "case_refused"),
-    *("case_stops", "case_three_joints", "case_too_late", "case_underrun_anywhere", "case_whole_motion"),
+    *(
+        "case_prepared",
+        "case_stops",
+        "case_three_joints",
+        "case_too_late",
+        "case_underrun_anywhere",
+        "case_whole_motion",
+    ),
     # here nothing depends on the width of words
     *("case_close_and_anew", "case_enable", "case_estop_at_rest", "case_estop_behind_a_limit_switch"),
     *("case_estop_while_loading", "case_following", "case_limit_switches", "case_limit_tripped_before"),

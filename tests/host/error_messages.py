@@ -11,7 +11,7 @@ from armtempo.basics import errors
 
 from tests.sources import parsed
 
-HOST = Path(errors.__file__).parent
+HOST = Path(errors.__file__).parents[1]
 MADE_FROM_PARTS = {"MissingPackageError"}
 """Classes that write their own problem and hint."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from armtempo.model.arm import Limits
+from armtempo.model.parts import Limits
 from armtempo.splines import bspline
 from armtempo.splines.trajectory import JointSpline
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from armtempo.link.board_messages import Positions, Sample
-from armtempo.model import arm_json, trajectory_file
+from armtempo.model import arm_json
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
@@ -56,7 +56,7 @@ def make(
     if on_board:
         arm_json.save(made.arm, path / run_folder.ARM)
     else:
-        trajectory_file.save(made, path / run_folder.TRAJECTORY)
+        made.save(path / run_folder.TRAJECTORY)
     for number in range(repetitions):
         with folder.begin_repetition() as file:
             for sample in _samples(made, scatter_deg, rng):

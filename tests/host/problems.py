@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from armtempo.model.arm import Arm, Joint, Limits, Motor
+from armtempo.model.arm import Arm
 from armtempo.model.job import Job, Stop
+from armtempo.model.parts import Joint, Limits, Motor
 
 FILE = Path(__file__).parents[1] / "data" / "problems.toml"
 

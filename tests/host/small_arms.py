@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 from armtempo.kinematics.solver import PoseSolver
-from armtempo.model.arm import Arm, Joint
+from armtempo.model.arm import Arm
+from armtempo.model.parts import Joint
 from armtempo.model.pose import to_rpy_deg
 from armtempo.model.tool_pose import APPROACH, WHOLE, Pose
 

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from armtempo.diagnosis import figures, resolution, torque
 from armtempo.kinematics.chain import chains_mm, outline_mm
-from armtempo.model import arm_file, shipped
-from armtempo.model.arm import Arm, JointModel
+from armtempo.model import shipped
+from armtempo.model.arm import Arm
+from armtempo.model.parts import JointModel
 
 from tests.host.arm_files import changed, run_check
 
@@ -48,7 +49,7 @@ def test_figures_without_a_load_know_no_infinity(tmp_path: Path) -> None:
     path = changed(
         tmp_path, ("rotor_inertia_kg_m2 = 8.2e-6\ninertia_kg_m2 = 0.15", "rotor_inertia_kg_m2 = 0")
     )
-    found = figures.of(arm_file.read(path))[0]
+    found = figures.of(Arm.read(path))[0]
     assert found.torque_margin == math.inf
     assert found.values["torque_margin"] is None
     assert "inf x" in figures.table([found])[1]

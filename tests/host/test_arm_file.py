@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 from armtempo.basics.errors import InputError
-from armtempo.model import arm_file
+from armtempo.model import shipped
 from armtempo.model.arm import Arm
 
 
 def changed(tmp_path: Path, old: str, new: str) -> Path:
     """The shipped arm file with one text replaced."""
-    text = arm_file.default_path().read_text()
+    text = shipped.arm_path().read_text()
     assert old in text
     path = tmp_path / "arm.toml"
     path.write_text(text.replace(old, new, 1))

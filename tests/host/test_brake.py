@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
-from armtempo.model.arm import Arm, Limits
+from armtempo.model.arm import Arm
+from armtempo.model.parts import Limits
 from armtempo.planning import brake_time, planner, point_to_point
 from armtempo.planning.brake_time import UNIT_S
 from armtempo.splines.trajectory import Trajectory

@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from armtempo import link
 from armtempo.cli import COMMANDS, main
 from armtempo.link import Client, greet
-from armtempo.model import arm_file, job_file, trajectory_file
+from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import planner
+from armtempo.robot import connect
 from armtempo.runs import reader
 from click.testing import CliRunner, Result
 
@@ -37,7 +37,7 @@ def pipe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pipe:
     def open_board(port: str, *arguments: Any, **options: Any) -> Iterator[Client]:
         yield greet(found, None, found.clock)
 
-    monkeypatch.setattr(link, "open_board", open_board)
+    monkeypatch.setattr(connect, "open_board", open_board)
     monkeypatch.chdir(tmp_path)
     return found
 
@@ -47,7 +47,7 @@ def run(pipe: Pipe) -> Run:
     """Runs a command on that board, which counts as a real one; the paper's arm is the one that is named."""
 
     def run_command(*arguments: str, code: int = 0, **variables: str) -> Result:
-        settings = {"ARMTEMPO_ARM": arm_file.default_path(), "ARMTEMPO_JOB": job_file.default_path()}
+        settings = {"ARMTEMPO_ARM": shipped.arm_path(), "ARMTEMPO_JOB": shipped.job_path()}
         environment = {**{name: str(value) for name, value in settings.items()}, **variables}
         result = CliRunner().invoke(main, [*arguments, "--port", "pipe"], env=environment)
         assert result.exit_code == code, result.output
@@ -60,7 +60,7 @@ def run(pipe: Pipe) -> Run:
 def file(tmp_path: Path) -> str:
     """A trajectory file."""
     job = Job("small", (START, END), population=5, iterations=20)
-    trajectory_file.save(planner.plan(ARM, job), tmp_path / "small.json")
+    planner.plan(ARM, job).save(tmp_path / "small.json")
     return "small.json"
 
 
@@ -165,7 +165,7 @@ def test_interrupt_brakes_then_freezes_and_keeps_the_samples(
 def test_arm_is_not_replaced_silently(run: Run, file: str, tmp_path: Path) -> None:
     run("upload", file)
     other = tmp_path / "other.toml"
-    other.write_text(arm_file.default_path().read_text().replace("pulse_us = 2.0", "pulse_us = 3.0"))
+    other.write_text(shipped.arm_path().read_text().replace("pulse_us = 2.0", "pulse_us = 3.0"))
     run("home")
     refused = run("home", "--arm", str(other), code=1).output
     assert "set up for another arm" in refused

@@ -8,7 +8,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from armtempo.basics.errors import InputError, PlanError
-from armtempo.model.arm import Arm, Limits
+from armtempo.model.arm import Arm
+from armtempo.model.parts import Limits
 from armtempo.planning import checks
 from armtempo.planning.brake_time import BrakeTimes
 from armtempo.records import encode

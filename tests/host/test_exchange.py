@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from armtempo.basics.errors import InputError
 from armtempo.cli import main
-from armtempo.model import arm_file, exchange, thinning, trajectory_file
+from armtempo.model import exchange, shipped, thinning, via_table
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from click.testing import CliRunner
@@ -23,7 +23,7 @@ ARM = Arm.paper()
 
 def test_csv_is_the_trajectory_at_any_rate_end_included() -> None:
     plan = shipped_plan()
-    rows = list(csv.DictReader(exchange.to_csv(plan, 37.0).splitlines()))
+    rows = list(csv.DictReader(plan.to_csv(37.0).splitlines()))
     assert len(rows[0]) == 1 + 3 * len(exchange.CSV_COLUMNS)
     times = np.array([float(row["time_s"]) for row in rows])
     exact = exchange.times_s(plan.trajectory.duration_s, 37.0)
@@ -43,7 +43,7 @@ def test_a_plan_has_a_hundred_points_a_second() -> None:
 
 def test_ros_points_are_in_radians_and_in_order() -> None:
     plan = shipped_plan()
-    text = exchange.to_ros(plan, 10.0, "base_link")
+    text = plan.to_ros(10.0, "base_link")
     assert "frame_id: 'base_link'" in text
     assert "joint_names: ['joint 1', 'joint 2', 'joint 3']" in text
     points = [line for line in text.splitlines() if line.startswith("- positions: ")]
@@ -81,7 +81,7 @@ def test_via_points_come_from_any_sensible_table(tmp_path: Path, text: str, radi
     table = tmp_path / "via.csv"
     table.write_text(text, encoding="utf-8")
     np.testing.assert_allclose(
-        exchange.via_from_csv(table, ARM, radians).via_deg, [[0, -60, 40], [20, -75, 50]], atol=1e-6
+        via_table.via_from_csv(table, ARM, radians).via_deg, [[0, -60, 40], [20, -75, 50]], atol=1e-6
     )
 
 
@@ -104,7 +104,7 @@ def test_a_table_that_will_not_do_is_refused_with_its_line(tmp_path: Path, text:
     table = tmp_path / "via.csv"
     table.write_text(text)
     with pytest.raises(InputError, match=said):
-        exchange.via_from_csv(table, ARM)
+        via_table.via_from_csv(table, ARM)
 
 
 @pytest.mark.parametrize("tolerance", [1.0, 0.1, 0.01])
@@ -112,7 +112,7 @@ def test_an_exported_motion_comes_back_thinned_to_the_tolerance(tmp_path: Path, 
     plan = shipped_plan()
     table = tmp_path / "feed.csv"
     table.write_text(plan.to_csv(60.0))
-    found = exchange.via_from_csv(table, ARM, tolerance_deg=tolerance)
+    found = via_table.via_from_csv(table, ARM, tolerance_deg=tolerance)
     assert found.lines == 409
     assert 5 < len(found.via_deg) < {1.0: 15, 0.1: 25, 0.01: 50}[tolerance]
     times = exchange.times_s(plan.trajectory.duration_s, 60.0)
@@ -129,8 +129,8 @@ def test_a_path_without_times_is_thinned_where_asked(tmp_path: Path) -> None:
     table = tmp_path / "arc.csv"
     turn = np.linspace(0.0, np.pi, 600)
     table.write_text("".join(f"{20 * np.cos(a)},{-60 + 20 * np.sin(a)},40\n" for a in np.repeat(turn, 2)))
-    assert len(exchange.via_from_csv(table, ARM).via_deg) == 1200
-    found = exchange.via_from_csv(table, ARM, tolerance_deg=0.1)
+    assert len(via_table.via_from_csv(table, ARM).via_deg) == 1200
+    found = via_table.via_from_csv(table, ARM, tolerance_deg=0.1)
     assert 3 < len(found.via_deg) < 25
     np.testing.assert_allclose(found.via_deg[[0, -1]], [[20, -60, 40], [-20, -60, 40]], atol=1e-9)
 
@@ -149,8 +149,8 @@ def test_what_cannot_be_thinned_to_a_motion_is_refused() -> None:
 
 def test_the_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    trajectory_file.save(shipped_plan(), "feed.json")
-    run = CliRunner(env={"ARMTEMPO_ARM": str(arm_file.default_path())}).invoke
+    shipped_plan().save("feed.json")
+    run = CliRunner(env={"ARMTEMPO_ARM": str(shipped.arm_path())}).invoke
     assert run(main, ["export", "feed.json", "--rate", "2", "-o", "feed.csv"]).exit_code == 0
     assert run(main, ["export", "feed.json", "--format", "ros"]).output.startswith("header:")
     made = run(main, ["import", "feed.csv", "--name", "again"])

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from armtempo.model.arm import Arm, Limits
+from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.model.parts import Limits
 from armtempo.planning import dual_bound, dual_value, lower_bounds, planner, rest_to_rest
 from armtempo.planning.dual_bound import Cells, Multipliers
 from armtempo.splines import bspline

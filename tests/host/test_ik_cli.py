@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from armtempo.cli import main
 from armtempo.kinematics import forward
-from armtempo.model import arm_file
+from armtempo.model import shipped
 from click.testing import CliRunner, Result
 
 from tests.host.published_arms import PAPER
@@ -21,9 +21,7 @@ POSITION = ("--position", "-536.404", "0", "434.698")
 
 
 def run(*arguments: str | Path) -> Result:
-    return CliRunner(env={"ARMTEMPO_ARM": str(arm_file.default_path())}).invoke(
-        main, ["ik", *map(str, arguments)]
-    )
+    return CliRunner(env={"ARMTEMPO_ARM": str(shipped.arm_path())}).invoke(main, ["ik", *map(str, arguments)])
 
 
 def solutions(*arguments: str | Path) -> list[dict[str, Any]]:
@@ -128,7 +126,7 @@ def test_singular_poses_say_so() -> None:
 def test_an_arm_outside_the_class_is_searched_numerically(tmp_path: Path) -> None:
     arm = tmp_path / "arm.toml"
     arm.write_text(
-        arm_file.default_path().read_text().replace("d_mm = 360.0\na_mm = 0.0", "d_mm = 360.0\na_mm = 10.0")
+        shipped.arm_path().read_text().replace("d_mm = 360.0\na_mm = 0.0", "d_mm = 360.0\na_mm = 10.0")
     )
     form = ("--arm", arm, "--position", "300", "200", "300", "--rpy", "10", "20", "30")
     result = run(*form)

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 from armtempo.diagnosis.arm_check import check
-from armtempo.model import arm_file, job_file
+from armtempo.model import shipped
 
 from tests.host.arm_files import changed, run_check
 
 
 def changed_job(tmp_path: Path, old: str = "", new: str = "") -> Path:
-    text = job_file.default_path().read_text()
+    text = shipped.job_path().read_text()
     assert old in text
     path = tmp_path / "job.toml"
     path.write_text(text.replace(old, new, 1))
@@ -45,7 +45,7 @@ def test_the_feeding_job_fits(tmp_path: Path) -> None:
 def test_what_looks_wrong_about_a_job(tmp_path: Path, via: str, level: str, said: str) -> None:
     path = tmp_path / "job.toml"
     path.write_text(f'name = "j"\nvia_deg = {via}\n')
-    _, found = check(arm_file.default_path(), path)
+    _, found = check(shipped.arm_path(), path)
     assert any(said in finding.what and finding.level.value == level for finding in found), found
     assert run_check("--job", path).exit_code == (1 if level == "error" else 0)
 

@@ -11,7 +11,8 @@ import pytest
 from armtempo.basics.errors import InputError
 from armtempo.cli import main
 from armtempo.link import board_messages
-from armtempo.model import arm_file, shipped, trajectory_file
+from armtempo.model import shipped
+from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.report import comparison, run_report
 from armtempo_shared import wire
@@ -68,15 +69,15 @@ def test_other_alphabets_are_names(tmp_path: Path) -> None:
     path = tmp_path / "arm.toml"
     text = shipped.files()[shipped.PAPER].read_text(encoding="utf-8")
     path.write_text(text.replace('"joint 2"', '"Schulter – плечо 肩"', 1), encoding="utf-8")
-    assert arm_file.load(path).driven[1].name == "Schulter – плечо 肩"
+    assert Arm.load(path).driven[1].name == "Schulter – плечо 肩"
 
 
 @pytest.mark.parametrize("name", [name for name in CONTROL if "\n" not in name])
 def test_a_trajectory_file_with_them_is_refused(tmp_path: Path, name: str) -> None:
     path = tmp_path / "x.json"
-    trajectory_file.save(named(name, "b", "c"), path)
+    named(name, "b", "c").save(path)
     with pytest.raises(InputError, match="control characters") as caught:
-        trajectory_file.load(path)
+        Plan.load(path)
     assert shown_safely(str(caught.value))
 
 

@@ -7,7 +7,10 @@ from pathlib import Path
 import pytest
 from armtempo.basics.errors import InputError
 from armtempo.cli import main
-from armtempo.model import arm_file, job_file, sequence_file, shipped
+from armtempo.model import shipped
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
+from armtempo.model.sequence import Sequence
 from armtempo.new_arm import folder as project_folder
 from armtempo.new_arm import given_geometry, joint_entry
 from click.testing import CliRunner, Result
@@ -29,7 +32,7 @@ def test_an_own_arm_of_four_joints_is_planned_at_once(tmp_path: Path) -> None:
     folder = tmp_path / "my arm"
     done = new(str(folder), *(word for joint in FOUR for word in ("--joint", joint)))
     assert done.exit_code == 0, done.output
-    arm = arm_file.load(folder / "arm.toml")
+    arm = Arm.load(folder / "arm.toml")
     assert [joint.name for joint in arm.driven] == ["joint 1", "shoulder", "joint 3", "joint 4"]
     assert arm.driven[1].limits.speed_deg_s == 30.0
     assert arm.driven[2].motor.microsteps == 8
@@ -49,9 +52,9 @@ def test_an_own_arm_of_four_joints_is_planned_at_once(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", list(shipped.files()))
 def test_the_first_job_of_every_arm_that_ships_is_within_its_ranges(name: str, tmp_path: Path) -> None:
     project_folder.write(tmp_path / name, given_geometry.from_shipped(name), "sim:board")
-    arm = arm_file.load(tmp_path / name / "arm.toml")
-    job = job_file.load(tmp_path / name / "first.toml", arm)
-    sequence = sequence_file.load(tmp_path / name / "sequence.toml", arm)
+    arm = Arm.load(tmp_path / name / "arm.toml")
+    job = Job.load(tmp_path / name / "first.toml", arm)
+    sequence = Sequence.load(tmp_path / name / "sequence.toml", arm)
     assert sequence.name == "cycle"
     assert len(job.via) == 3
     for angles in job.via:
@@ -132,7 +135,7 @@ def test_questions_at_a_terminal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     answers = ["own", "1", "turntable", "", "", "", "", "-180", "180", "", "", "5", "", "20", "sim:table"]
     done = new(str(tmp_path / "x"), text="\n".join(answers) + "\n")
     assert done.exit_code == 0, done.output
-    arm = arm_file.load(tmp_path / "x" / "arm.toml")
+    arm = Arm.load(tmp_path / "x" / "arm.toml")
     assert arm.driven[0].name == "turntable"
     assert arm.driven[0].motor.gear_ratio == 5.0
     assert arm.driven[0].limits.speed_deg_s == 20.0

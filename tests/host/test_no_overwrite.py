@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from armtempo.cli import main
-from armtempo.model import arm_file
+from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import planner
@@ -20,7 +20,7 @@ JOB = 'name = "keep"\nvia_deg = [[0.0, -60.0, 40.0], [5.0, -58.0, 41.0]]\niterat
 def _files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("keep.toml").write_text(JOB)
-    Path("arm.toml").write_text(arm_file.default_path().read_text())
+    Path("arm.toml").write_text(shipped.arm_path().read_text())
     Path("table.csv").write_text("0,-60,40\n5,-58,41\n")
     job = Job("keep", ((0.0, -60.0, 40.0), (5.0, -58.0, 41.0)), population=5, iterations=5)
     planner.plan(ARM, job).save("motion.json")

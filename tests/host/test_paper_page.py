@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from armtempo.basics.errors import LinkError
-from armtempo.model.arm import Limits
+from armtempo.model.parts import Limits
 from armtempo.paper import experiment, motions, searches, sheet
 from armtempo.paper.claims import DIFFERS, SAME, Claim
 from armtempo.paper.experiment import CUBIC, QUINTIC, UNOPTIMISED, Series

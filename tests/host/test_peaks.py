@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from armtempo.model.arm import Limits
+from armtempo.model.parts import Limits
 from armtempo.runs import analysis, peaks
 from armtempo.runs.reader import RepetitionData
 from armtempo.splines.extremes import of_joints

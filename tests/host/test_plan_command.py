@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 from armtempo.cli import main
-from armtempo.model import arm_file, shipped, trajectory_file
+from armtempo.model import shipped
 from armtempo.model.arm import Arm
+from armtempo.model.plan import Plan
 from armtempo.planning import planner
 from click.testing import CliRunner, Result
 
@@ -21,7 +22,7 @@ iterations = 10
 
 def run(*arguments: str) -> Result:
     """The command's outcome; a job is for the arm that ships with armtempo."""
-    arm = {"ARMTEMPO_ARM": str(arm_file.default_path())} if "--job" in arguments else {}
+    arm = {"ARMTEMPO_ARM": str(shipped.arm_path())} if "--job" in arguments else {}
     return CliRunner(env=arm).invoke(main, ["plan", *arguments])
 
 
@@ -36,7 +37,7 @@ def test_plans_the_shipped_job_without_options() -> None:
     assert result.exit_code == 0, result.output
     assert "joint 3" in result.output
     assert "written: feed.json" in result.output
-    assert trajectory_file.load("feed.json").job.iterations == 20
+    assert Plan.load("feed.json").job.iterations == 20
 
 
 def test_json_is_one_document_and_quiet_leaves_it_alone() -> None:
@@ -44,7 +45,7 @@ def test_json_is_one_document_and_quiet_leaves_it_alone() -> None:
     assert result.exit_code == 0, result.output
     assert result.stderr == ""
     (found,) = json.loads(result.stdout)["plans"]
-    saved = trajectory_file.load("feed.json")
+    saved = Plan.load("feed.json")
     assert (found["file"], found["duration_s"]) == ("feed.json", saved.trajectory.duration_s)
     assert [joint["name"] for joint in found["joints"]] == ["joint 1", "joint 2", "joint 3"]
     for joint in found["joints"]:
@@ -72,7 +73,7 @@ def test_coarse_steps_are_told_with_what_to_do() -> None:
     )
     assert told[1].startswith("warning: joint 2: its smallest step, 3.6 deg, moves the tool by up to")
     assert all("use more microsteps or a larger gear ratio" in line for line in told)
-    assert trajectory_file.load("move.json").arm.joints[1].motor is not None
+    assert Plan.load("move.json").arm.joints[1].motor is not None
 
 
 def test_an_arm_that_ships_is_taken_by_its_name() -> None:
@@ -80,7 +81,7 @@ def test_an_arm_that_ships_is_taken_by_its_name() -> None:
     result = run("--job", "ar4.toml", "--arm", "ar4")
     assert result.exit_code == 0, result.output
     assert "arm: AR4-MK3 (as it ships with armtempo)" in result.stdout
-    assert trajectory_file.load("lift.json").arm == Arm.load("ar4")
+    assert Plan.load("lift.json").arm == Arm.load("ar4")
 
 
 def test_options_go_before_the_file() -> None:
@@ -98,7 +99,7 @@ def test_options_go_before_the_file() -> None:
         "--polish",
     )
     assert result.exit_code == 0, result.output
-    plan = trajectory_file.load("out.json")
+    plan = Plan.load("out.json")
     assert (plan.job.timing, plan.job.degree, plan.job.seed, plan.job.polish) == ("shared", 3, 5, True)
     assert plan.trajectory.shared
     assert plan.searches[0].optimum_s > 0
@@ -176,7 +177,7 @@ def test_plans_a_free_path_with_a_stop_and_says_its_starts_and_record() -> None:
     assert "free path, shared timing" in result.output
     assert "1 starts, driven joint" in result.output
     assert "bytes of the 16384 that the board takes" in result.output
-    plan = trajectory_file.load("rests.json")
+    plan = Plan.load("rests.json")
     assert plan.trajectory.joints[0].via_segments is not None
     assert plan.job.stops[0].dwell_s == 0.5
 
@@ -188,7 +189,7 @@ def test_a_stop_on_the_spline_is_refused_and_split_makes_two_motions_of_it() -> 
     assert "--split" in refused.output
     result = run("--job", "rests.toml", "--split")
     assert result.exit_code == 0, result.output
-    first, second = (trajectory_file.load(f"rests-{number}.json") for number in (1, 2))
+    first, second = (Plan.load(f"rests-{number}.json") for number in (1, 2))
     assert first.via_deg[-1].tolist() == second.via_deg[0].tolist() == [20.0, -75.0, 50.0]
     assert not Path("rests.json").exists()
 
@@ -251,7 +252,7 @@ def test_a_corridor_curve_needs_a_free_path() -> None:
 def test_a_job_that_does_not_say_otherwise_is_planned_on_one_polished_axis() -> None:
     result = run("--job", "move.toml")
     assert result.exit_code == 0, result.output
-    plan = trajectory_file.load("move.json")
+    plan = Plan.load("move.json")
     assert (plan.job.timing, plan.job.refine, plan.job.polish, plan.job.bounds_s) == (
         "shared",
         "auto",

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from armtempo.basics.errors import InputError, PlanError
-from armtempo.model.arm import Arm, Limits
+from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.model.parts import Limits
 from armtempo.model.plan import Plan
 from armtempo.planning import lower_bounds, planner
 from armtempo.planning.lower_bounds import Floor

@@ -13,7 +13,7 @@ from armtempo.basics.errors import InputError
 from armtempo.cli import main
 from armtempo.cli.posture import NamedPosture
 from armtempo.kinematics.of_arm import forward
-from armtempo.model import arm_file, arm_json, posture_text
+from armtempo.model import arm_json, posture_text, shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import planner, via_points
@@ -27,7 +27,7 @@ POSE = "\n[posture.over]\nposition_mm = {}\ntolerance_mm = 0.01\n"
 def written(tmp_path: Path, more: str) -> Path:
     """The shipped arm file with more behind it."""
     path = tmp_path / "arm.toml"
-    path.write_text(arm_file.default_path().read_text() + more)
+    path.write_text(shipped.arm_path().read_text() + more)
     return path
 
 

@@ -1,4 +1,4 @@
-"""README: the calls and places that it names exist, and so does what the pages link to."""
+"""The tour of the code: the calls and places that it names exist; and the pages link to what exists."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ import pytest
 from tests import sources
 
 ROOT = Path(__file__).parents[2]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+TOUR = (ROOT / "host" / "docs" / "architecture.md").read_text(encoding="utf-8")
 SOURCES = {
     "host": ROOT / "host" / "armtempo",
     "shared": ROOT / "shared" / "armtempo_shared",
     "board": ROOT / "board" / "armtempo_board",
 }
-PAGES = [ROOT / "README.md", *sorted(ROOT.glob("*/docs/*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("*/docs/*.md"))]
 
 
 @cache
@@ -42,9 +42,8 @@ def names(side: str) -> frozenset[str]:
 
 
 def mentioned() -> list[tuple[str, str]]:
-    """(side, name) of each call or place in the second column of README's tables of the way and of places."""
-    begin = README.index("## The way of the data")
-    rows = [line.split("|") for line in README[begin : README.index("## For developers")].splitlines()]
+    """(side, name) of each call or place in the second column of the tables of the way and of places."""
+    rows = [line.split("|") for line in TOUR.splitlines()]
     cells = [row[2] for row in rows if len(row) > 3 and not set(row[1]) <= set("- ")]
     found = []
     for text in re.findall(r"`([^`]+)`", " ".join(cells)):
@@ -61,7 +60,7 @@ def test_the_tables_were_found() -> None:
 
 @sources.TOGETHER
 @pytest.mark.parametrize(("side", "name"), sorted(set(mentioned())))
-def test_what_the_readme_names_exists(side: str, name: str) -> None:
+def test_what_the_tour_names_exists(side: str, name: str) -> None:
     assert name in names(side)
 
 
@@ -83,6 +82,6 @@ def test_the_pages_on_arms_and_kinematics_name_modules_that_exist() -> None:
 
 
 def test_the_tour_names_every_package() -> None:
-    tour = README[README.index("host/armtempo/  basics") : README.index("shared/armtempo_shared/   ")]
+    tour = TOUR[TOUR.index("host/armtempo/  basics") : TOUR.index("shared/armtempo_shared/   ")]
     packages = {path.parent.name for path in SOURCES["host"].glob("*/__init__.py")} | {"pipeline"}
     assert packages <= set(re.findall(r"\w+", tour))

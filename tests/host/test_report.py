@@ -14,8 +14,7 @@ import numpy as np
 import pytest
 from armtempo.basics.errors import RunFolderError
 from armtempo.cli import main
-from armtempo.model import trajectory_file
-from armtempo.model.arm import Driver, Joint, Limits
+from armtempo.model.parts import Driver, Joint, Limits
 from armtempo.model.plan import Plan
 from armtempo.planning import path_deviation
 from armtempo.report import comparison, drawing, run_report, verdict
@@ -355,7 +354,7 @@ def test_shared_timing_needs_no_such_section(tmp_path: Path) -> None:
 def spoil_plan(path: Path, change: Callable[[Plan], Plan]) -> None:
     """Change the plan in a run folder."""
     file = path / "trajectory.json"
-    trajectory_file.save(change(trajectory_file.load(file)), file, force=True)
+    change(Plan.load(file)).save(file, force=True)
 
 
 @pytest.mark.usefixtures("without_drawing")

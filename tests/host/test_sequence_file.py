@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.kinematics.of_arm import forward
-from armtempo.model import sequence_file
+from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.sequence import Sequence
@@ -22,7 +22,7 @@ from armtempo.records import encoded_sequence
 from armtempo_shared import sequence as record
 from armtempo_shared import sequence_check
 
-FOLDER = Path(sequence_file.__file__).parents[1] / "data" / "pick_and_place"
+FOLDER = shipped.arm_path().parent / "pick_and_place"
 ARM = Arm.load(FOLDER / "arm.toml")
 POSTURES = """
 [posture.a]

@@ -2,22 +2,38 @@
 
 from __future__ import annotations
 
+import json
 import os
+import random
 import socket
 import stat
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, PortError
+from armtempo.link import Client
+from armtempo.link.board_messages import Levels
+from armtempo.link.refusal import refusal
 from armtempo.link.turns import Turns
 from armtempo.ports import caller, claim
 from armtempo.ports.caller import Caller, Ownership, ownership
-from armtempo.ports.lines import Message
+from armtempo.ports.claim import PortClaim
+from armtempo.ports.lines import LineReader, Message
+from armtempo.ports.requests import REQUESTS, Field, check
 from armtempo.ports.server import Server
+from armtempo.robot import sharing
 from armtempo.robot.shared_board import SharedBoard
+from armtempo.robot.sharing import Sharing
+from armtempo_shared import wire
+
+ANY = Field("anything", lambda _: True, needed=False)
+ECHO = {**REQUESTS, "echo": {"text": ANY, "refuse": ANY}}
 
 
 def handle(request: Message) -> Message:
@@ -29,7 +45,7 @@ def handle(request: Message) -> Message:
 
 @pytest.fixture
 def server() -> Iterator[Server]:
-    found = Server(claim.new("/dev/p", "/dev/p", "/dev/p"), {"echo": handle})
+    found = Server(claim.new("/dev/p", "/dev/p", "/dev/p"), {"echo": handle}, ECHO)
     yield found
     found.close()
 
@@ -80,7 +96,7 @@ def test_only_this_user_gets_in(server: Server) -> None:
 def test_a_token_is_asked_for_where_there_are_no_modes(monkeypatch: pytest.MonkeyPatch) -> None:
     """As on Windows: a port of localhost that every user reaches."""
     monkeypatch.setattr(claim, "LOCAL_SOCKETS", False)
-    server = Server(claim.new("COM5", "COM5", "COM5"), {"echo": handle})
+    server = Server(claim.new("COM5", "COM5", "COM5"), {"echo": handle}, ECHO)
     try:
         assert len(server.claim.token) == 32
         with Caller(server.claim) as other:
@@ -143,7 +159,7 @@ def test_who_lost_the_port_uses_it_no_more(server: Server) -> None:
 
 def test_what_is_subscribed_comes_until_the_port_is_given_up(server: Server) -> None:
     with Caller(server.claim) as other:
-        with pytest.raises(LinkError, match="topics must be"):
+        with pytest.raises(LinkError, match=r"topics is .*everything"):
             other.subscribe("everything")
         other.subscribe("sample")
         for index in range(3):
@@ -186,3 +202,168 @@ def test_who_is_in_a_hurry_goes_first() -> None:
     finally:
         ended.set()
         thread.join()
+
+
+class Owner:
+    """What ``Sharing`` needs of a client; keeps what the board would have been told."""
+
+    def __init__(self) -> None:
+        self.session = SimpleNamespace(transport=SimpleNamespace(name="/dev/p"), in_a_hurry=self._turn)
+        self.told: list[tuple[object, ...]] = []
+        self.rate = 1000
+
+    @contextmanager
+    def _turn(self, _wait_s: float) -> Iterator[bool]:
+        yield True
+
+    def speed(self, rate: int) -> None:
+        """A change of speed."""
+        self.told.append(("speed", rate))
+
+    def set_output(self, number: int, value: int) -> None:
+        """An output."""
+        self.told.append(("output", number, value))
+
+    def levels(self) -> Levels:
+        """Of an arm without outputs and inputs."""
+        return Levels(0, ())
+
+    def stop(self, now: bool) -> None:
+        """A stop."""
+        self.told.append(("stop", now))
+
+
+@pytest.fixture
+def owner(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Owner, PortClaim]]:
+    """A program that has a port, with a board that does as it is told."""
+    client, failed = Owner(), []
+    monkeypatch.setattr(sharing, "send_stop", lambda client, now: client.stop(now) is None)
+    monkeypatch.setattr(threading, "excepthook", failed.append)
+    shared = Sharing(cast(Any, client), cast(Any, lambda: SimpleNamespace(to_json=dict)), [], lambda: None)
+    shared.open("/dev/p")
+    found = claim.find("/dev/p", "/dev/p")
+    assert found is not None
+    yield client, found
+    shared.close()
+    assert not failed, "a thread of the owner ended in a traceback"
+
+
+def answers(server: PortClaim, lines: list[bytes]) -> Iterator[Message]:
+    """What the owner says to some lines that are messages, on one connection."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as stranger:
+        stranger.settimeout(10.0)
+        stranger.connect(server.address)
+        reader = LineReader(stranger)
+        for first in range(0, len(lines), 500):  # no more than the owner keeps for a slow reader
+            some = lines[first : first + 500]
+            stranger.sendall(b"".join(line + b"\n" for line in some))
+            for line in some:
+                answer = reader.read()
+                assert answer is not None, line
+                yield answer
+
+
+@pytest.mark.parametrize(
+    ("request_", "says"),
+    [
+        ('"request":"speed"', "rate is missing; rate is a whole number from 10 to 1000, or 0, or 65535"),
+        ('"request":"speed","rate":"50"', "rate is '50'"),
+        ('"request":"speed","rate":1e999', "rate is inf"),
+        ('"request":"speed","rate":-1', "rate is -1"),
+        ('"request":"speed","rate":true', "rate is True"),
+        (f'"request":"speed","rate":{"9" * 4000}', "speed: rate is 9999"),
+        ('"request":"speed","rat":50,"rate":50', "no field 'rat'; it has rate"),
+        ('"request":"stop","by":"\\ud800"', "by is '\\ud800'"),
+        ('"request":"stop","now":1', "now is 1; it must be true or false"),
+        ('"request":"output","number":256,"value":0', "number is 256"),
+        ('"request":"hello","token":"\\ud800"', "token is"),
+        ('"request":"subscribe","topics":[["sample"]]', "topics is"),
+        ('"request":["speed"]', "no request ['speed']"),
+    ],
+)
+def test_a_malformed_request_is_answered_with_what_is_wrong(
+    owner: tuple[Owner, PortClaim], request_: str, says: str
+) -> None:
+    client, server = owner
+    for answer in answers(server, [b'{"id":7,%s}' % request_.encode()]):
+        assert (answer["id"], answer["ok"]) == (7, False)
+        assert says in f"{answer['error']}; {answer['hint']}"
+    assert not client.told
+
+
+@pytest.mark.parametrize("number", ["1e999", "[1]", '"\\ud800"', "1.5", "null"])
+def test_an_id_that_cannot_be_repeated_is_refused(owner: tuple[Owner, PortClaim], number: str) -> None:
+    (answer,) = answers(owner[1], [b'{"id":%s,"request":"stop"}' % number.encode()])
+    assert (answer["id"], answer["ok"]) == (None, False)
+    assert "without an id" in answer["error"]
+    assert not owner[0].told
+
+
+VALUES = (
+    0,
+    1,
+    -1,
+    10,
+    999,
+    1000,
+    65535,
+    65536,
+    10**30,
+    0.5,
+    1e999,
+    -1e999,
+    1e300,
+    True,
+    None,
+    "",
+    "50",
+    "\ud800",
+)
+VALUES += ("\x1b[2J", "x" * 201, [], {}, ["sample"], ["sample", 1], [[]], {"rate": 1}, "status")
+NAMES = (*REQUESTS, "", "Speed", None, 3)
+FIELDS = ("version", "token", "topics", "now", "by", "rate", "number", "value", "id", "x", "\ud800")
+
+
+def random_request(numbers: random.Random) -> Message:
+    """A request with any fields; about one in eight is one that the owner does."""
+    name = numbers.choice(NAMES)
+    fields = {field: numbers.choice(VALUES) for field in numbers.sample(FIELDS, numbers.randrange(3))}
+    if name in REQUESTS and numbers.random() < 0.5:
+        fields = {field: numbers.choice(VALUES) for field in REQUESTS[name]}
+    return {"id": numbers.randrange(100), "request": name, **fields}
+
+
+@pytest.mark.slow
+def test_a_hundred_thousand_random_requests_are_answered(owner: tuple[Owner, PortClaim]) -> None:
+    """All of them by the table, one in ten over a socket too."""
+    seed = 26
+    print("seed", seed)
+    numbers = random.Random(seed)
+    client, server = owner
+    allowed, lines = 0, []
+    for number in range(100_000):
+        request = random_request(numbers)
+        if number % 10 == 0:
+            lines.append(json.dumps(request).replace("Infinity", "1e999").encode())
+        with suppress(LinkError):  # anything else ends the test
+            check(request, REQUESTS.get(request["request"], {}))
+            allowed += 1
+    done = 0
+    for answer, line in zip(answers(server, lines), lines, strict=True):
+        done += answer["ok"]
+        assert answer["ok"] or (answer["error"] and answer["hint"]), line
+    assert allowed > 5000
+    assert done > 500
+    for what, *values in client.told:
+        fields = REQUESTS[str(what)].values()
+        assert all(field.fits(value) for field, value in zip(fields, values, strict=False))
+
+
+def test_an_output_of_an_arm_that_has_none_is_said_to_be_missing() -> None:
+    def refuse(what: str, *_: object, **__: object) -> None:
+        raise refusal(what, wire.ERROR_CODES["unknown_command"])
+
+    client = Client(cast(Any, SimpleNamespace(command=refuse)))
+    with pytest.raises(BoardError, match=r"has no outputs; write a table \[output.NAME\]"):
+        client.set_output(0, 1)
+    assert client.levels() == Levels(0, ())

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import ast
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 from tests import sources
@@ -107,6 +108,30 @@ def test_imports_point_one_way() -> None:
         if here not in LOWEST + HIGHEST:
             for name in imported(tree(path)):
                 assert name not in ORDER or ORDER.index(name) <= ORDER.index(here), f"{path} imports {name}"
+
+
+def test_no_modules_import_each_other() -> None:
+    names = {name_of(path): path for path in modules()}
+    needs = {name: set(imported_modules(path, names)) - {name} for name, path in names.items()}
+    needs["armtempo"] = set()  # it hands names on, each when it is first used
+    TopologicalSorter(needs).prepare()  # CycleError, with the modules of the circle
+
+
+def name_of(path: Path) -> str:
+    """A module's name, with dots."""
+    return ".".join(path.relative_to(HOST.parent).with_suffix("").parts).removesuffix(".__init__")
+
+
+def imported_modules(path: Path, names: Container[str]) -> Iterator[str]:
+    """Modules among ``names`` that a file imports, anywhere in it."""
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            inner = [f"{node.module}.{alias.name}" for alias in node.names]
+            yield from (name for name in inner if name in names)
+            if node.module in names and any(name not in names for name in inner):
+                yield node.module
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name in names)
 
 
 def test_functions_take_few_parameters() -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from armtempo.basics.errors import InputError
-from armtempo.model import trajectory_file
+from armtempo.model import plan as plan_file
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
@@ -29,12 +29,12 @@ def plan() -> Plan:
 
 @pytest.fixture
 def path(plan: Plan, tmp_path: Path) -> Path:
-    trajectory_file.save(plan, tmp_path / "feed.json")
+    plan.save(tmp_path / "feed.json")
     return tmp_path / "feed.json"
 
 
 def test_comes_back_to_the_last_bit(plan: Plan, path: Path) -> None:
-    loaded = trajectory_file.load(path)
+    loaded = Plan.load(path)
     assert loaded.arm == plan.arm
     assert loaded.job == plan.job
     assert loaded.versions == plan.versions
@@ -43,12 +43,12 @@ def test_comes_back_to_the_last_bit(plan: Plan, path: Path) -> None:
         assert np.array_equal(one.angle_points_deg, two.angle_points_deg)
         assert np.array_equal(one.time_points_s, two.time_points_s)
     again = path.with_name("again.json")
-    trajectory_file.save(loaded, again)
+    loaded.save(again)
     assert again.read_bytes() == path.read_bytes()
 
 
 def test_is_enough_to_plan_again(path: Path) -> None:
-    loaded = trajectory_file.load(path)
+    loaded = Plan.load(path)
     again = planner.plan(loaded.arm, loaded.job)
     for one, two in zip(loaded.trajectory.joints, again.trajectory.joints, strict=True):
         assert np.array_equal(one.time_points_s, two.time_points_s)
@@ -57,8 +57,8 @@ def test_is_enough_to_plan_again(path: Path) -> None:
 def test_keeps_poses(plan: Plan, tmp_path: Path) -> None:
     pose = Pose.of_angles((5.0, 6.0, 7.0), {"pitch": 20.0})
     posed = replace(plan, job=replace(plan.job, via=(plan.job.via[0], pose)))
-    trajectory_file.save(posed, tmp_path / "posed.json")
-    assert trajectory_file.load(tmp_path / "posed.json").job == posed.job
+    posed.save(tmp_path / "posed.json")
+    assert Plan.load(tmp_path / "posed.json").job == posed.job
 
 
 def test_reads_files_from_before_poses_had_tolerances_and_joints_linkages() -> None:
@@ -66,7 +66,7 @@ def test_reads_files_from_before_poses_had_tolerances_and_joints_linkages() -> N
     old = Path(__file__).parents[1] / "data" / "trajectory_before_tolerances.json"
     content = json.loads(old.read_text(encoding="utf-8"))["plan"]
     assert set(content["job"]["via"][1]) == {"matrix", "posture_deg"}
-    loaded = trajectory_file.load(old)
+    loaded = Plan.load(old)
     assert replace(loaded.arm, source=ARM.source) == ARM
     _, pose, _ = loaded.job.via
     assert pose == Pose(tuple(map(tuple, content["job"]["via"][1]["matrix"])))
@@ -81,7 +81,7 @@ def test_refuses_every_cut_of_the_file(path: Path, tmp_path: Path) -> None:
     for length in [0, 1, 10, len(content) // 2, len(content) - 2, len(content) - 1]:
         cut.write_bytes(content[:length])
         with pytest.raises(InputError, match=r"cut\.json"):
-            trajectory_file.load(cut)
+            Plan.load(cut)
 
 
 def edited(path: Path, edit: Callable[[Any], None]) -> Path:
@@ -89,7 +89,7 @@ def edited(path: Path, edit: Callable[[Any], None]) -> Path:
     content = json.loads(path.read_text(encoding="utf-8"))
     edit(content)
     if "plan" in content and "sha256" in content:
-        content["sha256"] = trajectory_file._checksum(content["plan"])
+        content["sha256"] = plan_file._checksum(content["plan"])
     path.write_text(json.dumps(content), encoding="utf-8")
     return path
 
@@ -141,7 +141,7 @@ def edited(path: Path, edit: Callable[[Any], None]) -> Path:
 )
 def test_refuses_what_it_does_not_understand(path: Path, edit: Callable[[Any], None], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        trajectory_file.load(edited(path, edit))
+        Plan.load(edited(path, edit))
 
 
 @pytest.mark.parametrize(
@@ -152,14 +152,14 @@ def test_refuses_what_is_no_trajectory(tmp_path: Path, text: str) -> None:
     path = tmp_path / "other.json"
     path.write_bytes(text.encode("latin-1"))
     with pytest.raises(InputError, match=r"other\.json"):
-        trajectory_file.load(path)
+        Plan.load(path)
 
 
 def test_refuses_a_missing_file_and_a_folder(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
-        trajectory_file.load(tmp_path / "none.json")
+        Plan.load(tmp_path / "none.json")
     with pytest.raises(InputError, match="cannot be read"):
-        trajectory_file.load(tmp_path)
+        Plan.load(tmp_path)
 
 
 def test_writes_whole_or_not_at_all(plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -171,14 +171,14 @@ def test_writes_whole_or_not_at_all(plan: Plan, tmp_path: Path, monkeypatch: pyt
 
     monkeypatch.setattr("os.replace", broken)
     with pytest.raises(InputError, match="No space left"):
-        trajectory_file.save(plan, target, force=True)
+        plan.save(target, force=True)
     assert target.read_text() == "old"
     assert list(tmp_path.iterdir()) == [target]
 
 
 def test_says_where_it_cannot_write(plan: Plan, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be written"):
-        trajectory_file.save(plan, tmp_path / "none" / "feed.json")
+        plan.save(tmp_path / "none" / "feed.json")
 
 
 ALTERATIONS: list[Callable[[Any], None]] = [
@@ -198,15 +198,15 @@ def test_an_altered_file_is_refused_unless_it_is_asked_for(
     alter(content["plan"])
     path.write_text(json.dumps(content), encoding="utf-8")
     with pytest.raises(InputError, match=r"feed\.json was altered .* --altered"):
-        trajectory_file.load(path)
+        Plan.load(path)
     assert not caplog.records
-    trajectory_file.load(path, altered=True)
+    Plan.load(path, altered=True)
     assert "was altered" in caplog.text
 
 
 def test_blanks_and_line_breaks_are_no_alteration(path: Path, caplog: pytest.LogCaptureFixture) -> None:
     path.write_text(json.dumps(json.loads(path.read_text())), encoding="utf-8")
-    trajectory_file.load(path)
+    Plan.load(path)
     assert not caplog.records
 
 
@@ -215,7 +215,7 @@ def test_a_checksum_that_was_taken_away_is_missed(path: Path) -> None:
     del content["sha256"]
     path.write_text(json.dumps(content), encoding="utf-8")
     with pytest.raises(InputError, match="missing key"):
-        trajectory_file.load(path)
+        Plan.load(path)
 
 
 def test_a_file_from_before_the_checksum_is_read_with_a_note(
@@ -224,7 +224,7 @@ def test_a_file_from_before_the_checksum_is_read_with_a_note(
     content = json.loads(path.read_text(encoding="utf-8"))
     del content["sha256"]
     path.write_text(json.dumps({**content, "version": 1}), encoding="utf-8")
-    assert trajectory_file.load(path).job == plan.job
+    assert Plan.load(path).job == plan.job
     assert "before trajectory files had a checksum" in caplog.text
 
 
@@ -234,22 +234,22 @@ def test_an_altered_file_in_a_run_folder_is_to_be_brought_back(path: Path) -> No
     content["plan"]["job"]["seed"] = 7
     path.write_text(json.dumps(content), encoding="utf-8")
     with pytest.raises(InputError, match="bring the original back"):
-        trajectory_file.load(path)
+        Plan.load(path)
 
 
 def test_only_an_earlier_plan_of_the_same_job_and_arm_is_replaced(plan: Plan, path: Path) -> None:
-    trajectory_file.save(replace(plan, job=replace(plan.job, seed=9)), path)
-    assert trajectory_file.load(path).job.seed == 9
+    replace(plan, job=replace(plan.job, seed=9)).save(path)
+    assert Plan.load(path).job.seed == 9
     for other in (
         replace(plan, job=replace(plan.job, name="another")),
         replace(plan, arm=replace(plan.arm, name="another")),
     ):
         with pytest.raises(InputError, match=r"exists and has other content.*the same job.*--force"):
-            trajectory_file.save(other, path)
-        assert trajectory_file.load(path).job.seed == 9
-        trajectory_file.save(other, path.with_name("new.json"), force=True)
-        trajectory_file.save(other, path, force=True)
-        trajectory_file.save(replace(plan, job=replace(plan.job, seed=9)), path, force=True)
+            other.save(path)
+        assert Plan.load(path).job.seed == 9
+        other.save(path.with_name("new.json"), force=True)
+        other.save(path, force=True)
+        replace(plan, job=replace(plan.job, seed=9)).save(path, force=True)
 
 
 def test_an_altered_plan_of_the_same_job_is_kept(plan: Plan, path: Path) -> None:
@@ -258,7 +258,7 @@ def test_an_altered_plan_of_the_same_job_is_kept(plan: Plan, path: Path) -> None
     path.write_text(json.dumps(content), encoding="utf-8")
     before = path.read_bytes()
     with pytest.raises(InputError, match="--force"):
-        trajectory_file.save(plan, path)
+        plan.save(path)
     assert path.read_bytes() == before
 
 
@@ -267,5 +267,5 @@ def test_what_is_no_trajectory_file_is_kept(plan: Plan, tmp_path: Path, text: st
     target = tmp_path / "arm.toml"
     target.write_bytes(text.encode("latin-1"))
     with pytest.raises(InputError, match="--force"):
-        trajectory_file.save(plan, target)
+        plan.save(target)
     assert target.read_bytes() == text.encode("latin-1")

@@ -14,7 +14,7 @@ from armtempo.basics.errors import InputError, PlanError
 from armtempo.cli import main
 from armtempo.kinematics import Geometry, forward
 from armtempo.kinematics.shape import refusals
-from armtempo.model import arm_file
+from armtempo.model.arm import Arm
 from armtempo.new_arm import urdf_fitting as fitting
 from armtempo.new_arm import urdf_reader as reader
 from armtempo.new_arm import urdf_rows as dh
@@ -77,7 +77,7 @@ def test_the_written_arm_stands_where_the_urdf_does(tmp_path: Path, name: str, j
     """With constant rows only where base or tool need them."""
     out, said = imported(tmp_path, name)
     assert "worst error at 1000 random postures" in said
-    arm = arm_file.read(out)
+    arm = Arm.read(out)
     assert [joint.name for joint in arm.joints] == joints.split()
     rng = np.random.default_rng(SEED)
     angles = np.array([0.0 if joint.name in ("base", "tool") else rng.uniform(-3, 3) for joint in arm.joints])
@@ -89,7 +89,7 @@ def test_the_written_arm_stands_where_the_urdf_does(tmp_path: Path, name: str, j
 
 
 def test_ranges_are_the_urdfs_and_never_wider(tmp_path: Path) -> None:
-    arm = arm_file.read(imported(tmp_path, "four_skew")[0])
+    arm = Arm.read(imported(tmp_path, "four_skew")[0])
     ranges = {joint.name: joint.range_deg for joint in arm.joints}
     assert ranges["j1"] == (-114.5915, 114.5915)  # 2 rad are 114.59156 degrees
     assert ranges["j4"] == reader.CONTINUOUS_DEG
@@ -99,7 +99,7 @@ def test_ranges_are_the_urdfs_and_never_wider(tmp_path: Path) -> None:
 
 def test_quarter_turns_with_few_digits_become_quarter_turns(tmp_path: Path) -> None:
     """So that the closed-form inverse serves the arm."""
-    arm = arm_file.read(imported(tmp_path, "six_rounded")[0])
+    arm = Arm.read(imported(tmp_path, "six_rounded")[0])
     assert [abs(joint.alpha_deg) for joint in arm.joints] == [90, 180, 90, 90, 90, 180]
     assert [joint.d_mm for joint in arm.joints] == [170, 0, 0, -260, 0, 40]
     assert [joint.a_mm for joint in arm.joints] == [50, 300, 20.1, 0, 0, 0]
@@ -116,7 +116,7 @@ def test_motors_are_left_to_fill_in_and_check_says_so(tmp_path: Path) -> None:
     for mark in ("# limits", "# motor", "# encoder"):
         text = text.replace(mark, mark[2:])
     out.write_text(text)
-    assert next(joint.limits.speed_deg_s for joint in arm_file.read(out).driven if joint.limits) == 114.592
+    assert next(joint.limits.speed_deg_s for joint in Arm.read(out).driven if joint.limits) == 114.592
     result = CliRunner().invoke(main, ["check", "--arm", str(out)])
     assert "no motor" not in result.output
 
@@ -201,7 +201,7 @@ def test_names_of_any_kind_are_written_safely(tmp_path: Path) -> None:
     path.write_text(text.replace('name="j1"', 'name="j &quot;1&quot;&#10;d_mm = 7 # \\ é"'))
     result = CliRunner().invoke(main, ["import-urdf", str(path), "-o", str(out)])
     assert result.exit_code == 0, result.output
-    assert arm_file.read(out).joints[0].name.startswith('j "1"')
+    assert Arm.read(out).joints[0].name.startswith('j "1"')
 
 
 def test_nothing_is_overwritten(tmp_path: Path) -> None:
@@ -214,7 +214,7 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
         assert result.exit_code == 2
         assert kept.read_bytes() == before
     assert CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(out), "--force"]).exit_code == 0
-    assert arm_file.read(out).name == "three planar"
+    assert Arm.read(out).name == "three planar"
 
 
 def test_without_the_extra_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -280,8 +280,8 @@ def test_blank_names_are_replaced(tmp_path: Path) -> None:
     path.write_text(text.replace('"three planar"', '" "').replace('name="j2"', 'name=" "'))
     result = CliRunner().invoke(main, ["import-urdf", str(path), "-o", str(out)])
     assert result.exit_code == 0, result.output
-    assert arm_file.read(out).name == "imported arm"
-    assert [joint.name for joint in arm_file.read(out).joints] == ["j1", "joint 2", "j3"]
+    assert Arm.read(out).name == "imported arm"
+    assert [joint.name for joint in Arm.read(out).joints] == ["j1", "joint 2", "j3"]
 
 
 def test_what_an_arm_file_cannot_hold_is_not_written(tmp_path: Path) -> None:

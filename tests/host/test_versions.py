@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from armtempo.model import arm_json, sequence_plan, trajectory_file
+from armtempo.model import arm_json, sequence_plan
+from armtempo.model import plan as plan_file
 from armtempo.ports import claim_file
 from armtempo.runs import run_folder, sequence_folder
 from armtempo_shared import armrecord, messages
@@ -11,7 +12,7 @@ from armtempo_shared import armrecord, messages
 def test_versions_are_those_of_files_that_exist() -> None:
     versions = {
         "arm": arm_json.VERSION,
-        "trajectory": trajectory_file.VERSION,
+        "trajectory": plan_file.VERSION,
         "sequence": sequence_plan.VERSION,
         "run": run_folder.VERSION,
         "sequence run": sequence_folder.VERSION,

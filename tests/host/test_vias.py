@@ -10,9 +10,10 @@ import pytest
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.cli import main
 from armtempo.kinematics import Geometry, forward
-from armtempo.model import arm_file, trajectory_file
+from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.model.plan import Plan
 from armtempo.model.pose import from_rpy
 from armtempo.model.tool_pose import Pose
 from armtempo.planning import planner, via_points
@@ -172,11 +173,11 @@ def test_plan_prints_the_notes(tmp_path: Path) -> None:
     )
     output = tmp_path / "posed.json"
     result = CliRunner().invoke(
-        main, ["plan", "--arm", str(arm_file.default_path()), "--job", str(file), "-o", str(output)]
+        main, ["plan", "--arm", str(shipped.arm_path()), "--job", str(file), "-o", str(output)]
     )
     assert result.exit_code == 0, result.output
     assert "note: via 2: the pose needs joints that have no motor: joint 5 at 30 deg" in result.output
-    plan = trajectory_file.load(output)
+    plan = Plan.load(output)
     np.testing.assert_allclose(plan.via_deg, [[0.0, -60.0, 40.0], [20.0, -75.0, 50.0]], atol=1e-9)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from armtempo.model import arm_file
+from armtempo.model import shipped
 from armtempo.model.arm import Arm
 
 GRIPPER = """
@@ -26,7 +26,7 @@ ALL = GRIPPER + PUMP + FAN + PART + DOOR
 def write(folder: Path, *tables: str, board: str = "") -> Path:
     """The shipped arm's file with these tables behind it."""
     path = folder / "wired.toml"
-    text = arm_file.default_path().read_text(encoding="utf-8")
+    text = shipped.arm_path().read_text(encoding="utf-8")
     path.write_text(f'board = "{board}"\n{text}' if board else text, encoding="utf-8")
     path.write_text(path.read_text(encoding="utf-8") + "".join(tables), encoding="utf-8")
     return path

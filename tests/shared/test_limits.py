@@ -21,7 +21,6 @@ ROOT = Path(__file__).parents[2]
             "MAX_STEP_RATE",
             240_000,
         ),
-        ("README.md", "240 000 steps/s with one joint or with all", limits, "MAX_STEP_RATE_SUM", 240_000),
         ("board/docs/hardware.md", "TIM2 and TIM5 count 84 MHz ticks", limits, "TICK_HZ", 84_000_000),
         ("board/docs/hardware.md", "pulses of up to six stepper drivers", limits, "MAX_JOINTS", 6),
         ("board/docs/hardware.md", "reads up to four encoders", limits, "MAX_ENCODERS", 4),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import subprocess
 from pathlib import Path
 
-from armtempo.model import trajectory_file
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import planner
@@ -29,7 +28,7 @@ def small_plan(path: Path, end_deg: tuple[float, ...] = (20.0, -75.0, 50.0), nam
         population=5,
         iterations=20,
     )
-    trajectory_file.save(planner.plan(ARM, job), path)
+    planner.plan(ARM, job).save(path)
     return path
 
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 from armtempo import simulator
-from armtempo.model import trajectory_file
-from armtempo.model.arm import Arm, DrivenJoint
+from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.model.parts import DrivenJoint
 from armtempo.model.plan import Plan
 from armtempo.planning import planner
 from armtempo.robot.connect import connect
@@ -48,7 +48,7 @@ def plan_file(job: str, folder: Path) -> Path:
     arm = Arm.paper()
     plan = planner.plan(arm, replace(Job.paper(arm), **JOBS[job]))
     path = folder / f"{job}.json"
-    trajectory_file.save(refined(plan) if job == "refined" else plan, path)
+    refined(plan) if job == "refined" else plan.save(path)
     return path
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import armtempo
-from armtempo.model import sequence_file
+from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.sequence import Sequence
 from armtempo.model.sequence_plan import SequencePlan
@@ -16,7 +16,7 @@ from armtempo_shared.limits import TICK_HZ
 
 from tests.system.pulses import PINS
 
-FOLDER = Path(sequence_file.__file__).parents[1] / "data" / "pick_and_place"
+FOLDER = shipped.arm_path().parent / "pick_and_place"
 SHIPPED = Arm.load(FOLDER / "arm.toml")
 ARM = replace(SHIPPED, safety=replace(SHIPPED.safety, estop_fitted=True))
 GRIPPER, PART = "B8", "D0"

@@ -10,13 +10,13 @@ from pathlib import Path
 import pytest
 from armtempo import simulator
 from armtempo.link import open_board
-from armtempo.model import arm_file, job_file
+from armtempo.model import shipped
 
 from tests.system import commandline
 
 ANSWERS_WITHIN_S = 30.0
 """Far more than the 2 s in which a silent board is given up, for loaded machines."""
-SHIPPED = {"job": job_file.default_path(), "arm": arm_file.default_path()}
+SHIPPED = {"job": shipped.job_path(), "arm": shipped.arm_path()}
 WRONG_FILES = {
     "no via point": ("job", None, "via_deg = []", "via_deg = []", "at least 2"),
     "one via point": ("job", None, "via_deg = [[0.0, -60.0, 40.0]]", "1 via point", "at least 2"),

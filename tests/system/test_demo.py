@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from armtempo.model import trajectory_file
+from armtempo.model.plan import Plan
 from armtempo.report.run_report import PAGE
 from armtempo.runs import reader
 from armtempo.runs.run_folder import MOTION
@@ -48,7 +48,7 @@ def test_its_run_folder_is_whole(demo: tuple[Ended, Path]) -> None:
     run = reader.load(folder)
     assert [repetition.state for repetition in run.repetitions] == ["complete"]
     assert (folder / MOTION).stat().st_size > 0
-    assert trajectory_file.load(folder / "trajectory.json").job.name == "feed"
+    assert Plan.load(folder / "trajectory.json").job.name == "feed"
     assert "samples-01.csv: complete, 6.795 s, 69 samples" in done.output
 
 
@@ -65,7 +65,7 @@ def test_its_report_is_there(demo: tuple[Ended, Path]) -> None:
 def test_it_sums_up_the_plan_beside_the_limits(joint: str, demo: tuple[Ended, Path]) -> None:
     done, folder = demo
     planned, _ = rows(done.output, joint)
-    plan = trajectory_file.load(folder / "trajectory.json")
+    plan = Plan.load(folder / "trajectory.json")
     spline = plan.trajectory.joints[list(LIMITS).index(joint)]
     assert planned[0] == pytest.approx(spline.duration_s, abs=1e-4)
     assert tuple(planned[-5::2]) == LIMITS[joint]

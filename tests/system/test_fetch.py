@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 from armtempo.link import open_board
-from armtempo.model import trajectory_file
+from armtempo.model.plan import Plan
 from armtempo.runs import reader
 from armtempo.simulator import InjectedFault, LaunchOptions, launch
 
@@ -34,7 +34,7 @@ def test_button_then_fetch(tmp_path: Path) -> None:
     fetched = reader.load(tmp_path / "runs" / "small-001")
     (samples,) = fetched.repetitions
     assert samples.index.tolist() == list(range(len(samples.index)))
-    plan = trajectory_file.load(file)
+    plan = Plan.load(file)
     assert abs(samples.time_s[-1] - plan.trajectory.duration_s) < 1e-4
     end_deg = plan.trajectory(plan.trajectory.duration_s)
     assert np.max(np.abs(samples.commanded_deg[-1] - end_deg)) < 0.03

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from armtempo.basics.errors import BoardError, InputError, LinkError
 from armtempo.link import Client, open_board
-from armtempo.model import arm_file
+from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.robot import arm_state, goto, homing
 from armtempo.robot.stop_request import StopRequest
@@ -27,7 +27,7 @@ low_deg = {angle}
 
 def switched_arm(folder: Path, angle: float = -9.0) -> Arm:
     """The paper's arm with a switch at the low end of joint 1."""
-    text = arm_file.default_path().read_text()
+    text = shipped.arm_path().read_text()
     parts = text.split("[[joint]]")
     parts[1] += SWITCH.format(angle=angle)
     (folder / "arm.toml").write_text("[[joint]]".join(parts))

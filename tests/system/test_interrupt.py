@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from armtempo.link import open_board
-from armtempo.model import trajectory_file
+from armtempo.model.plan import Plan
 from armtempo.runs import reader, run_folder
 from armtempo.simulator import LaunchOptions, launch
 
@@ -35,7 +35,7 @@ def test_interrupted_run(tmp_path: Path, number: signal.Signals) -> None:
     repetition = run.meta["repetitions"][0]
     assert repetition["state"] == run_folder.INTERRUPTED
     assert len(run.repetitions[0].index) == repetition["samples"] >= 3
-    assert repetition["duration_s"] < trajectory_file.load(file).trajectory.duration_s - 0.1
+    assert repetition["duration_s"] < Plan.load(file).trajectory.duration_s - 0.1
     assert tuple(repetition["commanded_steps"]) == status.positions.commanded_steps
 
 

@@ -19,7 +19,7 @@ from armtempo.basics.errors import InputError
 from armtempo.cli import main
 from armtempo.cli.teach_points import TaughtPoints, by_hand
 from armtempo.link.board_messages import Notice
-from armtempo.model import arm_file
+from armtempo.model import shipped
 from armtempo.simulator import LaunchOptions, launch
 from click.testing import CliRunner
 
@@ -288,7 +288,7 @@ def test_teach_collects_points_into_a_job_that_plans(tmp_path: Path) -> None:
 
 
 def test_a_joint_without_an_encoder_cannot_be_taught_by_hand(tmp_path: Path) -> None:
-    text = arm_file.default_path().read_text()
+    text = shipped.arm_path().read_text()
     start = text.index("encoder = {")
     path = tmp_path / "arm.toml"
     path.write_text(text[:start] + text[text.index("\n", start) :])

@@ -8,7 +8,7 @@ import armtempo
 import numpy as np
 import pytest
 from armtempo.cli import main
-from armtempo.model import arm_file
+from armtempo.model import shipped
 from armtempo.simulator import LaunchOptions, launch
 from click.testing import CliRunner
 
@@ -17,7 +17,7 @@ TAUGHT_DEG = (5.0, -61.0, 41.0)
 
 def test_a_posture_is_taught_and_gone_to_by_name(tmp_path: Path) -> None:
     path = tmp_path / "arm.toml"
-    path.write_text(arm_file.default_path().read_text())
+    path.write_text(shipped.arm_path().read_text())
     with launch(LaunchOptions(arm=armtempo.Arm.load(path))) as virtual:
 
         def run(*arguments: str, code: int = 0) -> str:

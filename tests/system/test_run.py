@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.model import arm_file, job_file
+from armtempo.model import shipped
 from armtempo.runs import reader
 from armtempo.simulator import LaunchOptions, launch
 
@@ -24,7 +24,7 @@ def test_board_on_a_port(tmp_path: Path) -> None:
 
         assert "armtempo home" in on_board("run", file, code=1)
         on_board("home", "--arm", "paper")
-        said = on_board("goto", "P1", "--job", job_file.default_path())
+        said = on_board("goto", "P1", "--job", shipped.job_path())
         assert "20.00°" in said
         assert "-75.0" in said
         assert "armtempo goto" in on_board("run", file, code=1)
@@ -49,7 +49,7 @@ def test_stored_motion_keeps_its_place_in_a_sim_folder(tmp_path: Path) -> None:
 
 
 def test_board_set_up_for_another_arm(tmp_path: Path) -> None:
-    text = arm_file.default_path().read_text().replace("microsteps = 8", "microsteps = 16")
+    text = shipped.arm_path().read_text().replace("microsteps = 8", "microsteps = 16")
     (tmp_path / "other.toml").write_text(text)
     armtempo("home", "--arm", "other.toml", "--port", "sim:flash", cwd=tmp_path)
     assert "give --arm" in armtempo("home", "--port", "sim:flash", cwd=tmp_path, code=2)
@@ -71,7 +71,7 @@ def test_live_says_where_there_is_no_display(tmp_path: Path) -> None:
 
 def test_fault_is_named_in_terminal_run_folder_and_report(tmp_path: Path) -> None:
     """A joint far too heavy for its motor: it loses steps, and the encoder's watch ends the run."""
-    heavy = arm_file.default_path().read_text().replace("\ninertia_kg_m2 = 0.15", "\ninertia_kg_m2 = 6.0")
+    heavy = shipped.arm_path().read_text().replace("\ninertia_kg_m2 = 0.15", "\ninertia_kg_m2 = 6.0")
     (tmp_path / "heavy.toml").write_text(heavy)
     job = 'name = "throw"\nvia_deg = [[0.0, -60.0, 40.0], [30.0, -60.0, 40.0]]\niterations = 20\n'
     (tmp_path / "job.toml").write_text(job)

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from armtempo.cli import main
 from armtempo.link.transport import SerialTransport
-from armtempo.model import arm_file
+from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import planner
@@ -42,7 +42,7 @@ class Two:
     def __init__(self, folder: Path, port: str) -> None:
         self.port = port
         self.arms, self.files, self.crcs = {}, {}, {}
-        text = arm_file.default_path().read_text()
+        text = shipped.arm_path().read_text()
         for host, content in zip(HOSTS, (text, text.replace(*OTHER_FIGURES)), strict=True):
             self.arms[host] = str(folder / f"{host}.toml")
             Path(self.arms[host]).write_text(content)

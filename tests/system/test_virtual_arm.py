@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from armtempo.link import open_board
 from armtempo.link.board_messages import Sample
-from armtempo.model.arm import Arm, JointModel, LimitSwitches
+from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.model.parts import JointModel, LimitSwitches
 from armtempo.planning import planner
 from armtempo.records import encode
 from armtempo.robot import arm_state, homing, stored_motion

@@ -11,7 +11,8 @@ import pytest
 from armtempo.link import open_board
 from armtempo.link.board_messages import Status
 from armtempo.link.follow import RunEnd
-from armtempo.model.arm import Arm, JointModel
+from armtempo.model.arm import Arm
+from armtempo.model.parts import JointModel
 from armtempo.planning import point_to_point
 from armtempo.records import encode
 from armtempo.robot import arm_state, stored_motion

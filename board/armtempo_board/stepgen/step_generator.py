@@ -216,6 +216,7 @@ class StepGenerator:
         start_kiticks = _kiticks(self._law_words[_REAL_START_HIGH], 0)
         reached = queue[_REACHED]
         if queue[_LATEST_KITICKS] >= start_kiticks and self.waits():
+            self.ended = False  # the last step may be among them
             if self._held_queued:
                 step_queue.withdraw(queue, queue[_IN] - 1 & 0xFFFF, start_kiticks)
                 self._held = True
@@ -227,6 +228,7 @@ class StepGenerator:
         if reached < 0:
             reached = 0
             self._first_waits = True
+            self._heading = self.direction  # it was in the queue, or held back behind what was
         queue[_REACHED] = reached
         # what was written last may have followed the law before, so no cubic begins there
         queue[_SINGLE_STEPS] = max(queue[_SINGLE_STEPS], 1)
@@ -260,6 +262,7 @@ class StepGenerator:
             if self._waits_for(found):
                 return
         if found == _END:
+            self._found = found  # nothing is looked for behind it
             self.ended = True
         elif found:
             self._found = _NOT_YET

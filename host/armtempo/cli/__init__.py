@@ -12,8 +12,8 @@ from typing import Any
 
 import click
 
-from armtempo import __version__
 from armtempo.basics.errors import INTERRUPTED, ArmtempoError
+from armtempo.basics.version import installed_version
 from armtempo.cli import examples, messages
 from armtempo.cli.interrupts import raised_by_signals
 from armtempo.formats.spelling import did_you_mean
@@ -135,7 +135,7 @@ def _of_file(error: OSError) -> ArmtempoError:
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]}, epilog=_EXAMPLES)
-@click.version_option(__version__, prog_name="armtempo")
+@click.version_option(installed_version(), prog_name="armtempo")
 @click.option("-q", "--quiet", is_flag=True, help="No progress bars and no remarks: only results and errors.")
 def main(quiet: bool) -> None:
     """Time-optimal B-spline motions for stepper arms, replayed by an STM32F407 with MicroPython."""

@@ -10,7 +10,7 @@ import click
 from armtempo.cli import chosen, options, results
 
 if TYPE_CHECKING:
-    from armtempo.model.exchange import ImportedPath
+    from armtempo.model.via_table import ImportedPath
 
 
 @click.command("import")
@@ -51,15 +51,16 @@ def command(
     """
     from armtempo.formats import toml_table
     from armtempo.formats.atomic_file import check_not_input, check_replaceable, replace_text
-    from armtempo.model import exchange, job_file
+    from armtempo.model import via_table
+    from armtempo.model.job import Job
 
     arm = chosen.load_arm(arm_path)
     title = name or table.stem
     target = output or Path(f"{title}.toml")
     check_not_input(target, (table, arm.source))
-    found = exchange.via_from_csv(table, arm, radians, tolerance_deg)
-    text = exchange.job_text(title, found)
-    job_file.of_table(toml_table.parse(text, str(table)), arm)
+    found = via_table.via_from_csv(table, arm, radians, tolerance_deg)
+    text = via_table.job_text(title, found)
+    Job.of_table(toml_table.parse(text, str(table)), arm)
     check_replaceable(target, text, force)
     replace_text(target, text)
     values = {

@@ -34,7 +34,7 @@ def command(urdf: Path, out: Path, base: str | None, tip: str | None, force: boo
     from armtempo.basics.errors import InputError
     from armtempo.formats import toml_table
     from armtempo.formats.atomic_file import replace_text
-    from armtempo.model import arm_file
+    from armtempo.model.arm import Arm
     from armtempo.new_arm import arm_text
     from armtempo.new_arm import urdf_fitting as fitting
     from armtempo.new_arm import urdf_reader as reader
@@ -46,7 +46,7 @@ def command(urdf: Path, out: Path, base: str | None, tip: str | None, force: boo
     chain = reader.read(urdf, base, tip)
     fit = fitting.fit(chain)
     text = arm_text.arm_text(chain, fit, urdf.name)
-    arm_file.of_table(toml_table.parse(text, str(out)))  # what would not be read again is not written
+    Arm.of_table(toml_table.parse(text, str(out)))  # what would not be read again is not written
     replace_text(out, text)
     values = {
         "file": str(out),

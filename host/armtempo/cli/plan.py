@@ -88,11 +88,11 @@ def command(
     Where neither an arm nor a job is named, this plans the demo's job for the arm that ships with armtempo.
     """
     from armtempo.formats.atomic_file import check_not_input
-    from armtempo.model import sequence_file
+    from armtempo.model.sequence import is_sequence
 
     if file is not None and job_path is not None:
         raise InputError("FILE and --job are both given", "name one of them")
-    if file is not None and sequence_file.is_sequence(file):
+    if file is not None and is_sequence(file):
         sequences.refuse_job_options({"split": split, "corridor_curve": corridor_curve, **changes})
         sequences.plan(file, arm_path, output, force, as_json)
         return
@@ -141,10 +141,9 @@ def _part(target: Path, number: int) -> Path:
 
 def _save(made: dict[Path, Plan], force: bool) -> None:
     """All files, or none where one of them may not be replaced."""
-    from armtempo.model import trajectory_file
 
     for file, plan in made.items():
-        trajectory_file.check(plan, file, force)
+        plan.check_replaceable(file, force)
     for file, plan in made.items():
         plan.save(file, force)
 

@@ -25,10 +25,9 @@ def plan(file: Path, arm_path: Path | None, output: Path | None, force: bool, as
     """Plan a sequence file, say what its time is made of, and write it."""
     import armtempo
     from armtempo.formats.atomic_file import check_not_input
-    from armtempo.model import sequence_file
-    from armtempo.model.sequence import Sequence
+    from armtempo.model.sequence import Sequence, arm_named
 
-    named = arm_path or sequence_file.arm_named(file)
+    named = arm_path or arm_named(file)
     arm = chosen.load_arm(named)
     sequence = Sequence.load(file, arm)
     target = output or Path(f"{sequence.name}.json")

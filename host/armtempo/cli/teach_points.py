@@ -11,7 +11,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.cli.keys import END, INTERRUPT, Keys
 from armtempo.formats.atomic_file import replace_text
-from armtempo.model import job_text, posture, posture_text
+from armtempo.model import job_text, posture_text
 from armtempo.model.arm import Arm
 
 TAKE, UNDO = "p", "u"
@@ -34,7 +34,7 @@ class TaughtPoints:
     def take(self) -> str:
         """Take where the arm stands; says what was done."""
         point = posture_text.digits(self._arm, self.where().tolist())
-        if problem := posture.angles_problem(self._arm, point):
+        if problem := self._arm.angles_problem(point):
             return f"not taken: {problem}"
         if self.points_deg and point == self.points_deg[-1]:
             return "not taken: the arm stands where it stood at the last point"

@@ -6,8 +6,8 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
-from armtempo import __version__
 from armtempo.basics.errors import InputError
+from armtempo.basics.version import installed_version
 from armtempo.deploy import program_files
 
 PACKAGE = "package.json"
@@ -26,7 +26,7 @@ def write(folder: Path) -> None:
         **program_files.start_files(),
     }
     names = {path.removeprefix(f"{program_files.ROOT}/"): data for path, data in files.items()}
-    content = {"version": __version__, "urls": [[name, name] for name in names]}
+    content = {"version": installed_version(), "urls": [[name, name] for name in names]}
     fill(folder, {**names, PACKAGE: f"{json.dumps(content, indent=1)}\n".encode()})
 
 

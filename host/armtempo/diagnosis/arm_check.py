@@ -10,7 +10,6 @@ from armtempo.basics.errors import InputError
 from armtempo.diagnosis import drives, encoders, geometry, resolution, torque, wiring
 from armtempo.diagnosis.finding import Finding, Level, error, note
 from armtempo.diagnosis.item import Condition, Item
-from armtempo.model import arm_file as reader
 from armtempo.model.arm import Arm
 
 _CONSTANT_DEG = 0.01
@@ -23,7 +22,7 @@ def check(arm_file: Path, job_file: Path | None = None) -> tuple[Arm | None, lis
     What the readers refuse is a finding too.
     """
     try:
-        arm = reader.read(arm_file)
+        arm = Arm.read(arm_file)
     except InputError as refused:
         return None, [error("arm file", str(refused), "correct that; the rest of the file was not looked at")]
     found = check_arm(arm)
@@ -39,7 +38,7 @@ def check(arm_file: Path, job_file: Path | None = None) -> tuple[Arm | None, lis
 def check_arm(arm: Arm) -> list[Finding]:
     """Everything found in an arm that was read, errors first.
 
-    It need not be ready to be driven: ``armtempo.model.arm_file.read`` reads one without motors.
+    It need not be ready to be driven: ``Arm.read`` reads one without motors.
     """
     found = [*geometry.findings(arm), *_motors(arm)]
     if arm.driven:

@@ -6,7 +6,8 @@ from armtempo_shared.limits import MAX_STEP_RATE, MAX_STEP_RATE_SUM
 
 from armtempo.basics.errors import ArmtempoError
 from armtempo.diagnosis.finding import Finding, error, warning
-from armtempo.model.arm import Arm, DrivenJoint, Driver
+from armtempo.model.arm import Arm
+from armtempo.model.parts import DrivenJoint, Driver
 from armtempo.records import encode
 
 _MICROSTEPS = {*(1 << n for n in range(9)), 5, 10, 20, 25, 40, 50, 100, 125, 200, 250}

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from armtempo.diagnosis.finding import Finding, error, note, warning
-from armtempo.model.arm import Arm, DrivenJoint
+from armtempo.model.arm import Arm
+from armtempo.model.parts import DrivenJoint
 
 _FASTEST_COUNTS_S = 1e6
 """A reading is right while the encoder moves less than 32 768 counts between two of them (board/docs/hardware.md)."""

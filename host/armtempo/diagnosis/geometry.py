@@ -11,7 +11,8 @@ from armtempo.basics.arrays import Array
 from armtempo.diagnosis.finding import Finding, error, note, warning
 from armtempo.kinematics import Geometry
 from armtempo.kinematics.chain import outline_mm
-from armtempo.model.arm import Arm, DrivenJoint
+from armtempo.model.arm import Arm
+from armtempo.model.parts import DrivenJoint
 
 _BELOW_MM = 1.0
 _NEAR = 0.01

@@ -17,13 +17,13 @@ _GROUP = "sudo usermod -a -G dialout $USER, then log in again"
 
 def examine_machine() -> list[Item]:
     """Versions of armtempo, Python and the operating system."""
-    from armtempo import __version__
+    from armtempo.basics.version import installed_version
 
     python = f"{platform.python_version()} ({platform.python_implementation()})"
     fits = sys.version_info[:2] >= LEAST_PYTHON
     least = ".".join(map(str, LEAST_PYTHON))
     return [
-        Item("armtempo", __version__),
+        Item("armtempo", installed_version()),
         Item(
             "Python",
             python,

@@ -10,7 +10,8 @@ from armtempo.basics.arrays import Array
 from armtempo.diagnosis.finding import Finding, warning
 from armtempo.kinematics import Geometry, forward
 from armtempo.kinematics.chain import all_angles_deg
-from armtempo.model.arm import Arm, DrivenJoint
+from armtempo.model.arm import Arm
+from armtempo.model.parts import DrivenJoint
 
 COARSE_MM = 0.5
 """A step that moves the tool by more than this is told."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from armtempo.diagnosis.finding import Finding, error, note, warning
-from armtempo.model.arm import Arm, DrivenJoint
+from armtempo.model.arm import Arm
+from armtempo.model.parts import DrivenJoint
 
 _ENOUGH = 1.5
 """Motors are seldom as strong as their data sheet: less than half as much again is told."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import defaultdict
 
 from armtempo.diagnosis.finding import Finding, error, note, warning
-from armtempo.model.arm import Arm, DrivenJoint, Joint
-from armtempo.model.arm_file import shared_channels
+from armtempo.model.arm import Arm, shared_channels
+from armtempo.model.parts import DrivenJoint, Joint
 from armtempo.model.pin_use import problems as pin_problems
 
 BUTTON_CHANNEL = 6

@@ -262,11 +262,26 @@ class Client:
 
     def set_output(self, number: int, value: int) -> None:
         """Set an output of the arm record (from 0) to a value of 0 to 65535, also while something moves."""
-        self.session.command("output", (number, value))
+        try:
+            self.session.command("output", (number, value))
+        except BoardError as error:
+            if error.code != wire.ERROR_CODES["unknown_command"]:
+                raise
+            raise BoardError(
+                "the arm that the board is set up for has no outputs",
+                "write a table [output.NAME] in its file, then run 'armtempo configure'",
+                error.code,
+            ) from None
 
     def levels(self) -> board_messages.Levels:
-        """What the inputs of the arm record are now, debounced, and what its outputs are set to."""
-        (inputs,), tail = self.session.command("inputs")
+        """What the inputs of the arm record are now, debounced, and what its outputs are set to; none of an arm that
+        has none, whose board does not know this command."""
+        try:
+            (inputs,), tail = self.session.command("inputs")
+        except BoardError as error:
+            if error.code != wire.ERROR_CODES["unknown_command"]:
+                raise
+            return board_messages.Levels(0, ())
         return board_messages.levels(inputs, tail)
 
     def leave(self) -> None:

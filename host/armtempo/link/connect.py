@@ -151,9 +151,9 @@ def greet(
 @contextmanager
 def _virtual_port(port: str, arm: Arm | None) -> Iterator[str]:
     """A virtual board's port; where its program fails, link errors end with the last line of its log."""
-    from armtempo import simulator
+    from armtempo.simulator import LaunchOptions, launch
 
-    with simulator.launch(simulator.LaunchOptions(names.sim_flash(port), arm=arm)) as board:
+    with launch(LaunchOptions(names.sim_flash(port), arm=arm)) as board:
         try:
             yield board.port
         except LinkError as error:

@@ -1,182 +1,26 @@
-"""The arm: geometry, limits, drives and encoders."""
+"""The arm: geometry, limits, drives and encoders, and the file that describes it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from fractions import Fraction
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 from armtempo.basics.errors import InputError
-from armtempo.formats import json_codec
+from armtempo.formats import json_codec, toml_table
 from armtempo.formats.spelling import did_you_mean
-from armtempo.model import boards
+from armtempo.formats.toml_table import Table
+from armtempo.model import boards, outputs_file, parts_file, pin_use, pose_table, shipped
 from armtempo.model import posture as named
 from armtempo.model.outputs import Input, Output
+from armtempo.model.parts import DrivenJoint, Driver, Joint, Motor, Safety
 from armtempo.model.posture import ArmPosture
+from armtempo.model.tool_pose import Pose
 
-
-@dataclass(frozen=True)
-class Limits:
-    """Largest magnitudes of one joint's motion (Table 5)."""
-
-    speed_deg_s: float
-    acceleration_deg_s2: float
-    jerk_deg_s3: float
-
-    @property
-    def values(self) -> tuple[float, float, float]:
-        """Speed, acceleration, jerk."""
-        return self.speed_deg_s, self.acceleration_deg_s2, self.jerk_deg_s3
-
-
-@dataclass(frozen=True)
-class Motor:
-    """Stepper, driver and gear of one joint (Table 7)."""
-
-    channel: int
-    """STEP/DIR channel on the board, 1 to 6."""
-    steps_per_rev: int
-    """Full steps of the motor shaft."""
-    microsteps: int
-    gear_ratio: float
-    """Motor revolutions per joint revolution."""
-    direction: int = 1
-    """1, or -1 where the DIR signal is inverted."""
-
-    @property
-    def steps_per_deg(self) -> float:
-        """Step pulses per degree of the joint."""
-        return self.steps_per_rev * self.microsteps * self.gear_ratio / 360.0
-
-
-@dataclass(frozen=True)
-class Encoder:
-    """Incremental encoder of one joint."""
-
-    channel: int
-    """Encoder channel on the board, 1 to 4."""
-    counts_per_rev: int
-    """Counts, all edges, per revolution of the shaft it sits on."""
-    on: str = "joint"
-    """``"joint"`` or ``"motor"``."""
-    direction: int = 1
-    following_error_deg: float = 0.0
-    """Largest deviation from the command, in degrees of the joint; 0: not watched."""
-
-
-@dataclass(frozen=True)
-class LimitSwitches:
-    """Limit switch inputs of one joint: board inputs 1 to 3, or None."""
-
-    low: int | None = None
-    high: int | None = None
-    active: str = "low"
-    low_deg: float | None = None
-    """Joint angle at which the low switch trips, for homing."""
-    high_deg: float | None = None
-
-
-@dataclass(frozen=True)
-class JointModel:
-    """What the virtual arm simulates of one joint beyond its drive."""
-
-    holding_torque_nm: float = 0.0
-    """Of the motor, at its shaft; 0: an ideal motor, which never lags."""
-    rotor_inertia_kg_m2: float = 0.0
-    inertia_kg_m2: float = 0.0
-    """Of what the joint moves, at the joint."""
-    damping_nm_s: float = 0.0
-    """Viscous, of the motor shaft against its turning field."""
-    corner_speed_rad_s: float = 0.0
-    """Of the motor shaft; there the torque has fallen to 0.71 of the holding torque. 0: it does not fall."""
-    gravity_torque_nm: float = 0.0
-    """At the joint, at angle 0; falls with the angle's cosine."""
-    backlash_deg: float = 0.0
-    """Of the joint against its motor."""
-    encoder_phase_counts: float = 0.0
-    """Fraction of a count by which the encoder is beyond its last edge at power-up, 0 to 1."""
-    scatter_deg: float = 0.0
-    """Standard deviation between repetitions."""
-
-
-@dataclass(frozen=True)
-class Joint:
-    """One Denavit-Hartenberg row (standard convention) and what moves it; ``motor`` None: not driven."""
-
-    name: str
-    d_mm: float
-    a_mm: float
-    alpha_deg: float
-    theta_offset_deg: float
-    range_deg: tuple[float, float]
-    home_deg: float = 0.0
-    limits: Limits | None = None
-    motor: Motor | None = None
-    encoder: Encoder | None = None
-    switches: LimitSwitches = field(default_factory=LimitSwitches)
-    model: JointModel = field(default_factory=JointModel)
-    parallel_linkage: bool = field(default=False, metadata=json_codec.ADDED)
-    """The drive stands on the link before the previous one and turns this link by a parallelogram: the angle
-    is counted from that link, so it stays when the previous joint turns. The row turns by the difference."""
-
-
-@dataclass(frozen=True)
-class DrivenJoint:
-    """A joint with a motor, and therefore with limits: the joints of every motion are of this type."""
-
-    name: str
-    range_deg: tuple[float, float]
-    home_deg: float
-    limits: Limits
-    motor: Motor
-    encoder: Encoder | None
-    switches: LimitSwitches
-    model: JointModel
-
-    @property
-    def steps_per_deg(self) -> float:
-        """Step pulses per degree of the joint."""
-        return self.motor.steps_per_deg
-
-    @property
-    def counts_per_step(self) -> Fraction:
-        """Encoder counts per step pulse, exactly as the arm file's decimals say; 0 without an encoder."""
-        if self.encoder is None:
-            return Fraction(0)
-        gear = Fraction(str(self.motor.gear_ratio))
-        counts = Fraction(self.encoder.counts_per_rev)
-        if self.encoder.on == "motor":
-            counts *= gear
-        return counts / (self.motor.steps_per_rev * self.motor.microsteps * gear)
-
-    @property
-    def counts_per_deg(self) -> float:
-        """Encoder counts per degree of the joint; 0 without an encoder."""
-        return float(self.counts_per_step) * self.steps_per_deg
-
-
-@dataclass(frozen=True)
-class Driver:
-    """Timing and polarity of the signals that the stepper drivers need."""
-
-    pulse_us: float = 2.0
-    low_us: float = 2.0
-    dir_setup_us: float = 5.0
-    dir_hold_us: float = 5.0
-    enable_active: str = "low"
-
-
-@dataclass(frozen=True)
-class Safety:
-    """E-stop input, and what the board does when it trips or the host disappears."""
-
-    estop_fitted: bool = False
-    estop_active: str = "low"
-    estop_releases_enable: bool = False
-    on_link_loss: str = "finish"
-    """``"finish"`` the motion or ``"stop"``."""
-    link_timeout_ms: int = 1000
+_REACHES_MM = 1e-6
 
 
 @dataclass(frozen=True)
@@ -200,19 +44,45 @@ class Arm:
     def load(cls, path: Path | str) -> Arm:
         """The arm described by a TOML file, or the one of that name that ships, such as ``"ar4"``; a file wins.
 
-        Raises InputError, naming file, key and value, for anything missing, unknown or not allowed; naming the arms
-        that ship where there is neither file nor arm.
+        It is ready to be driven. Raises InputError, naming file, key and value, for anything missing, unknown or not
+        allowed; naming the arms that ship if there is neither file nor arm.
         """
-        from armtempo.model import arm_file, shipped
+        path = shipped.find(path).path
+        arm = cls.read(path)
+        _check_channels(arm, path)
+        for problem in pin_use.problems(arm):
+            raise InputError(f"{path}: {problem.where}: {problem.what}", problem.next_step)
+        return arm
 
-        return arm_file.load(shipped.find(path).path)
+    @classmethod
+    def read(cls, path: Path | str) -> Arm:
+        """The arm of a TOML file, even if no joint has a motor yet or two have the same channel or pin.
+
+        Raises InputError as ``load`` does for all else.
+        """
+        return cls.of_table(toml_table.read(path))
+
+    @classmethod
+    def of_table(cls, top: Table) -> Arm:
+        """The arm in the top table of a file, as ``read`` gives it."""
+        name = top.text("name")
+        driver = parts_file.driver(top.table("driver"))
+        safety = parts_file.safety(top.table("safety"))
+        tables = top.tables("joint")
+        joints = tuple(parts_file.joint(table, number) for number, table in enumerate(tables, 1))
+        board = top.choice("board", tuple(boards.BOARDS), boards.DEFAULT)
+        outputs, inputs = outputs_file.outputs(top), outputs_file.inputs(top)
+        postures = top.table("posture")
+        top.done()
+        arm = cls(name, joints, driver, safety, top.file, board, outputs, inputs)
+        if not postures:
+            return arm
+        return replace(arm, postures=tuple(read_posture(postures, name, arm) for name in postures.names()))
 
     @classmethod
     def paper(cls) -> Arm:
         """The arm that ships with armtempo: the paper's 1:5 model, three of its six joints driven."""
-        from armtempo.model import arm_file
-
-        return arm_file.load(arm_file.default_path())
+        return cls.load(shipped.arm_path())
 
     @cached_property
     def driven(self) -> tuple[DrivenJoint, ...]:
@@ -256,8 +126,35 @@ class Arm:
             return ArmPosture(name, self.home_deg)
         found = [posture for posture in self.postures if posture.name == name]
         if not found:
-            raise named.unknown(self, name)
+            names = [named.HOME, *(posture.name for posture in self.postures)]
+            raise InputError(
+                f"arm {self.name!r} has no posture {name!r}{did_you_mean(name, names)}",
+                f"known: {', '.join(names)}; 'armtempo teach --posture {name}' adds where the arm stands",
+            )
         return found[0]
+
+    def angles_problem(self, angles_deg: Iterable[float]) -> str:
+        """Why the driven joints cannot stand at these angles, in words; "" if they can."""
+        angles = tuple(angles_deg)
+        if len(angles) != len(self.driven):
+            return f"{len(angles)} angles, but {len(self.driven)} joints have a motor"
+        for joint, angle in zip(self.driven, angles, strict=True):
+            low, high = joint.range_deg
+            if not low <= angle <= high:
+                return f"{joint.name}: {angle:g} degrees is outside of its range {low:g} to {high:g}"
+        return ""
+
+    def posture_problem(self, posture: ArmPosture) -> str:
+        """What is wrong with a posture, as far as it shows without the inverse kinematics; "" for nothing."""
+        if found := named.name_problem(posture.name):
+            return found
+        if not isinstance(posture.where, Pose):
+            return self.angles_problem(posture.where)
+        reach_mm = sum((joint.d_mm**2 + joint.a_mm**2) ** 0.5 for joint in self.joints)
+        away_mm = sum(row[3] ** 2 for row in posture.where.matrix[:3]) ** 0.5
+        if away_mm > reach_mm + posture.where.tolerance_mm + _REACHES_MM:
+            return f"{away_mm:g} mm from the base, but all links together are {reach_mm:g} mm long"
+        return ""
 
 
 def _driven(arm: str, joint: Joint, motor: Motor) -> DrivenJoint:
@@ -273,3 +170,54 @@ def _driven(arm: str, joint: Joint, motor: Motor) -> DrivenJoint:
         joint.switches,
         joint.model,
     )
+
+
+def read_posture(tables: Table, name: str, arm: Arm) -> ArmPosture:
+    """The posture ``name`` of the table [posture]; InputError where it is none that the arm can take."""
+    where = f"{tables.file}: posture.{name}"
+    table = tables.table(name)
+    if problem := named.name_problem(name):
+        raise InputError(f"{where}: {problem}", "choose another name")
+    if table is None:
+        raise tables.fail(name, "a table")
+    forms = [key for key in ("angles_deg", "matrix", "position_mm") if table.has(key)]
+    if len(forms) != 1:
+        raise InputError(
+            f"{where}: exactly one of angles_deg, matrix and position_mm is needed", "give one of them"
+        )
+    if forms == ["angles_deg"]:
+        found = ArmPosture(name, table.numbers("angles_deg", len(arm.driven)))
+    else:
+        found = ArmPosture(name, replace(pose_table.read(table, where), posture_deg=arm.all_home_deg))
+    table.done()
+    if problem := arm.posture_problem(found):
+        raise InputError(f"{where}: {problem}", "give a posture that the arm can take")
+    return found
+
+
+class SharedChannel(NamedTuple):
+    """A channel of the board that more than one joint has."""
+
+    key: str
+    """``"motor"`` or ``"encoder"``."""
+    channel: int
+    joints: tuple[str, ...]
+
+
+def shared_channels(arm: Arm) -> list[SharedChannel]:
+    """Channels that more than one joint has; empty for an arm that can be wired."""
+    users: dict[tuple[str, int], list[str]] = defaultdict(list)
+    for joint in arm.joints:
+        for key, part in (("motor", joint.motor), ("encoder", joint.encoder)):
+            if part is not None:
+                users[key, part.channel].append(joint.name)
+    return [SharedChannel(*place, tuple(names)) for place, names in users.items() if len(names) > 1]
+
+
+def _check_channels(arm: Arm, path: Path | str) -> None:
+    if not arm.driven:
+        raise InputError(f"{path}: no joint has a motor", "add at least one [joint.motor]")
+    for key, channel, joints in shared_channels(arm):
+        raise InputError(
+            f"{path}: {key}.channel = {channel} is used by {' and '.join(joints)}", "give each joint its own"
+        )

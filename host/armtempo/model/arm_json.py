@@ -10,9 +10,9 @@ from armtempo.basics.errors import InputError
 from armtempo.formats import json_codec
 from armtempo.formats.atomic_file import replace_text, why
 from armtempo.model import boards, pin_use
-from armtempo.model import posture as named
-from armtempo.model.arm import Arm, Joint
+from armtempo.model.arm import Arm
 from armtempo.model.outputs import KINDS, SWITCH, Output
+from armtempo.model.parts import Joint
 
 FORMAT = "armtempo arm"
 VERSION = 1
@@ -55,7 +55,7 @@ def check(arm: Arm, where: str, hint: str) -> None:
         raise InputError(f"{where}: {pin.where}: {pin.what}", hint)
 
     for posture in arm.postures:
-        if problem := named.problem(arm, posture):
+        if problem := arm.posture_problem(posture):
             raise InputError(f"{where}: posture {posture.name!r}: {problem}", hint)
 
 

@@ -6,12 +6,24 @@ import ast
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
-from armtempo.model.arm import Arm
+from armtempo.model.parts import Joint, Safety
 
 _SINGLE = {"ENABLE of the drivers": "ENABLE", "the button": "BUTTON", "the E-stop": "ESTOP"}
 ENGINE_TIMERS = {2: "the step pulses", 5: "the step pulses", 6: "the step pulses"}
+
+
+class ChannelUser(Protocol):
+    """What is needed of an arm here."""
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """Those with a motor have channels."""
+
+    @property
+    def safety(self) -> Safety:
+        """Whether there is an E-stop."""
 
 
 @cache
@@ -31,7 +43,7 @@ def table() -> dict[str, Any]:
     return found
 
 
-def taken_pins(arm: Arm) -> dict[str, str]:
+def taken_pins(arm: ChannelUser) -> dict[str, str]:
     """Pins (``"PE12"``) that the program takes for this arm, and what for."""
     pins = table()
     found = {pins["ENABLE"]: "ENABLE of the drivers", pins["BUTTON"]: "the button"}
@@ -67,7 +79,7 @@ def uses(pin: str) -> list[str]:
     ]
 
 
-def taken_timers(arm: Arm) -> dict[int, str]:
+def taken_timers(arm: ChannelUser) -> dict[int, str]:
     """Timers that the program takes for this arm, and what for."""
     found = dict(ENGINE_TIMERS)
     for joint in arm.joints:

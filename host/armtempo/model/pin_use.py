@@ -3,14 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 from armtempo.model import engine_pins
-from armtempo.model.arm import Arm
 from armtempo.model.boards import BOARDS, DEFAULT, TIMER_OUTPUTS, BoardPins, TimerOutput
-from armtempo.model.outputs import SWITCH, Output
+from armtempo.model.engine_pins import ChannelUser
+from armtempo.model.outputs import SWITCH, Input, Output
 
 _MORE = "board/docs/hardware.md lists what is free"
 _MOST_COUNTS = 65_535
+
+
+class PinUser(ChannelUser, Protocol):
+    """What is needed of an arm here."""
+
+    @property
+    def board(self) -> str:
+        """Name in ``boards.BOARDS``."""
+
+    @property
+    def outputs(self) -> tuple[Output, ...]:
+        """Each with its pin."""
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """Each with its pin."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +59,7 @@ class Period:
         return round(time_us * place.clock_hz / 1e6 / self.prescaler)
 
 
-def problems(arm: Arm) -> list[PinProblem]:
+def problems(arm: PinUser) -> list[PinProblem]:
     """What stands in the way of the arm's outputs and inputs, and of its board; empty where nothing does."""
     if not (arm.outputs or arm.inputs) and arm.board == DEFAULT:
         return []
@@ -57,12 +74,12 @@ def problems(arm: Arm) -> list[PinProblem]:
     return [*found, *(problem for problem in _placed(arm)[1] if problem.where not in named)]
 
 
-def timer_outputs(arm: Arm) -> dict[str, TimerOutput]:
+def timer_outputs(arm: PinUser) -> dict[str, TimerOutput]:
     """The timer channel of each output with pulses, by the output's name; of an arm without problems."""
     return _placed(arm)[0]
 
 
-def _pin_problems(arm: Arm, board: BoardPins, engine: dict[str, str]) -> list[PinProblem]:
+def _pin_problems(arm: PinUser, board: BoardPins, engine: dict[str, str]) -> list[PinProblem]:
     found = []
     used = {pin: f"is taken by the engine for {use}" for pin, use in engine.items()}
     for pin, use in board.taken.items():
@@ -81,7 +98,7 @@ def _pin_problems(arm: Arm, board: BoardPins, engine: dict[str, str]) -> list[Pi
     return found
 
 
-def _placed(arm: Arm) -> tuple[dict[str, TimerOutput], list[PinProblem]]:
+def _placed(arm: PinUser) -> tuple[dict[str, TimerOutput], list[PinProblem]]:
     found: dict[str, TimerOutput] = {}
     failed = []
     taken = engine_pins.taken_timers(arm)

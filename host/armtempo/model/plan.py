@@ -1,19 +1,38 @@
-"""A finished plan: the trajectory with all that led to it."""
+"""A finished plan: the trajectory with all that led to it, and its file.
+
+The trajectory file is JSON, whole enough to run the plan and to plan it again. It carries a sha256 over the plan,
+which does not depend on blanks and line breaks; files of version 1 have none.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import json
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from armtempo_shared.basis import BASIS
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError
 from armtempo.formats import json_codec
+from armtempo.formats.atomic_file import check_replaceable, replace_text, why
+from armtempo.model import arm_json, exchange
 from armtempo.model.arm import Arm
-from armtempo.model.job import Job
+from armtempo.model.job import AUTO, Job
 from armtempo.splines.extremes import Extremes
-from armtempo.splines.trajectory import Trajectory
+from armtempo.splines.trajectory import JointSpline, Trajectory
+
+FORMAT = "armtempo trajectory"
+VERSION = 2
+_RUN = "run.json"
+"""A run folder has this beside its trajectory file."""
+RULE = "a trajectory file is replaced by one of the same job, by its name, for an arm of the same name"
+LOG = logging.getLogger("armtempo")
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,31 +92,169 @@ class Plan:
     def save(self, path: Path | str, force: bool = False) -> None:
         """Write the trajectory file, whole or not at all.
 
-        ``force``: also over a file that is no earlier plan of the same job for the same arm, by their names.
-        Raises InputError where such a file is there, or the file cannot be written.
+        ``force``: also over a file that is not of the same job for the same arm, by their names, or was altered.
+        Raises InputError if such a file exists, or the file cannot be written.
         """
-        from armtempo.model import trajectory_file
+        self.check_replaceable(path, force)
+        replace_text(Path(path), _text(self))
 
-        trajectory_file.save(self, path, force)
+    def check_replaceable(self, path: Path | str, force: bool = False) -> None:
+        """Raise InputError if ``save`` would not replace a file that exists; nothing is written."""
+        target = Path(path)
+        check_replaceable(target, _text(self), force or _is_earlier(target, self), RULE)
 
     def to_csv(self, rate_hz: float = 100.0) -> str:
         """Angle, speed, acceleration and jerk of each driven joint as CSV, ``rate_hz`` lines a second."""
-        from armtempo.model import exchange
-
-        return exchange.to_csv(self, rate_hz)
+        return exchange.to_csv(self.trajectory, rate_hz)
 
     def to_ros(self, rate_hz: float = 100.0, frame_id: str = "") -> str:
         """A trajectory_msgs/JointTrajectory message in YAML, radians, with ``rate_hz`` points a second."""
-        from armtempo.model import exchange
-
-        return exchange.to_ros(self, rate_hz, frame_id)
+        return exchange.to_ros(self.trajectory, [joint.name for joint in self.arm.driven], rate_hz, frame_id)
 
     @classmethod
     def load(cls, path: Path | str, altered: bool = False) -> Plan:
-        """The plan of a trajectory file; ``altered``: also of one that was altered after it had been written.
+        """The plan of a trajectory file.
 
-        InputError where the file is none, is damaged, altered or does not fit.
+        ``altered``: also of one that was altered after it had been written. Raises InputError for a file that is
+        missing, cut, altered, of another format or version, or holds a key, value or shape that this program does
+        not understand.
         """
-        from armtempo.model import trajectory_file
+        content = _read(path)
+        if not isinstance(content, dict) or content.get("format") != FORMAT:
+            raise InputError(f"{path}: is not a trajectory file", "make one with: armtempo plan")
+        version = content.get("version")
+        if version not in (1, VERSION):
+            raise InputError(
+                f"{path}: has version {version!r}, this program reads versions 1 and {VERSION}",
+                "plan it again",
+            )
+        expected = {"format", "version", "plan"} | ({"sha256"} if version == VERSION else set())
+        if content.keys() != expected:
+            raise InputError(
+                f"{path}: unknown or missing key beside {', '.join(sorted(expected))}", "plan it again"
+            )
+        _check_unaltered(content, path, altered)
+        plan: Plan = json_codec.decode(cls, content["plan"], f"{path}: plan")
+        _check(plan, path)
+        return plan
 
-        return trajectory_file.load(path, altered)
+
+def _text(plan: Plan) -> str:
+    content = json_codec.encode(plan)
+    whole = {"format": FORMAT, "version": VERSION, "sha256": _checksum(content), "plan": content}
+    return json.dumps(whole, indent=1, allow_nan=False) + "\n"
+
+
+def _checksum(content: Any) -> str:
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _check_unaltered(content: dict[str, Any], path: Path | str, altered: bool) -> None:
+    if content["version"] == 1:
+        LOG.warning(
+            f"{path} was written before trajectory files had a checksum: whether it was altered is not known"
+        )
+    elif content["sha256"] != _checksum(content["plan"]):
+        if not altered:
+            raise InputError(
+                f"{path} was altered after it had been written: its checksum does not fit", _cure(path)
+            )
+        LOG.warning(f"{path} was altered after it had been written, and is taken all the same")
+
+
+def _cure(path: Path | str) -> str:
+    if (Path(path).parent / _RUN).exists():
+        return "it no longer says what was run: bring the original back, or move it out of the run folder"
+    return "plan it again; or, if you know what was altered, take it with --altered"
+
+
+def _is_earlier(path: Path, plan: Plan) -> bool:
+    """Whether the file holds an earlier plan of the same job and arm, by their names, as it was written."""
+    try:
+        content = _read(path)
+        before = content["plan"]
+        names = before["job"]["name"], before["arm"]["name"]
+        unaltered = content["version"] == 1 or content["sha256"] == _checksum(before)
+    except (InputError, LookupError, TypeError):
+        return False
+    return bool(names == (plan.job.name, plan.arm.name) and unaltered and content.get("format") == FORMAT)
+
+
+def _read(path: Path | str) -> Any:
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise InputError(
+            f"{path}: no such file",
+            f"check the path, or make it with: armtempo plan -o {path}",
+        ) from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {why(error)}", "check its permissions") from None
+    try:
+        return json.loads(text, parse_constant=_refuse)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path}: damaged or cut: {error}", "plan it again or copy it again") from None
+
+
+def _refuse(name: str) -> None:
+    raise ValueError(f"{name} is not a number")
+
+
+def _check(plan: Plan, path: Path | str) -> None:
+    """Check what types cannot express: shapes, increasing times, one spline for each driven joint."""
+    arm_json.check(plan.arm, f"{path}: arm", "plan it again")
+    joints, driven = plan.trajectory.joints, plan.arm.driven
+    if not joints or len(joints) != len(driven):
+        raise InputError(
+            f"{path}: {len(joints)} joints in the trajectory, the arm drives {len(driven)}",
+            "plan it again",
+        )
+    if plan.via_deg.shape[1:] != (len(driven),) or len(plan.extremes) != len(driven):
+        raise InputError(
+            f"{path}: via_deg and extremes must have an entry for each of {len(driven)} joints",
+            "plan it again",
+        )
+    for number, spline in enumerate(joints, 1):
+        _check_spline(spline, len(plan.via_deg) - 1, f"{path}: trajectory joint {number}")
+    if plan.trajectory.shared and any(
+        not np.array_equal(spline.time_points_s, joints[0].time_points_s) for spline in joints
+    ):
+        raise InputError(
+            f"{path}: shared timing, but the joints' time control points differ",
+            "plan it again",
+        )
+    if isinstance(plan.job.refine, str) and plan.job.refine != AUTO:
+        raise InputError(
+            f"{path}: plan.job.refine {plan.job.refine!r} should be a number or {AUTO!r}", "plan it again"
+        )
+    if any(not 0 <= index < len(joints) for search in plan.searches for index in search.joints):
+        raise InputError(f"{path}: searches name a joint that there is not", "plan it again")
+
+
+def _check_spline(spline: JointSpline, stretches: int, where: str) -> None:
+    segments = stretches
+    if spline.via_segments is not None:
+        if len(spline.via_segments) != stretches + 1 or spline.via_segments[0] != 0:
+            raise InputError(
+                f"{where}: via_segments must name {stretches + 1} via points, the first at 0", "plan it again"
+            )
+        if np.any(np.diff(spline.via_segments) < 1):
+            raise InputError(f"{where}: its via_segments do not increase", "plan it again")
+        segments = spline.via_segments[-1]
+    if spline.degree not in BASIS or spline.refine < 1:
+        raise InputError(
+            f"{where}: degree {spline.degree} with refine {spline.refine} is not known",
+            "plan it again",
+        )
+    for what, points, pieces in (
+        ("angle", spline.angle_points_deg, segments),
+        ("time", spline.time_points_s, segments * spline.refine),
+    ):
+        if points.shape != (pieces + spline.degree,):
+            raise InputError(
+                f"{where}: {points.size} {what} control points do not fit {pieces} segments",
+                "plan it again",
+            )
+    if not np.all(np.diff(spline.time_points_s) > 0):
+        raise InputError(f"{where}: its time control points do not increase", "plan it again")

@@ -25,7 +25,7 @@ def save(path: Path, arm: Arm, name: str, angles_deg: list[float], replace: bool
     """
     if problem := named.name_problem(name):
         raise InputError(f"posture {name!r}: {problem}", "choose another name")
-    if problem := named.angles_problem(arm, angles_deg):
+    if problem := arm.angles_problem(angles_deg):
         raise InputError(f"posture {name!r}: {problem}", "bring the arm into its ranges")
     try:
         with path.open(encoding="utf-8", newline="") as file:

@@ -1,96 +1,47 @@
-"""A sequence of motions, outputs and waits, as its file describes it; nothing is planned yet."""
+"""A sequence of motions, outputs and waits, and the file that describes it; nothing is planned yet."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
-from armtempo.model.arm import Arm
-from armtempo.model.job import Job
+from armtempo_shared.sequence import MAX_NESTING, MAX_REPEATS, MAX_WAIT_MS
+
+from armtempo.basics.errors import InputError
+from armtempo.formats import toml_table
+from armtempo.formats.spelling import did_you_mean
+from armtempo.formats.toml_table import Table
+from armtempo.model.arm import Arm, read_posture
+from armtempo.model.job import Job, name_of, read_angles
 from armtempo.model.plan import Plan
 from armtempo.model.posture import ArmPosture
+from armtempo.model.steps import (
+    FOR_EVER,
+    ON_TIMEOUT,
+    STOP,
+    Count,
+    Goto,
+    Repeat,
+    RunMotion,
+    SetOutput,
+    SourceMotion,
+    Step,
+    Wait,
+    WaitInput,
+)
 
-STOP, FAULT, NEXT = "stop", "fault", "next"
-ON_TIMEOUT = (STOP, FAULT, NEXT)
-"""What happens where an input does not come in time: the sequence ends in order, or by a fault, or goes on."""
-FOR_EVER = "for ever"
-
-
-@dataclass(frozen=True, eq=False)
-class SourceMotion:
-    """A job that is still to be planned, or a plan, by its file."""
-
-    name: str
-    source: Job | Plan
-
-
-@dataclass(frozen=True)
-class Placed:
-    """A step of a sequence file."""
-
-    where: str
-    """File and step, for messages."""
-    step: int
-    """Its number in the sequence's own file, from 1."""
+LONGEST_NAME = 20
+"""Of a sequence: its motions are stored as NAME-1, NAME-2 …, within the board's 24 characters."""
+HOME = "home"
+_MOST_S = MAX_WAIT_MS / 1000
+_KINDS = ("goto", "run", "output", "wait_s", "wait_input", "count", "repeat", "end", "call")
 
 
-@dataclass(frozen=True, eq=False)
-class Goto(Placed):
-    """Move straight to a posture, or to where a motion begins."""
-
-    target: ArmPosture | SourceMotion
-
-
-@dataclass(frozen=True, eq=False)
-class RunMotion(Placed):
-    """Run a motion from its beginning."""
-
-    motion: SourceMotion
-
-
-@dataclass(frozen=True)
-class SetOutput(Placed):
-    """Set an output; ``raw`` as the board takes it, ``words`` as the user wrote it."""
-
-    number: int
-    raw: int
-    words: str
-
-
-@dataclass(frozen=True)
-class Wait(Placed):
-    """Wait for a time."""
-
-    wait_s: float
-
-
-@dataclass(frozen=True)
-class WaitInput(Placed):
-    """Wait until an input is active, or not; ``timeout_s`` 0: for ever."""
-
-    number: int
-    active: bool
-    timeout_s: float
-    on_timeout: str
-    words: str
-
-
-@dataclass(frozen=True)
-class Count(Placed):
-    """Add one to a counter."""
-
-    counter: str
-
-
-@dataclass(frozen=True)
-class Repeat(Placed):
-    """Steps that come ``times`` times, 0: for ever."""
-
-    times: int
-    steps: tuple[Step, ...]
-
-
-Step = Goto | RunMotion | SetOutput | Wait | WaitInput | Count | Repeat
+def is_sequence(path: Path | str) -> bool:
+    """Whether a TOML file describes a sequence: it has steps. Raises InputError where it is not TOML."""
+    return Path(path).suffix == ".toml" and toml_table.read(path).has("step")
 
 
 @dataclass(frozen=True)
@@ -109,6 +60,215 @@ class Sequence:
 
         Raises InputError, naming file, step and key, for anything missing, unknown or not allowed.
         """
-        from armtempo.model import sequence_file
+        top = toml_table.read(path)
+        name = name_of(top, LONGEST_NAME)
+        reader = _Reader(arm, Path(path), _postures(top, arm))
+        start = reader.posture(top, "start") if top.has("start") else None
+        steps = reader.steps(top)
+        top.done()
+        return cls(name, start, steps, str(path))
 
-        return sequence_file.load(path, arm)
+
+def arm_named(path: Path | str) -> Path | None:
+    """The arm file that a sequence file names, or None."""
+    top = toml_table.read(path)
+    if not top.has("arm"):
+        return None
+    named = Path(top.text("arm"))
+    beside = Path(path).parent / named
+    return beside if beside.is_file() else named
+
+
+def _postures(top: Table, arm: Arm) -> dict[str, ArmPosture]:
+    """The arm's postures by name, the arm's home, and those of the sequence itself."""
+    found = {HOME: ArmPosture(HOME, tuple(float(angle) for angle in arm.home_deg))}
+    found.update((posture.name, posture) for posture in arm.postures)
+    own = top.table("posture")
+    if own is None:
+        return found
+    for name in own.names():
+        if name in found:
+            raise InputError(f"{top.file}: posture.{name} is there already", "choose another name")
+        found[name] = read_posture(own, name, arm)
+    return found
+
+
+@dataclass
+class _Reader:
+    """Reads the steps of one file, and of those that it calls."""
+
+    arm: Arm
+    file: Path
+    postures: dict[str, ArmPosture]
+    callers: tuple[Path, ...] = ()
+    number: int = 0
+    """Of the calling step, for all steps of a file that was called; 0: each has its own."""
+    motions: dict[Path, SourceMotion] = field(default_factory=dict)
+
+    def steps(self, top: Table) -> tuple[Step, ...]:
+        """All steps of a file; repeats hold what stands between them and their end."""
+        top.known("name", "arm", "start", "posture")
+        tables = top.tables("step")
+        found: list[list[Step]] = [[]]
+        begun: list[tuple[Table, int, int]] = []
+        for index, table in enumerate(tables, 1):
+            step = self.number or index
+            kind = self._kind(table, index)
+            if kind == "repeat":
+                begun.append((table, step, self._times(table)))
+                found.append([])
+                if len(begun) > MAX_NESTING:
+                    raise table.fail("repeat", f"at most {MAX_NESTING} within each other")
+            elif kind == "end":
+                table.choice("end", ("repeat",))
+                if not begun:
+                    raise table.fail("end", "given behind a step with repeat")
+                row, number, times = begun.pop()
+                inner = tuple(found.pop())
+                found[-1].append(Repeat(_place(row), number, times, inner))
+            else:
+                found[-1].extend(_GETTERS[kind](self, table, step))
+            table.done()
+        if begun:
+            raise InputError(
+                f"{_place(begun[-1][0])}: repeat has no end",
+                'write a step with end = "repeat" behind its last step',
+            )
+        return tuple(found[0])
+
+    def _kind(self, table: Table, index: int) -> str:
+        table.known(*_KINDS, "to", "active", "timeout_s", "on_timeout")
+        kinds = [key for key in _KINDS if table.has(key)]
+        if kinds == ["output", "wait_s"]:
+            return "output"
+        if len(kinds) == 1:
+            return kinds[0]
+        table.done()  # a key that nobody knows is the likelier mistake
+        what = " and ".join(kinds) if kinds else "nothing"
+        raise InputError(f"{_place(table)}: says {what}", f"give one of {', '.join(_KINDS)} in each step")
+
+    def _times(self, table: Table) -> int:
+        only(table, "repeat")
+        if isinstance(table.peek("repeat"), str):
+            table.choice("repeat", (FOR_EVER,), allowed=f'"{FOR_EVER}", or a whole number')
+            return 0
+        return table.integer("repeat", least=1, most=MAX_REPEATS)
+
+    def goto(self, table: Table, step: int) -> list[Step]:
+        only(table, "goto")
+        target: ArmPosture | SourceMotion
+        if table.has("goto") and str(table.peek("goto")).endswith((".toml", ".json")):
+            target = self._motion(table, "goto")
+        else:
+            target = self.posture(table, "goto")
+        return [Goto(_place(table), step, target)]
+
+    def posture(self, table: Table, key: str) -> ArmPosture:
+        """A posture by name, or as angles."""
+        if not isinstance(table.peek(key), str):
+            angles = read_angles(table, key, self.arm)
+            return ArmPosture(", ".join(f"{angle:g}" for angle in angles) + "°", angles)
+        name = table.text(key)
+        if name not in self.postures:
+            near = did_you_mean(name, self.postures)
+            raise InputError(
+                f"{_place(table)}{key} = {name!r}: there is no such posture{near}",
+                f"known here: {', '.join(sorted(self.postures))}; more with [posture.NAME] angles_deg = [...]",
+            )
+        return self.postures[name]
+
+    def run(self, table: Table, step: int) -> list[Step]:
+        only(table, "run")
+        return [RunMotion(_place(table), step, self._motion(table, "run"))]
+
+    def _motion(self, table: Table, key: str) -> SourceMotion:
+        path = self.file.parent / table.text(key)
+        if path not in self.motions:
+            source = Plan.load(path) if path.suffix == ".json" else Job.load(path, self.arm)
+            self.motions[path] = SourceMotion(path.stem, source)
+        return self.motions[path]
+
+    def output(self, table: Table, step: int) -> list[Step]:
+        only(table, "output", "to", "wait_s")
+        name, place = table.text("output"), _place(table)
+        number = _placed(place, self.arm.output, name)
+        to = table.peek("to")
+        if isinstance(to, bool) or not isinstance(to, str | int | float):
+            raise table.fail("to", "a state of the output, or a number in its unit")
+        raw = _placed(f"{place}to: ", self.arm.outputs[number].raw, to)
+        table.known("to")
+        found: list[Step] = [SetOutput(place, step, number, raw, f"{name} {to}")]
+        return found + (self.wait(table, step) if table.has("wait_s") else [])
+
+    def wait(self, table: Table, step: int) -> list[Step]:
+        only(table, "output", "to", "wait_s")
+        return [Wait(_place(table), step, table.number("wait_s", least=0.001, most=_MOST_S))]
+
+    def wait_input(self, table: Table, step: int) -> list[Step]:
+        only(table, "wait_input", "active", "timeout_s", "on_timeout")
+        name, place = table.text("wait_input"), _place(table)
+        number = _placed(place, self.arm.input, name)
+        active = table.boolean("active", True)
+        timeout_s = (
+            table.number("timeout_s", 0.0, least=0.001, most=_MOST_S) if table.has("timeout_s") else 0.0
+        )
+        if table.has("on_timeout") and not timeout_s:
+            raise table.fail("on_timeout", "given together with timeout_s only")
+        then = table.choice("on_timeout", ON_TIMEOUT, STOP)
+        words = name if active else f"{name} not"
+        return [WaitInput(place, step, number, active, timeout_s, then, words)]
+
+    def count(self, table: Table, step: int) -> list[Step]:
+        only(table, "count")
+        return [Count(_place(table), step, name_of(table, key="count"))]
+
+    def call(self, table: Table, step: int) -> list[Step]:
+        only(table, "call")
+        path = (self.file.parent / table.text("call")).resolve()
+        chain = (*self.callers, self.file.resolve())
+        if path in chain:
+            names = " calls ".join(one.name for one in (*chain[chain.index(path) :], path))
+            raise InputError(
+                f"{_place(table)}call: the sequence calls itself: {names}", "take one of the calls out"
+            )
+        top = toml_table.read(path)
+        if not top.has("step"):
+            raise InputError(
+                f"{_place(table)}call: {path.name} is no sequence: it has no [[step]]", "use run for a job"
+            )
+        postures = {**self.postures, **_postures(top, self.arm)}
+        called = _Reader(self.arm, path, postures, chain, step, self.motions)
+        steps = called.steps(top)
+        top.done()
+        return list(steps)
+
+
+_Getter = Callable[[_Reader, Table, int], list[Step]]
+_GETTERS: dict[str, _Getter] = {
+    "goto": _Reader.goto,
+    "run": _Reader.run,
+    "output": _Reader.output,
+    "wait_s": _Reader.wait,
+    "wait_input": _Reader.wait_input,
+    "count": _Reader.count,
+    "call": _Reader.call,
+}
+
+
+def only(table: Table, *keys: str) -> None:
+    """Raise InputError for a key that belongs to another kind of step."""
+    for key in (*_KINDS, "to", "active", "timeout_s", "on_timeout"):
+        if table.has(key) and key not in keys:
+            raise table.fail(key, f"left out beside {keys[0]}")
+
+
+def _place(table: Table) -> str:
+    return f"{table.file}: {table.place}"
+
+
+def _placed(place: str, function: Callable[[Any], int], value: Any) -> int:
+    """What a function of the arm says of a value; its InputError names the step."""
+    try:
+        return function(value)
+    except InputError as error:
+        raise InputError(f"{place}{error.problem}", error.hint) from None

@@ -1,4 +1,4 @@
-"""The arm files that ship with armtempo, by name."""
+"""The files that ship with armtempo: arms by name, the paper's job."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from armtempo.basics.errors import InputError
-from armtempo.model import arm_file
 
+_DATA = Path(__file__).parents[1] / "data"
 PAPER = "paper"
 """Name of the paper's 1:5 arm, which is taken where none is named."""
 
@@ -21,9 +21,19 @@ class ArmFile:
     """Whether it was found by the name of an arm that ships."""
 
 
+def arm_path() -> Path:
+    """The arm file of the paper's 1:5 arm."""
+    return _DATA / "paper_arm.toml"
+
+
+def job_path() -> Path:
+    """The job file of the paper's feeding motion."""
+    return _DATA / "feeding.toml"
+
+
 def files() -> dict[str, Path]:
     """The arm file of each name: the paper's arm first, then by alphabet."""
-    paper = arm_file.default_path()
+    paper = arm_path()
     return {PAPER: paper, **{path.stem: path for path in sorted((paper.parent / "arms").glob("*.toml"))}}
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from armtempo.basics.errors import InputError
 from armtempo.formats import toml_table
-from armtempo.model import arm_file, shipped
+from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.new_arm import joint_entry
 from armtempo.new_arm.joint_entry import JointEntry
@@ -55,4 +55,4 @@ def from_joints(name: str, joints: Sequence[JointEntry]) -> ArmText:
 
 def _checked(text: str) -> ArmText:
     """Raises InputError for a text that could not be read again."""
-    return ArmText(text, arm_file.of_table(toml_table.parse(text, "arm.toml")))
+    return ArmText(text, Arm.of_table(toml_table.parse(text, "arm.toml")))

@@ -13,7 +13,7 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, MissingPackageError
 from armtempo.formats.atomic_file import why
-from armtempo.model.arm_file import MAX_ANGLE_DEG
+from armtempo.model.parts_file import MAX_ANGLE_DEG
 
 MM = 1000.0
 """Millimetres in the URDF's unit, the metre."""

@@ -14,8 +14,9 @@ import numpy as np
 from armtempo import optimise
 from armtempo.basics.arrays import Array
 from armtempo.basics.progress import Progress
-from armtempo.model.arm import Arm, Limits
+from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.model.parts import Limits
 from armtempo.paper.claims import BETTER, DIFFERS, SAME, Claim
 from armtempo.paper.printed import SEARCHES_S
 from armtempo.planning import planner

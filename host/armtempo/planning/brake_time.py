@@ -16,7 +16,7 @@ from armtempo_shared.motion import RAMP_ENTRIES, RAMP_UNIT_TICKS
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
-from armtempo.model.arm import Limits
+from armtempo.model.parts import Limits
 from armtempo.splines.trajectory import Trajectory
 
 EXCESS = 1.25

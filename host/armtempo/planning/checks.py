@@ -18,10 +18,9 @@ from armtempo_shared.limits import (
     TICK_HZ,
 )
 
-from armtempo import optimise
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, PlanError
-from armtempo.model.arm import Arm, DrivenJoint, Limits
+from armtempo.model.arm import Arm
 from armtempo.model.job import (
     AUTO,
     GRADIENT,
@@ -33,7 +32,9 @@ from armtempo.model.job import (
     TIMINGS,
     Job,
 )
+from armtempo.model.parts import DrivenJoint, Limits
 from armtempo.model.tool_pose import TOLERANCE_DEG, TOLERANCE_MM, WHOLE, Pose
+from armtempo.optimise import parameters as algorithm_parameters
 from armtempo.splines import bspline, extremes
 from armtempo.splines.extremes import Extremes
 from armtempo.splines.trajectory import JointSpline, Trajectory
@@ -104,7 +105,7 @@ def check_job(arm: Arm, job: Job) -> None:
             "choose one of them, or leave fitness out",
         )
     if job.optimiser != GRADIENT:
-        optimise.parameters(job.optimiser)
+        algorithm_parameters(job.optimiser)
     if is_free(job):
         return
     segments = len(job.via) - 1

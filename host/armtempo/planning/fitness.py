@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from armtempo.model.arm import Limits
+from armtempo.model.parts import Limits
 from armtempo.splines import bspline, time_axis
 from armtempo.splines.bspline import Array
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.model.arm import Limits
+from armtempo.model.parts import Limits
 from armtempo.optimise import interior_point
 from armtempo.optimise.interior_point import Schedule
 from armtempo.optimise.kkt import Equalities

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from armtempo import optimise
 from armtempo.basics.arrays import Array
 from armtempo.basics.progress import Progress
-from armtempo.model.arm import Limits
 from armtempo.model.job import GRADIENT, Job
+from armtempo.model.parts import Limits
+from armtempo.optimise import Settings, minimise
 from armtempo.optimise.tracker import Result
 from armtempo.planning import checks, rest_to_rest
 from armtempo.planning.fitness import Fitness
@@ -98,8 +98,8 @@ def _once(
     fitness = Fitness(points, job.degree, limits)
     parameters = dict(job.parameters)
     function = getattr(fitness, str(parameters.pop("fitness", checks.FITNESS[0])))
-    settings = optimise.Settings(job.optimiser, job.population, job.iterations, parameters)
-    return Found(optimise.minimise(function, box, rng, settings, progress), np.empty(0))
+    settings = Settings(job.optimiser, job.population, job.iterations, parameters)
+    return Found(minimise(function, box, rng, settings, progress), np.empty(0))
 
 
 def gradient(

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.model.arm import Limits
+from armtempo.model.parts import Limits
 from armtempo.planning import dual_bound, dual_value, rest_to_rest
 from armtempo.planning.dual_bound import Cells
 from armtempo.splines import bspline

@@ -9,9 +9,9 @@ from importlib.metadata import version
 
 import numpy as np
 
-import armtempo
 from armtempo.basics.arrays import Array
 from armtempo.basics.progress import Progress
+from armtempo.basics.version import installed_version
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
@@ -48,7 +48,7 @@ def _silent(_done: float, _whole: float) -> None:
 def versions() -> Mapping[str, str]:
     """What a plan's numbers depend on besides its input."""
     return {
-        "armtempo": armtempo.__version__,
+        "armtempo": installed_version(),
         "numpy": np.__version__,
         "scipy": version("scipy"),
         "python": platform.python_version(),

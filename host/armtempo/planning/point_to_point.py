@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armtempo.basics.errors import InputError
-from armtempo.model.arm import Arm, DrivenJoint
+from armtempo.model.arm import Arm
+from armtempo.model.parts import DrivenJoint
 from armtempo.splines import bspline, time_axis
 from armtempo.splines.bspline import Array
 from armtempo.splines.trajectory import JointSpline, Trajectory

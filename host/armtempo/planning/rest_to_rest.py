@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.model.arm import Limits
+from armtempo.model.parts import Limits
 
 _ROUNDING = 8 * float(np.finfo(float).eps)
 """A way may be shorter by this part of the largest angle: what is at an angle is there as far as its digits go."""

@@ -9,13 +9,14 @@ from armtempo_shared import sequence as record
 
 from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.basics.progress import Progress
-from armtempo.model import sequence as kinds
+from armtempo.model import steps as kinds
 from armtempo.model.arm import Arm
 from armtempo.model.job import GRADIENT, Job
 from armtempo.model.plan import Plan
 from armtempo.model.posture import ArmPosture
-from armtempo.model.sequence import Sequence, SourceMotion, Step
+from armtempo.model.sequence import Sequence
 from armtempo.model.sequence_plan import SequencePlan, SequenceRow, check_size
+from armtempo.model.steps import SourceMotion, Step
 from armtempo.planning import checks, planner, via_points
 from armtempo.splines.trajectory import Trajectory
 

@@ -6,8 +6,9 @@ import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.progress import Progress
-from armtempo.model.arm import Arm, Limits
+from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.model.parts import Limits
 from armtempo.model.plan import Search
 from armtempo.planning import checks, lower_bounds, time_parameterization
 from armtempo.planning.planned import Planned

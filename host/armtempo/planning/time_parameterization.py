@@ -12,8 +12,8 @@ from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.progress import Progress
-from armtempo.model.arm import Limits
 from armtempo.model.job import REFINE, Job
+from armtempo.model.parts import Limits
 from armtempo.optimise.tracker import Result
 from armtempo.planning import interval_search
 from armtempo.planning.fixed_path import FixedPath, Optimum

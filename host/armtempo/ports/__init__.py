@@ -5,8 +5,9 @@
     names.py, listing.py  what a port is called, and which ports this machine has
     claim.py      the file that says which program has a port and where that program listens
     lines.py      messages over a socket, a line of JSON each
+    requests.py   what may be asked for, with which fields
     server.py     the owner's end: requests in, samples and events out
     caller.py     the other end: who has this port, ask it, subscribe
 
-The messages: host/docs/sharing.md. Nothing here knows what a board is.
+The messages: host/docs/sharing.md.
 """

@@ -36,8 +36,9 @@ class LineReader:
             if not piece:
                 return None
             self._data += piece
-        line, _, rest = bytes(self._data).partition(b"\n")
-        self._data = bytearray(rest)
+        end = self._data.index(b"\n")
+        line = bytes(self._data[:end])
+        del self._data[: end + 1]
         return _parse(line)
 
 
@@ -48,9 +49,13 @@ def to_line(message: Message) -> bytes:
 
 def _parse(line: bytes) -> Message:
     try:
-        found = json.loads(line)
+        found = json.loads(line, parse_constant=_no_number)
     except (ValueError, RecursionError):
         found = None
     if not isinstance(found, dict):
         raise LinkError("not a message", "send a JSON object in one line")
     return found
+
+
+def _no_number(word: str) -> None:
+    raise ValueError(f"{word} is not JSON")

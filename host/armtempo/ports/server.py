@@ -19,11 +19,11 @@ from armtempo.basics.errors import ArmtempoError, BoardError, LinkError, PortErr
 from armtempo.ports import claim as claims
 from armtempo.ports.claim import VERSION, PortClaim
 from armtempo.ports.lines import LineReader, Message, to_line
+from armtempo.ports.requests import REQUESTS, Fields, check, is_id
 
 Handler = Callable[[Message], Message]
 """Answers one request; its ArmtempoError becomes an answer too."""
 
-TOPICS = ("sample", "status", "event", "traffic")
 _BACKLOG = 16
 _FLUSH_S = 0.5
 """Time in which a caller must take the last messages."""
@@ -36,11 +36,15 @@ _QUEUE = 1000
 class Server:
     """Listens as the owner of a port, from the making on until ``close``.
 
-    ``handlers``: by the name of a request. OSError where nobody can be listened to.
+    ``handlers``: by the name of a request, which gets only what ``requests`` allows. OSError where nobody can be
+    listened to.
     """
 
-    def __init__(self, claim: PortClaim, handlers: Mapping[str, Handler]) -> None:
+    def __init__(
+        self, claim: PortClaim, handlers: Mapping[str, Handler], requests: Mapping[str, Fields] = REQUESTS
+    ) -> None:
         self._handlers = handlers
+        self._requests = requests
         self._connections: set[_Connection] = set()
         self._lock = Lock()
         self._checked_s = 0.0
@@ -94,7 +98,7 @@ class Server:
                 accepted, _ = self._socket.accept()
             except OSError:
                 return
-            connection = _Connection(accepted, self.claim, self._handlers)
+            connection = _Connection(accepted, self.claim, self._handlers, self._requests)
             with self._lock:
                 self._connections.add(connection)
             Thread(target=self._serve, args=(connection,), name="armtempo reader", daemon=True).start()
@@ -112,11 +116,18 @@ class Server:
 class _Connection:
     """One caller."""
 
-    def __init__(self, accepted: socket.socket, claim: PortClaim, handlers: Mapping[str, Handler]) -> None:
+    def __init__(
+        self,
+        accepted: socket.socket,
+        claim: PortClaim,
+        handlers: Mapping[str, Handler],
+        requests: Mapping[str, Fields],
+    ) -> None:
         self.topics: frozenset[str] = frozenset()
         self._socket = accepted
         self._claim = claim
         self._handlers = {"hello": self._hello, "subscribe": self._subscribe, **handlers}
+        self._requests = requests
         self._known = not claim.token
         self._lines: queue.Queue[bytes | None] = queue.Queue(_QUEUE)
         self._dropped = 0
@@ -134,7 +145,8 @@ class _Connection:
         reader = LineReader(self._socket)
         try:
             while (request := reader.read()) is not None:
-                self.send(to_line({"id": request.get("id"), **self._answer(request)}))
+                number = request.get("id")
+                self.send(to_line({"id": number if is_id(number) else None, **self._answer(request)}))
         except LinkError as error:
             self.send(to_line({"id": None, **_failed(error)}))
         except OSError:
@@ -166,31 +178,31 @@ class _Connection:
                 self._socket.sendall(line)
 
     def _answer(self, request: Message) -> Message:
+        if not is_id(request.get("id")):
+            return _failed(LinkError("a request without an id", "give a whole number or a short text as id"))
         name = request.get("request")
         if not self._known and name != "hello":
             return _failed(LinkError("nobody has said hello yet", "say hello with the token first"))
         handler = self._handlers.get(name) if isinstance(name, str) else None
         if handler is None:
             return _failed(
-                LinkError(f"no request {name!r}", f"there are {', '.join(sorted(self._handlers))}")
+                LinkError(f"no request {name!r:.40}", f"there are {', '.join(sorted(self._handlers))}")
             )
         try:
+            check(request, self._requests[str(name)])
             return {"ok": True, **handler(request)}
         except ArmtempoError as error:
             return _failed(error)
 
     def _hello(self, request: Message) -> Message:
-        if not compare_digest(str(request.get("token", "")).encode(), self._claim.token.encode()):
+        if not compare_digest(request.get("token", "").encode(), self._claim.token.encode()):
             raise LinkError("wrong token", "take it from the file of the claim")
         self._known = True
         claim = self._claim
         return {"version": VERSION, "port": claim.port, "program": claim.program, "pid": claim.pid}
 
     def _subscribe(self, request: Message) -> Message:
-        topics = request.get("topics")
-        if not isinstance(topics, list) or not set(map(str, topics)) <= set(TOPICS):
-            raise LinkError("topics must be a list", f"give some of {', '.join(TOPICS)}")
-        self.topics = frozenset(topics)
+        self.topics = frozenset(request["topics"])
         return {"topics": sorted(self.topics)}
 
 

@@ -13,7 +13,8 @@ from armtempo_shared.wire import record_crc
 from numpy.typing import NDArray
 
 from armtempo.basics.errors import InputError
-from armtempo.model.arm import Arm, DrivenJoint
+from armtempo.model.arm import Arm
+from armtempo.model.parts import DrivenJoint
 from armtempo.planning import checks
 from armtempo.planning.brake_time import BrakeTimes
 from armtempo.records import output_rows

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from armtempo.basics.errors import InputError, RunFolderError
-from armtempo.model.arm import Arm, Limits
+from armtempo.model.arm import Arm
+from armtempo.model.parts import Limits
 from armtempo.model.plan import Plan
 from armtempo.runs import analysis, peaks, reader, replayed, stretched
 from armtempo.runs.run_folder import COMPLETE

@@ -12,7 +12,7 @@ import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import MissingPackageError
-from armtempo.model.arm import Limits
+from armtempo.model.parts import Limits
 from armtempo.report.drawing import PAGE_COLOUR
 from armtempo.runs import stretched
 from armtempo.runs.analysis import Curves

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 
-from armtempo import link
+from armtempo.link.connect import open_board, patiently
 from armtempo.link.traffic import Chunk, Sink
 from armtempo.model.arm import Arm
 from armtempo.project import board_port
@@ -43,7 +43,7 @@ def connect(
     chosen = board_port.choose(port)
     if chosen.source in board_port.UNASKED:
         tell(f"port {chosen.value}: {chosen.source}")
-    return link.patiently(
+    return patiently(
         lambda: connect_now(
             chosen.value, arm, log_traffic=log_traffic, sink=sink, any_program=any_program, tell=tell
         )
@@ -62,7 +62,7 @@ def connect_now(
     """``connect`` to the port that is named, without waiting; PortInUseError where another program has it."""
     stack = ExitStack()
     taps = _Taps(sink)
-    client = stack.enter_context(link.open_board(port, log_traffic, taps, arm, any_program, tell))
+    client = stack.enter_context(open_board(port, log_traffic, taps, arm, any_program, tell))
     client.session.tell = tell
     board = Board(client, port, stack)
     sharing = Sharing(client, board.state, board.stops, lambda: board.arm)

@@ -13,7 +13,8 @@ from armtempo_shared.messages import START_HOMING
 
 from armtempo.basics.errors import InputError, LinkError
 from armtempo.link import Client
-from armtempo.model.arm import Arm, DrivenJoint, Limits
+from armtempo.model.arm import Arm
+from armtempo.model.parts import DrivenJoint, Limits
 from armtempo.planning import point_to_point
 from armtempo.records import encoded_motion
 from armtempo.robot.stop_request import StopRequest

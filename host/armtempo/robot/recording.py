@@ -12,7 +12,7 @@ from armtempo.basics.progress import Progress
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import Follower, RunEnd
-from armtempo.model import arm_json, trajectory_file
+from armtempo.model import arm_json
 from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.robot.goto import go_back
 from armtempo.robot.stop_request import StopRequest
@@ -77,7 +77,7 @@ def new_run(parent: Path, motion: EncodedMotion, port: str, client: Client) -> R
     )
     folder.write_motion(motion.data)
     if motion.plan is not None:
-        trajectory_file.save(motion.plan, folder.path / run_folder.TRAJECTORY)
+        motion.plan.save(folder.path / run_folder.TRAJECTORY)
     else:
         arm_json.save(motion.arm, folder.path / run_folder.ARM)
     folder.write()

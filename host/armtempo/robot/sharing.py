@@ -12,16 +12,17 @@ from threading import Event as Flag
 from threading import Thread
 from typing import Any
 
-from armtempo_shared.limits import FULL_OUTPUT, TICK_HZ
+from armtempo_shared.limits import TICK_HZ
 
-from armtempo.basics.errors import ArmtempoError, LinkError, NoAnswerError
+from armtempo.basics.errors import ArmtempoError, NoAnswerError
 from armtempo.link import Client
 from armtempo.link.board_messages import Done, Event, Fault, Sample
 from armtempo.link.traffic import Chunk
 from armtempo.model.arm import Arm
 from armtempo.ports import claim, names
 from armtempo.ports.lines import Message
-from armtempo.ports.server import TOPICS, Server
+from armtempo.ports.requests import TOPICS
+from armtempo.ports.server import Server
 from armtempo.robot.board_state import BoardState
 from armtempo.robot.speed import change_speed
 from armtempo.robot.stop_request import StopRequest
@@ -91,9 +92,9 @@ class Sharing:
         return {"status": self._read().to_json()}
 
     def _stop(self, request: Message) -> Message:
-        now = request.get("now") is True
+        now = request.get("now", False)
         for stop in [*self._stops]:
-            stop.ask(str(request.get("by") or "another program"))
+            stop.ask(request.get("by") or "another program")
         with self._client.session.in_a_hurry(TURN_S) as mine:
             if not mine:
                 raise NoAnswerError(
@@ -106,7 +107,7 @@ class Sharing:
         return {"moving": moving}
 
     def _speed(self, request: Message) -> Message:
-        rate = int(request["rate"])
+        rate = request["rate"]
         with self._turn():
             change_speed(self._client, rate)
         if self._server is not None:
@@ -114,11 +115,8 @@ class Sharing:
         return {}
 
     def _output(self, request: Message) -> Message:
-        number, value = request.get("number"), request.get("value")
-        if not (isinstance(number, int) and isinstance(value, int)):
-            raise LinkError("output: a number and a value are needed", "run the command again")
         with self._turn():
-            self._client.set_output(number & 0xFF, min(max(value, 0), FULL_OUTPUT))
+            self._client.set_output(request["number"], request["value"])
         return {}
 
     def _inputs(self, request: Message) -> Message:

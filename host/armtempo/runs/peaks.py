@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.model.arm import Limits
+from armtempo.model.parts import Limits
 from armtempo.runs import stretched
 from armtempo.runs.analysis import SAMPLE_S, Curves
 from armtempo.runs.differentiation import noise, of_curves, quantisation_sigma, weights

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from armtempo.basics.errors import InputError, RunFolderError
 from armtempo.formats.atomic_file import why
-from armtempo.model import arm_json, trajectory_file
+from armtempo.model import arm_json
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.records import decode
@@ -15,7 +15,7 @@ from armtempo.splines.trajectory import Trajectory
 
 def plan_of(run: RunData) -> Plan | None:
     """The plan; None where only the board had the motion. InputError where its file is damaged."""
-    return trajectory_file.load(run.trajectory_path) if run.trajectory_path else None
+    return Plan.load(run.trajectory_path) if run.trajectory_path else None
 
 
 def trajectory_of(run: RunData) -> Trajectory:

@@ -26,8 +26,8 @@ from typing import Any, Self
 
 from armtempo_shared import limits
 
-from armtempo import __version__
 from armtempo.basics.errors import InputError, RunFolderError
+from armtempo.basics.version import installed_version
 from armtempo.formats.atomic_file import replace_text
 from armtempo.link.board_messages import Positions, Sample
 from armtempo.link.follow import Gap
@@ -227,7 +227,7 @@ def writing(path: Path) -> Iterator[None]:
 
 def written_head(name: str, started: str) -> dict[str, Any]:
     """What run.json says of any run, behind its format: by which version, of what, when."""
-    return {"armtempo": __version__, "name": name, "started": started, "written": now()}
+    return {"armtempo": installed_version(), "name": name, "started": started, "written": now()}
 
 
 def write_meta(folder: Path, meta: dict[str, Any]) -> None:

@@ -9,7 +9,8 @@ from typing import Any
 from armtempo_shared import armrecord
 
 from armtempo.basics.errors import InputError
-from armtempo.model.arm import Arm, DrivenJoint
+from armtempo.model.arm import Arm
+from armtempo.model.parts import DrivenJoint
 from armtempo.records import encode
 
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, PlanError
-from armtempo.model.arm import Arm, DrivenJoint
+from armtempo.model.arm import Arm
+from armtempo.model.parts import DrivenJoint
 from armtempo.planning import brake_time, point_to_point
 from armtempo.planning.brake_time import BrakeTimes
 from armtempo.planning.jog import jog_law

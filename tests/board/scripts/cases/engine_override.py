@@ -178,6 +178,78 @@ def case_whole_path():
         assert (rig.samples[-1][2] & 0xFFFFFFFF) >= end, number
 
 
+def some_leg(rig, start, end):
+    """A motion of three joints from the steps ``start`` to ``end``, where they rest, but with acceleration."""
+    from armtempo_board.motion.start_check import check_splines
+
+    times = [random.randrange(20, 80) / 1000 for _ in range(14)]
+    times = [(number - 2) * times[0] for number in range(4)] + [
+        2 * times[0] + sum(times[:n]) for n in range(10)
+    ]
+    angles = []
+    for places in zip(start, end):
+        size = 10 ** (random.randrange(5, 30) / 10)
+        ends = [(place, (random.random() - 0.5) * size) for place in places]
+        first, last = [[place + by * speed for by in (1, 0, -1 / 33, 0, 1)] for place, speed in ends]
+        angles.append(first + [random.random() * size for _ in range(4)] + last)
+    motion = record(BRAKE_TICKS, angles, times)
+    try:
+        check_splines(motion, rig.engine.drives, rig.engine.limits)
+    except Refused:  # too abrupt
+        return some_leg(rig, start, end)
+    return motion
+
+
+def some_place():
+    """Three joints, often close to the middle between two steps: the first steps of a motion then come together."""
+    return [random.randrange(-200, 200) + random.choice((-0.45, 0.1, 0.45)) for _ in range(3)]
+
+
+def case_prepared():
+    """Motions prepared while others move, at every speed: on the pins each ends where its record does."""
+    random.seed(SEED + 1)
+    rig = Rig(joints(), planned=False)
+    from armtempo_board.motion.next_motion import NextMotion  # once the rig has its board
+
+    rig.trusting()
+    engine = rig.engine
+    coming = NextMotion(engine)
+    places = [[0, 0, 0], some_place()]
+    ready, rate, coming_leg = None, 1000, some_leg(rig, *places)
+    for number in range(10 * MOTIONS):
+        leg = coming_leg
+        places = [places[1], some_place()]
+        coming_leg = some_leg(rig, *places)
+        engine.load(leg, rate, ready)
+        engine.start()
+        rig.run_to(random.randrange(-TICK_HZ // 50, TICK_HZ // 2))
+        rate, ready = random.choice((1000, 900, 700, 400)), coming
+        stands = [round(steps) for steps in places[0]]
+        for _ in coming.pieces(rate, lambda leg=coming_leg: leg, lambda _, joint, at=stands: at[joint]):
+            rig.turn()
+        if engine.moving and random.randrange(2):
+            change(rig)
+        if engine.moving:
+            engine.change_rate(1000)
+        rig.run_to(rig.board.now - rig.zero() + 5 * TICK_HZ)
+        assert engine.fault == 0, (number, engine.fault)
+        moved = [motor.position for motor in rig.arm.motors]
+        assert rig.commanded() == moved == stands, (number, rig.commanded(), moved, stands)
+
+
+def case_step_at_the_start():
+    """A joint that begins just beyond the middle between two steps: its only step comes, at every speed."""
+    for segments in range(1, 5):
+        points = [[0.505] * (segments + 5), [0.0] * (segments + 5), [0.0] * (segments + 5)]
+        motion = record(BRAKE_TICKS, points, [(number - 2) / 20 for number in range(segments + 5)])
+        for rate in (1000, 700):
+            rig, recorders = begin(motion, rate)
+            rig.run_to(TICK_HZ)
+            assert not rig.engine.moving and rig.engine.fault == 0
+            assert rig.commanded() == [1, 0, 0], (segments, rate, rig.commanded())
+            assert [len(recorder.steps) for recorder in recorders] == [1, 0, 0]
+
+
 def case_stops():
     """A stop, whatever the speed is and is becoming, ends on the path."""
     random.seed(SEED)

@@ -1,21 +1,11 @@
-"""The arm file: an arm described in TOML."""
+"""The parts of an arm in its file: the tables of joints, drivers and safety, with the range of each key."""
 
 from __future__ import annotations
 
-from collections import defaultdict
-from dataclasses import replace
-from pathlib import Path
-from typing import NamedTuple
-
 from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS
 
-from armtempo.basics.errors import InputError
-from armtempo.formats import toml_table
 from armtempo.formats.toml_table import Table
-from armtempo.model import boards, outputs_file, pin_use, pose_table
-from armtempo.model import posture as named
-from armtempo.model.arm import (
-    Arm,
+from armtempo.model.parts import (
     Driver,
     Encoder,
     Joint,
@@ -25,7 +15,6 @@ from armtempo.model.arm import (
     Motor,
     Safety,
 )
-from armtempo.model.posture import ArmPosture
 
 MAX_ANGLE_DEG = 36_000.0
 """Largest angle, either way, that an arm file may give: a hundred turns."""
@@ -50,75 +39,8 @@ _MODEL = {
 """Bounds that no small arm comes near: what is beyond them is a slip of the unit or of the point."""
 
 
-def default_path() -> Path:
-    """The arm file that ships with armtempo: the paper's 1:5 arm."""
-    return Path(__file__).parents[1] / "data" / "paper_arm.toml"
-
-
-def load(path: Path | str) -> Arm:
-    """The arm described by a TOML file, ready to be driven.
-
-    Raises InputError, naming file, key and value, for anything missing, unknown or not allowed.
-    """
-    arm = read(path)
-    _check_channels(arm, path)
-    for problem in pin_use.problems(arm):
-        raise InputError(f"{path}: {problem.where}: {problem.what}", problem.next_step)
-    return arm
-
-
-def read(path: Path | str) -> Arm:
-    """The arm as its file stands, even if no joint has a motor yet or two have the same channel or pin.
-
-    Raises InputError as ``load`` does for all else.
-    """
-    return of_table(toml_table.read(path))
-
-
-def of_table(top: Table) -> Arm:
-    """The arm in the top table of a file, as ``read`` gives it."""
-    name = top.text("name")
-    driver = _driver(top.table("driver"))
-    safety = _safety(top.table("safety"))
-    tables = top.tables("joint")
-    joints = tuple(_joint(table, number) for number, table in enumerate(tables, 1))
-    board = top.choice("board", tuple(boards.BOARDS), boards.DEFAULT)
-    outputs, inputs = outputs_file.outputs(top), outputs_file.inputs(top)
-    postures = top.table("posture")
-    top.done()
-    arm = Arm(name, joints, driver, safety, top.file, board, outputs, inputs)
-    return replace(arm, postures=_postures(postures, arm)) if postures else arm
-
-
-def _postures(tables: Table, arm: Arm) -> tuple[ArmPosture, ...]:
-    """[posture.NAME]: ``angles_deg``, or a tool pose as in a job."""
-    return tuple(posture(tables, name, arm) for name in tables.names())
-
-
-def posture(tables: Table, name: str, arm: Arm) -> ArmPosture:
-    """The posture ``name`` of the table [posture]; InputError where it is none that the arm can take."""
-    where = f"{tables.file}: posture.{name}"
-    table = tables.table(name)
-    if problem := named.name_problem(name):
-        raise InputError(f"{where}: {problem}", "choose another name")
-    if table is None:
-        raise tables.fail(name, "a table")
-    forms = [key for key in ("angles_deg", "matrix", "position_mm") if table.has(key)]
-    if len(forms) != 1:
-        raise InputError(
-            f"{where}: exactly one of angles_deg, matrix and position_mm is needed", "give one of them"
-        )
-    if forms == ["angles_deg"]:
-        found = ArmPosture(name, table.numbers("angles_deg", len(arm.driven)))
-    else:
-        found = ArmPosture(name, replace(pose_table.read(table, where), posture_deg=arm.all_home_deg))
-    table.done()
-    if problem := named.problem(arm, found):
-        raise InputError(f"{where}: {problem}", "give a posture that the arm can take")
-    return found
-
-
-def _driver(table: Table | None) -> Driver:
+def driver(table: Table | None) -> Driver:
+    """[driver]; errors of this and the other functions: InputError, naming file, key and value."""
     if table is None:
         return Driver()
     times = {
@@ -130,10 +52,11 @@ def _driver(table: Table | None) -> Driver:
     return Driver(**times, enable_active=active)
 
 
-def _safety(table: Table | None) -> Safety:
+def safety(table: Table | None) -> Safety:
+    """[safety]."""
     if table is None:
         return Safety()
-    safety = Safety(
+    found = Safety(
         estop_fitted=table.boolean("estop_fitted", Safety.estop_fitted),
         estop_active=table.choice("estop_active", ("low", "high"), Safety.estop_active),
         estop_releases_enable=table.boolean("estop_releases_enable", Safety.estop_releases_enable),
@@ -141,10 +64,11 @@ def _safety(table: Table | None) -> Safety:
         link_timeout_ms=table.integer("link_timeout_ms", Safety.link_timeout_ms, least=200, most=60_000),
     )
     table.done()
-    return safety
+    return found
 
 
-def _joint(table: Table, number: int) -> Joint:
+def joint(table: Table, number: int) -> Joint:
+    """A [[joint]] table; ``number`` from 1."""
     low, high = table.numbers("range_deg", 2)
     if not -MAX_ANGLE_DEG <= low < high <= MAX_ANGLE_DEG:
         raise table.fail(
@@ -160,7 +84,7 @@ def _joint(table: Table, number: int) -> Joint:
     encoder = _encoder(table.table("encoder"))
     if encoder is not None and motor is None:
         raise table.fail("motor", "given where there is an encoder")
-    joint = Joint(
+    found = Joint(
         name=table.text("name", f"joint {number}"),
         d_mm=table.number("d_mm", least=-MAX_LENGTH_MM, most=MAX_LENGTH_MM),
         a_mm=table.number("a_mm", least=-MAX_LENGTH_MM, most=MAX_LENGTH_MM),
@@ -176,7 +100,7 @@ def _joint(table: Table, number: int) -> Joint:
         parallel_linkage=linkage,
     )
     table.done()
-    return joint
+    return found
 
 
 def _limits(table: Table | None) -> Limits | None:
@@ -241,31 +165,3 @@ def _model(table: Table | None) -> JointModel:
     values = {key: table.number(key, 0.0, least=least, most=most) for key, (least, most) in _MODEL.items()}
     table.done()
     return JointModel(**values)
-
-
-class SharedChannel(NamedTuple):
-    """A channel of the board that more than one joint has."""
-
-    key: str
-    """``"motor"`` or ``"encoder"``."""
-    channel: int
-    joints: tuple[str, ...]
-
-
-def shared_channels(arm: Arm) -> list[SharedChannel]:
-    """Channels that more than one joint has; empty for an arm that can be wired."""
-    users: dict[tuple[str, int], list[str]] = defaultdict(list)
-    for joint in arm.joints:
-        for key, part in (("motor", joint.motor), ("encoder", joint.encoder)):
-            if part is not None:
-                users[key, part.channel].append(joint.name)
-    return [SharedChannel(*place, tuple(names)) for place, names in users.items() if len(names) > 1]
-
-
-def _check_channels(arm: Arm, path: Path | str) -> None:
-    if not arm.driven:
-        raise InputError(f"{path}: no joint has a motor", "add at least one [joint.motor]")
-    for key, channel, joints in shared_channels(arm):
-        raise InputError(
-            f"{path}: {key}.channel = {channel} is used by {' and '.join(joints)}", "give each joint its own"
-        )

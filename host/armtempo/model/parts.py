@@ -1,0 +1,171 @@
+"""The parts of an arm: joints with limits, drives, encoders and switches; the drivers' signals; safety."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from armtempo.formats import json_codec
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Largest magnitudes of one joint's motion (Table 5)."""
+
+    speed_deg_s: float
+    acceleration_deg_s2: float
+    jerk_deg_s3: float
+
+    @property
+    def values(self) -> tuple[float, float, float]:
+        """Speed, acceleration, jerk."""
+        return self.speed_deg_s, self.acceleration_deg_s2, self.jerk_deg_s3
+
+
+@dataclass(frozen=True)
+class Motor:
+    """Stepper, driver and gear of one joint (Table 7)."""
+
+    channel: int
+    """STEP/DIR channel on the board, 1 to 6."""
+    steps_per_rev: int
+    """Full steps of the motor shaft."""
+    microsteps: int
+    gear_ratio: float
+    """Motor revolutions per joint revolution."""
+    direction: int = 1
+    """1, or -1 where the DIR signal is inverted."""
+
+    @property
+    def steps_per_deg(self) -> float:
+        """Step pulses per degree of the joint."""
+        return self.steps_per_rev * self.microsteps * self.gear_ratio / 360.0
+
+
+@dataclass(frozen=True)
+class Encoder:
+    """Incremental encoder of one joint."""
+
+    channel: int
+    """Encoder channel on the board, 1 to 4."""
+    counts_per_rev: int
+    """Counts, all edges, per revolution of the shaft it sits on."""
+    on: str = "joint"
+    """``"joint"`` or ``"motor"``."""
+    direction: int = 1
+    following_error_deg: float = 0.0
+    """Largest deviation from the command, in degrees of the joint; 0: not watched."""
+
+
+@dataclass(frozen=True)
+class LimitSwitches:
+    """Limit switch inputs of one joint: board inputs 1 to 3, or None."""
+
+    low: int | None = None
+    high: int | None = None
+    active: str = "low"
+    low_deg: float | None = None
+    """Joint angle at which the low switch trips, for homing."""
+    high_deg: float | None = None
+
+
+@dataclass(frozen=True)
+class JointModel:
+    """What the virtual arm simulates of one joint beyond its drive."""
+
+    holding_torque_nm: float = 0.0
+    """Of the motor, at its shaft; 0: an ideal motor, which never lags."""
+    rotor_inertia_kg_m2: float = 0.0
+    inertia_kg_m2: float = 0.0
+    """Of what the joint moves, at the joint."""
+    damping_nm_s: float = 0.0
+    """Viscous, of the motor shaft against its turning field."""
+    corner_speed_rad_s: float = 0.0
+    """Of the motor shaft; there the torque has fallen to 0.71 of the holding torque. 0: it does not fall."""
+    gravity_torque_nm: float = 0.0
+    """At the joint, at angle 0; falls with the angle's cosine."""
+    backlash_deg: float = 0.0
+    """Of the joint against its motor."""
+    encoder_phase_counts: float = 0.0
+    """Fraction of a count by which the encoder is beyond its last edge at power-up, 0 to 1."""
+    scatter_deg: float = 0.0
+    """Standard deviation between repetitions."""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One Denavit-Hartenberg row (standard convention) and what moves it; ``motor`` None: not driven."""
+
+    name: str
+    d_mm: float
+    a_mm: float
+    alpha_deg: float
+    theta_offset_deg: float
+    range_deg: tuple[float, float]
+    home_deg: float = 0.0
+    limits: Limits | None = None
+    motor: Motor | None = None
+    encoder: Encoder | None = None
+    switches: LimitSwitches = field(default_factory=LimitSwitches)
+    model: JointModel = field(default_factory=JointModel)
+    parallel_linkage: bool = field(default=False, metadata=json_codec.ADDED)
+    """The drive stands on the link before the previous one and turns this link by a parallelogram: the angle
+    is counted from that link, so it stays when the previous joint turns. The row turns by the difference."""
+
+
+@dataclass(frozen=True)
+class DrivenJoint:
+    """A joint with a motor, and therefore with limits: the joints of every motion are of this type."""
+
+    name: str
+    range_deg: tuple[float, float]
+    home_deg: float
+    limits: Limits
+    motor: Motor
+    encoder: Encoder | None
+    switches: LimitSwitches
+    model: JointModel
+
+    @property
+    def steps_per_deg(self) -> float:
+        """Step pulses per degree of the joint."""
+        return self.motor.steps_per_deg
+
+    @property
+    def counts_per_step(self) -> Fraction:
+        """Encoder counts per step pulse, exactly as the arm file's decimals say; 0 without an encoder."""
+        if self.encoder is None:
+            return Fraction(0)
+        gear = Fraction(str(self.motor.gear_ratio))
+        counts = Fraction(self.encoder.counts_per_rev)
+        if self.encoder.on == "motor":
+            counts *= gear
+        return counts / (self.motor.steps_per_rev * self.motor.microsteps * gear)
+
+    @property
+    def counts_per_deg(self) -> float:
+        """Encoder counts per degree of the joint; 0 without an encoder."""
+        return float(self.counts_per_step) * self.steps_per_deg
+
+
+@dataclass(frozen=True)
+class Driver:
+    """Timing and polarity of the signals that the stepper drivers need."""
+
+    pulse_us: float = 2.0
+    low_us: float = 2.0
+    dir_setup_us: float = 5.0
+    dir_hold_us: float = 5.0
+    enable_active: str = "low"
+
+
+@dataclass(frozen=True)
+class Safety:
+    """E-stop input, and what the board does when it trips or the host disappears."""
+
+    estop_fitted: bool = False
+    estop_active: str = "low"
+    estop_releases_enable: bool = False
+    on_link_loss: str = "finish"
+    """``"finish"`` the motion or ``"stop"``."""
+    link_timeout_ms: int = 1000

@@ -1,0 +1,103 @@
+"""Via points from a table of another program: CSV."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError
+from armtempo.formats import number_table
+from armtempo.formats.number_table import NumberTable
+from armtempo.model import thinning
+from armtempo.model.arm import Arm
+from armtempo.model.exchange import CSV_COLUMNS, TIME_COLUMN
+
+TOLERANCE_DEG = 0.1
+"""To which a sampled motion is thinned by default."""
+_ROS = "header:"
+"""How a ROS message begins."""
+
+
+@dataclass(frozen=True)
+class ImportedPath:
+    """Via points (n, J) in degrees, and how many lines of the table they come from."""
+
+    via_deg: Array
+    lines: int
+    thinned_to_deg: float | None = None
+    """The tolerance they keep to where there were more; None where every line is a via point."""
+
+
+def via_from_csv(
+    path: Path, arm: Arm, radians: bool = False, tolerance_deg: float | None = None
+) -> ImportedPath:
+    """Via points from a table: a line a point, a column a driven joint; separated by commas, semicolons or tabs.
+
+    A first line with a word in it is a header; where it names the joints (``joint 1``, or ``j1_angle_deg``
+    as ``exchange.to_csv`` writes), the columns are found by name. One with ``time_s`` is a sampled motion,
+    thinned to ``tolerance_deg``, without one to TOLERANCE_DEG; other tables only where a tolerance is given.
+    Raises InputError with line and value.
+    """
+    table = number_table.read(path)
+    columns = _columns(table, arm)
+    points = np.array(table.numbers(columns)).reshape(-1, len(columns))
+    if len(points) < 2:
+        raise InputError(f"{path}: {len(points)} via points are no motion", "give at least 2 lines of angles")
+    angles = np.degrees(points) if radians else points
+    times = _times(table)
+    if tolerance_deg is None and times is None:
+        return ImportedPath(angles, len(points))
+    tolerance = TOLERANCE_DEG if tolerance_deg is None else tolerance_deg
+    return ImportedPath(thinning.thinned(angles, tolerance, times), len(points), tolerance)
+
+
+def job_text(name: str, path: ImportedPath) -> str:
+    """A job file through these via points, everything else as it is by default.
+
+    Of a thinned path the joints pass the via points together, as they did in the table.
+    """
+    timing = "" if path.thinned_to_deg is None else 'timing = "shared"\n'
+    rows = "".join(f"    [{', '.join(f'{angle:.10g}' for angle in row)}],\n" for row in path.via_deg)
+    return f"name = {json.dumps(name)}\n{timing}via_deg = [\n{rows}]\n"
+
+
+def _times(table: NumberTable) -> Array | None:
+    """The column ``time_s``, (n,), which must increase; None where there is none."""
+    if table.header is None or TIME_COLUMN not in table.header:
+        return None
+    times = np.array(table.numbers([table.header.index(TIME_COLUMN)]))[:, 0]
+    for (line, _), step in zip(table.rows[1:], np.diff(times), strict=True):
+        if not step > 0.0:
+            raise InputError(
+                f"{table.path}: line {line}: {TIME_COLUMN} does not increase",
+                f"put the lines in order, or leave the column {TIME_COLUMN} out",
+            )
+    return times
+
+
+def _columns(table: NumberTable, arm: Arm) -> list[int]:
+    names = table.header
+    if names is None:
+        return list(range(len(arm.driven)))
+    if names[0].startswith(_ROS):
+        raise InputError(
+            f"{table.path}: is a ROS message, not a table", "export the trajectory as CSV and import that"
+        )
+    found = []
+    for number, joint in enumerate(arm.driven, 1):
+        wanted = [name for name in (joint.name, f"j{number}_{CSV_COLUMNS[0]}") if name in names]
+        if wanted:
+            found.append(names.index(wanted[0]))
+    if not found and len(names) == len(arm.driven):
+        return list(range(len(names)))
+    if len(found) != len(arm.driven):
+        expected = ", ".join(joint.name for joint in arm.driven)
+        raise InputError(
+            f"{table.path}: line 1: the header does not name a column for each driven joint",
+            f"name a column for each of {expected}",
+        )
+    return found

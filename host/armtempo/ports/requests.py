@@ -1,0 +1,87 @@
+"""What other programs may ask for: the requests, their fields, and what each field must be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from armtempo_shared.limits import FULL_OUTPUT
+from armtempo_shared.messages import PERMILLE, RESUME, SLOWEST_PERMILLE
+
+from armtempo.basics.errors import LinkError
+from armtempo.ports.claim import VERSION
+from armtempo.ports.lines import Message
+
+TYPE_CHECKING = False  # as "typing" has it, which takes longer to import than the rest of a stop
+if TYPE_CHECKING:
+    from typing import Any
+
+TOPICS = ("sample", "status", "event", "traffic")
+LONGEST_TEXT = 200
+_SHOWN = 40
+
+
+class Field:
+    """One field of a request: ``words`` say what it must be, ``fits`` whether a value is that."""
+
+    def __init__(self, words: str, fits: Callable[[Any], bool], needed: bool = True) -> None:
+        self.words = words
+        self.fits = fits
+        self.needed = needed
+
+
+Fields = Mapping[str, Field]
+
+
+def _whole(least: int, most: int, *others: int, needed: bool = True) -> Field:
+    words = f"a whole number from {least} to {most}" + "".join(f", or {other}" for other in others)
+    return Field(
+        words, lambda value: type(value) is int and (least <= value <= most or value in others), needed
+    )
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str) and len(value) <= LONGEST_TEXT and (not value or value.isprintable())
+
+
+def _text() -> Field:
+    return Field(f"text of at most {LONGEST_TEXT} printable characters", _is_text, needed=False)
+
+
+REQUESTS: Mapping[str, Fields] = {
+    "hello": {"version": _whole(VERSION, VERSION, needed=False), "token": _text()},
+    "subscribe": {
+        "topics": Field(
+            f"a list of some of {', '.join(TOPICS)}",
+            lambda value: (
+                isinstance(value, list) and all(isinstance(one, str) and one in TOPICS for one in value)
+            ),
+        )
+    },
+    "status": {},
+    "stop": {
+        "now": Field("true or false", lambda value: isinstance(value, bool), needed=False),
+        "by": _text(),
+    },
+    "speed": {"rate": _whole(SLOWEST_PERMILLE, PERMILLE, 0, RESUME)},
+    "output": {"number": _whole(0, 255), "value": _whole(0, FULL_OUTPUT)},
+    "inputs": {},
+}
+
+
+def is_id(value: object) -> bool:
+    """Whether a value can be the ``id`` of a request: the answer must be able to repeat it."""
+    return type(value) is int or _is_text(value)
+
+
+def check(request: Message, fields: Fields) -> None:
+    """Raise LinkError where the fields of a request are not as the table says."""
+    name = request["request"]
+    for field, wanted in fields.items():
+        if field not in request:
+            if wanted.needed:
+                raise LinkError(f"{name}: {field} is missing", f"{field} is {wanted.words}")
+        elif not wanted.fits(request[field]):
+            raise LinkError(f"{name}: {field} is {request[field]!r:.{_SHOWN}}", f"it must be {wanted.words}")
+    for field in request.keys() - fields.keys() - {"id", "request"}:
+        there = f"it has {', '.join(fields)}" if fields else "it has none"
+        raise LinkError(f"{name}: no field {field!r:.{_SHOWN}}", there)
