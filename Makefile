@@ -30,7 +30,8 @@ check: $(VENV)/test .cache/typings
 	"$(BIN)/mypy" --config-file board/mypy.ini board/armtempo_board
 
 $(BIN)/python:
-	$(PYTHON) .ci/make_venv.py
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "armtempo needs Python 3.11 or newer: make PYTHON=python3.11")'
+	$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); test "$$(id -u)" = 0 && apt-get install -qy python3-venv && $(PYTHON) -m venv $(VENV); }
 
 $(VENV)/demo: pyproject.toml | $(BIN)/python
 	"$(BIN)/python" -m pip install --quiet --disable-pip-version-check -e '.[plot]'

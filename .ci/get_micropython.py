@@ -1,100 +1,120 @@
-"""Bring the MicroPython interpreters that the tests need into .cache/micropython.
+"""Put starters of the MicroPython interpreters that the tests need into .cache/micropython.
 
-Two starters come to stand there: ``micropython`` (this machine's word size; the one on PATH where there is
-one) and ``micropython-arm`` (32-bit Arm under qemu). On Debian-like machines what is missing is taken from
-the Debian 13 archive, unpacked into the cache and started from there: nothing is installed and no root is
-needed. Elsewhere what is missing is said, and left out.
+``micropython``: the one on PATH, else Debian 13's. ``micropython-arm``: Debian 13's for 32-bit Arm, under qemu, which
+apt-get installs if this is root. Debian 12 packages no MicroPython, and one machine cannot install it for two
+architectures; so Debian 13's files, those that ``debian.lock`` names, are unpacked into the cache and started there.
 """
 
 from __future__ import annotations
 
+import hashlib
 import os
 import platform
+import re
 import shlex
 import shutil
 import subprocess
 import sys
+import urllib.request
 from pathlib import Path
 
-from debian import Archive, Missing, need_debian
-
+LOCK = Path(__file__).with_name("debian.lock")
 CACHE = Path(__file__).resolve().parent.parent / ".cache" / "micropython"
-LIBRARIES = ["libc6", "libffi8", "libmbedcrypto16", "libmbedtls21", "libmbedx509-7"]
 PROBE = "import struct; print(struct.calcsize('P'))"
 
 
-def write_starter(name: str, command: list[str]) -> None:
-    """A shell script that runs ``command`` with the arguments it is given."""
-    script = CACHE / name
-    script.write_text("#!/bin/sh\nexec " + " ".join(shlex.quote(word) for word in command) + ' "$@"\n')
-    script.chmod(0o755)
+class Missing(Exception):
+    """Why an interpreter is not available, and what to do."""
 
 
-def word_size(name: str) -> int:
-    """Bytes of a pointer in the interpreter behind a starter; 0 where it does not run."""
+def archive_address() -> str:
+    """The Debian archive that this machine's own apt uses."""
+    for file in [Path("/etc/apt/sources.list"), *sorted(Path("/etc/apt/sources.list.d").glob("*"))]:
+        text = file.read_text(errors="replace") if file.is_file() else ""
+        found = re.search(r"^\s*(?:URIs:|deb\s).*?([a-z+]+:/\S+/debian)/?\s", text, re.MULTILINE)
+        if found:
+            return found[1]
+    raise Missing("apt on this machine names no Debian archive")
+
+
+def unpack(architecture: str) -> Path:
+    """A folder with the files that the lock names for an architecture."""
+    root = CACHE / architecture
+    for line in LOCK.read_text().splitlines():
+        sha256, path = line.split()
+        if not path.endswith(f"_{architecture}.deb"):
+            continue
+        try:
+            with urllib.request.urlopen(f"{archive_address()}/{path}", timeout=60) as answer:
+                data = answer.read()
+        except OSError as reason:
+            raise Missing(f"{path}: {reason}; a newer version needs a new line in {LOCK.name}") from reason
+        if hashlib.sha256(data).hexdigest() != sha256:
+            raise Missing(f"{path} is not the file that {LOCK.name} names")
+        package = CACHE / Path(path).name
+        package.write_bytes(data)
+        subprocess.run(["dpkg", "-x", package, root], check=True)
+        package.unlink()
+    return root
+
+
+def native() -> list[str]:
+    """Command of an interpreter of this machine's word size."""
+    if found := shutil.which("micropython"):
+        return [found]
+    if platform.machine() != "x86_64" or not shutil.which("dpkg"):
+        raise Missing("install MicroPython: apt-get, brew and others call it micropython")
+    root = unpack("amd64")
+    loader, libraries = root / "usr/lib64/ld-linux-x86-64.so.2", root / "usr/lib/x86_64-linux-gnu"
+    return [str(loader), "--library-path", str(libraries), str(root / "usr/bin/micropython")]
+
+
+def arm() -> list[str]:
+    """Command of an interpreter of 32-bit Arm code."""
+    if not shutil.which("dpkg"):
+        raise Missing("needs Debian or Ubuntu")
+    if not shutil.which("qemu-arm"):
+        if os.geteuid():
+            raise Missing("install qemu: sudo apt-get install qemu-user")
+        subprocess.run(["apt-get", "-qq", "update"], check=True)
+        subprocess.run(
+            ["apt-get", "-qq", "install", "-y", "--no-install-recommends", "qemu-user"], check=True
+        )
+    root = unpack("armhf")
+    (root / "lib").symlink_to("usr/lib")
+    return ["qemu-arm", "-L", str(root), str(root / "usr/bin/micropython")]
+
+
+def word_size(starter: Path) -> int:
+    """Bytes of a pointer in the interpreter; 0 if it does not run."""
     try:
-        done = subprocess.run([CACHE / name, "-c", PROBE], capture_output=True, text=True, timeout=60)
+        done = subprocess.run([starter, "-c", PROBE], capture_output=True, text=True, timeout=60)
     except OSError:
         return 0
     return int(done.stdout) if done.returncode == 0 and done.stdout.strip().isdigit() else 0
 
 
-def bring_native() -> None:
-    """``micropython`` of this machine."""
-    found = shutil.which("micropython")
-    if found:
-        write_starter("micropython", [found])
-        return
-    need_debian()
-    architecture = {"x86_64": "amd64", "aarch64": "arm64"}.get(platform.machine())
-    if architecture is None:
-        raise Missing(f"no package is known for {platform.machine()}")
-    root = CACHE / "root"
-    Archive(architecture, CACHE).unpack(["micropython", *LIBRARIES], root)
-    loader = next(root.glob("usr/lib*/ld-linux-*")) if any(root.glob("usr/lib*/ld-linux-*")) else None
-    loader = loader or next(root.glob("usr/lib/*/ld-linux-*"))
-    library = next(root.glob("usr/lib/*-linux-gnu"))
-    write_starter(
-        "micropython", [str(loader), "--library-path", str(library), str(root / "usr/bin/micropython")]
-    )
-
-
-def bring_arm() -> None:
-    """``micropython-arm``: 32-bit Arm code under qemu's user mode emulation."""
-    need_debian()
-    emulator = shutil.which("qemu-arm") or shutil.which("qemu-arm-static")
-    if emulator is None:
-        architecture = {"x86_64": "amd64", "aarch64": "arm64"}.get(platform.machine(), "amd64")
-        Archive(architecture, CACHE).unpack(["qemu-user"], CACHE / "qemu")
-        emulator = str(CACHE / "qemu/usr/bin/qemu-arm")
-    root = CACHE / "root-arm"
-    Archive("armhf", CACHE).unpack(["micropython", "libgcc-s1", *LIBRARIES], root)
-    if not (root / "lib").exists():
-        (root / "lib").symlink_to("usr/lib")
-    write_starter("micropython-arm", [emulator, "-L", str(root), str(root / "usr/bin/micropython")])
-
-
 def main() -> int:
-    """Bring both; exit code 0 even where one is missing (the tests then say what they leave out)."""
+    """Get both; code 1 in CI if one is missing. Elsewhere the tests say what they leave out."""
     CACHE.mkdir(parents=True, exist_ok=True)
-    for name, bring, size in (("micropython", bring_native, 0), ("micropython-arm", bring_arm, 4)):
-        if word_size(name):
+    missing = 0
+    for name, command, sizes in (("micropython", native, (4, 8)), ("micropython-arm", arm, (4,))):
+        starter = CACHE / name
+        if word_size(starter) in sizes:
             continue
         try:
-            bring()
-            if not word_size(name) or (size and word_size(name) != size):
-                raise Missing("it was unpacked but does not run")
-        except Missing as reason:
-            (CACHE / name).unlink(missing_ok=True)
-            print(f"{name}: not here: {reason}", file=sys.stderr)
-            continue
-        print(f"{name}: ready")
-    if os.environ.get("CI") and not all(
-        (CACHE / name).exists() for name in ("micropython", "micropython-arm")
-    ):
-        print("CI needs both interpreters", file=sys.stderr)
-        return 1
-    return 0
+            shutil.rmtree(CACHE / ("armhf" if command is arm else "amd64"), ignore_errors=True)
+            words = " ".join(map(shlex.quote, command()))
+            starter.write_text(f'#!/bin/sh\nexec {words} "$@"\n')
+            starter.chmod(0o755)
+            if word_size(starter) not in sizes:
+                raise Missing(f"{words} does not run")
+            print(f"{name}: ready")
+        except (Missing, OSError, subprocess.CalledProcessError) as reason:
+            starter.unlink(missing_ok=True)
+            missing = 1
+            print(f"{name}: left out: {reason}", file=sys.stderr)
+    return missing if os.environ.get("CI") else 0
 
 
 if __name__ == "__main__":

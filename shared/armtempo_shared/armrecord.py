@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 MAGIC = b"ATA1"
 NONE = 255
 """Channel number that means: this joint has no such thing."""
+POLLED = 128
+"""Instead of a limit switch input: this plus a pin as in OUTPUT, whose switch only ends homing motions."""
 
 HEAD = (
     ("flags", "H"),  # see the FLAG_ constants
@@ -48,7 +50,7 @@ JOINT = (
     ("max_steps", "i"),
     ("max_rate", "I"),  # steps/s
     ("following_counts", "I"),  # largest |encoder - command|; 0: not watched
-    ("limit_low", "B"),  # limit switch input at the low end, 0 to 2, or NONE
+    ("limit_low", "B"),  # limit switch at the low end: input 0 to 2, POLLED and a pin, or NONE
     ("limit_high", "B"),
     ("limit_active_high", "B"),
     ("spare", "B"),

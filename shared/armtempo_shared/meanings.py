@@ -138,6 +138,11 @@ _ROWS = (
         "an input did not come in time in a sequence",
         "find out why, then 'armtempo clear'",
     ),
+    (
+        "wrong_steps",
+        "a joint made other steps than the motion's record has: a mistake in the board program",
+        "'armtempo clear', then home; report it with the log",
+    ),
     ("start_failed", "the timers did not start as set up", "power-cycle the board"),
 )
 ERRORS: "dict[int, tuple[str, str, str]]" = {}
@@ -179,10 +184,10 @@ COMMANDS: "dict[str, str]" = {
     "tail is the unique id in hex and the firmware.",
     "status": "What the board is doing. `known`: bit a joint, its position is known. `run`: number of the "
     "current or last run since the start. `ticks`: motion clock. `path`: the motion's own time, which is behind the "
-    "clock where the speed was below 100 %. `rate`: the speed that is wanted, in thousandths, 0 in a pause; while "
-    "nothing moves that of the next start. `rest_ms`: in how many milliseconds the arm would rest if it were stopped "
-    "now, or will after a stop; 0 where nothing moves, or where a stop freezes. Tail: per joint commanded steps and "
-    "encoder counts (two i32).",
+    "clock where the speed was below 100 %. `fault_joint`: also the joint whose switch ended the last homing motion. "
+    "`rate`: the speed that is wanted, in thousandths, 0 in a pause; while nothing moves that of the next start. "
+    "`rest_ms`: in how many milliseconds the arm would rest if it were stopped now, or will after a stop; 0 where nothing "
+    "moves, or where a stop freezes. Tail: per joint commanded steps and encoder counts (two i32).",
     "put_begin": "Begins an upload of `size` bytes; the tail is the trajectory's name, or `/arm` for the arm "
     "record. `crc` is the record's own checksum, its last four bytes. An upload under way is given up.",
     "put_data": "The bytes from `offset` on; pieces may overlap what came before but leave no hole. Answer: "

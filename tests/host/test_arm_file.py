@@ -82,6 +82,16 @@ def test_the_shipped_arm_is_the_papers() -> None:
         ('on = "joint"', 'on = "belt"', ["joint[1].encoder.on = 'belt'", "'joint', 'motor'"]),
         ('name = "paper-1to5"', 'name = ""', ["name = ''", "not empty"]),
         ('name = "paper-1to5"', 'name = "x', ["not valid TOML", "line"]),
+        ("home_deg = 0.0", 'switches = { low = "PF1" }', ["switches.low = 'PF1'", "a free pin such as PD0"]),
+        ("home_deg = 0.0", 'switches = { low = "PE7" }', ["joint 1: PE7", "DIR of channel 1"]),
+        (
+            "home_deg = 0.0",
+            'switches = { low = "PD0", high = "PD0" }',
+            ["PD0 is the pin of switches of joint 1"],
+        ),
+        ("[driver]", 'homing = ["joint 9"]\n[driver]', ["homing = ['joint 9']", "the joints are joint 1"]),
+        ("[driver]", 'homing = [["joint 1"], "joint 1"]\n[driver]', ["homing", "each once"]),
+        ("[driver]", "homing = [[]]\n[driver]", ["homing", "a list of joints' names"]),
         ("[driver]", "[drivers]", ["drivers: unknown key", "did you mean 'driver'"]),
     ],
 )

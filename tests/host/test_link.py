@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from armtempo.basics.errors import BoardError, LinkError
 from armtempo.link.follow import Follower
+from armtempo.link.session import Session
 from armtempo.records.encoded_motion import MotionKey
 from armtempo.robot import stored_motion
 from armtempo.robot.stop_request import StopRequest
@@ -182,3 +183,32 @@ def test_what_was_to_stop_before_does_not_start(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         stored_motion.replay(board, MotionKey("feed", wire.record_crc(data)), stop)
     assert pipe.app.controller.engine.calls.count("start") == 0
+
+
+class Late:
+    """A board whose answer to an older command comes just before the one that is asked for."""
+
+    name = "late"
+
+    def __init__(self) -> None:
+        self._said = b""
+
+    def write(self, data: bytes) -> None:
+        sequence, number = data[3], data[4]
+        for delay, value in ((-1, 17), (0, 42)):
+            answer = bytes((number,)) + wire.encode(wire.ANSWER["put_data"], [value])
+            self._said += wire.frame((sequence + delay) % 256, wire.EVENT["ok"][1], answer)
+
+    def read(self, timeout_s: float) -> bytes:
+        said, self._said = self._said, b""
+        return said
+
+    def wake(self) -> None: ...
+
+    def close(self) -> None: ...
+
+
+def test_an_answer_with_another_sequence_number_is_not_taken() -> None:
+    session = Session(Late())
+    for _ in range(3):
+        assert session.command("put_data", [0], b"x") == ((42,), b"")

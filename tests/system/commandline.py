@@ -1,16 +1,24 @@
-"""The armtempo command as a process of its own, as a user meets it."""
+"""The armtempo command as a user meets it: in this process by click's runner, or as a process of its own.
+
+In the process it has its imports already, which take a second of processor time. What sends a signal, kills, or runs at
+the same time as something else needs ``start``.
+"""
 
 from __future__ import annotations
 
 import os
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
+from contextlib import chdir
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from tests import forked
+from armtempo.cli import main
+from click.testing import CliRunner
 
 COMMAND = (sys.executable, "-c", "from armtempo.__main__ import main; main()")
 SLOW_S = 600.0
@@ -33,16 +41,22 @@ class Ended:
 
 
 def run(*arguments: str | Path, folder: Path, **environment: str) -> Ended:
-    """Run to the end in ``folder``."""
-    return ended(start(*arguments, folder=folder, **environment))
+    """Run to the end in ``folder``, on a virtual board unless another port is named; an exception passes through.
+
+    In a process of its own for another ``PYTHONPATH``, in a thread, and for ``stop``, which begins before click does.
+    """
+    in_thread = threading.current_thread() is not threading.main_thread()
+    if in_thread or "PYTHONPATH" in environment or arguments[0] == "stop":
+        return ended(start(*arguments, folder=folder, **environment))
+    runner = CliRunner(env={"ARMTEMPO_PORT": "sim", **environment})
+    with chdir(folder):
+        done = runner.invoke(main, [*map(str, arguments)], prog_name="armtempo", catch_exceptions=False)
+    return Ended(done.exit_code, done.stdout, done.stderr)
 
 
 def start(*arguments: str | Path, folder: Path, **environment: str) -> subprocess.Popen[str]:
-    """Start in ``folder``, away from the terminal's signals; on a virtual board unless another port is named.
-
-    Its large packages are in memory already: see ``forked``.
-    """
-    return forked.Process(
+    """Start in ``folder``, away from the terminal's signals; on a virtual board unless another port is named."""
+    return subprocess.Popen(
         [*COMMAND, *map(str, arguments)],
         cwd=folder,
         env={**os.environ, "ARMTEMPO_PORT": "sim", **environment},
@@ -52,6 +66,14 @@ def start(*arguments: str | Path, folder: Path, **environment: str) -> subproces
         text=True,
         start_new_session=True,
     )
+
+
+def python(
+    *arguments: str | Path, timeout: float = SLOW_S, **options: Any
+) -> subprocess.CompletedProcess[str]:
+    """This interpreter with ``arguments``, its output and errors kept as text."""
+    command = [sys.executable, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=timeout, **options)
 
 
 def ended(process: subprocess.Popen[str], within_s: float = SLOW_S) -> Ended:

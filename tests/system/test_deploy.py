@@ -11,7 +11,7 @@ from armtempo.deploy import deploy, package, remote
 from armtempo.deploy.firmware import frozen
 from armtempo.simulator import LaunchOptions, VirtualBoard, edgelog, launch
 
-from tests import forked, interpreters
+from tests import interpreters
 from tests.system import commandline
 from tests.system.boards import armtempo, small_plan
 
@@ -53,7 +53,7 @@ def test_the_compiled_program_makes_the_same_pulses(tmp_path: Path) -> None:
 
 
 def mpremote(port: str, *arguments: str) -> str:
-    done = forked.run("-m", "mpremote", "connect", port, *arguments, timeout=commandline.SLOW_S)
+    done = commandline.python("-m", "mpremote", "connect", port, *arguments)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 

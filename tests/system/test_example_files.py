@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from tests import forked
 from tests.interpreters import ROOT
 from tests.system import commandline
 
@@ -40,7 +39,7 @@ def test_example(name: str, tmp_path: Path) -> None:
     elif "repeat=3" in (text := script.read_text(encoding="utf-8")):  # takes time and shows nothing new here
         script = tmp_path / name
         script.write_text(text.replace("repeat=3", "repeat=1"), encoding="utf-8")
-    done = forked.run(script, *ARGUMENTS.get(name, []), cwd=tmp_path, timeout=commandline.SLOW_S)
+    done = commandline.python(script, *ARGUMENTS.get(name, []), cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / LEAVES[name]).stat().st_size > 0
 
@@ -53,7 +52,7 @@ def test_searches_on_a_cluster_give_the_same(tmp_path: Path) -> None:
     with distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None) as cluster:
         for where in ([], ["--scheduler", cluster.scheduler_address]):
             command = [sys.executable, str(script), *FEW, *where]
-            subprocess.run(command, cwd=tmp_path, check=True, timeout=commandline.SLOW_S)
+            subprocess.run(command, cwd=tmp_path, check=True)
             found.append((tmp_path / "searches.csv").read_text())
     assert found[0] == found[1]
     assert found[0].count("\n") == 13

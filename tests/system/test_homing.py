@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from armtempo.basics.errors import BoardError, InputError, LinkError
 from armtempo.link import Client, open_board
-from armtempo.model import shipped
+from armtempo.model import engine_pins, shipped
 from armtempo.model.arm import Arm
+from armtempo.model.parts import DrivenJoint
 from armtempo.robot import arm_state, goto, homing
 from armtempo.robot.stop_request import StopRequest
-from armtempo.simulator import LaunchOptions, launch
+from armtempo.simulator import LaunchOptions, edgelog, launch
 
 PAPER = Arm.paper()
 SWITCH = """
@@ -50,9 +51,38 @@ def test_homing_run_finds_where_the_arm_stands(tmp_path: Path, angle: float) -> 
         arm_state.home(board, found, np.array([30.0, -60.0, 40.0]))  # wrong: the arm stands at 0
         homing.home_to_switches(board, found, stop)
         stands_deg = arm_state.posture_deg(board, found)
-    back_deg = homing.BACK_DEG + max(0.0, -10.0 - angle)
-    assert stands_deg[0] == pytest.approx(angle + back_deg, abs=0.03)
-    assert stands_deg[1:] == pytest.approx([-60.0, 40.0], abs=0.01)
+    assert stands_deg == pytest.approx([0.0, -60.0, 40.0], abs=0.03)
+
+
+HOMED_FROM = {"ar4": (-167, -39, 48, -176, -102, 177), "parol6": (-24, -141, 113, 100, -85, 185)}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", HOMED_FROM)
+def test_six_joints_by_their_switches(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Homing from far off ends at home; so say the board and, by their pulses, the motors."""
+    found, log = Arm.load(name), tmp_path / "log"
+    monkeypatch.setattr(homing, "FAST", 1.0)  # as the simulation takes its time
+    monkeypatch.setattr(homing, "SLOW", 0.2)
+    options = LaunchOptions(arm=found, start_deg=HOMED_FROM[name], edge_log=log)
+    with launch(options) as virtual, open_board(virtual.port) as board, StopRequest() as stop:
+        arm_state.configure(board, found, replace=True)
+        homing.home_to_switches(board, found, stop)
+        assert board.status().known == 0b111111
+        assert arm_state.posture_deg(board, found) == pytest.approx(list(found.home_deg), abs=0.02)
+    (cycle,) = edgelog.read(log)
+    moved_deg = [_moved_deg(cycle, joint) for joint in found.driven]
+    assert np.add(HOMED_FROM[name], moved_deg) == pytest.approx(list(found.home_deg), abs=0.1)
+
+
+def _moved_deg(cycle: edgelog.PowerCycle, joint: DrivenJoint) -> float:
+    """How far the pulses have moved a joint's motor since power-up."""
+    pins, channel = engine_pins.table(), joint.motor.channel - 1
+    ticks, levels = cycle.pins[pins["STEP"][channel][0]]
+    turns, to = cycle.pins[pins["DIR"][channel]]
+    at = np.searchsorted(turns, ticks[levels == 1], side="right")
+    signs = np.where(np.concatenate(([1 - to[0]], to))[at] == 1, 1, -1)
+    return float(signs.sum()) * joint.motor.direction / joint.steps_per_deg
 
 
 def test_switch_with_a_broken_wire(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from armtempo.simulator import LaunchOptions, edgelog, launch
 from mpremote.transport import TransportError
 from mpremote.transport_serial import SerialTransport
 
-from tests import forked, interpreters
+from tests import interpreters
 from tests.system import boards, commandline
 
 INTERPRETER = interpreters.starter("micropython" if "micropython" in interpreters.AVAILABLE else "cpython")
@@ -42,7 +42,7 @@ def flash(tmp_path: Path) -> Path:
 
 def mpremote(port: str, *arguments: str) -> str:
     """What mpremote prints."""
-    done = forked.run("-m", "mpremote", "connect", port, *arguments, timeout=commandline.SLOW_S)
+    done = commandline.python("-m", "mpremote", "connect", port, *arguments)
     assert done.returncode == 0, (done.stdout, done.stderr)
     return done.stdout
 

@@ -19,7 +19,7 @@ import pytest
 from armtempo.simulator import LaunchOptions, VirtualBoard, launch
 from armtempo.simulator.launcher import _DEPLOYED_BLOCKS
 
-from tests import forked, interpreters
+from tests import interpreters
 from tests.system import commandline
 from tests.system.boards import armtempo, small_plan
 
@@ -123,7 +123,7 @@ class Bench:
         assert words[0] == "mpremote", command
         for _ in range(TRIES):
             with suppress(subprocess.TimeoutExpired):
-                ended = forked.run("-m", *words, cwd=self.folder, timeout=MPREMOTE_S)
+                ended = commandline.python("-m", *words, cwd=self.folder, timeout=MPREMOTE_S)
                 return ended.returncode, ended.stdout + ended.stderr
         raise AssertionError(f"{command}: no end within {MPREMOTE_S} s, {TRIES} times")
 

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import serial
 from armtempo.basics.errors import LinkError, RunFolderError
 from armtempo.link.connect import open_board
 from armtempo.simulator import LaunchOptions, edgelog, launch, launcher
@@ -143,6 +142,6 @@ def test_command_prints_the_port_and_ends_with_ctrl_c(tmp_path: Path) -> None:
         process.send_signal(signal.SIGINT)
         _, error = process.communicate(timeout=commandline.SLOW_S)
     assert process.returncode == 130
-    assert "Traceback" not in error
-    with pytest.raises(serial.SerialException):
-        serial.Serial(port)
+    assert (
+        "Traceback" not in error
+    )  # that its port is gone cannot be told: another program may have the number now

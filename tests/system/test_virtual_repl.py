@@ -10,7 +10,7 @@ import pytest
 import serial
 from armtempo.simulator import LaunchOptions, VirtualBoard, launch
 
-from tests import forked, interpreters
+from tests import interpreters
 from tests.system import commandline
 
 
@@ -26,7 +26,7 @@ def bare(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[VirtualBoar
 
 def mpremote(board: VirtualBoard, *arguments: str, code: int = 0) -> str:
     """What mpremote prints."""
-    done = forked.run("-m", "mpremote", "connect", board.port, *arguments, timeout=commandline.SLOW_S)
+    done = commandline.python("-m", "mpremote", "connect", board.port, *arguments)
     assert done.returncode == code, (done.stdout, done.stderr)
     return done.stdout + done.stderr
 
@@ -66,7 +66,7 @@ def test_main_starts_with_a_reset_and_is_interrupted(bare: VirtualBoard) -> None
         bare, "exec", "open('main.py', 'w').write('import pyb\\nprint(6 * 7)\\nwhile 1:\\n  pyb.delay(5)\\n')"
     )
     mpremote(bare, "reset")
-    with serial.Serial(bare.port, timeout=commandline.SLOW_S) as port:
+    with serial.Serial(bare.port) as port:
         port.write(b"\x03")
         assert b"KeyboardInterrupt" in port.read_until(b">>> ")
         port.write(b"\x04")
@@ -75,7 +75,7 @@ def test_main_starts_with_a_reset_and_is_interrupted(bare: VirtualBoard) -> None
 
 
 def test_friendly_prompt(bare: VirtualBoard) -> None:
-    with serial.Serial(bare.port, timeout=commandline.SLOW_S) as port:
+    with serial.Serial(bare.port) as port:
         port.write(b"print('be' 'gin')\r")
         port.read_until(b"begin\r\n>>> ")
         port.write(b"\x02")

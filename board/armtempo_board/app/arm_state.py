@@ -131,8 +131,8 @@ class ArmState:
         return self.pending or (self.engine.fault if self.engine else 0)
 
     def fault_joint(self) -> int:
-        """The joint that the fault is about, or NO_JOINT."""
-        return self.engine.fault_joint if self.engine and self.engine.fault else NO_JOINT
+        """The joint that the fault is about, or whose switch ended the last motion, a homing one; or NO_JOINT."""
+        return int(self.engine.fault_joint) if self.engine and not self.pending else NO_JOINT
 
     def clear(self) -> None:
         """Clear what is pending; the cause must be gone."""

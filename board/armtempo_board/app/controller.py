@@ -137,11 +137,15 @@ class Controller(ArmState):
 
         return run_start.opened(self, name, crc)
 
-    def _assume(self, motion: "MotionFile", unknown: int) -> None:
-        """A homing motion may begin anywhere; joints that are not known to stand there are unknown after it."""
+    def _assume(self, motion: "MotionFile", unknown: int) -> int:
+        """A homing motion may begin anywhere; joints that are not known to stand there are unknown after it.
+
+        Returns a bit for each joint that moves.
+        """
         from armtempo_board.app import run_start  # here, so that it can be forgotten
 
         self._assumed = run_start.assume(self, motion, unknown)
+        return run_start.moving(motion)
 
     def tidy(self) -> None:
         """Free what only the last commands needed: what comes then lies close to what stays."""
@@ -200,15 +204,13 @@ class Controller(ArmState):
 
         ``flags``, ``crc`` as for ``begin``; ``unknown``: joints of unknown position.
         """
-        homing = bool(flags & START_HOMING)
         heap.collect_often(heap.OFTEN if self.workspace.is_short else heap.SELDOM)
         self._make_room()
         try:
             motion = self._opened(name, crc)
             self.tidy()
-            if homing:
-                self._assume(motion, unknown)
-            self.engine.load(motion, rate)
+            homing = self._assume(motion, unknown) if flags & START_HOMING else 0
+            self.engine.load(motion, rate, None, homing)
         except Refused:
             self._withdraw_assumed()
             heap.collect_often()
@@ -230,7 +232,7 @@ class Controller(ArmState):
         self.running = True
         self._held = flags & START_HELD
         self.hold()
-        self.engine.start(bool(flags & START_HOMING))
+        self.engine.start()
 
     def _withdraw_assumed(self) -> None:
         if self._assumed:

@@ -49,6 +49,17 @@ def assume(board: "ArmState", motion: "MotionFile", unknown: int) -> int:
     return unknown
 
 
+def moving(motion: "MotionFile") -> int:
+    """A bit for each joint that stands elsewhere at the end of a motion than at its start."""
+    from armtempo_board.motion import endpoints  # here, so that it can be forgotten
+
+    found = 0
+    for joint in range(motion.joints):
+        if endpoints.at_start(motion, joint) != endpoints.at_end(motion, joint):
+            found |= 1 << joint
+    return found
+
+
 def home(board: "ArmState", mask: int, steps: "Sequence[int]") -> None:
     """Declare where the joints of ``mask`` stand; ``steps`` has a number for every joint."""
     for joint in range(board.joints):

@@ -1,7 +1,8 @@
 """E-stop and limit switches: hard interrupts that freeze the outputs; and the ENABLE output.
 
 The interrupts' callback (``isr.freezer``) only stops the outputs and releases the drivers. Which switch it was, and so
-which fault, the main loop notes when it finds the outputs frozen. How long it takes from the edge to frozen outputs:
+which fault, the main loop notes when it finds the outputs frozen. Switches on other pins have no interrupt:
+``poll_home`` looks at them while a homing motion runs. How long it takes from the edge to frozen outputs:
 docs/hardware.md. The pull resistors draw towards the tripped level, so a switch that opens when it trips also trips
 when its wire breaks.
 """
@@ -39,6 +40,7 @@ class Inputs:
         self._estop_line = pins.line(pins.ESTOP)
         self._limits: "list[tuple[Pin, int, int]]" = []  # pin, level when tripped, line
         self._towards: "list[tuple[int, int, int, int]]" = []  # line, bit of DIR, its level, joint
+        self._polled: "list[tuple[Pin, int, int, int, int]]" = []  # pin, level when tripped, and as above
         self._freeze = self._make_freezer()
         if flags & armrecord.FLAG_ESTOP_FITTED:
             self._estop_level = 1 if flags & armrecord.FLAG_ESTOP_ACTIVE_HIGH else 0
@@ -46,7 +48,7 @@ class Inputs:
             if self.releases:
                 self._block[self._line_at(self._estop_line) + isr.LINE_RELEASE] = self._release_word()
             self._estop = self._hook(pins.ESTOP, self._estop_level)
-        self._add_limits(joints, armrecord.NONE)
+        self._add_limits(joints)
 
     def _make_freezer(self) -> "Callable[[int], object]":
         block = self._block
@@ -70,18 +72,26 @@ class Inputs:
         ExtInt(pin, mode, pull, self._freeze)  # type: ignore[arg-type]  # what it returns does not matter
         return pin
 
-    def _add_limits(self, joints: "list[dict[str, int]]", none: int) -> None:
-        from armtempo_board.hardware import pins  # here, so that it can be forgotten
+    def _add_limits(self, joints: "list[dict[str, int]]") -> None:
+        from armtempo_shared import armrecord  # here, so that they can be forgotten
+
+        from armtempo_board.hardware import pins
 
         fitted = {}
         for number, joint in enumerate(joints):
             bit = 1 << pins.line(pins.DIR[joint["channel"]])
             for side, positive in (("limit_low", 0), ("limit_high", 1)):
                 switch = joint[side]
-                if switch == none:
+                if switch == armrecord.NONE:
                     continue
-                fitted[switch] = joint["limit_active_high"]
+                active = joint["limit_active_high"]
                 level = positive ^ joint["dir_inverted"]
+                if switch >= armrecord.POLLED:
+                    pull = Pin.PULL_UP if active else Pin.PULL_DOWN
+                    pin = Pin(pins.name(switch - armrecord.POLLED), Pin.IN, pull=pull)
+                    self._polled.append((pin, active, bit, level, number))
+                    continue
+                fitted[switch] = active
                 self._towards.append((pins.line(pins.LIMIT[switch]), bit, level, number))
         for switch, level in fitted.items():
             self._limits.append((self._hook(pins.LIMIT[switch], level), level, pins.line(pins.LIMIT[switch])))
@@ -96,12 +106,12 @@ class Inputs:
         self._block[at + isr.LINE_LEVELS] = levels
         self._block[at + isr.LINE_MASK] = mask
 
-    def watch(self, on: int) -> None:
-        """A switch stops joints only while they move: ``on`` 1 or 0."""
+    def watch(self, moving: int) -> None:
+        """A switch stops joints only while they move: ``moving`` has a bit for each that may."""
         for _, _, line in self._limits:
             levels = mask = 0
-            for pair_line, bit, level, _ in self._towards:
-                if pair_line == line and on:
+            for pair_line, bit, level, joint in self._towards:
+                if pair_line == line and moving >> joint & 1:
                     if mask & bit:  # one switch at both ends
                         bit = isr.ALWAYS
                         level = 0
@@ -134,6 +144,14 @@ class Inputs:
         for pin, level, line in self._limits:
             if pin.value() == level:
                 self._trip(line)
+
+    def poll_home(self, moving: int) -> None:
+        """Freeze where a switch without interrupt is tripped, and one of the ``moving`` joints (bits) heads for it."""
+        levels = isr.output_levels(self._port)
+        for pin, active, bit, level, joint in self._polled:
+            if moving >> joint & 1 and (levels & bit != 0) == level and pin.value() == active:
+                isr.set_fault(self._block, codes.LIMIT_SWITCH, joint)
+                self.freeze()
 
     def note_trip(self) -> bool:
         """Note the fault of a switch that tripped since the last call, the E-stop's above all. Whether it was that."""

@@ -20,8 +20,8 @@ def checked(data: bytes, room_words: int, most_joints: int) -> "Record":
     """(head, joints, crc32, outputs, inputs) of an arm record, as ``armrecord`` unpacks them.
 
     ``room_words``, ``most_joints``: what an engine can have. Refused: BAD_RECORD where it is damaged, of another
-    version, or names what the board has not; PIN_TAKEN where an output or input has what the engine takes; NO_ROOM
-    with the bytes needed.
+    version, or names what the board has not; PIN_TAKEN where an output, input or polled switch has what is taken;
+    NO_ROOM with the bytes needed.
     """
     try:
         head, joints, crc = armrecord.unpack(data)
@@ -44,19 +44,26 @@ def checked(data: bytes, room_words: int, most_joints: int) -> "Record":
 def _is_fit(row: "dict[str, int]") -> bool:
     if row["channel"] >= len(pins.STEP) or row["min_steps"] > row["max_steps"] or row["counts_den"] < 1:
         return False
-    for name, count in (
-        ("encoder", MAX_ENCODERS),
-        ("limit_low", len(pins.LIMIT)),
-        ("limit_high", len(pins.LIMIT)),
-    ):
-        if row[name] >= count and row[name] != armrecord.NONE:
-            return False
-    return True
+    if row["encoder"] >= MAX_ENCODERS and row["encoder"] != armrecord.NONE:
+        return False
+    return _is_switch(row["limit_low"]) and _is_switch(row["limit_high"])
+
+
+def _is_switch(switch: int) -> bool:
+    if switch < armrecord.POLLED:
+        return switch < len(pins.LIMIT)
+    return switch == armrecord.NONE or pins.name(switch - armrecord.POLLED) != ""
+
+
+def _is_polled(switch: int) -> bool:
+    return armrecord.POLLED <= switch < armrecord.NONE
 
 
 def _check_pins(head: "dict[str, int]", joints: "Rows", outputs: "Rows", inputs: "Rows") -> None:
-    """Pins and timers of outputs and inputs: each once, and none that the engine takes."""
-    if not outputs and not inputs:
+    """Pins and timers of outputs, inputs and polled switches: each once, and none that the engine takes."""
+    switches = [row[side] for row in joints for side in ("limit_low", "limit_high")]
+    polled = [{"pin": switch - armrecord.POLLED} for switch in switches if _is_polled(switch)]
+    if not outputs and not inputs and not polled:
         return
     timers = [2, 5, 6]  # the counters of STEP, and what fills their rings
     taken = ["", pins.ENABLE, pins.BUTTON] + list(pins.LEDS)
@@ -65,14 +72,12 @@ def _check_pins(head: "dict[str, int]", joints: "Rows", outputs: "Rows", inputs:
     for row in joints:
         step, _, _, _, _, _ = pins.STEP[row["channel"]]
         taken += [step, pins.DIR[row["channel"]]]
-        taken += [
-            pins.LIMIT[row[side]] for side in ("limit_low", "limit_high") if row[side] != armrecord.NONE
-        ]
         if row["encoder"] != armrecord.NONE:
             timer, first, second, _ = pins.ENCODER[row["encoder"]]
             taken += [first, second]
             timers.append(timer)
-    for row in outputs + inputs:
+    taken += [pins.LIMIT[switch] for switch in switches if switch < armrecord.POLLED]
+    for row in outputs + inputs + polled:
         name = pins.name(row["pin"])
         timer = row.get("timer", 0)
         if name in taken or timer in timers or timer > _LAST_TIMER:

@@ -10,6 +10,7 @@ limit switch           the same
 underrun               the same: the ring stops, no wrong step is made
 E-stop                 known, but unknown where the arm record releases the drivers
 following error        unknown for the joint that was lost
+wrong steps            unknown for the joint that made others than its record has
 DIR turned too late    unknown for all joints
 exception in service   unknown for all joints
 =====================  =============================================================
@@ -45,6 +46,7 @@ _ROUNDS = const(8)  # of filling the queues, before other work gets its turn
 _PERMILLE = const(1000)
 _TICKS_PER_MS = const(84000)
 _MOST_MS = const(65535)
+_ALL_JOINTS = const(0xFF)
 # work beside the filling of queues: one of these in each call of ``service``
 _POLL_SWITCHES = const(0)
 _CHECK_FOLLOWING = const(1)
@@ -57,17 +59,18 @@ class Engine(EngineParts):
     def __init__(self, head: "dict[str, int]", joints: "list[dict[str, int]]", workspace: Workspace) -> None:
         super().__init__(head, joints, workspace)
         self._watched_joint = self._background_task = 0
-        self._homing = False
+        self._homing = 0  # bit a joint that moves in a homing motion
         self._in_service = False  # service() or refill() is at work, or has not come to its end
         self.judged = False  # the next motion is one that was checked before, and nothing has changed since
 
     # before a motion
 
-    def load(self, motion: "MotionHead", rate: int = _PERMILLE, ready: "Any" = None) -> None:
+    def load(self, motion: "MotionHead", rate: int = _PERMILLE, ready: "Any" = None, homing: int = 0) -> None:
         """Check a motion and fill the rings; Refused where something is wrong.
 
-        ``rate``, in thousandths: how fast the motion's own time is to run. ``ready``: the
-        ``NextMotion`` that has it loaded already.
+        ``rate``, in thousandths: how fast the motion's own time is to run. ``ready``: the ``NextMotion`` that has it
+        loaded already. ``homing``: bit a joint that moves in a homing motion; a switch of these ends it without a
+        fault, and ``fault_joint`` says whose.
         """
         if self.moving:
             raise Refused(codes.BUSY)
@@ -89,7 +92,9 @@ class Engine(EngineParts):
                 if rate != _PERMILLE:
                     joint.follow(override.law, False)
             self._prefill(joint)
-        self.inputs.watch(1)
+        self._homing = homing
+        self.fault_joint = NO_JOINT
+        self.inputs.watch(homing or _ALL_JOINTS)
         if not ready:
             gc.collect()
 
@@ -124,9 +129,8 @@ class Engine(EngineParts):
         for _ in range(_PREFILLS):
             joint.refill(now_kiticks)
 
-    def start(self, homing: bool = False) -> None:
-        """Let the counters run. ``homing``: a limit switch ends the motion without a fault."""
-        self._homing = homing
+    def start(self) -> None:
+        """Let the counters run."""
         self.moving = True
         if not self.clock.start():
             self._fail(codes.START_FAILED, NO_JOINT)
@@ -160,13 +164,16 @@ class Engine(EngineParts):
         self._background_task = self._background_task + 1 if self._background_task < _CHECK_INTERRUPT else 0
         if self._background_task == _POLL_SWITCHES:
             self.inputs.poll()
+            if self._homing:
+                self.inputs.poll_home(self._homing)
         elif self._background_task == _CHECK_FOLLOWING:
             self._check_following()
         elif self._sampler.overdue(self._watched_joint):
             self.block[isr.TURN_LATE] = 1
         if self.block[isr.TURN_LATE]:
             self._fail(codes.INTERNAL, NO_JOINT)
-        elif self._has_ended():
+        elif self._has_ended() and self.moving:  # not where an encoder has just ended it
+            self._check_end()
             self._finish(self.rates.duration_ticks)
 
     def _refill_queues(self) -> bool:
@@ -201,6 +208,17 @@ class Engine(EngineParts):
                     self.freeze()
                 return False
         return True
+
+    def _check_end(self, at_rest: bool = False) -> None:
+        """However a motion came to its end, each joint has made the steps of its record, or it is a fault.
+
+        ``at_rest``: it ends in a pause.
+        """
+        for number, joint in enumerate(self.drives):
+            if joint.is_astray(at_rest):
+                self.known &= ~(1 << number)
+                isr.set_fault(self.block, codes.WRONG_STEPS, number)
+                self._take_fault()
 
     def _check_following(self) -> None:
         """Compare one joint with its encoder; the next joint comes with the next call."""
@@ -238,6 +256,8 @@ class Engine(EngineParts):
         if not self.moving or rates.braked:
             return
         if not rates.brake():
+            if rates.stands():
+                self._check_end(True)
             self.freeze()
         elif rates.stands():
             for joint in self.drives:
@@ -303,6 +323,7 @@ class Engine(EngineParts):
         self._note_trip()
         if self.block[isr.FAULT] == codes.LIMIT_SWITCH and self._homing:
             self.block[isr.FAULT] = 0
+            self.fault_joint = self.block[isr.FAULT_JOINT]
         if self.block[isr.FAULT]:
             self._take_fault()
         self._finish(end_ticks)

@@ -110,6 +110,10 @@ class JointDrive:
             self._turns_out += 1
         return self._base + self._direction * (steps - self._base_steps)
 
+    def is_astray(self, at_rest: bool) -> bool:
+        """Whether the motion that ends here made other steps than its record has; see ``StepGenerator.end_steps``."""
+        return self.position(self.ring.matches()) != self.generator.end_steps(at_rest)
+
     def ahead_kiticks(self) -> int:
         """How far ahead steps are in the ring, rounded up."""
         ahead_kiticks = self.ring.fed_kiticks()

@@ -243,6 +243,21 @@ class StepGenerator:
         if is_last and self.halted:
             self.ended = True
 
+    def end_steps(self, at_rest: bool) -> int:
+        """Position at which the joint must stand once it has ended: where the record ends, or a last law stopped it.
+
+        ``at_rest``: the motion's time stands still, and it ends here.
+        """
+        if not (self._is_last_law or at_rest):
+            return self.subintervals.end_steps()
+        queue = self.queue
+        left = self.direction * (queue[_LAST_STEP] - queue[_REACHED])
+        if self._first_waits:
+            left = self._heading * (queue[_LAST_STEP] + 1)
+        if self._held:
+            left += self.direction
+        return self._position - _BIAS - left
+
     def next_kiticks(self) -> int:
         """Time of the next step to be written, or one before it while it is not known."""
         time = step_queue.next_kiticks(self.queue)

@@ -94,6 +94,11 @@ class Subintervals:
             found = _NOT_YET  # a new segment is enough for one call
         return found
 
+    def end_steps(self) -> int:
+        """Where the subinterval ends, in whole steps."""
+        end: int = self.angle[bezier.LAST_HIGH] + (self.angle[bezier.LAST_LOW] >> 27) - bezier.BIAS
+        return end
+
     def measure(self) -> int:
         """Compute and measure the subinterval; 0: past the end, else MEASURED and its other results."""
         found = 0

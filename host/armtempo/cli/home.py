@@ -35,7 +35,8 @@ def command(
 
     WHERE: angles such as '0,-60,40', a posture of the arm file by its name, a via point of the job such as P0, or a
     trajectory file for its start. Without it: the home posture of the arm file. Nothing moves; afterwards motions may
-    start. With --switches the joints that have a switch of known angle move: to it, off it, and slowly to it again.
+    start. With --switches the joints that have a switch of known angle move: to it, off it, slowly to it again, and to
+    their home angle; in the order of 'homing' in the arm file, else one after the other.
     """
     if switches and where != posture.HOME:
         raise InputError(

@@ -42,7 +42,7 @@ def _levels(arm: Arm) -> list[Finding]:
     levels: dict[int, set[str]] = defaultdict(set)
     for joint in arm.joints:
         for number in (joint.switches.low, joint.switches.high):
-            if number is not None:
+            if isinstance(number, int):
                 levels[number].add(joint.switches.active)
     return [
         error(
@@ -73,13 +73,16 @@ def _switches(joint: DrivenJoint) -> list[Finding]:
             text = f"{side}_deg is given, but no input for that switch"
             found.append(
                 warning(
-                    joint.name, text, f"give {side} = 1, 2 or 3 in its [switches], or leave {side}_deg out"
+                    joint.name,
+                    text,
+                    f"give {side} = 1, 2, 3 or a pin in its [switches], or leave {side}_deg out",
                 )
             )
         if number is not None and trip_deg is None:
-            text = f"its {side} switch protects, but cannot home: its angle is not known"
+            protects = "protects, but " if isinstance(number, int) else ""
+            text = f"its {side} switch {protects}cannot home: its angle is not known"
             found.append(note(joint.name, text, f"measure where it trips and give {side}_deg"))
-        if number is not None and trip_deg is not None and low < trip_deg < high:
+        if isinstance(number, int) and trip_deg is not None and low < trip_deg < high:
             text = f"its {side} switch trips at {trip_deg:g} deg, within its range of {low:g} to {high:g}"
             found.append(
                 warning(joint.name, text, "narrow range_deg to what the switch leaves, or correct the angle")

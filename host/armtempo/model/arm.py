@@ -39,6 +39,8 @@ class Arm:
     inputs: tuple[Input, ...] = field(default=(), metadata=json_codec.ADDED)
     postures: tuple[ArmPosture, ...] = field(default=(), metadata=json_codec.ADDED)
     """In the order of the file; the board knows nothing of them."""
+    homing: tuple[tuple[str, ...], ...] = field(default=(), metadata=json_codec.ADDED)
+    """Names of the joints that are homed first, together those of an entry; the others follow one by one."""
 
     @classmethod
     def load(cls, path: Path | str) -> Arm:
@@ -73,8 +75,9 @@ class Arm:
         board = top.choice("board", tuple(boards.BOARDS), boards.DEFAULT)
         outputs, inputs = outputs_file.outputs(top), outputs_file.inputs(top)
         postures = top.table("posture")
+        homing = parts_file.homing(top, [joint.name for joint in joints])
         top.done()
-        arm = cls(name, joints, driver, safety, top.file, board, outputs, inputs)
+        arm = cls(name, joints, driver, safety, top.file, board, outputs, inputs, homing=homing)
         if not postures:
             return arm
         return replace(arm, postures=tuple(read_posture(postures, name, arm) for name in postures.names()))

@@ -65,6 +65,12 @@ TIMER_OUTPUTS: dict[str, tuple[TimerOutput, ...]] = {
 }
 """By pin, the timer with the fewest channels first (data sheet DS8626, table 9); TIM2 and TIM5 count steps."""
 
+
+def pin_number(pin: str) -> int:
+    """A pin (``"PE9"``) as the arm record has it."""
+    return 16 * (ord(pin[1]) - ord("A")) + int(pin[2:])
+
+
 _USB = {
     "PA9": "USB (supply sensed)",
     "PA10": "USB (ID)",

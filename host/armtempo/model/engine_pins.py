@@ -60,7 +60,7 @@ def taken_pins(arm: ChannelUser) -> dict[str, str]:
             for pin in pins["ENCODER"][joint.encoder.channel - 1][1:3]:
                 found[pin] = f"encoder {joint.encoder.channel}"
         for switch in (joint.switches.low, joint.switches.high):
-            if switch is not None:
+            if isinstance(switch, int):
                 found[pins["LIMIT"][switch - 1]] = f"limit switch {switch}"
     return {f"P{pin}": use for pin, use in found.items()}
 

@@ -53,7 +53,7 @@ def _output(name: str, table: Table) -> Output:
         settings["frequency_hz"] = table.number("frequency_hz", least=_FREQUENCY_HZ[0], most=_FREQUENCY_HZ[1])
     else:
         settings |= _servo(table)
-    bare = Output(name, kind, _pin(table), 0.0, **settings)
+    bare = Output(name, kind, pin(table), 0.0, **settings)
     states = _states(bare, table.table("states"))
     known = Output(name, kind, bare.pin, 0.0, states, **settings)
     safe = _safe(known, table)
@@ -107,7 +107,7 @@ def _checked(output: Output, table: Table, key: str, value: float) -> float:
 def _input(name: str, table: Table) -> Input:
     found = Input(
         name,
-        _pin(table),
+        pin(table),
         active=table.choice("active", ("low", "high"), Input.active),
         debounce_ms=table.integer("debounce_ms", Input.debounce_ms, least=0, most=10_000),
     )
@@ -115,11 +115,12 @@ def _input(name: str, table: Table) -> Input:
     return found
 
 
-def _pin(table: Table) -> str:
-    pin = table.text("pin")
-    if not _PIN.fullmatch(pin):
-        raise table.fail("pin", _PIN_WORDS)
-    return pin
+def pin(table: Table, key: str = "pin", allowed: str = _PIN_WORDS) -> str:
+    """The name of a pin, such as ``"PD0"``; whether the board has it is not judged here."""
+    found = table.text(key)
+    if not _PIN.fullmatch(found):
+        raise table.fail(key, allowed)
+    return found
 
 
 def _is_number(text: str) -> bool:

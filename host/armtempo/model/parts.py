@@ -59,10 +59,14 @@ class Encoder:
 
 @dataclass(frozen=True)
 class LimitSwitches:
-    """Limit switch inputs of one joint: board inputs 1 to 3, or None."""
+    """Switches of one joint.
 
-    low: int | None = None
-    high: int | None = None
+    Each is one of the board's limit switch inputs 1 to 3, where it stops what moves towards it at once; or a pin
+    (``"PD0"``), which is only looked at while homing; or None.
+    """
+
+    low: int | str | None = None
+    high: int | str | None = None
     active: str = "low"
     low_deg: float | None = None
     """Joint angle at which the low switch trips, for homing."""

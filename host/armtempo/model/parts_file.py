@@ -5,6 +5,7 @@ from __future__ import annotations
 from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS
 
 from armtempo.formats.toml_table import Table
+from armtempo.model import outputs_file
 from armtempo.model.parts import (
     Driver,
     Encoder,
@@ -145,14 +146,33 @@ def _switches(table: Table | None) -> LimitSwitches:
     if table is None:
         return LimitSwitches()
     switches = LimitSwitches(
-        low=table.integer("low", least=1, most=3) if table.has("low") else None,
-        high=table.integer("high", least=1, most=3) if table.has("high") else None,
+        low=_switch(table, "low"),
+        high=_switch(table, "high"),
         active=table.choice("active", ("low", "high"), "low"),
         low_deg=_angle(table, "low_deg"),
         high_deg=_angle(table, "high_deg"),
     )
     table.done()
     return switches
+
+
+def _switch(table: Table, key: str) -> int | str | None:
+    if table.is_text(key):
+        return outputs_file.pin(table, key, "an input from 1 to 3, or a free pin such as PD0 for homing only")
+    return table.integer(key, least=1, most=3) if table.has(key) else None
+
+
+def homing(top: Table, names: list[str]) -> tuple[tuple[str, ...], ...]:
+    """``homing``: names of joints, or lists of them, in the order in which they are homed."""
+    if not top.has("homing"):
+        return ()
+    allowed = f"a list of joints' names, each once, or of lists of them; the joints are {', '.join(names)}"
+    entries = top.array("homing", allowed)
+    groups = tuple(tuple(entry) if isinstance(entry, list) else (entry,) for entry in entries)
+    flat = [name for group in groups for name in group]
+    if not all(name in names for name in flat) or len(set(flat)) != len(flat) or not all(groups):
+        raise top.fail("homing", allowed)
+    return groups
 
 
 def _angle(table: Table, key: str) -> float | None:

@@ -1,4 +1,4 @@
-"""Which pin and timer each output and input of an arm takes, and what stands in the way."""
+"""Which pin and timer each output, input and home switch of an arm takes, and what stands in the way."""
 
 from __future__ import annotations
 
@@ -60,8 +60,8 @@ class Period:
 
 
 def problems(arm: PinUser) -> list[PinProblem]:
-    """What stands in the way of the arm's outputs and inputs, and of its board; empty where nothing does."""
-    if not (arm.outputs or arm.inputs) and arm.board == DEFAULT:
+    """What stands in the way of outputs, inputs and home switches, and of the board; empty where nothing does."""
+    if not (arm.outputs or arm.inputs or _home_switches(arm)) and arm.board == DEFAULT:
         return []
     board = BOARDS[arm.board]
     engine = engine_pins.taken_pins(arm)
@@ -87,6 +87,7 @@ def _pin_problems(arm: PinUser, board: BoardPins, engine: dict[str, str]) -> lis
     for where, pin in [
         *((f"output.{output.name}", output.pin) for output in arm.outputs),
         *((f"input.{entry.name}", entry.pin) for entry in arm.inputs),
+        *_home_switches(arm),
     ]:
         if pin not in board.pins:
             found.append(
@@ -96,6 +97,16 @@ def _pin_problems(arm: PinUser, board: BoardPins, engine: dict[str, str]) -> lis
             found.append(PinProblem(where, f"{pin} {used[pin]}", f"take another pin; {_MORE}"))
         used.setdefault(pin, f"is the pin of {where}")
     return found
+
+
+def _home_switches(arm: PinUser) -> list[tuple[str, str]]:
+    """(where, pin) of each switch that has a pin instead of a limit switch input."""
+    return [
+        (f"switches of {joint.name}", switch)
+        for joint in arm.joints
+        for switch in (joint.switches.low, joint.switches.high)
+        if isinstance(switch, str) and joint.motor is not None
+    ]
 
 
 def _placed(arm: PinUser) -> tuple[dict[str, TimerOutput], list[PinProblem]]:

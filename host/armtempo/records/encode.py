@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from armtempo.basics.errors import InputError
 from armtempo.model.arm import Arm
+from armtempo.model.boards import pin_number
 from armtempo.model.parts import DrivenJoint
 from armtempo.planning import checks
 from armtempo.planning.brake_time import BrakeTimes
@@ -152,11 +153,17 @@ def _joint(joint: DrivenJoint) -> dict[str, Any]:
         "max_steps": high,
         "max_rate": _max_rate(joint),
         "following_counts": round(following),
-        "limit_low": armrecord.NONE if switches.low is None else switches.low - 1,
-        "limit_high": armrecord.NONE if switches.high is None else switches.high - 1,
+        "limit_low": _switch(switches.low),
+        "limit_high": _switch(switches.high),
         "limit_active_high": int(switches.active == "high"),
         "spare": 0,
     }
+
+
+def _switch(where: int | str | None) -> int:
+    if where is None:
+        return armrecord.NONE
+    return where - 1 if isinstance(where, int) else armrecord.POLLED + pin_number(where)
 
 
 def _max_rate(joint: DrivenJoint) -> int:

@@ -6,7 +6,7 @@ from typing import Any
 
 from armtempo.model import pin_use
 from armtempo.model.arm import Arm
-from armtempo.model.boards import TimerOutput
+from armtempo.model.boards import TimerOutput, pin_number
 from armtempo.model.outputs import SERVO, Output
 from armtempo.model.pin_use import Period
 
@@ -21,7 +21,7 @@ def inputs(arm: Arm) -> list[dict[str, Any]]:
     """Rows of ``armrecord.INPUT``."""
     return [
         {
-            "pin": _number(entry.pin),
+            "pin": pin_number(entry.pin),
             "active_high": int(entry.active == "high"),
             "debounce_ms": entry.debounce_ms,
         }
@@ -30,7 +30,7 @@ def inputs(arm: Arm) -> list[dict[str, Any]]:
 
 
 def _output(output: Output, place: TimerOutput | None) -> dict[str, Any]:
-    row = {"pin": _number(output.pin), "spare": 0, "safe": output.raw(output.safe)}
+    row = {"pin": pin_number(output.pin), "spare": 0, "safe": output.raw(output.safe)}
     if place is None:
         on = int(output.active == "high")
         return {**row, "timer": 0, "channel": 0, "prescaler": 0, "period": 0, "low": 1 - on, "high": on}
@@ -47,7 +47,3 @@ def _output(output: Output, place: TimerOutput | None) -> dict[str, Any]:
         "low": low,
         "high": high,
     }
-
-
-def _number(pin: str) -> int:
-    return 16 * (ord(pin[1]) - ord("A")) + int(pin[2:])

@@ -183,7 +183,7 @@ class Board:
         arm_state.home(self.client, arm, None if where is None else posture_deg(where, arm))
 
     def home_to_switches(self, arm: Arm, stop: StopRequest | None = None) -> None:
-        """Home the joints that have a limit switch of known angle: they move to it, off it, slowly to it again.
+        """Home the joints that have a switch of known angle: to it, off it, slowly to it again, to their home angle.
 
         Raises InputError where no joint has one, LinkError where a switch does not trip.
         """

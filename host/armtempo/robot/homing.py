@@ -1,12 +1,13 @@
-"""Homing by limit switches: approach, back off, approach slowly, one joint after the other.
+"""Homing by switches: approach, back off, approach slowly, go home; joint by joint, or as the arm file groups them.
 
-The board takes these motions while the joint's position is unknown: it assumes that the joint is where the
-motion begins, and calls the position unknown again at the end. So the position is never wrong, only unknown,
-until the last step.
+The board takes these motions while a joint's position is unknown: it assumes that the joint is where the motion
+begins, and calls the position unknown again at the end. So the position is never wrong, only unknown, until it is
+declared. A switch that trips ends the motion for all joints that move in it; the others then go on by another one.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from armtempo_shared.messages import START_HOMING
@@ -30,7 +31,7 @@ _TOLERANCE_DEG = 0.1
 
 @dataclass(frozen=True)
 class _Switch:
-    """Where a joint's limit switch is."""
+    """Where a joint's switch is."""
 
     side: int
     """-1 at the low end of the range, 1 at the high one."""
@@ -40,22 +41,36 @@ class _Switch:
     far_deg: float
     """The other end."""
 
+    @property
+    def outside_deg(self) -> float:
+        """How far beyond the range it trips."""
+        return max(0.0, self.side * (self.trip_deg - self.edge_deg))
+
 
 def home_to_switches(client: Client, arm: Arm, stop: StopRequest) -> None:
-    """Home every joint that has a switch of known angle; the others stay as they are.
+    """Home every joint that has a switch of known angle, then bring it to its home posture; the others stay.
 
-    Raises InputError where no joint has one, LinkError where a switch does not trip, BoardError where the
-    board refuses or a fault ends it, Stopped after a stop request.
+    In the order of ``arm.homing``. Raises InputError where no joint has one, LinkError where a switch does not trip,
+    BoardError where the board refuses or a fault ends it, Stopped after a stop request.
     """
-    switches = [(index, _switch(joint)) for index, joint in enumerate(arm.driven)]
-    found = [(index, switch) for index, switch in switches if switch is not None]
-    if not found:
+    groups = _groups(arm)
+    if not groups:
         raise InputError(
             f"arm {arm.name!r} has no limit switch whose angle is known",
             "give low_deg or high_deg in a joint's [switches], or home by hand",
         )
-    for index, switch in found:
-        _JointHoming(client, arm, index, switch, stop).run()
+    for group in groups:
+        _GroupHoming(client, arm, stop, group).run()
+
+
+def _groups(arm: Arm) -> list[dict[int, _Switch]]:
+    """Joints (from 0, among the driven ones) that are homed together, in order, with their switches."""
+    switches = {joint.name: (index, _switch(joint)) for index, joint in enumerate(arm.driven)}
+    named = [name for group in arm.homing for name in group]
+    groups = [*arm.homing, *((name,) for name in switches if name not in named)]
+    found = [[switches[name] for name in group if name in switches] for group in groups]
+    fitted = [{index: switch for index, switch in group if switch is not None} for group in found]
+    return [group for group in fitted if group]
 
 
 def _switch(joint: DrivenJoint) -> _Switch | None:
@@ -69,57 +84,121 @@ def _switch(joint: DrivenJoint) -> _Switch | None:
 
 
 @dataclass(frozen=True)
-class _JointHoming:
-    """Homing one joint."""
+class _GroupHoming:
+    """Homing some joints together. A distance to go is positive towards the joint's switch."""
 
     client: Client
     arm: Arm
-    index: int
-    """Of the joint, among the driven ones."""
-    switch: _Switch
     stop: StopRequest
+    switches: dict[int, _Switch]
 
     def run(self) -> None:
-        """Both approaches, then the position is declared, a little away from the switch."""
-        joint, switch = self.arm.driven[self.index], self.switch
-        edge_deg, back_deg = switch.edge_deg, -switch.side * BACK_DEG
-        if abs(self._move(switch.far_deg, edge_deg, FAST) - edge_deg) <= _TOLERANCE_DEG:
-            raise LinkError(
-                f"{joint.name}: its limit switch did not trip over the whole range",
-                "check its wiring and its pin in the arm file",
-            )
-        self._move(edge_deg, edge_deg + back_deg, FAST)
-        before_deg = edge_deg + 2 * back_deg
-        way_deg = abs(self._move(before_deg, edge_deg, SLOW) - before_deg)
-        if not 0.5 * BACK_DEG < way_deg < 1.5 * BACK_DEG:
-            raise LinkError(
-                (
-                    f"{joint.name}: its limit switch tripped {way_deg:.2f} degrees after it had been left by "
-                    f"{BACK_DEG:g}"
-                ),
-                "check its wiring and that it sits firmly",
-            )
-        outside_deg = max(0.0, switch.side * (switch.trip_deg - edge_deg))
-        away_deg = switch.side * (BACK_DEG + outside_deg)
-        self._move(edge_deg, edge_deg - away_deg, FAST)
+        """Both approaches, then the positions are declared, a little away from the switches, and the joints go home."""
+        whole = {
+            index: abs(switch.far_deg - switch.edge_deg) + switch.outside_deg
+            for index, switch in self.switches.items()
+        }
+        self._approach(whole, FAST)
+        self._leave(dict.fromkeys(whole, BACK_DEG))
+        for index, way_deg in self._approach(dict.fromkeys(whole, 2 * BACK_DEG), SLOW).items():
+            if not 0.5 * BACK_DEG < way_deg < 1.5 * BACK_DEG:
+                raise LinkError(
+                    (
+                        f"{self.arm.driven[index].name}: its limit switch tripped {way_deg:.2f} degrees after it had "
+                        f"been left by {BACK_DEG:g}"
+                    ),
+                    "check its wiring and that it sits firmly",
+                )
+        away_deg = {index: BACK_DEG + switch.outside_deg for index, switch in self.switches.items()}
+        self._leave(away_deg)
+        self._declare(away_deg)
+        self._go_home()
+
+    def _approach(self, ways_deg: dict[int, float], fraction: float) -> dict[int, float]:
+        """Move joints towards their switches until all have tripped; how far each has gone, degrees."""
+        left = dict(ways_deg)
+        gone = dict.fromkeys(left, 0.0)
+        while left:
+            moved, tripped = self._towards(left, fraction)
+            for index, way_deg in moved.items():
+                gone[index] += way_deg
+                left[index] -= way_deg
+            missed = [index for index, way_deg in left.items() if way_deg <= _TOLERANCE_DEG]
+            if tripped in left:
+                del left[tripped]
+            elif missed:
+                raise LinkError(
+                    f"{self._names(missed)}: no limit switch tripped within {ways_deg[missed[0]]:.0f} degrees",
+                    "check its wiring and its pin in the arm file",
+                )
+            elif max(moved.values()) <= _TOLERANCE_DEG:
+                raise LinkError(
+                    f"{self._names(left)}: a switch of another joint stops it",
+                    "check the wiring of the switches",
+                )
+        return gone
+
+    def _towards(self, left: dict[int, float], fraction: float) -> tuple[dict[int, float], int]:
+        """One motion towards the switches, over a range at most; how far each joint came, and whose switch tripped."""
+        ways = {}
+        for index, way_deg in left.items():
+            switch = self.switches[index]
+            step_deg = min(way_deg, abs(switch.far_deg - switch.edge_deg))
+            ways[index] = (switch.edge_deg - switch.side * step_deg, switch.edge_deg)
+        ends, tripped = self._move(ways, fraction)
+        return {index: abs(end_deg - ways[index][0]) for index, end_deg in ends.items()}, tripped
+
+    def _leave(self, ways_deg: dict[int, float]) -> None:
+        ways = {}
+        for index, way_deg in ways_deg.items():
+            switch = self.switches[index]
+            ways[index] = (switch.edge_deg, switch.edge_deg - switch.side * way_deg)
+        self._move(ways, FAST)
+
+    def _declare(self, away_deg: dict[int, float]) -> None:
+        """The joints stand so far from their switches."""
         steps: list[int | None] = [None] * len(self.arm.driven)
-        steps[self.index] = round((switch.trip_deg - away_deg) * joint.steps_per_deg)
+        for index, way_deg in away_deg.items():
+            switch, joint = self.switches[index], self.arm.driven[index]
+            steps[index] = round((switch.trip_deg - switch.side * way_deg) * joint.steps_per_deg)
         self.client.home(steps)
 
-    def _move(self, from_deg: float, to_deg: float, fraction: float) -> float:
-        """Move the joint, at a fraction of its limits; gives the angle at which it came to rest, degrees."""
+    def _go_home(self) -> None:
+        stands_deg = self._posture_deg()
+        ways = {index: (stands_deg[index], self.arm.driven[index].home_deg) for index in self.switches}
+        ends, _ = self._move(ways, FAST)
+        stopped = [index for index, end_deg in ends.items() if abs(end_deg - ways[index][1]) > _TOLERANCE_DEG]
+        if stopped:
+            raise LinkError(
+                f"{self._names(stopped)}: a switch tripped on the way to its home posture",
+                "check home_deg and the switches in the arm file",
+            )
+
+    def _names(self, joints: Iterable[int]) -> str:
+        return ", ".join(self.arm.driven[index].name for index in joints)
+
+    def _move(
+        self, ways_deg: dict[int, tuple[float, float]], fraction: float
+    ) -> tuple[dict[int, float], int]:
+        """Move joints at a fraction of their limits, each from and to an angle.
+
+        Gives the angles at which they came to rest, degrees, and the joint whose switch ended it (NO_JOINT).
+        """
         start_deg = self._posture_deg()
         end_deg = list(start_deg)
-        start_deg[self.index], end_deg[self.index] = from_deg, to_deg
+        for index, (from_deg, to_deg) in ways_deg.items():
+            start_deg[index], end_deg[index] = from_deg, to_deg
         slow_arm = _slowed(self.arm, fraction)
         trajectory = point_to_point.straight(TEMPORARY + "home", start_deg, end_deg, slow_arm)
         motion = encoded_motion.of_trajectory(trajectory, self.arm)
         key = store(self.client, motion.name, motion.data)
         end = replay(self.client, key, self.stop, flags=START_HOMING)
+        tripped = self.client.status().fault_joint
         self.client.remove(key.name)
         raise_fault(end)
         self.stop.check()
-        return end.positions.commanded_steps[self.index] / self.arm.driven[self.index].steps_per_deg
+        steps = end.positions.commanded_steps
+        return {index: steps[index] / self.arm.driven[index].steps_per_deg for index in ways_deg}, tripped
 
     def _posture_deg(self) -> list[float]:
         """Where the joints are; for one that is unknown any angle will do, as it does not move."""

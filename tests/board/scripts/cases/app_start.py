@@ -77,6 +77,7 @@ def case_what_the_board_has_not_is_named():
         ("channel", 6),
         ("encoder", 4),
         ("limit_low", 3),
+        ("limit_high", armrecord.POLLED + 0x50),
         ("counts_den", 0),
         ("min_steps", 2000),
     ):

@@ -9,6 +9,7 @@ from engine_rig import FEWER, HEAD, TICK_HZ, Evaluator, Motion, Rig, Steps, arm,
 from firmware import external_interrupts
 
 FREEZE_TICKS = 84 * 10
+HOME_TICKS = 84 * 10_000  # the main loop looks at a home switch in one of three services, here 1 ms apart
 SEED = 20261
 MOTION = Motion(
     TICK_HZ // 40,
@@ -266,18 +267,43 @@ def case_limit_switches():
     joints = arm(3)
     joints[1] = row(channel=1, dir_inverted=1, limit_low=0, limit_high=2, limit_active_high=1)
     for name, moment, trips in (("D8", 300_000, 1), ("D8", 1_000_000, 0), ("D10", 1_000_000, 1)):
-        for homing in (0, 1):
+        for homing in (0, 7):
             rig = Rig(joints)
             rig.start(MOTION, homing)
             rig.board.at(rig.zero() + moment, lambda name=name: external_interrupts.set_level(name, 1))
             rig.run_to(MOTION.duration + TICK_HZ)
             if trips:
                 assert rig.pulses[1].last_rise <= rig.zero() + moment + FREEZE_TICKS
-                stopped(rig, *((0, 255) if homing else (codes.LIMIT_SWITCH, 1)))
+                stopped(rig, 0 if homing else codes.LIMIT_SWITCH, 1)
                 assert rig.engine.known == 7
             else:
                 assert rig.engine.fault == 0
                 assert rig.commanded() == [steps.total() for steps in MOTION.joints]
+
+
+def case_home_switches():
+    """A switch without interrupt ends a homing run towards it, and nothing else."""
+    joints = arm(3)
+    joints[1] = row(channel=1, limit_low=armrecord.POLLED | 0x34, limit_active_high=1)  # PD4
+    for homing, moment, trips in (
+        (0, 300_000, 0),
+        (7, 300_000, 1),
+        (5, 300_000, 0),
+        (7, 1_000_000, 0),
+        (7, 0, 1),
+    ):
+        rig = Rig(joints)
+        external_interrupts.set_level("D4", int(moment == 0))
+        rig.start(MOTION, homing)
+        rig.board.at(rig.zero() + moment, lambda: external_interrupts.set_level("D4", 1))
+        rig.run_to(MOTION.duration + TICK_HZ)
+        if trips:
+            assert rig.pulses[1].last_rise <= rig.zero() + moment + HOME_TICKS
+            stopped(rig, 0, 1)
+            assert rig.engine.known == 7
+        else:
+            assert rig.engine.fault == 0
+            assert rig.commanded() == [steps.total() for steps in MOTION.joints]
 
 
 def case_limit_tripped_before():
@@ -308,7 +334,7 @@ def case_following():
             rig.arm.motors[0].slip(40)
         rig.run_to(MOTION.duration + TICK_HZ)
         assert (rig.engine.fault, rig.engine.fault_joint) == (codes.FOLLOWING, 0), rig.engine.fault
-        assert rig.engine.known == 6
+        assert rig.engine.known == 6, (harm, rig.engine.known)
         stopped(rig, codes.FOLLOWING, 0)
         assert rig.engine.clear()
         assert rig.refusal(MOTION) == (codes.UNHOMED, 0, 0)

@@ -13,13 +13,14 @@ import cases
 from armtempo_board.errors import Refused
 from armtempo_shared import codes
 from armtempo_shared.limits import LONGEST_RUN_TICKS
-from armtempo_shared.messages import RESUME
+from armtempo_shared.messages import NO_JOINT, RESUME
 from armtempo_shared.motion import NO_RAMPS, RAMP_ENTRIES, RAMP_UNIT_TICKS
 from brake_motion import BRAKE_TICKS, RAMPS, record
 from engine_rig import FEWER, TICK_HZ, Rig, arm
 
 SEED = 20263
 CHANGES = 6
+BRAKE = -1  # instead of a rate
 LONGEST_STOP_TICKS = 2 * (BRAKE_TICKS + TICK_HZ // 13)
 """A change that has just been asked for begins 75 ms later, and the stop 75 ms behind its end."""
 MOTIONS = int(([word for word in sys.argv[1:] if word.isdigit()] or [4 // FEWER])[0])
@@ -192,7 +193,7 @@ def some_leg(rig, start, end):
         ends = [(place, (random.random() - 0.5) * size) for place in places]
         first, last = [[place + by * speed for by in (1, 0, -1 / 33, 0, 1)] for place, speed in ends]
         angles.append(first + [random.random() * size for _ in range(4)] + last)
-    motion = record(BRAKE_TICKS, angles, times)
+    motion = record(some_ramps(), angles, times)
     try:
         check_splines(motion, rig.engine.drives, rig.engine.limits)
     except Refused:  # too abrupt
@@ -241,7 +242,7 @@ def case_step_at_the_start():
     """A joint that begins just beyond the middle between two steps: its only step comes, at every speed."""
     for segments in range(1, 5):
         points = [[0.505] * (segments + 5), [0.0] * (segments + 5), [0.0] * (segments + 5)]
-        motion = record(BRAKE_TICKS, points, [(number - 2) / 20 for number in range(segments + 5)])
+        motion = record(some_ramps(), points, [(number - 2) / 20 for number in range(segments + 5)])
         for rate in (1000, 700):
             rig, recorders = begin(motion, rate)
             rig.run_to(TICK_HZ)
@@ -277,6 +278,23 @@ def case_stops():
             assert abs(count - due) <= 1, (number, count, due)
         assert rig.commanded() == [motor.position for motor in rig.arm.motors]
         check_samples(rig)
+
+
+def case_wrong_steps():
+    """A step that is not in the record is found out however the motion ends, and makes its joint unknown."""
+    for rates in ((), (700,), (0, RESUME), (BRAKE,), (500, BRAKE), (0, BRAKE)):
+        for wrong in (0, 1):
+            rig, _ = begin(record())
+            rig.run_to(TICK_HZ // 4)
+            rig.engine.drives[1]._base += wrong
+            for rate in rates:
+                rig.engine.brake() if rate == BRAKE else rig.engine.change_rate(rate)
+                rig.run_to(rig.board.now - rig.zero() + TICK_HZ // 2)
+            rig.run_to(5 * TICK_HZ)
+            assert not rig.engine.moving
+            found = rig.engine.fault, rig.engine.fault_joint, rig.engine.known
+            assert found == ((codes.WRONG_STEPS, 1, 5) if wrong else (0, NO_JOINT, 7)), (rates, wrong, found)
+            assert rig.engine.clear() and rig.engine.fault == 0
 
 
 def case_long_pause():

@@ -23,6 +23,7 @@ class Still:
     def __init__(self):
         self.moving = True
         self.fault = 0
+        self.fault_joint = 255
         self.known = 3
         self.rates = stand_in.Rates()
         self.turns = 0

@@ -75,6 +75,7 @@ class StepGenerator:
     def load(self, motion, joint, position, pulse, gap):
         """Stand before the first step."""
         self._steps = motion.joints[joint]
+        self._end_steps = position + self._steps.total()
         self._place = [0, 0]
         state = self.queue
         state[step_queue.PULSE] = pulse
@@ -88,6 +89,10 @@ class StepGenerator:
     def next_kiticks(self):
         """Time of the next step, in 1024 ticks."""
         return step_queue.next_kiticks(self.queue)
+
+    def end_steps(self, at_rest):
+        """Where the plan leads."""
+        return self._end_steps
 
     def turn(self):
         """Go on in the other direction."""
@@ -288,13 +293,13 @@ class Rig:
         """Board time of the motion's time 0."""
         return self._zero
 
-    def start(self, motion, homing=False):
-        """Load and start a motion."""
+    def start(self, motion, homing=0):
+        """Load and start a motion; ``homing``: see ``Engine.load``."""
         self.samples = []
         for pulses, steps in zip(self.pulses, motion.joints):
             pulses.expect(steps)
-        self.engine.load(motion)
-        self.engine.start(homing)
+        self.engine.load(motion, homing=homing)
+        self.engine.start()
 
     def refusal(self, motion):
         """(code, joint, value) where it cannot be loaded, else None."""

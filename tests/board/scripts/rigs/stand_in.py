@@ -201,7 +201,7 @@ class Engine:
 
             raise Refused(*self.unfit)
 
-    def load(self, motion, rate=1000, ready=None):
+    def load(self, motion, rate=1000, ready=None, homing=0):
         if ready:
             assert ready.is_ready and ready.motion is motion and ready.rate == rate
         self.calls.append("load ready" if ready else "load judged" if self.judged else "load")
@@ -211,7 +211,7 @@ class Engine:
 
             raise Refused(*self.refusal)
 
-    def start(self, homing=False):
+    def start(self):
         self.calls.append("start")
         self.moving = True
         self.ticks = 0

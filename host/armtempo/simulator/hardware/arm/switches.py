@@ -32,7 +32,7 @@ def fitted(motor, joint, pins):
     ):
         if channel == armrecord.NONE:
             continue
-        pin = pins.LIMIT[channel]
+        pin = pins.LIMIT[channel] if channel < armrecord.POLLED else pins.name(channel - armrecord.POLLED)
         if trip_deg is None:
             set_level(pin, 1 - joint["limit_active_high"])
         else:
