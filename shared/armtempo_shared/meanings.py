@@ -186,8 +186,8 @@ COMMANDS: "dict[str, str]" = {
     "current or last run since the start. `ticks`: motion clock. `path`: the motion's own time, which is behind the "
     "clock where the speed was below 100 %. `fault_joint`: also the joint whose switch ended the last homing motion. "
     "`rate`: the speed that is wanted, in thousandths, 0 in a pause; while nothing moves that of the next start. "
-    "`rest_ms`: in how many milliseconds the arm would rest if it were stopped now, or will after a stop; 0 where nothing "
-    "moves, or where a stop freezes. Tail: per joint commanded steps and encoder counts (two i32).",
+    "`rest_ms`: in how many milliseconds the arm would rest if it were stopped now, or will after a stop; 0 where "
+    "nothing moves, or where a stop freezes. Tail: per joint commanded steps and encoder counts (two i32).",
     "put_begin": "Begins an upload of `size` bytes; the tail is the trajectory's name, or `/arm` for the arm "
     "record. `crc` is the record's own checksum, its last four bytes. An upload under way is given up.",
     "put_data": "The bytes from `offset` on; pieces may overlap what came before but leave no hole. Answer: "

@@ -33,6 +33,7 @@ SHORTER = 0.97
 LONGEST_S = 65535 * UNIT_S
 ROUNDS = 12
 SAMPLES = 4000
+SHORTEST_S = 1e-3
 
 
 def main() -> None:
@@ -70,7 +71,7 @@ def ratios(trajectory: Trajectory, limits: Sequence[Limits]) -> Array:
     moments = (np.arange(MOMENTS) + 0.5) / MOMENTS
     record_s = brake_time.of_motion(trajectory, limits).rest_s(moments * trajectory.duration_s)
     ramps = brake_time._Ramps(trajectory, allowed)
-    lawful_s = ramps.shortest_s(moments, TO_REST[:1], np.full(MOMENTS, 1e-4 * trajectory.duration_s))
+    lawful_s = ramps.shortest_s(moments, TO_REST[:1], np.full(MOMENTS, SHORTEST_S))
     any_s = [
         Shortest(trajectory, allowed, moment)(time) for moment, time in zip(moments, lawful_s, strict=True)
     ]

