@@ -115,14 +115,22 @@ class MotionHead:
         if length != size(self.degree, self.joints, self.shared, self.segments, self.refine):
             raise MotionError("length does not fit the header")
 
-    def ramp_ticks(self, at_ticks: int, duration_ticks: int, to_rest: bool) -> int:
-        """How long a change of speed takes, rounded up, that begins at a time of the motion, which lasts so long."""
-        first, part = RAMP_ENTRIES - 2, duration_ticks
-        if at_ticks < duration_ticks:
-            first, part = divmod(max(at_ticks, 0) * (RAMP_ENTRIES - 1), duration_ticks)
-        at = 0 if to_rest else _RAMPS_SIZE
-        before, after = struct.unpack_from("<HH", self.ramps, at + 2 * first)
-        return int(RAMP_UNIT_TICKS * before - RAMP_UNIT_TICKS * (before - after) * part // duration_ticks)
+    def ramp_units(self, at: int, duration: int, to_rest: bool) -> int:
+        """How long a change of speed takes, in RAMP_UNIT_TICKS, rounded up, that begins between two times.
+
+        ``at``, and ``at`` + 1, of a motion that lasts ``duration``, all in any unit of which it has less than 8192. All
+        small integers, on the board too.
+        """
+        parts = RAMP_ENTRIES - 1
+        at = parts * min(max(at, 0), duration)
+        first = min(at // duration, parts - 1)
+        at -= first * duration
+        place = 2 * first + (0 if to_rest else _RAMPS_SIZE)
+        ramps = self.ramps
+        before, after = ramps[place] + (ramps[place + 1] << 8), ramps[place + 2] + (ramps[place + 3] << 8)
+        if after > before:
+            at = min(at + parts, duration)
+        return before - (before - after) * at // duration
 
     def angle_offset(self, joint: int) -> int:
         """Byte offset of the joint's first angle control point."""

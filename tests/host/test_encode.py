@@ -34,11 +34,12 @@ def test_control_points_arrive_as_steps_and_ticks(shared: bool) -> None:
     record = motion.Motion(encode.motion_record(trajectory(shared), ARM, BRAKES))
     assert (record.degree, record.joints, record.segments, record.refine) == (5, 3, 2, 2)
     assert record.shared == shared
-    unit, end = motion.RAMP_UNIT_TICKS, 1_000_000
-    assert [record.ramp_ticks(end * place // 31, end, True) // unit for place in range(32)] == list(
-        range(5, 37)
-    )
-    assert [record.ramp_ticks(at, end, False) // unit for at in (-5, 0, end, end + 1)] == [100, 100, 410, 410]
+    end = 31 * 200
+    assert [record.ramp_units(200 * place, end, True) for place in range(32)] == [
+        *range(6, 37),
+        36,
+    ]  # or 1 later
+    assert [record.ramp_units(at, end, False) for at in (-5, 0, end, end + 1)] == [101, 101, 410, 410]
     for joint, per_deg in enumerate((6400 / 180, 32000 / 360, 6400 / 180)):
         angles = np.frombuffer(record.data, "<i8", 7, record.angle_offset(joint)) / 2.0**28
         np.testing.assert_allclose(angles, (np.arange(7) + 10 * joint) * per_deg, atol=2.0**-28)

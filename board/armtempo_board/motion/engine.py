@@ -44,8 +44,8 @@ LEAD_TICKS = const(1680000)
 _PREFILLS = const(32)
 _ROUNDS = const(8)  # of filling the queues, before other work gets its turn
 _PERMILLE = const(1000)
-_TICKS_PER_MS = const(84000)
-_MOST_MS = const(65535)
+_KITICKS_PER_32_MS = const(2625)
+_MOST_KITICKS = const(5_000_000)  # a minute
 _ALL_JOINTS = const(0xFF)
 # work beside the filling of queues: one of these in each call of ``service``
 _POLL_SWITCHES = const(0)
@@ -267,11 +267,16 @@ class Engine(EngineParts):
 
     def rest_ms(self) -> int:
         """In how many milliseconds it rests after ``brake``, which came before or comes now; 0: at once."""
-        return min(self.rates.rest_ticks(self._ahead_kiticks()) // _TICKS_PER_MS + 1, _MOST_MS)
+        return (
+            min(self.rates.rest_kiticks(self._ahead_kiticks()), _MOST_KITICKS) * 32 // _KITICKS_PER_32_MS + 1
+        )
 
     def _ahead_kiticks(self) -> int:
-        """How far ahead steps are in the rings."""
-        return max([joint.ahead_kiticks() for joint in self.drives])
+        """How far ahead steps are in the rings; allocates nothing."""
+        ahead_kiticks = 0
+        for joint in self.drives:
+            ahead_kiticks = max(joint.ahead_kiticks(), ahead_kiticks)
+        return ahead_kiticks
 
     def change_rate(self, rate: int) -> None:
         """Let the motion's own time go on at another rate, in thousandths; 0: pause, RESUME: as before it.

@@ -30,7 +30,7 @@ class RateControl:
         self._clock = clock
         self.override: "Any" = None
         self.wanted = self._before_pause = _PERMILLE
-        self.duration_ticks = 0
+        self.duration_ticks = self._end_kiticks = 0
         self._can_brake = False
         self.braked = self.end_moves = self.waits = False
 
@@ -39,6 +39,7 @@ class RateControl:
         self.override = override
         self.wanted = self._before_pause = override.rate
         self.duration_ticks = override.end_ticks()
+        self._end_kiticks = self.duration_ticks >> 10
         self._can_brake = motion.can_brake
         self.braked = self.end_moves = self.waits = False
 
@@ -84,7 +85,8 @@ class RateControl:
         ``ahead_kiticks``: how far ahead steps are in them. Where it would come to rest later than it ends by itself,
         it does that.
         """
-        start_ticks = self._start_ticks(ahead_kiticks)
+        ahead_kiticks = max(LOOKAHEAD_KITICKS + _LAW_MARGIN_KITICKS, ahead_kiticks)
+        start_ticks = (self._clock.kiticks() + ahead_kiticks) << 10
         self.waits = False
         if start_ticks >= self.duration_ticks or (
             self.braked and self.override.ramp_end_ticks(start_ticks, 0) >= self.duration_ticks
@@ -95,23 +97,25 @@ class RateControl:
         law: "array[int]" = self.override.law
         return law
 
-    def _start_ticks(self, ahead_kiticks: int) -> int:
-        """When a change can begin."""
-        ahead_kiticks = max(LOOKAHEAD_KITICKS + _LAW_MARGIN_KITICKS, ahead_kiticks)
-        return (self._clock.kiticks() + ahead_kiticks) << 10
+    def rest_kiticks(self, ahead_kiticks: int) -> int:
+        """How long from now it takes to come to rest after a stop: one that came before, or one now; 0 by freezing.
 
-    def rest_ticks(self, ahead_kiticks: int) -> int:
-        """How long from now it takes to come to rest after a stop: one that came before, or one now; 0 by freezing."""
-        now = self._clock.ticks()
-        end = self.duration_ticks
+        Allocates nothing.
+        """
+        now = self._clock.kiticks()
+        end = self._end_kiticks
         if not self.braked or self.waits:
             if not self._can_brake:
                 return 0
             override = self.override
-            start = max(self._start_ticks(ahead_kiticks), override.steady_ticks())
-            end = override.steady_ticks() if self.stands() else min(override.ramp_end_ticks(start, 0), end)
+            if self.stands():
+                end = override.steady_kiticks
+            else:
+                start = now + max(LOOKAHEAD_KITICKS + _LAW_MARGIN_KITICKS, ahead_kiticks)
+                end = min(override.rest_kiticks(max(start, override.steady_kiticks)), end)
         return max(end - now, 0)
 
     def _end_at(self, ticks: int) -> None:
         self.duration_ticks = ticks
+        self._end_kiticks = ticks >> 10
         self.end_moves = True

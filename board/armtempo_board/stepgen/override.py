@@ -8,6 +8,7 @@ for. Imported before a motion, and forgotten after it.
 from array import array
 
 from armtempo_shared.limits import LONGEST_RUN_TICKS
+from micropython import const
 
 from armtempo_board.stepgen import interval_steps, time_law
 from armtempo_board.stepgen.time_law import (
@@ -27,6 +28,9 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
+_UNIT_BITS = const(14)  # RAMP_UNIT_TICKS of the record
+_MOST_PARTS = const(8191)  # of a motion's time, to look up its ramps
+
 
 class Override:
     """``law`` is what the joints follow; ``rate`` that behind its ramp, steady from ``steady_kiticks`` on."""
@@ -39,7 +43,12 @@ class Override:
         """Stand at time 0 of a motion, a ``MotionHead``, which says how long its ramps are."""
         self._motion = motion
         self._duration_ticks = duration_ticks
+        self._shift = 10
+        while duration_ticks >> self._shift > _MOST_PARTS:
+            self._shift += 1
+        self._parts = max(duration_ticks >> self._shift, 1)
         self._motion_ticks = self._real_ticks = 0  # at the end of the last ramp
+        self._motion_kiticks = self._real_kiticks = 0
         self.rate = rate
         time_law.set_length(self.law, 0)
         self._set(time_law.START_HIGH, rate, rate)
@@ -55,6 +64,13 @@ class Override:
             + self._ramp_ticks(self._motion_ticks + self.rate * thousands, rate)
         )
 
+    def rest_kiticks(self, from_kiticks: int) -> int:
+        """Real time, in Ki ticks, at which a ramp to rest would end that begins at a real time; allocates nothing."""
+        since = max(from_kiticks - self._real_kiticks, 0)
+        at = self._motion_kiticks + since // PERMILLE * self.rate + since % PERMILLE * self.rate // PERMILLE
+        units = self._motion.ramp_units(at >> (self._shift - 10), self._parts, True)
+        return self._real_kiticks + since + (units << (_UNIT_BITS - 10))
+
     def _thousands(self, from_ticks: int) -> int:
         """Thousands of ticks from the last ramp's end, rounded up."""
         return max(-(-(from_ticks - self._real_ticks) // PERMILLE), 0)
@@ -62,8 +78,8 @@ class Override:
     def _ramp_ticks(self, at_ticks: int, rate: int) -> int:
         """Length of a ramp that begins at a time of the motion, rounded up to the grid."""
         grid = time_law.RAMP_GRID_TICKS
-        length = self._motion.ramp_ticks(at_ticks, self._duration_ticks, rate == 0)
-        return min(-(-length // grid), time_law.LONGEST_RAMP_TICKS // grid) * grid
+        units = self._motion.ramp_units(at_ticks >> self._shift, self._parts, rate == 0)
+        return min(-(-(units << _UNIT_BITS) // grid), time_law.LONGEST_RAMP_TICKS // grid) * grid
 
     def ramp(self, from_ticks: int, rate: int) -> None:
         """Go to another rate, from a real time on that lies behind the last ramp."""
@@ -76,6 +92,8 @@ class Override:
         self._real_ticks += length
         self._motion_ticks += (self.rate + rate) * (length // (2 * PERMILLE))
         self._set(time_law.END_HIGH, self.rate, rate)
+        self._motion_kiticks = self._motion_ticks >> 10
+        self._real_kiticks = self._real_ticks >> 10
         self.rate = rate
         self.steady_kiticks = (self._real_ticks >> 10) + 1
 
