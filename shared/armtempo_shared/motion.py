@@ -116,10 +116,11 @@ class MotionHead:
             raise MotionError("length does not fit the header")
 
     def ramp_units(self, at: int, duration: int, to_rest: bool) -> int:
-        """How long a change of speed takes, in RAMP_UNIT_TICKS, rounded up, that begins between two times.
+        """How long a change of speed takes, in RAMP_UNIT_TICKS, that begins at a time of the motion.
 
-        ``at``, and ``at`` + 1, of a motion that lasts ``duration``, all in any unit of which it has less than 8192. All
-        small integers, on the board too.
+        ``at``, and how long the motion lasts, in a unit of which that is less than 8192, so all are small integers of
+        the board: ``at`` rounded down, ``duration`` up. What is between two entries is taken up to 2 units later where
+        the next one is longer.
         """
         parts = RAMP_ENTRIES - 1
         at = parts * min(max(at, 0), duration)
@@ -129,7 +130,7 @@ class MotionHead:
         ramps = self.ramps
         before, after = ramps[place] + (ramps[place + 1] << 8), ramps[place + 2] + (ramps[place + 3] << 8)
         if after > before:
-            at = min(at + parts, duration)
+            at = min(at + 2 * parts, duration)
         return before - (before - after) * at // duration
 
     def angle_offset(self, joint: int) -> int:

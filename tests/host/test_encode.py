@@ -35,10 +35,7 @@ def test_control_points_arrive_as_steps_and_ticks(shared: bool) -> None:
     assert (record.degree, record.joints, record.segments, record.refine) == (5, 3, 2, 2)
     assert record.shared == shared
     end = 31 * 200
-    assert [record.ramp_units(200 * place, end, True) for place in range(32)] == [
-        *range(6, 37),
-        36,
-    ]  # or 1 later
+    assert [record.ramp_units(200 * place, end, True) for place in range(32)] == [*range(6, 37), 36]
     assert [record.ramp_units(at, end, False) for at in (-5, 0, end, end + 1)] == [101, 101, 410, 410]
     for joint, per_deg in enumerate((6400 / 180, 32000 / 360, 6400 / 180)):
         angles = np.frombuffer(record.data, "<i8", 7, record.angle_offset(joint)) / 2.0**28

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 _UNIT_BITS = const(14)  # RAMP_UNIT_TICKS of the record
-_MOST_PARTS = const(8191)  # of a motion's time, to look up its ramps
+_MOST_PARTS = const(8190)  # of a motion's time, to look up its ramps
 
 
 class Override:
@@ -46,7 +46,7 @@ class Override:
         self._shift = 10
         while duration_ticks >> self._shift > _MOST_PARTS:
             self._shift += 1
-        self._parts = max(duration_ticks >> self._shift, 1)
+        self._parts = (duration_ticks >> self._shift) + 1
         self._motion_ticks = self._real_ticks = 0  # at the end of the last ramp
         self._motion_kiticks = self._real_kiticks = 0
         self.rate = rate

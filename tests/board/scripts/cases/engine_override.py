@@ -101,9 +101,8 @@ def begin(motion, rate=1000):
         ramp(from_ticks, to)
         assert override.steady_ticks() == end
         longer = end - start - length_by_table(motion, to == 0, override._duration_ticks, passed)
-        assert -2 < longer <= 8000 + RAMP_UNIT_TICKS * (1 + 725 * 31 * 2 / 4096), (
-            longer
-        )  # a place of 4096 later
+        near = RAMP_UNIT_TICKS * (1 + 725 * 31 * 2 / 4096)  # two places of 4096
+        assert -near < longer <= 8000 + near, longer
         rig.laws.append((start, passed, end - start, before, to))
 
     rig.engine.rates.override.ramp = watched

@@ -106,6 +106,7 @@ def run(joints, brake_at):
             brake_at = 0
         else:
             locked(engine.service)
+            assert not engine.moving or 0 < locked(engine.rest_ms) < 2000
         while locked(engine.next_sample, BUFFER):
             samples += 1
         assert now < 200_000_000
