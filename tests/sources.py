@@ -1,10 +1,12 @@
-"""Python sources as syntax trees, for the tests that read the project's own code."""
+"""Python sources as syntax trees, and scripts that write files of the project, for the tests that read its code."""
 
 from __future__ import annotations
 
 import ast
+import runpy
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -21,3 +23,8 @@ def parsed(text: str) -> ast.Module:
 def tree(path: Path) -> ast.Module:
     """Of a file."""
     return parsed(path.read_text(encoding="utf-8"))
+
+
+def script(path: Path) -> SimpleNamespace:
+    """The names of a script that is no module of a package; it is not run as the main program."""
+    return SimpleNamespace(**runpy.run_path(str(path)))

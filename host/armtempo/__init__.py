@@ -21,27 +21,46 @@ TYPE_CHECKING = False  # as "typing" has it, which takes longer to import than t
 
 __all__ = [
     "Arm",
+    "ArmPosture",
     "ArmtempoError",
     "Board",
     "BoardError",
     "BoardState",
+    "Count",
+    "Driver",
+    "Encoder",
+    "Goto",
+    "Input",
     "InputError",
     "Job",
+    "Joint",
+    "LimitSwitches",
+    "Limits",
     "LinkError",
     "MissingPackageError",
+    "Motor",
+    "Output",
     "Plan",
     "PlanError",
     "Pose",
+    "Repeat",
     "Run",
     "RunFolderError",
+    "RunMotion",
+    "Safety",
     "Sequence",
     "SequencePlan",
     "SequenceRun",
+    "SetOutput",
     "SharedBoard",
     "Spline",
+    "Step",
+    "Stop",
     "StopRequest",
     "Stopped",
     "Trajectory",
+    "Wait",
+    "WaitInput",
     "Watcher",
     "__version__",
     "attach",
@@ -51,6 +70,7 @@ __all__ = [
     "find_ports",
     "forward",
     "inverse",
+    "inverse_many",
     "optimise",
     "plan",
     "plan_sequence",
@@ -73,12 +93,17 @@ if TYPE_CHECKING:
         PlanError,
         RunFolderError,
     )
+    from armtempo.kinematics.many import inverse_many
     from armtempo.kinematics.of_arm import forward, inverse
     from armtempo.model.arm import Arm
-    from armtempo.model.job import Job
+    from armtempo.model.job import Job, Stop
+    from armtempo.model.outputs import Input, Output
+    from armtempo.model.parts import Driver, Encoder, Joint, Limits, LimitSwitches, Motor, Safety
     from armtempo.model.plan import Plan
+    from armtempo.model.posture import ArmPosture
     from armtempo.model.sequence import Sequence
     from armtempo.model.sequence_plan import SequencePlan
+    from armtempo.model.steps import Count, Goto, Repeat, RunMotion, SetOutput, Step, Wait, WaitInput
     from armtempo.model.tool_pose import Pose
     from armtempo.pipeline import compare, connect, plan, plan_sequence, summary
     from armtempo.ports.listing import find_ports
@@ -102,10 +127,24 @@ _HOMES = {
         "PlanError",
         "RunFolderError",
     ),
+    "armtempo.kinematics.many": ("inverse_many",),
     "armtempo.kinematics.of_arm": ("forward", "inverse"),
     "armtempo.ports.listing": ("find_ports",),
     "armtempo.model.arm": ("Arm",),
-    "armtempo.model.job": ("Job",),
+    "armtempo.model.job": ("Job", "Stop"),
+    "armtempo.model.outputs": ("Input", "Output"),
+    "armtempo.model.parts": ("Driver", "Encoder", "Joint", "LimitSwitches", "Limits", "Motor", "Safety"),
+    "armtempo.model.posture": ("ArmPosture",),
+    "armtempo.model.steps": (
+        "Count",
+        "Goto",
+        "Repeat",
+        "RunMotion",
+        "SetOutput",
+        "Step",
+        "Wait",
+        "WaitInput",
+    ),
     "armtempo.model.plan": ("Plan",),
     "armtempo.model.sequence": ("Sequence",),
     "armtempo.model.sequence_plan": ("SequencePlan",),

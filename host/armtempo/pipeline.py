@@ -17,7 +17,8 @@ from __future__ import annotations
 from collections import abc
 from pathlib import Path
 
-from armtempo.basics.errors import InputError
+from armtempo.basics.arguments import checked
+from armtempo.basics.errors import InputError, RunFolderError
 from armtempo.basics.progress import Progress, part
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
@@ -49,18 +50,27 @@ __all__ = [
 ]
 
 
-def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
+@checked
+def plan(arm: Arm | Path | str, job: Job | Path | str, progress: Progress | None = None) -> Plan:
     """The motion through the job's via points, from rest to rest, as short as the search finds it.
 
-    The same arm, job and seed give the same plan on the same machine and versions. Raises InputError where
-    job and arm do not fit each other, PlanError where there is no motion under these limits and ranges.
+    ``arm``, ``job``: or their files, or the name of an arm that ships.
+
+    The same arm, job and seed give the same plan on the same machine and versions. Raises InputError where job and
+    arm do not fit each other, PlanError where there is no motion under these limits and ranges.
     """
-    return planner.plan(arm, job, progress)
+    arm = Arm.of(arm)
+    return planner.plan(arm, Job.of(job, arm), progress)
 
 
-def plan_sequence(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> SequencePlan:
-    """A sequence, every motion planned from where the one before it ends; errors as in ``sequence_planner.plan``."""
-    return sequence_planner.plan(arm, sequence, progress)
+@checked
+def plan_sequence(
+    arm: Arm | Path | str, sequence: Sequence | Path | str, progress: Progress | None = None
+) -> SequencePlan:
+    """A sequence, or that of a file, every motion planned from where the one before it ends; errors as in
+    ``sequence_planner.plan``."""
+    arm = Arm.of(arm)
+    return sequence_planner.plan(arm, Sequence.of(sequence, arm), progress)
 
 
 def split(arm: Arm, job: Job, progress: Progress | None = None) -> list[Plan]:
@@ -84,6 +94,7 @@ def corridor_curve(arm: Arm, job: Job, progress: Progress | None = None) -> list
     return corridors.curve(arm, job, progress or (lambda _done, _whole: None))
 
 
+@checked
 def summary(plan: Plan) -> list[str]:
     """A plan in a few lines: motion times beside their lower bounds, extremes beside their limits."""
     return text_summary.lines(plan)
@@ -125,9 +136,13 @@ def report(run: Run | SequenceRun) -> Path:
     return sequence_report.write(run.path) if isinstance(run, SequenceRun) else run.report()
 
 
-def compare(folders: abc.Sequence[Path], page: Path | None = None) -> Path:
+@checked
+def compare(folders: abc.Sequence[Path | str], page: Path | str | None = None) -> Path:
     """Write one page that compares recorded runs, by default beside the first; gives the page.
 
     A folder that cannot be read is named there. Raises RunFolderError where fewer than two can be read.
     """
-    return comparison.write(folders, page or folders[0].parent / comparison.PAGE)
+    paths = [Path(folder) for folder in folders]
+    if not paths:
+        raise RunFolderError("no run folders to compare", "give at least two")
+    return comparison.write(paths, Path(page) if page else paths[0].parent / comparison.PAGE)

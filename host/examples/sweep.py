@@ -35,8 +35,10 @@ def main() -> None:
         executor = ProcessPoolExecutor()
     with executor, Path("sweep.csv").open("w", encoding="utf-8") as table:
         table.write("seed,way_deg,time_s\n")
-        for seed, way_deg, time_s in executor.map(one, range(chosen.jobs)):
+        for done, (seed, way_deg, time_s) in enumerate(executor.map(one, range(chosen.jobs)), 1):
             table.write(f"{seed},{way_deg:.3f},{time_s:.4f}\n")
+            print(f"\r{done} of {chosen.jobs}", end="", flush=True)
+    print()
     print(f"wrote sweep.csv, {chosen.jobs} moves")
 
 

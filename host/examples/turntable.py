@@ -30,5 +30,5 @@ print("\n".join(armtempo.summary(plan)))
 with armtempo.connect(port, arm) as board:
     board.home(arm)
     run = board.run(plan, repeat=2)  # back along the same path in between
-for repetition in run.repetitions:
-    print(repetition)
+for joint in run.results:
+    print(f"{joint.name}: {joint.steps_sent} steps sent, {plan.total_s:.2f} s each way")

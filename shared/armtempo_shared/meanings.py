@@ -28,7 +28,7 @@ _ROWS = (
         "the flash has no room; what was stored is kept",
         "remove motions that are no longer needed: 'armtempo remove'",
     ),
-    ("flash_error", "the flash could not be written or read", "see host/docs/recovery.md"),
+    ("flash_error", "the flash could not be written or read", "see 'armtempo help recovery'"),
     ("bad_record", "the record is damaged or of an unknown kind", "upload it again"),
     ("bad_offset", "a piece of the upload is out of order", "upload it again"),
     ("bad_checksum", "the upload does not match its checksum", "upload it again"),
@@ -86,7 +86,7 @@ _ROWS = (
     (
         "pin_taken",
         "an output or input of the arm has a pin or timer that is taken",
-        "give another pin ('armtempo check' names the arm file's key; board/docs/hardware.md lists what is free)",
+        "give another pin ('armtempo check' names the arm file's key; 'armtempo help hardware' lists what is free)",
     ),
     ("is_sequence", "this is a sequence, not a motion", "run it with 'armtempo run' and its name"),
     (

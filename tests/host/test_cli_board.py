@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import signal
 from collections.abc import Callable, Iterator
@@ -11,6 +12,7 @@ from typing import Any
 
 import pytest
 from armtempo.cli import COMMANDS, main
+from armtempo.kinematics.of_arm import forward
 from armtempo.link import Client, greet
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
@@ -24,6 +26,7 @@ from tests.inprocess import Pipe
 
 ARM = Arm.paper()
 START, END = (0.0, -60.0, 40.0), (10.0, -50.0, 45.0)
+ARM_HOME = forward(ARM, START)
 Run = Callable[..., Result]
 
 
@@ -84,7 +87,7 @@ def test_store_commands(run: Run, file: str) -> None:
     assert "small" not in run("list").output
     assert "no trajectory of this name" in run("remove", "small", code=1).output
     assert "is no name for the board" in run("upload", file, "--name", "a b", code=2).output
-    assert "empty, too long or has other characters" in run("rename", "x", "a b", code=1).output
+    assert "'a b' is no name for a motion on the board" in run("rename", "x", "a b", code=2).output
 
 
 @pytest.mark.slow
@@ -203,3 +206,36 @@ def test_ports_and_missing_ports() -> None:
     result = CliRunner().invoke(main, ["status"], env={"ARMTEMPO_PORT": "/dev/nowhere"})
     assert result.exit_code == 2
     assert "there is no port /dev/nowhere" in result.output
+
+
+def test_a_typing_error_names_the_file_that_is_meant(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "first.json").write_text("{}", encoding="utf-8")
+    for wrong in ("first.jsn", "firts.json"):
+        said = run("run", wrong, code=2).output
+        assert f"{wrong}: there is no such file; did you mean 'first.json'?" in said
+
+
+def test_angles_without_commas_are_shown_with_them(run: Run) -> None:
+    said = run("goto", "10", "10", "-10", code=2).output
+    assert "3 values for one posture" in said
+    assert "armtempo goto 10,10,-10" in said
+
+
+def test_a_failure_is_json_where_results_are(run: Run) -> None:
+    found = json.loads(run("goto", "10,-50,500", "--json", code=2).stdout)
+    assert found["exit_code"] == 2
+    assert "500 degrees is outside" in found["error"]
+    assert found["hint"]
+
+
+@pytest.mark.parametrize("command", ["pause", "resume"])
+def test_nothing_to_pause_is_said_as_just_that(run: Run, command: str) -> None:
+    run("home")
+    assert f"there is nothing to {command}: nothing moves" in run(command, code=1).output
+
+
+def test_status_says_where_the_tool_is(run: Run) -> None:
+    run("home")
+    assert re.search(r"tool at 299\.6 0\.0 \S+ mm, roll", run("status").output)
+    tool = json.loads(run("status", "--json").stdout)["tool"]
+    assert tool["position_mm"] == pytest.approx(ARM_HOME[:3, 3], abs=0.1)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from armtempo.runs import differentiation
@@ -43,22 +41,6 @@ def test_the_stated_noise_is_what_comes_out(order: int) -> None:
     values = np.random.default_rng(2).normal(scale=sigma, size=100_000)
     found = differentiation.derivative(values, STEP, order)[10:-10].std()
     assert found == pytest.approx(differentiation.noise(order, STEP, sigma), rel=0.02)
-
-
-def test_the_page_states_noise_and_gain_as_they_are() -> None:
-    page = (Path(__file__).parents[2] / "host" / "docs" / "analysis.md").read_text(encoding="utf-8")
-    sigma = differentiation.quantisation_sigma(0.09)
-    speed, acceleration = (differentiation.noise(order, STEP, sigma) for order in (1, 2))
-    assert f"{speed:.3f} °/s and {acceleration:.3f} °/s²" in page
-    t = np.arange(400) * STEP
-    for frequency in (0.5, 1.0, 2.0):
-        rate = 2 * np.pi * frequency
-        exact = (rate * np.cos(rate * t), -(rate**2) * np.sin(rate * t))
-        gains = []
-        for order, wanted in enumerate(exact, 1):
-            found = differentiation.derivative(np.sin(rate * t), STEP, order)
-            gains.append(found[10:-10] @ wanted[10:-10] / (wanted[10:-10] @ wanted[10:-10]))
-        assert f"| {frequency} | {gains[0]:.3f} | {gains[1]:.3f} |" in page
 
 
 def test_too_few_samples_say_so_with_nan() -> None:

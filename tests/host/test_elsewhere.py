@@ -17,6 +17,7 @@ WITHOUT = f"""
 import sys, os, select, signal, socket, pkgutil, importlib
 # What the standard library and other packages have is imported before: it is of POSIX here, as it must be.
 import armtempo, click, numpy, scipy.optimize, scipy.linalg, scipy.sparse.linalg, matplotlib.figure, serial
+import nicegui, fastapi, uvicorn
 import serial.tools.list_ports, multiprocessing, concurrent.futures.process, subprocess, tempfile, logging, mpremote
 for name in {POSIX_ONLY}:
     sys.modules[name] = None

@@ -168,7 +168,7 @@ def test_the_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Path("out.csv").write_text("0,-60,40\n900,0,0\n")
     outside = run(main, ["import", "out.csv"])
     assert outside.exit_code == 2
-    assert "out.csv: via_deg[2] = [900, 0, 0]" in outside.output
+    assert "out.csv: via_deg P1 = [900, 0, 0]" in outside.output
     assert "range of joint 1" in outside.output
     named = run(main, ["import", "feed.csv", "--name", 'a"b'])
     assert """feed.csv: name = 'a"b' is not allowed""" in named.output

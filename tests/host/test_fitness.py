@@ -29,6 +29,14 @@ def test_sees_the_extremes(degree: int) -> None:
         assert pytest.approx(expected, rel=0.02) == peaks[:, :, number].T
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_stretch_is_that_of_the_highest_peaks(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    fitness = Fitness(bspline.fit(rng.normal(0, 30, (9, 3)), 5), 5, LIMITS)
+    population = rng.uniform(0.1, 3.0, (30, 8))
+    assert np.array_equal(fitness.stretch(population), stretch_of(fitness.peaks(population).max(axis=(1, 2))))
+
+
 def test_stretched_is_the_time_that_just_keeps_the_limits() -> None:
     points = bspline.fit(FEEDING, 5)
     population = np.random.default_rng(3).uniform(0.5, 2.5, (20, 6))

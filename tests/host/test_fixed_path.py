@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 from armtempo.model.job import Job
-from armtempo.planning import interval_search, limit_ratios, planner
+from armtempo.planning import interval_search, limit_ratios, planner, time_parameterization
 from armtempo.planning.fixed_path import FixedPath
+from armtempo.planning.path_rows import Rows
+from armtempo.planning.time_parameterization import Group
 from armtempo.splines import bspline
 
 from tests.host import problems
@@ -201,3 +203,67 @@ def test_gradients_start_within_bounds_and_are_not_held_by_them() -> None:
     plan = planner.plan(arm, replace(job, bounds_s=(20.0, 21.0)))
     assert not plan.notes
     assert plan.total_s == pytest.approx(planner.plan(arm, job).total_s, rel=1e-4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("vias", "joints", "timing"),
+    [(2, 3, "shared"), (7, 2, "per-joint"), (258, 1, "shared"), (500, 1, "shared")],
+)
+def test_auto_is_never_slower_than_any_fixed_refine(vias: int, joints: int, timing: str) -> None:
+    """By no more than the least saving for which it goes on; from 258 via points on the record holds no finer axis."""
+    points = bspline.fit(np.random.default_rng(vias).normal(0, 40, (vias, joints)), 5)
+    together = [list(range(joints))] if timing == "shared" else [[joint] for joint in range(joints)]
+    groups = [Group(tuple(own), points[:, own], LIMITS[: len(own)]) for own in together]
+    job = Job("any", ((0.0,) * joints,) * vias, timing=timing, iterations=20)
+    most = time_parameterization.most_refine(job, vias - 1, joints)
+    times = {
+        refine: max(
+            axis.total_s for axis in time_parameterization.axes(groups, replace(job, refine=refine), most)
+        )
+        for refine in ("auto", *range(1, min(most, 3) + 1), most)
+    }
+    assert times["auto"] <= min(times.values()) * 1.001, times
+
+
+def rows_at(angle: np.ndarray, joint: int, kind: int, sign: float, limits: np.ndarray) -> Rows:
+    """One row at each point."""
+    count = angle.shape[1]
+    slices = [slice(0, 0)] * kind + [slice(0, count)] + [slice(count, count)] * (2 - kind)
+    slopes = sign * angle[:, :, joint] / limits[joint, kind]
+    return Rows(np.arange(count), slopes, (slices[0], slices[1], slices[2]))
+
+
+@pytest.mark.parametrize("kind", range(3))
+def test_rows_of_a_path_are_its_ratios_and_have_their_derivatives(kind: int) -> None:
+    angle, time, limits = point(kind)
+    rows = rows_at(angle, 1, kind, -1.0, limits)
+    assert rows.ratios(time) == pytest.approx(
+        -limit_ratios.ratios(angle, time, limits)[kind, :, 1], rel=1e-12
+    )
+    gradient, weights = rows.gradient(time), np.array([2.0, -1.0, 0.5])
+    assert gradient == pytest.approx(-limit_ratios.gradient(angle, time, limits)[kind, 3:, :, 1], rel=1e-12)
+    spread = np.zeros((3, 3, 2))
+    spread[kind, :, 1] = -weights
+    whole = limit_ratios.curvature(angle, time, limits, spread)[3:, 3:, :, 1]
+    for (row, column), bent in rows.curvature(time, weights).items():
+        assert bent == pytest.approx(whole[row, column], rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_no_row_that_is_left_out_can_be_reached_before_those_that_are_watched(seed: int) -> None:
+    """t'' or t''' anywhere that the watched rows allow, at a t' that their speed allows, keeps the others too."""
+    rng = np.random.default_rng(seed)
+    angle, limits = rng.normal(0, 10, (3, 40, 3)), rng.uniform(5, 50, (3, 3))
+    time = np.stack([rng.uniform(1, 3, 40), *rng.normal(0, 1, (2, 40))])
+    rows = Rows.reachable(angle, [time], limits)
+    for kind in (0, 1, 2):
+        moved = np.repeat(time[:, :, None], 401, axis=2)
+        moved[kind] += np.linspace(-20, 20, 401) if kind else np.linspace(-0.9, 20, 401)
+        flat, own = moved.reshape(3, -1), rows.kinds[kind]
+        every = np.abs(limit_ratios.ratios(np.repeat(angle, 401, axis=1), flat, limits)[kind]).max(axis=1)
+        inside = np.ones((40, 401), dtype=bool)
+        for step in range(401):
+            ratios = rows.ratios(moved[:, rows.point, step])[own]
+            np.logical_and.at(inside[:, step], rows.point[own], ratios <= 1.0)
+        assert np.all(every.reshape(40, 401)[inside] <= 1.0 + 1e-9), f"seed {seed}, kind {kind}"

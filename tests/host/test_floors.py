@@ -184,3 +184,24 @@ def test_floor_of_a_free_path_is_below_its_plan(name: str) -> None:
     for search in planner.plan(problem.arm, job).searches:
         assert search.floor_kind == "vias"
         assert 0.7 * search.total_s <= search.floor_s <= search.total_s
+
+
+@pytest.mark.parametrize(("count", "joints"), [(1, 2), (2, 1), (5, 3), (9, 6)])
+def test_equations_of_the_dual_are_solved(count: int, joints: int) -> None:
+    """Like the dense matrix D + S' B S that they stand for; how wide the band is does not depend on the joints."""
+    rng = np.random.default_rng(count)
+    pieces = bspline.polynomials(rng.normal(0, 1, (count + 5, joints)), 5)
+    kkt = dual_bound._Dual(Cells(pieces, np.ones((joints, 3)), True)).kkt
+    size, points = int(kkt._columns.max()) + 1, kkt._slopes.shape[1] // 2 * count
+    slopes = np.zeros((count, 2 * points // count, size))
+    for cell, own in enumerate(kkt._columns):
+        slopes[cell][:, own] = kkt._slopes[cell]
+    roots = rng.normal(0, 1, (2, 2, points))
+    blocks = np.einsum("abp,cbp->acp", roots, roots)
+    diagonal = rng.uniform(0.5, 2, size)
+    flat = slopes.reshape(points, 2, size)
+    dense = np.diag(diagonal) + np.einsum("pax,abp,pby->xy", flat, blocks, flat)
+    gradient = rng.normal(0, 1, size)
+    step = kkt.factor(np.concatenate([blocks.ravel(), diagonal])).solve(gradient, np.empty(0))
+    assert dense @ step == pytest.approx(-gradient, rel=1e-8, abs=1e-8)
+    assert kkt._rows == 24

@@ -18,6 +18,7 @@ from armtempo.planning.free import corridor
 from armtempo.planning.free.tool import Tool
 from armtempo.splines import bspline
 
+from tests.benchmark import corridors
 from tests.host import problems
 from tests.host.independent import faults, sampled
 
@@ -117,8 +118,9 @@ def _away_deg(plan: Plan) -> float:
 def test_a_corridor_of_the_tool_holds_everywhere() -> None:
     plan = planner.plan(ARM, replace(FEED, corridor_mm=2.0))
     assert faults(plan) == []
-    through = bspline.refined(bspline.fit(plan.via_deg, 5), 6, 5)
     splines = plan.trajectory.joints
+    pieces = (len(splines[0].angle_points_deg) - 5) // (len(plan.via_deg) - 1)
+    through = bspline.refined(bspline.fit(plan.via_deg, 5), pieces, 5)
     here = np.stack([sampled(spline).angle_deg for spline in splines], axis=1)
     there = np.stack(
         [
@@ -139,6 +141,30 @@ def test_wider_corridors_are_never_slower_and_none_is_the_spline() -> None:
     assert planner.plan(ARM, FEED).total_s <= 1.001 * totals[2]
     on_spline = planner.plan(ARM, replace(FEED, path="through"))
     assert totals[0] == pytest.approx(on_spline.total_s, rel=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 3, 11])
+def test_a_corridor_is_never_slower_than_the_spline_nor_than_a_narrower_one(seed: int) -> None:
+    """More of them: tests/benchmark/corridors.py."""
+    assert corridors.faults(list(corridors.times(seed))) == []
+
+
+@pytest.mark.slow
+def test_a_corridor_too_narrow_to_prove_is_the_spline_in_bounded_memory(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seen = []
+    chained = Tool.positions_mm
+    monkeypatch.setattr(
+        Tool, "positions_mm", lambda tool, angles: seen.append(len(angles)) or chained(tool, angles)
+    )
+    plan = planner.plan(ARM, replace(FEED, corridor_mm=0.0001))
+    assert plan.total_s == planner.plan(ARM, replace(FEED, path="through", refine="auto")).total_s
+    assert any("no faster path" in note for note in plan.notes)
+    assert faults(plan) == []
+    assert max(seen) <= 3 * corridor._MOST_PIECES
+    assert len(seen) < 500
 
 
 @pytest.mark.parametrize("linkage", [False, True])

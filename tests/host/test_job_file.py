@@ -35,26 +35,6 @@ def test_the_shipped_job_is_table_3_with_its_misprint_mended() -> None:
     assert job.bounds_s == (0.1, 3.0)
 
 
-@pytest.mark.parametrize(
-    ("keys", "defaults"),
-    [
-        ("`degree`", [5]),
-        ("`timing`", ["shared"]),
-        ("`optimiser`", ["acs"]),
-        ("`population`, `iterations`", [10, 500]),
-        ("`starts`", [3]),
-        ("`seed`", [1]),
-    ],
-)
-def test_what_is_left_out_is_as_the_page_says(keys: str, defaults: list[object], tmp_path: Path) -> None:
-    page = (Path(__file__).parents[2] / "host" / "docs" / "files.md").read_text(encoding="utf-8")
-    (row,) = [line for line in page.splitlines() if line.startswith(f"| {keys} |")]
-    words = row.rstrip(" |").rpartition("| ")[2].replace("`", "").replace('"', "")
-    assert words == ", ".join(map(str, defaults))
-    job = Job.load(written(tmp_path, TWO), ARM)
-    assert [getattr(job, key.strip("`")) for key in keys.split(", ")] == defaults
-
-
 def test_poses_and_angles_may_be_mixed(tmp_path: Path) -> None:
     matrix = "[[0, 0, -1, -536.404], [0, 1, 0, 0], [1, 0, 0, 434.698], [0, 0, 0, 1]]"
     text = f"[[via]]\nangles_deg = [0, -60, 40]\n[[via]]\nmatrix = {matrix}\n"
@@ -118,12 +98,12 @@ def test_a_position_may_ask_for_a_part_of_the_orientation(
             "roll and yaw without pitch leave too much open",
         ),
         ("position_mm = [1, 2, 3]\napproach = [0, 0, 0]", "a direction such as 0 0 -1"),
-        ("position_mm = [1, 2, 3]\npitch_deg = nan", "via[1].pitch_deg"),
-        ("position_mm = [1, 2, 3]\ntolerance_mm = 0", "via[1].tolerance_mm = 0 is not allowed"),
-        ("position_mm = [1, 2, 3]\ntolerance_deg = 200", "via[1].tolerance_deg = 200 is not allowed"),
-        ("angles_deg = [0, 0, 0]\ntolerance_deg = 2", "via[1].tolerance_deg: unknown key"),
-        ("position_mm = [1, 2]\nrpy_deg = [0, 0, 0]", "via[1].position_mm = [1, 2]"),
-        ("position_mm = [1, 2, 3]\nrpy_deg = [0, 0, nan]", "via[1].rpy_deg"),
+        ("position_mm = [1, 2, 3]\npitch_deg = nan", "via P0.pitch_deg"),
+        ("position_mm = [1, 2, 3]\ntolerance_mm = 0", "via P0.tolerance_mm = 0 is not allowed"),
+        ("position_mm = [1, 2, 3]\ntolerance_deg = 200", "via P0.tolerance_deg = 200 is not allowed"),
+        ("angles_deg = [0, 0, 0]\ntolerance_deg = 2", "via P0.tolerance_deg: unknown key"),
+        ("position_mm = [1, 2]\nrpy_deg = [0, 0, 0]", "via P0.position_mm = [1, 2]"),
+        ("position_mm = [1, 2, 3]\nrpy_deg = [0, 0, nan]", "via P0.rpy_deg"),
         ("position_mm = [1, 2, 3]\nquaternion = [1, 1, 0, 0]", "length 1.41421"),
         ("position_mm = [1, 2, 3]\nrpy_deg = [0, 0, 0]\nangles_deg = [0, 0, 0]", "exactly one of"),
         ("position_mm = [1, 2, 3]\nrpy_deg = [0, 0, 0]\nrpy = 1", "rpy"),
@@ -143,20 +123,20 @@ def test_what_can_be_wrong_with_a_turned_position(via: str, said: str, tmp_path:
         ("", ["via_deg is missing", "[[via]]"]),
         ("via_deg = []\n", ["via_deg = []", "at least 2 lists"]),
         ("via_deg = [[0, -60, 40]]\n", ["1 via point is not a motion", "at least 2"]),
-        ("via_deg = [[0, -60, 40], [20, -75]]\n", ["via_deg[2] = [20, -75]", "list of 3 numbers"]),
-        ("via_deg = [[0, -60, 40], [20, nan, 50]]\n", ["via_deg[2]", "list of 3 numbers"]),
-        ("via_deg = [[0, -60, 40], [200, -75, 50]]\n", ["via_deg[2]", "range of joint 1, -10 to 190"]),
+        ("via_deg = [[0, -60, 40], [20, -75]]\n", ["via_deg P1 = [20, -75]", "list of 3 numbers"]),
+        ("via_deg = [[0, -60, 40], [20, nan, 50]]\n", ["via_deg P1", "list of 3 numbers"]),
+        ("via_deg = [[0, -60, 40], [200, -75, 50]]\n", ["via_deg P1", "range of joint 1, -10 to 190"]),
         (TWO + "degree = 4\n", ["degree = 4", "3, 5"]),
         (TWO + 'timing = "fast"\n', ["timing = 'fast'", "'shared', 'per-joint'"]),
         (TWO + 'optimiser = "magic"\n', ["optimiser = 'magic'", "'acs'"]),
         (TWO + "population = 2\n", ["population = 2", "from 4"]),
         (TWO + "bounds_s = [3.0, 0.1]\n", ["bounds_s", "shorter first"]),
         (TWO + "seeds = 3\n", ["seeds: unknown key", "'seed'"]),
-        ("[[via]]\nmatrix = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n", ["via[1].matrix", "4 rows of 4 numbers"]),
-        (f"via_deg = [[0, -60, 1{'0' * 400}], [20, -75, 50]]\n", ["via_deg[1]", "list of 3 numbers"]),
+        ("[[via]]\nmatrix = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n", ["via P0.matrix", "4 rows of 4 numbers"]),
+        (f"via_deg = [[0, -60, 1{'0' * 400}], [20, -75, 50]]\n", ["via_deg P0", "list of 3 numbers"]),
         (f"seed = 1{'0' * 5000}\n", ["not valid TOML"]),
         ("via_deg = " + "[" * 5000 + "]" * 5000, ["not valid TOML"]),
-        ("[[via]]\nangle = 3\n", ["via[1]: exactly one of angles_deg, matrix"]),
+        ("[[via]]\nangle = 3\n", ["via P0: exactly one of angles_deg, matrix"]),
     ],
 )
 def test_what_is_wrong_is_said(tmp_path: Path, text: str, said: list[str]) -> None:

@@ -248,3 +248,12 @@ def test_joints_have_numbers_and_names() -> None:
     for wrong in (0, 4, "j9", "-1", -1):
         with pytest.raises(InputError, match="drives no joint"):
             jog_motion.number_of_joint(named, wrong)
+
+
+@pytest.mark.parametrize("stretched", [(0.0, 0.0), (30.0, 0.0)])
+def test_a_stretched_arm_is_said_to_be_singular(stretched: tuple[float, float]) -> None:
+    arm = Arm.load("scara")
+    here = [*stretched, *[joint.home_deg for joint in arm.driven[2:]]]
+    axis = "x" if stretched[0] == 0.0 else "tool-x"
+    with pytest.raises(InputError, match="the posture is singular, stretched or folded; bend it first"):
+        jog_motion.plan("jog", arm, here, JogMove(10.0, axis=axis))

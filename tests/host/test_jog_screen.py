@@ -66,6 +66,7 @@ class Jogged:
     """A board that notes what is to move."""
 
     arm = Arm.paper()
+    last_jog_ends = "joint 1 is at the end of its range, 190 degrees"
 
     def __init__(self) -> None:
         self.moves: list[tuple[object, ...]] = []
@@ -76,6 +77,30 @@ class Jogged:
     def jog(self, *move: object) -> None:
         """The last of it is the wish to stop."""
         self.moves.append(move[:-1])
+
+
+@pytest.mark.parametrize("arm", ["paper", "ar4"])
+def test_the_line_never_wraps_in_80_columns(
+    arm: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(Jogged, "arm", Arm.load(arm))
+    monkeypatch.setenv("COLUMNS", "80")
+    screen = JogScreen(Jogged(), Typed())  # type: ignore[arg-type]
+    for key in ("", "Z", "+", "%", "2", "-"):
+        screen._act(key)
+        screen._show()
+    lines = [line.removeprefix("\x1b[K") for line in capsys.readouterr().out.split("\r")[1:]]
+    assert max(map(len, lines)) <= 79
+    assert any("at the end of its range" in line for line in lines)
+    assert any(line.endswith("°") and "mm" in line for line in lines)
+
+
+def test_a_question_mark_says_the_keys(capsys: pytest.CaptureFixture[str]) -> None:
+    screen = JogScreen(Jogged(), Typed(), {"p": str}, "  p  the caller's")  # type: ignore[arg-type]
+    screen._act("?")
+    said = capsys.readouterr().out
+    assert "steps, or moving while" in said
+    assert said.endswith("the caller's\n")
 
 
 def test_a_step_goes_to_the_board_as_it_was_chosen() -> None:

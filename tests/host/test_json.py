@@ -20,6 +20,7 @@ NO_REPORT = {
     "demo": "shows a newcomer around",
     "teach": "a screen with keys, and a line on the file",
     "completion": "prints a script",
+    "help": "prints a page",
     "virtual-board": "prints its port, and stays",
 }
 JOB = """
@@ -91,7 +92,7 @@ def test_what_goes_to_stdout_itself_has_no_document(project: Path) -> None:
     said("plan")
     done = CliRunner().invoke(main, ["export", "short.json", "--json"])
     assert done.exit_code == 2
-    assert "-o FILE" in done.stderr
+    assert "-o FILE" in json.loads(done.stdout)["hint"] + json.loads(done.stdout)["error"]
 
 
 @pytest.fixture

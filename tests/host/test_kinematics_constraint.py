@@ -119,7 +119,7 @@ def test_targets_that_make_no_sense_are_refused() -> None:
         InputError, match=r"tolerances of 0 mm and 0\.1 deg are not allowed; give 1e-06 to 1000 mm"
     ):
         Pose(rows, tolerance_mm=0.0)
-    with pytest.raises(InputError, match="tolerances"):
+    with pytest.raises(InputError, match="tolerance_deg is nan"):
         Pose(rows, tolerance_deg=math.nan)
 
 

@@ -9,7 +9,7 @@ import sys
 from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import armtempo
 import numpy as np
@@ -41,9 +41,10 @@ def test_the_button_starts_an_uploaded_sequence_only_where_asked(
     defaults: list[str] = []
     client: Any = SimpleNamespace(set_default=defaults.append)
     monkeypatch.setattr(armtempo.Board, "configure", lambda board, arm: None)
+    sequence = armtempo.plan_sequence(arm, armtempo.Sequence("pick", (armtempo.Wait(1.0),)))
     monkeypatch.setattr(encoded_sequence, "of_plan", lambda plan: SimpleNamespace(arm=arm))
     monkeypatch.setattr(sequence_run, "store", lambda *_: SimpleNamespace(name="pick"))
-    board, sequence = armtempo.Board(client, "pipe"), cast(Any, None)
+    board = armtempo.Board(client, "pipe")
     board.upload_sequence(sequence)
     assert defaults == []
     board.upload_sequence(sequence, default=True)
@@ -80,7 +81,7 @@ def test_a_plan_is_computed_without_plots_and_ports() -> None:
         "job = armtempo.Job('x', via_deg=[[0, -60, 40], [1, -60, 40]], population=4, iterations=1)\n"
         "armtempo.plan(arm, job)"
     )
-    assert not modules_after(code) & {"matplotlib", "click"}
+    assert not modules_after(code) & {"matplotlib", "click", "scipy.interpolate"}
 
 
 def test_every_public_name_is_there_and_described() -> None:
@@ -178,6 +179,80 @@ def test_a_second_run_of_the_same_board_starts_where_it_should(
         for _ in range(2):
             run = board.run(plan, out=tmp_path)
             assert all(abs(joint.error_deg) < 0.2 for joint in run.results)
+
+
+def test_names_and_files_will_do_for_arm_and_job(tmp_path: Path) -> None:
+    (tmp_path / "job.toml").write_text(
+        'name = "go"\nvia_deg = [[0, -60, 40], [5, -58, 41]]\niterations = 1\npopulation = 4\n',
+        encoding="utf-8",
+    )
+    plan = armtempo.plan("paper", tmp_path / "job.toml")
+    assert repr(plan) == f"<Plan 'go' for 'paper-1to5': 2 via points, {plan.total_s:.3f} s>"
+    assert len(repr(plan.trajectory)) < 80
+    np.testing.assert_allclose(
+        armtempo.forward("ar4", [0.0] * 6), armtempo.forward(armtempo.Arm.load("ar4"), [0.0] * 6)
+    )
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        (
+            {"name": "two words"},
+            r"'two words': the board keeps no such name; give at most 24 of the characters",
+        ),
+        ({"name": "x", "timing": "x"}, r"timing 'x' is not allowed; give 'shared' or 'per-joint'"),
+        ({"name": "x", "population": 2}, "population 2 must be a whole number from 4"),
+        ({"name": "x", "bounds_s": (2.0, 1.0)}, "bounds_s"),
+        ({"name": "x", "via_deg": [[0, "a"]]}, "via_deg is .* give a list, each entry a list"),
+    ],
+)
+def test_a_job_that_no_planner_takes_is_not_even_made(settings: dict[str, Any], said: str) -> None:
+    with pytest.raises(armtempo.InputError, match=said):
+        armtempo.Job(**settings)
+
+
+def test_angles_that_are_a_name_are_refused_in_words(arm: armtempo.Arm) -> None:
+    with pytest.raises(armtempo.InputError, match="forward: angles_deg is 'home'; give finite numbers"):
+        armtempo.forward(arm, "home")
+
+
+def test_an_arm_and_a_sequence_are_made_in_code() -> None:
+    limits = armtempo.Limits(speed_deg_s=50, acceleration_deg_s2=100, jerk_deg_s3=500)
+    motor = armtempo.Motor(channel=1, steps_per_rev=200, microsteps=16, gear_ratio=10)
+    joint = armtempo.Joint("table", 100, 150, 0, 0, (-90, 90), limits=limits, motor=motor)
+    gripper = armtempo.Output("gripper", "switch", "PE9", 0.0, states=(("closed", 1.0),))
+    arm = armtempo.Arm("mine", (joint,), outputs=(gripper,))
+    swing = armtempo.Job("swing", via_deg=[[45], [0]], iterations=1, population=4)
+    steps = (armtempo.Goto((45.0,)), armtempo.SetOutput("gripper", "closed"), armtempo.RunMotion(swing))
+    sequence = armtempo.Sequence("pick", (armtempo.Repeat(steps, times=2), armtempo.Wait(0.5)))
+    planned = armtempo.plan_sequence(arm, sequence)
+    assert planned.start_deg == (45.0,)
+    assert [row.words for row in planned.rows if row.words.startswith("output")] == 2 * [
+        "output gripper closed"
+    ]
+    with pytest.raises(armtempo.InputError, match="no output 'griper'"):
+        armtempo.plan_sequence(arm, armtempo.Sequence("pick", (armtempo.SetOutput("griper", 1),)))
+    with pytest.raises(armtempo.InputError, match="microsteps is 0; give 1 to 256"):
+        armtempo.Motor(channel=1, steps_per_rev=200, microsteps=0, gear_ratio=10)
+
+
+@pytest.mark.slow
+def test_goto_takes_a_speed_and_a_closed_board_says_so(arm: armtempo.Arm, tmp_path: Path) -> None:
+    with armtempo.connect("sim", arm) as board:
+        board.home(arm)
+        times: list[float] = []
+        for speed, where in ((1.0, END_DEG), (0.5, START_DEG)):
+            board.goto(where, lambda _done, whole: times.append(whole), speed=speed)
+        assert times[-1] == pytest.approx(2 * times[0], rel=0.01)
+        with pytest.raises(armtempo.InputError, match=r"speed of 50 times the planned one, 5000 %.*fraction"):
+            board.speed(50)
+        with pytest.raises(armtempo.InputError, match=r"missing\.json"):
+            board.run("missing.json")
+        with pytest.raises(armtempo.InputError, match=r"'x\.jsn' is no name for a motion"):
+            board.run("x.jsn")
+    with pytest.raises(armtempo.LinkError, match="the board on sim was closed; open it again"):
+        board.status()
 
 
 @pytest.mark.slow

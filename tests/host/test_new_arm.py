@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from armtempo.basics.errors import InputError
 from armtempo.cli import main
+from armtempo.kinematics import of_arm
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
@@ -14,6 +16,7 @@ from armtempo.model.sequence import Sequence
 from armtempo.new_arm import folder as project_folder
 from armtempo.new_arm import given_geometry, joint_entry
 from click.testing import CliRunner, Result
+from numpy.typing import NDArray
 
 FOUR = (
     "d_mm=120,alpha_deg=90,low_deg=-170,high_deg=170,gear_ratio=20",
@@ -132,7 +135,7 @@ def test_an_unknown_arm_lists_those_that_ship(tmp_path: Path) -> None:
 
 def test_questions_at_a_terminal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("armtempo.cli.new._asked", lambda: True)
-    answers = ["own", "1", "turntable", "", "", "", "", "-180", "180", "", "", "5", "", "20", "sim:table"]
+    answers = ["own", "1", "", "turntable", "", "", "", "", "-180", "180", "", "", "5", "", "20", "sim:table"]
     done = new(str(tmp_path / "x"), text="\n".join(answers) + "\n")
     assert done.exit_code == 0, done.output
     arm = Arm.load(tmp_path / "x" / "arm.toml")
@@ -154,3 +157,110 @@ def test_nothing_is_left_where_it_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="cannot be written"):
         project_folder.write(tmp_path / "file" / "x", given_geometry.from_shipped("paper"), "sim")
+
+
+def interview(folder: Path, monkeypatch: pytest.MonkeyPatch, answers: list[str], *options: str) -> Result:
+    monkeypatch.setattr("armtempo.cli.new._asked", lambda: True)
+    return new(str(folder), *options, text="\n".join(answers) + "\n")
+
+
+def test_each_answer_is_checked_where_it_is_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = [
+        "?",
+        "mine",
+        "own",
+        "7",
+        "1",
+        "modified?",
+        "?",
+        "",
+        "?",
+        "<",
+        "",
+        "axis",
+        "x",
+        "12",
+        "",
+        "1e9",
+        "",
+        "",
+    ]
+    answers += ["120", "-120", "<", "-120", "120", "200.5", "", "", "0", "2", "3", "", "1e9", "20", ""]
+    done = interview(tmp_path / "x", monkeypatch, answers)
+    assert done.exit_code == 0, done.output
+    for said in (
+        "An arm that ships is a beginning",
+        "it must be one of paper",
+        "a whole number from 1 to 6, such as 3",
+        "modified (Craig)",
+        "'x' is no number; write it as 120.5",
+        "from -180 to 180, such as -90",
+        "above the lowest angle, 120, such as 210; '<' goes back",
+        "a whole number from 4 to 10000",
+        "it must be from 0.1 to 10000, such as 4.5",
+        "a whole number from 4 to 10000000",
+    ):
+        assert said in done.output, said
+    (joint,) = Arm.load(tmp_path / "x" / "arm.toml").joints
+    assert (joint.name, joint.d_mm, joint.range_deg) == ("axis", 12.0, (-120.0, 120.0))
+    assert [path.name for path in tmp_path.iterdir()] == ["x"]  # no draft is left
+
+
+def test_what_was_answered_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "x"
+    left = interview(folder, monkeypatch, ["own", "1", "", "axis"])
+    assert left.exit_code == 130
+    assert f"go on with: armtempo new {folder} --resume" in left.output
+    assert not folder.exists()
+    done = interview(folder, monkeypatch, ["", "44", *[""] * 9, ""], "--resume")
+    assert done.exit_code == 0, done.output
+    (joint,) = Arm.load(folder / "arm.toml").joints
+    assert (joint.name, joint.a_mm) == ("axis", 44.0)
+    assert interview(tmp_path / "y", monkeypatch, [], "--resume").exit_code == 2
+
+
+def test_a_folder_that_is_taken_is_told_before_the_questions(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "mine.txt").touch()
+    done = interview(tmp_path, monkeypatch, [])
+    assert done.exit_code == 2
+    assert "which arm" not in done.output
+
+
+def test_modified_rows_bring_the_tool_where_craigs_do() -> None:
+    rng = np.random.default_rng(20_261)
+    rows = rng.uniform(-90, 90, (4, 4)).round(2).tolist()
+    joints = [
+        joint_entry.JointEntry(f"j{n}", d_mm=d, a_mm=a, alpha_deg=alpha, theta_offset_deg=theta)
+        for n, (d, a, alpha, theta) in enumerate(rows)
+    ]
+    pose = np.eye(4)
+    for d, a, alpha, theta in rows:
+        pose = pose @ turned(0, alpha) @ shifted(0, a) @ turned(2, theta) @ shifted(2, d)
+    made = given_geometry.from_joints("craig", joints, modified=True).arm
+    np.testing.assert_allclose(of_arm.forward(made, [0.0] * 4), pose, atol=1e-9)
+
+
+def test_a_parallel_linkage_is_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    joint = ["", "", "100", "", "", "", "", "", "", "", "4000", ""]
+    answers = ["own", "2", "", *joint, *joint[:5], "yes", *joint[5:], ""]
+    done = interview(tmp_path / "x", monkeypatch, answers)
+    assert done.exit_code == 0, done.output
+    assert [found.parallel_linkage for found in Arm.load(tmp_path / "x" / "arm.toml").joints] == [False, True]
+    assert Arm.load(tmp_path / "x" / "arm.toml").driven[1].encoder is not None
+
+
+def turned(axis: int, angle_deg: float) -> NDArray[np.float64]:
+    pose, angle = np.eye(4), np.radians(angle_deg)
+    one, two = [n for n in range(3) if n != axis]
+    sign = -1.0 if axis == 1 else 1.0
+    pose[one, one] = pose[two, two] = np.cos(angle)
+    pose[two, one], pose[one, two] = sign * np.sin(angle), -sign * np.sin(angle)
+    return pose
+
+
+def shifted(axis: int, way_mm: float) -> NDArray[np.float64]:
+    pose = np.eye(4)
+    pose[axis, 3] = way_mm
+    return pose

@@ -111,7 +111,7 @@ def test_a_job_with_an_unknown_posture_says_which_is_meant(tmp_path: Path) -> No
     arm = Arm.load(written(tmp_path, PARK))
     file = tmp_path / "job.toml"
     file.write_text('name = "x"\n[[via]]\nposture = "parc"\n[[via]]\nposture = "home"\n')
-    with pytest.raises(InputError, match=r"via\[1\].*no posture 'parc'; did you mean 'park'"):
+    with pytest.raises(InputError, match=r"via P0.*no posture 'parc'; did you mean 'park'"):
         Job.load(file, arm)
     file.write_text(
         'name = "x"\n[[via]]\nposture = "park"\nangles_deg = [0, 0, 0]\n[[via]]\nposture = "home"\n'

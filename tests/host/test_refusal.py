@@ -39,7 +39,7 @@ SAID = {
     "[bytes needed: 4711]; lower its top speeds, drive fewer joints, or put the program into the firmware "
     "(see 'armtempo firmware --help')",
     "pin_taken": "no: an output or input of the arm has a pin or timer that is taken (joint 2) [PE9: encoder 1]; give "
-    "another pin ('armtempo check' names the arm file's key; board/docs/hardware.md lists what is free)",
+    "another pin ('armtempo check' names the arm file's key; 'armtempo help hardware' lists what is free)",
     "leg_missing": "no: the board does not have a motion that the sequence runs, or another one under its name "
     "(joint 2) [number of the motion in the sequence, from 1: 4711]; upload the sequence again, which brings its "
     "motions",

@@ -12,6 +12,9 @@ import pytest
 from armtempo.cli import main
 from armtempo_shared import meanings
 
+sys.path.insert(0, str(Path(__file__).parents[2] / "host" / "docs" / "site"))
+import catalogue
+
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("site")]  # what they share is made once
 
 ROOT = Path(__file__).parents[2]
@@ -38,6 +41,51 @@ def test_every_page_is_built_and_reached_from_the_first(site: Path) -> None:
         built = (site / page).with_suffix(".html")
         assert built.exists(), page
         assert page.name == "index.md" or built.resolve() in reached, page
+
+
+def test_the_first_page_has_a_picture_and_two_buttons_and_no_list_of_pages(site: Path) -> None:
+    text = (site / "host" / "docs" / "index.html").read_text(encoding="utf-8")
+    article = text[text.index("<article") : text.index("</article>")]
+    assert article.count('class="button') == 2
+    assert "toctree-wrapper" not in re.sub(r'<div class="toctree-wrapper compound">\s*</div>', "", article)
+    assert "arm.gif" in article
+    assert "the armtempo authors" in text[text.index("<footer") :]
+
+
+def test_types_are_written_as_a_person_writes_them(site: Path) -> None:
+    text = (site / "host" / "docs" / "api.html").read_text(encoding="utf-8")
+    plain = re.sub(r"<[^>]+>", "", text)
+    for name in ("minimise", "launch", "deploy", "Joint", "Wait"):
+        assert f"{name}(" in plain, name
+    assert not re.findall(r"armtempo\.(?:model|basics|robot|splines|records)\.[a-z_.]+\.[A-Z]\w+", plain)
+
+
+def test_the_papers_page_is_one_of_the_site(site: Path) -> None:
+    text = (site / "host" / "docs" / "paper-repeated.html").read_text(encoding="utf-8")
+    assert "sidebar" in text
+    assert 'class="good">same' in text
+    assert 'class="good">differs' not in text
+
+
+def test_every_argument_is_described() -> None:
+    context = click.Context(main)
+    for name in main.list_commands(context):
+        command = main.get_command(context, name)
+        assert command is not None
+        for argument in catalogue.names_of_arguments(command):
+            assert catalogue.described(command, argument) or "{" in argument, f"{name} {argument}"
+
+
+def test_ranges_are_numbers(site: Path) -> None:
+    page = re.sub(r"<[^>]+>", "", (site / "host" / "docs" / "commands.html").read_text(encoding="utf-8"))
+    assert "RANGE" not in page
+    assert "1 to 99" in page
+
+
+def test_links_say_where_they_lead() -> None:
+    for page in PAGES:
+        found = re.findall(r"\[`?([\w./-]+\.md)`?\]\(", (ROOT / page).read_text(encoding="utf-8"))
+        assert not found, page
 
 
 def test_every_command_has_its_section(site: Path) -> None:

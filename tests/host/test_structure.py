@@ -37,6 +37,7 @@ ORDER = (
     "robot",  # a board in use: home, go, run, stop
     "pipeline",  # plan, load, run, report
     "paper",  # its tables and figures, repeated
+    "panel",  # the arm in a browser
     "cli",
 )
 """Each package or module imports from those before it in this list, never from those behind."""

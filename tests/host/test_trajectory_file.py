@@ -99,7 +99,7 @@ def edited(path: Path, edit: Callable[[Any], None]) -> Path:
     [
         (lambda c: c.update(format="gcode"), "not a trajectory file"),
         (lambda c: c.update(version=3), "version 3"),
-        (lambda c: c["plan"]["job"].update(refine="some"), "a number or 'auto'"),
+        (lambda c: c["plan"]["job"].update(refine="some"), "'auto' or a number"),
         (
             lambda c: c["plan"]["trajectory"]["joints"][0].update(via_segments=[0, 1, 1, 3, 4, 5, 6]),
             "do not increase",
@@ -134,7 +134,7 @@ def edited(path: Path, edit: Callable[[Any], None]) -> Path:
         (lambda c: c["plan"]["trajectory"].update(shared=True), "time control points differ"),
         (lambda c: c["plan"]["searches"][0].update(joints=[7]), "a joint that there is not"),
         (lambda c: c["plan"]["arm"]["joints"][0].update(limits=None), "joint 1: has no limits"),
-        (lambda c: c["plan"]["arm"]["joints"][0]["motor"].update(gear_ratio=0), "motor's figures"),
+        (lambda c: c["plan"]["arm"]["joints"][0]["motor"].update(gear_ratio=0), "Motor: "),
         (lambda c: c["plan"]["arm"]["joints"][0]["encoder"].update(counts_per_rev=0), "counts_per_rev"),
         (lambda c: c["plan"]["arm"]["joints"][0].update(d_mm=10**400), "d_mm: 1000"),
     ],

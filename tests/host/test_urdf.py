@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.cli import main
-from armtempo.kinematics import Geometry, forward
+from armtempo.kinematics import Geometry, forward, of_arm
 from armtempo.kinematics.shape import refusals
 from armtempo.model.arm import Arm
 from armtempo.new_arm import urdf_fitting as fitting
@@ -132,12 +133,16 @@ def test_the_tip_chooses_the_chain(tmp_path: Path) -> None:
     out, said = imported(tmp_path, "gripper", "--tip", "hand")
     assert "3 joints from link 'base' to 'hand'" in said
     out.unlink()
+    _, said = imported(tmp_path, "gripper")
+    assert "3 joints from link 'base' to 'hand'" in said  # the fingers follow there
+    out.unlink()
     _, said = imported(tmp_path, "gripper", "--base", "l1", "--tip", "left_finger")
     assert "3 joints from link 'l1' to 'left_finger'" in said
 
 
 REFUSED = [
-    ("gripper", [], ["choose with --tip: left_finger, right_finger"]),
+    ("two_ends", [], ["choose with --tip", ": tool (j1, j2, j3), l2 (j1, j2), camera (j1, j2), l1 (j1)\n"]),
+    ("wheel", [], ["'wheel' turn without end, as wheels do"]),
     ("gripper", ["--tip", "right_finger"], ["joint 'right': it mimics 'left'"]),
     ("gripper", ["--tip", "thumb"], ["has no link 'thumb' for --tip", "left_finger"]),
     ("gripper", ["--base", "hand", "--tip", "l1"], ["no chain leads from link 'hand' to 'l1'"]),
@@ -146,6 +151,7 @@ REFUSED = [
     ("no_limits", [], ["joint 'j2': it has no limits", "<limit lower="]),
     ("broken", [], ["not valid XML", "line"]),
     ("xacro", [], ["make a URDF of it first: xacro"]),
+    ("optenv", [], ["'$(optenv LENGTH 0.3) 0 0' still to be filled in", "make a URDF of it first: xacro"]),
     (
         "does_not_fit",
         [],
@@ -292,3 +298,35 @@ def test_what_an_arm_file_cannot_hold_is_not_written(tmp_path: Path) -> None:
     assert result.exit_code == 2
     assert "joint[1].a_mm = 2500000.0 is not allowed" in result.output
     assert not out.exists()
+
+
+@pytest.mark.parametrize(("name", "joints"), [("six_rounded", 6), ("seven_intersecting", 7)])
+def test_an_imported_arm_has_kinematics_before_its_motors(tmp_path: Path, name: str, joints: int) -> None:
+    out, said = imported(tmp_path, name)
+    assert ("lock some of them by fixed_deg" in said) == (joints == 7)
+    angles_deg = np.linspace(10.0, 25.0, joints)
+    pose = of_arm.forward(out, np.resize(angles_deg, len(Arm.read(out).joints)) * turns(out))
+    assert any(
+        np.allclose(of_arm.forward(out, found.angles_deg), pose, atol=0.1)
+        for found in of_arm.inverse(out, pose)
+    )
+    for command in ("fk", "ik"):
+        where = [] if command == "fk" else ["--position", *map(str, pose[:3, 3])]
+        result = CliRunner().invoke(main, [command, "--arm", str(out), *where])
+        assert result.exit_code == 0, result.output
+
+
+def turns(path: Path) -> Array:
+    """1 for each joint that turns, 0 for a constant row."""
+    return np.array([float(np.ptp(joint.range_deg) > 1) for joint in Arm.read(path).joints])
+
+
+def test_a_joint_is_locked(tmp_path: Path) -> None:
+    out, _ = imported(tmp_path, "seven_intersecting")
+    text = out.read_text()
+    parts = text.split("[[joint]]")
+    parts[3] = re.sub("home_deg = .*", "fixed_deg = 20.0", parts[3])
+    out.write_text("[[joint]]".join(parts))
+    locked = Arm.read(out).joints[2]
+    assert (locked.home_deg, locked.motor) == (20.0, None)
+    assert np.ptp(locked.range_deg) < 0.01

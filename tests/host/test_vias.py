@@ -77,10 +77,10 @@ def test_a_pose_that_needs_undriven_joints_is_reported_with_the_miss() -> None:
     resolved = via_points.resolve(ARM, job(JOB.via[0], pose_of(20.0, -75.0, 50.0, 0.0, 30.0, 0.0)))
     np.testing.assert_allclose(resolved.via_deg[1], [20.0, -75.0, 50.0], atol=1e-9)
     (note,) = resolved.notes
-    assert (note.kind, note.via) == ("undriven", 2)
+    assert (note.kind, note.via) == ("undriven", 1)
     # d6 = 40 mm turned by 30 degrees: 2 * 40 * sin(15) = 20.71.
     assert note.text == (
-        "via 2: the pose needs joints that have no motor: joint 5 at 30 deg (stays at 0); "
+        "P1: the pose needs joints that have no motor: joint 5 at 30 deg (stays at 0); "
         "the tool misses the pose by 20.71 mm and 30 deg"
     )
 
@@ -107,10 +107,10 @@ def test_a_branch_change_is_reported_with_the_reason() -> None:
         ARM, job((40.0, -110.0, 70.0), pose_of(150.0, -93.0, -140.0), (40.0, -110.0, 70.0))
     )
     first, second = resolved.notes
-    assert (first.kind, first.via, second.kind, second.via) == ("branch", 2, "branch", 3)
-    assert "between via 1 and via 2 the arm changes its branch (base): from front up to rear up" in first.text
+    assert (first.kind, first.via, second.kind, second.via) == ("branch", 1, "branch", 2)
+    assert "between P0 and P1 the arm changes its branch (base): from front up to rear up" in first.text
     assert "Staying in front up plain is not possible: out of reach by 33.1682 mm" in first.text
-    assert "between via 2 and via 3" in second.text
+    assert "between P1 and P2" in second.text
 
 
 def test_a_branch_change_by_way_of_a_straight_wrist_is_reported() -> None:
@@ -121,7 +121,7 @@ def test_a_branch_change_by_way_of_a_straight_wrist_is_reported() -> None:
     resolved = via_points.resolve(ALL_DRIVEN, job(*vias_given))
     np.testing.assert_allclose(resolved.via_deg[:, 4], bends, atol=1e-9)
     (note,) = resolved.notes
-    assert (note.kind, note.via) == ("branch", 3)
+    assert (note.kind, note.via) == ("branch", 2)
     assert "(wrist): from front up plain to front up flipped" in note.text
 
 
@@ -131,7 +131,7 @@ def test_a_branch_change_between_angles_the_user_gave_is_his_own() -> None:
 
 def test_a_pose_out_of_reach_is_refused_with_every_reason() -> None:
     far = Pose.of_angles((3000.0, 0.0, 0.0), {"roll": 0.0, "pitch": 0.0, "yaw": 0.0})
-    with pytest.raises(PlanError, match="via 2: no posture reaches this pose within") as caught:
+    with pytest.raises(PlanError, match="P1: no posture reaches this pose within") as caught:
         via_points.resolve(ARM, job(JOB.via[0], far))
     first, columns, front, rear = str(caught.value).splitlines()
     assert "misses it by 2193 mm and" in first
@@ -149,7 +149,7 @@ def test_a_pose_out_of_the_driven_ranges_is_refused_with_the_joint() -> None:
 @pytest.mark.parametrize(
     ("via", "words"),
     [
-        ((1.0, 2.0), "via 2: 2 angles, but 3 joints have a motor"),
+        ((1.0, 2.0), "P1: 2 angles, but 3 joints have a motor"),
         (
             Pose.of_matrix(np.diag((2.0, 1.0, 1.0, 1.0))),
             "not a rot",
@@ -158,7 +158,7 @@ def test_a_pose_out_of_the_driven_ranges_is_refused_with_the_joint() -> None:
     ],
 )
 def test_wrong_via_points_are_named(via: tuple[float, ...] | Pose, words: str) -> None:
-    with pytest.raises(InputError, match="via 2") as caught:
+    with pytest.raises(InputError, match="P1") as caught:
         via_points.resolve(ARM, job(pose_of(0.0, -60.0, 40.0), via))
     assert words in str(caught.value)
 
@@ -176,7 +176,7 @@ def test_plan_prints_the_notes(tmp_path: Path) -> None:
         main, ["plan", "--arm", str(shipped.arm_path()), "--job", str(file), "-o", str(output)]
     )
     assert result.exit_code == 0, result.output
-    assert "note: via 2: the pose needs joints that have no motor: joint 5 at 30 deg" in result.output
+    assert "note: P1: the pose needs joints that have no motor: joint 5 at 30 deg" in result.output
     plan = Plan.load(output)
     np.testing.assert_allclose(plan.via_deg, [[0.0, -60.0, 40.0], [20.0, -75.0, 50.0]], atol=1e-9)
 
@@ -201,14 +201,14 @@ def test_a_pose_within_its_tolerance_is_taken_with_a_note_of_the_miss() -> None:
     off = from_rpy((345.0, 120.0, 60.0), (90.0, 0.0, 19.9))
     refused = Pose.of_matrix(off)
     with pytest.raises(
-        PlanError, match=r"via 2: .* 0\.1 mm and 0\.1 deg: the nearest one that was found misses it by"
+        PlanError, match=r"P1: .* 0\.1 mm and 0\.1 deg: the nearest one that was found misses it by"
     ):
         via_points.resolve(FOUR, job((0.0, 60.0, -80.0, -50.0), refused))
     wider = replace(Pose.of_matrix(off), tolerance_deg=1.0)
     resolved = via_points.resolve(FOUR, job((0.0, 60.0, -80.0, -50.0), wider))
     (note,) = resolved.notes
-    assert (note.kind, note.via) == ("miss", 2)
-    assert note.text.startswith("via 2: the tool misses the pose by ")
+    assert (note.kind, note.via) == ("miss", 1)
+    assert note.text.startswith("P1: the tool misses the pose by ")
     assert note.text.endswith(" deg (0.1 mm and 1 deg allowed)")
 
 

@@ -68,5 +68,5 @@ def test_a_board_that_takes_nothing_is_not_waited_for_forever() -> None:
 def test_a_speed_is_1_to_100_percent() -> None:
     assert [speed.permille(fraction) for fraction in (0.01, 1.0)] == [10, 1000]
     for fraction in (0.009, 1.001):
-        with pytest.raises(InputError, match="it must be from 1 to 100 %"):
+        with pytest.raises(InputError, match=r"give a fraction of 0\.01 to 1"):
             speed.permille(fraction)

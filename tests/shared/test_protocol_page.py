@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-import importlib.util
 from pathlib import Path
-from types import ModuleType
 
 from armtempo_shared import codes, meanings, messages
 from armtempo_shared.table import rows
 
+from tests import sources
+
 SCRIPT = Path(__file__).parents[2] / "shared" / "docs" / "make_protocol.py"
 
 
-def _script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("make_protocol", SCRIPT)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 def test_page_is_current() -> None:
-    script = _script()
+    script = sources.script(SCRIPT)
     text = script.PAGE.read_text()
     assert script.page(text) == text, "run: python shared/docs/make_protocol.py"
 

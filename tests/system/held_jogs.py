@@ -96,7 +96,7 @@ class HeldJogs:
         self._board = board
         self._cables = (to_board, from_board)
         self._beyond = False
-        board.client.session.heard = self._heard
+        board.client.session.listeners.append(self._heard)
 
     @classmethod
     @contextmanager

@@ -20,7 +20,7 @@ SHIPPED = {"job": shipped.job_path(), "arm": shipped.arm_path()}
 WRONG_FILES = {
     "no via point": ("job", None, "via_deg = []", "via_deg = []", "at least 2"),
     "one via point": ("job", None, "via_deg = [[0.0, -60.0, 40.0]]", "1 via point", "at least 2"),
-    "NaN": ("job", "[90.0, -85.0, 40.0]", "[90.0, nan, 40.0]", "via_deg[4]", "nan"),
+    "NaN": ("job", "[90.0, -85.0, 40.0]", "[90.0, nan, 40.0]", "via_deg P3", "nan"),
     "unknown key": ("job", "degree = 5", "degree = 5\nsped = 3", "sped: unknown key", "did you mean"),
     "negative limit": (
         "arm",

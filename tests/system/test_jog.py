@@ -65,7 +65,8 @@ def test_steps_by_the_command_line() -> None:
         np.testing.assert_allclose(
             armtempo.forward(PAPER, where(port))[:3, 3] - before, [0.0, 0.0, 10.0], atol=0.3
         )
-        jogged(port, "--joint", "joint 2", "--by", "-1000", "--speed", "100")
+        said = jogged(port, "--joint", "joint 2", "--by", "-1000", "--speed", "100", code=1)
+        assert "ended early: joint 2 is at the end of its range, -170 degrees" in said
         assert where(port)[1] == pytest.approx(-170.0, abs=0.02)
         assert where(port)[1] >= -170.0
         assert "end of its range" in jogged(port, "--joint", "2", "--by", "-1", code=2)

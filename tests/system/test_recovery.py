@@ -128,9 +128,15 @@ class Bench:
         raise AssertionError(f"{command}: no end within {MPREMOTE_S} s, {TRIES} times")
 
     def used_blocks(self) -> int:
-        """Blocks of the flash that are in use."""
+        """Blocks of the flash that are in use; a folder's names take 32 bytes each, long ones three times as much."""
         paths = list(self.flash.rglob("*"))
-        return sum(1 if path.is_dir() else -(-path.stat().st_size // 512) for path in paths)
+        files = sum(-(-path.stat().st_size // 512) for path in paths if path.is_file())
+        names = {path: [each.name for each in path.iterdir()] for path in paths if path.is_dir()}
+        lengths = [
+            2 + sum(1 if len(name) <= 12 and name.count(".") < 2 else 3 for name in each)
+            for each in names.values()
+        ]
+        return files + sum(-(-length // 16) for length in lengths)
 
 
 @pytest.fixture(scope="module")

@@ -8,6 +8,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from armtempo.cli.help import TOPICS
 
 from tests.interpreters import ROOT
 
@@ -31,6 +32,10 @@ def test_its_top_level_is_the_three_packages(names: set[str]) -> None:
     top = {Path(name).parts[0] for name in names}
     assert {name for name in top if not name.endswith(".dist-info")} == set(PACKAGES)
     assert len(top) == len(PACKAGES) + 1
+
+
+def test_the_pages_that_messages_name_are_in_it(names: set[str]) -> None:
+    assert {f"armtempo/data/pages/{topic}.md" for topic in TOPICS} <= names
 
 
 def test_every_tracked_file_of_the_packages_is_in_it(names: set[str]) -> None:

@@ -38,7 +38,7 @@ CHOSEN = {
         "case_a_run_by_button_needs_no_host",
     },
     ("cpython", "prompt"): {"case_replay_typed_at_the_prompt"},
-    ("cpython", "sequences"): {"case_the_pins_do_the_same", "case_whatever_ends_it_at_any_moment"},
+    ("cpython", "sequences"): {"case_the_pins_do_the_same"},
     ("cpython", "faults"): {"case_host_disappears_and_the_arm_stops", "case_stop", "case_broken_trajectory"},
 }
 """The emulated interpreter is slow, and CPython never runs on a board: what they are to run."""

@@ -31,24 +31,24 @@ _BIAS = const(1 << 29)
 _HIGH_BIAS = const(1 << 28)
 # as in newton.py: words of the solver
 _FIRST_NODE = const(28)
-_FIRST_TIME = const(28)
-_FIRST_MANTISSA = const(29)
-_FIRST_EXPONENT = const(30)
-_MIDDLE_TIME = const(33)
-_MIDDLE_MANTISSA = const(34)
-_MIDDLE_EXPONENT = const(35)
-_END_TIME = const(38)
-_END_MANTISSA = const(39)
-_END_EXPONENT = const(40)
+_FIRST_TIME = const(28)  # = FIRST_NODE + NODE_TIME
+_FIRST_MANTISSA = const(29)  # = FIRST_NODE + NODE_MANTISSA
+_FIRST_EXPONENT = const(30)  # = FIRST_NODE + NODE_EXPONENT
+_MIDDLE_TIME = const(33)  # = MIDDLE_NODE + NODE_TIME
+_MIDDLE_MANTISSA = const(34)  # = MIDDLE_NODE + NODE_MANTISSA
+_MIDDLE_EXPONENT = const(35)  # = MIDDLE_NODE + NODE_EXPONENT
+_END_TIME = const(38)  # = END_NODE + NODE_TIME
+_END_MANTISSA = const(39)  # = END_NODE + NODE_MANTISSA
+_END_EXPONENT = const(40)  # = END_NODE + NODE_EXPONENT
 # of two neighbouring nodes
 _NODE_TIME = const(0)
 _NODE_MANTISSA = const(1)
 _NODE_EXPONENT = const(2)
 _NODE_DELAY = const(3)
 _NODE_RATE = const(4)
-_NEXT_TIME = const(5)
-_NEXT_MANTISSA = const(6)
-_NEXT_EXPONENT = const(7)
+_NEXT_TIME = const(5)  # = NODE_WORDS + NODE_TIME
+_NEXT_MANTISSA = const(6)  # = NODE_WORDS + NODE_MANTISSA
+_NEXT_EXPONENT = const(7)  # = NODE_WORDS + NODE_EXPONENT
 _NODE_WORDS = const(5)
 
 _HALF_MASK = const((1 << 15) - 1)

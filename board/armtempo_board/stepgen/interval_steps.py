@@ -47,15 +47,15 @@ _BY_LAW = const(1)
 _AT_START = const(2)
 # as in newton.py: words of the solver
 _FIRST_NODE = const(28)
-_FIRST_TIME = const(28)
-_MANTISSA = const(29)  # of the first node
-_EXPONENT = const(30)
-_FIRST_DELAY = const(31)
+_FIRST_TIME = const(28)  # = FIRST_NODE + NODE_TIME
+_MANTISSA = const(29)  # = FIRST_NODE + NODE_MANTISSA
+_EXPONENT = const(30)  # = FIRST_NODE + NODE_EXPONENT
+_FIRST_DELAY = const(31)  # = FIRST_NODE + NODE_DELAY
 _MIDDLE_NODE = const(33)
 _END_NODE = const(38)
-_END_MANTISSA = const(39)
-_END_EXPONENT = const(40)
-_END_DELAY = const(41)
+_END_MANTISSA = const(39)  # = END_NODE + NODE_MANTISSA
+_END_EXPONENT = const(40)  # = END_NODE + NODE_EXPONENT
+_END_DELAY = const(41)  # = END_NODE + NODE_DELAY
 _TARGET = const(20)
 _RANGE = const(22)
 _TIME_OFFSET = const(23)

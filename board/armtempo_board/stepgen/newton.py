@@ -53,11 +53,11 @@ _NODE_WORDS = const(5)
 
 # as in subdivision.py: measures of a piece
 _SCALE = const(0)
-_DIFFERENCE_1 = const(1)
-_DIFFERENCE_2 = const(2)
-_DIFFERENCE_3 = const(3)
-_DIFFERENCE_4 = const(4)
-_DIFFERENCE_5 = const(5)
+_DIFFERENCE_1 = const(1)  # = FIRST_DIFFERENCE + 0
+_DIFFERENCE_2 = const(2)  # = FIRST_DIFFERENCE + 1
+_DIFFERENCE_3 = const(3)  # = FIRST_DIFFERENCE + 2
+_DIFFERENCE_4 = const(4)  # = FIRST_DIFFERENCE + 3
+_DIFFERENCE_5 = const(5)  # = FIRST_DIFFERENCE + 4
 # as in bezier.py: word of a piece
 _LOW = const(6)
 

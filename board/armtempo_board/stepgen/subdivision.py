@@ -53,23 +53,23 @@ ANGLE_STEADY = const(2)
 TIME_STEADY = const(8)  # and they are positive
 
 # as in bezier.py: words of a piece, six high and six low ones; a pointer to a point finds its two and those of the next
-_HIGH_0 = const(0)
-_HIGH_1 = const(1)
-_HIGH_2 = const(2)
-_HIGH_3 = const(3)
-_HIGH_4 = const(4)
-_HIGH_5 = const(5)
-_LOW_0 = const(6)
-_LOW_1 = const(7)
-_LOW_2 = const(8)
-_LOW_3 = const(9)
-_LOW_4 = const(10)
-_LOW_5 = const(11)
+_HIGH_0 = const(0)  # = HIGH + 0
+_HIGH_1 = const(1)  # = HIGH + 1
+_HIGH_2 = const(2)  # = HIGH + 2
+_HIGH_3 = const(3)  # = HIGH + 3
+_HIGH_4 = const(4)  # = HIGH + 4
+_HIGH_5 = const(5)  # = HIGH + 5
+_LOW_0 = const(6)  # = LOW + 0
+_LOW_1 = const(7)  # = LOW + 1
+_LOW_2 = const(8)  # = LOW + 2
+_LOW_3 = const(9)  # = LOW + 3
+_LOW_4 = const(10)  # = LOW + 4
+_LOW_5 = const(11)  # = LOW + 5
 _HIGH = const(0)
-_NEXT_HIGH = const(1)
+_NEXT_HIGH = const(1)  # = HIGH + 1
 _LAST_HIGH = const(5)
 _LOW = const(6)
-_NEXT_LOW = const(7)
+_NEXT_LOW = const(7)  # = LOW + 1
 _LAST_LOW = const(11)
 
 _BIAS = const(1 << 29)

@@ -24,6 +24,8 @@ Stopped, a KeyboardInterrupt: a motion was brought to rest because a stop was as
 
 from __future__ import annotations
 
+from armtempo.basics import installation
+
 INTERRUPTED = 130
 """Exit code of the command after Ctrl-C."""
 
@@ -61,7 +63,7 @@ class MissingPackageError(ArmtempoError):
     def __init__(self, what: str, package: str, extra: str) -> None:
         super().__init__(
             f"{what} needs {package}, which is not installed",
-            f"install it with: pip install 'armtempo[{extra}]'",
+            f"install it with: {installation.command(package, extra)}",
         )
 
 

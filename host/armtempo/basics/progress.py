@@ -1,15 +1,87 @@
-"""How work that takes a while tells how far it is."""
+"""How work that takes a while tells how far it is and what it does, and how it is ended: by an exception there."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 
 Progress = Callable[[float, float], object]
-"""Called now and then with the work done and the whole of it, both in the same unit."""
+"""Called now and then with the work done and the whole of it, both in the same unit. What it raises ends the work. One
+that has a method ``stage`` is told by it, in a word or two, what is being done."""
+
+_EVERY_S = 0.05
+"""Time after which ``alive`` calls the progress again."""
 
 
 def part(progress: Progress | None, number: int, parts: int) -> Progress | None:
     """The progress of part ``number`` (from 0) of work that has ``parts`` equal ones."""
-    if progress is None:
-        return None
-    return lambda done, whole: progress(number + done / whole, parts)
+    return None if progress is None else _Part(progress, number, parts)
+
+
+class _Part:
+    def __init__(self, progress: Progress, number: int, parts: int) -> None:
+        self._progress, self._number, self._parts = progress, number, parts
+
+    def __call__(self, done: float, whole: float) -> None:
+        self._progress(self._number + done / whole, self._parts)
+
+    def stage(self, name: str) -> None:
+        _tell(self._progress, name)
+
+
+class _Watched:
+    """A progress, how far it was when last called, and when."""
+
+    def __init__(self, progress: Progress) -> None:
+        self.progress = progress
+        self._at = 0.0, 1.0
+        self._called_s = time.monotonic()
+
+    def __call__(self, done: float, whole: float) -> None:
+        self._at, self._called_s = (done, whole), time.monotonic()
+        self.progress(done, whole)
+
+    def alive(self) -> None:
+        if time.monotonic() - self._called_s >= _EVERY_S:
+            self(*self._at)
+
+    def stage(self, name: str) -> None:
+        _tell(self.progress, name)
+
+
+_watched: ContextVar[_Watched | None] = ContextVar("_watched", default=None)
+
+
+@contextmanager
+def watched(progress: Progress | None) -> Iterator[Progress]:
+    """A progress for work within, where ``stage`` and ``alive`` reach it from any depth."""
+    whole = _Watched(progress or _silent)
+    token = _watched.set(whole)
+    try:
+        yield whole
+    finally:
+        _watched.reset(token)
+
+
+def stage(name: str) -> None:
+    """What is being done from here on."""
+    if (current := _watched.get()) is not None:
+        current.stage(name)
+
+
+def alive() -> None:
+    """Work goes on: the progress is called again with what it was last called with, so that it may end the work."""
+    if (current := _watched.get()) is not None:
+        current.alive()
+
+
+def _tell(progress: Progress, name: str) -> None:
+    told = getattr(progress, "stage", None)
+    if told is not None:
+        told(name)
+
+
+def _silent(_done: float, _whole: float) -> None:
+    """Progress that nobody watches."""

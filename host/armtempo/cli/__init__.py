@@ -38,11 +38,12 @@ GROUPS = {
         "watch",
         "fetch",
         "report",
+        "panel",
     ),
     "Board": (
         *("ports", "deploy", "undeploy", "firmware", "flash", "configure"),
         *("upload", "list", "show", "remove", "rename"),
-        *("virtual-board", "monitor", "config", "doctor"),
+        *("virtual-board", "monitor", "config", "doctor", "help"),
     ),
     "Develop": ("paper", "completion"),
 }
@@ -85,6 +86,11 @@ class LazyGroup(click.Group):
         module = import_module(f"{__name__}.{name.replace('-', '_')}{'_' * iskeyword(name)}")
         command: click.Command = module.command
         command.epilog = examples.of(name)
+        for parameter in command.params:
+            if isinstance(parameter, click.Option) and isinstance(
+                parameter.type, click.IntRange | click.FloatRange
+            ):
+                parameter.metavar = parameter.metavar or "NUMBER"
         return command
 
     def resolve_command(
@@ -101,24 +107,26 @@ class LazyGroup(click.Group):
         for stream in (sys.stdout, sys.stderr):
             if isinstance(stream, io.TextIOWrapper):
                 stream.reconfigure(errors="replace")  # a ² in a code page that has none ends no command
+        as_json = "--json" in [*ctx._protected_args, *ctx.args]
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads only cost time on matrices this small
         try:
             with raised_by_signals():
                 return super().invoke(ctx)
         except ArmtempoError as error:
-            messages.show(error)
+            messages.show(error, as_json=as_json)
             ctx.exit(error.exit_code)
         except OSError as error:
             if error.errno == errno.EPIPE:  # whoever read the output has gone: click ends quietly
                 raise
-            messages.show(_of_file(error))
+            messages.show(_of_file(error), as_json=as_json)
             ctx.exit(1)
         except MemoryError as error:
             messages.show(
                 ArmtempoError(
                     f"this takes more memory than there is: {error}".rstrip(": "),
                     "close other programs, or ask for less: lower refine, a smaller population",
-                )
+                ),
+                as_json=as_json,
             )
             ctx.exit(1)
         except KeyboardInterrupt as error:

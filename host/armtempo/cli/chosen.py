@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from armtempo.robot.shared_board import SharedBoard
 
 
+_ANEW = ", started for this command: its arm begins at home; 'armtempo virtual-board' keeps one running"
+
+
 def tell(text: str) -> None:
     """Say something beside the command's output, unless ``armtempo --quiet``."""
     if not is_quiet():
@@ -32,15 +35,18 @@ def tell(text: str) -> None:
 # arm and job
 
 
-def named_arm(path: Path | None) -> Arm | None:
-    """The arm of ``--arm``, of the variable or of the project folder, with its postures checked; None without one."""
+def named_arm(path: Path | None, for_shape: bool = False) -> Arm | None:
+    """The arm of ``--arm``, of the variable or of the project folder, with its postures checked; None without one.
+
+    ``for_shape``: for its kinematics, so it needs no motors.
+    """
     setting = ProjectSettings().get(ARM, path)
     if not setting:
         return None
     from armtempo.model.arm import Arm
     from armtempo.model.tool_pose import Pose
 
-    arm = Arm.load(setting.path)
+    arm = (Arm.shape if for_shape else Arm.load)(setting.path)
     if any(isinstance(posture.where, Pose) for posture in arm.postures):
         from armtempo.planning import via_points  # here, because most arms need no kinematics
 
@@ -66,9 +72,9 @@ def load_arm(path: Path | None) -> Arm:
     return found
 
 
-def arm_or_paper(path: Path | None) -> Arm:
+def arm_or_paper(path: Path | None, for_shape: bool = False) -> Arm:
     """The same, for commands that move nothing: without one the paper's arm, which is said aloud."""
-    found = named_arm(path)
+    found = named_arm(path, for_shape)
     if found is None:
         from armtempo.model.arm import Arm
 
@@ -85,6 +91,12 @@ def load_job(path: Path | None, arm: Arm) -> Job:
     from armtempo.model.job import Job
 
     return Job.load(setting.path, arm)
+
+
+def job_file(path: Path | None) -> Path | None:
+    """The file of the job that is named; None without one."""
+    setting = ProjectSettings().get(JOB, path)
+    return setting.path if setting else None
 
 
 def arm_and_job(arm_path: Path | None, job_path: Path | None) -> tuple[Arm, Job]:
@@ -140,9 +152,24 @@ def source_words(name: str, source: str) -> str:
 
 
 def is_file(what: str) -> bool:
-    """Whether an argument names a trajectory file rather than a motion on the board."""
+    """Whether an argument names a trajectory file rather than a motion on the board.
+
+    InputError, naming the nearest file, for what is no file and can be no name of a motion either.
+    """
+    from armtempo.formats.spelling import did_you_mean
+    from armtempo.model.job import is_name
+
     path = Path(what)
-    return path.suffix == ".json" or path.is_file()
+    if path.is_file():
+        return True
+    if path.suffix != ".json" and is_name(what):
+        return False
+    beside = [str(path.with_name(one.name)) for one in path.parent.glob("*.json")]
+    near = did_you_mean(what, beside)
+    raise InputError(
+        f"{what}: there is no such file{near}",
+        "check the path; 'armtempo plan' makes one, 'armtempo list' shows the board's",
+    )
 
 
 def load_plan(path: Path, arm_path: Path | None, altered: bool = False) -> Plan:
@@ -249,6 +276,8 @@ def board_state(port: str, log_traffic: Path | None = None) -> BoardState:
 
 def virtual_words(port: str) -> str:
     """What kind of virtual board is on a port."""
-    from armtempo.ports.names import SIM
+    from armtempo.ports.names import SIM, is_sim
 
-    return "a virtual board, which ends with this command" if port == SIM else "a virtual board"
+    if port == SIM:
+        return "a virtual board, which ends with this command"
+    return f"a virtual board{_ANEW}" if is_sim(port) else "a virtual board"

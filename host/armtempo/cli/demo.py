@@ -12,6 +12,13 @@ from armtempo.cli.progress import ProgressBar
 from armtempo.cli.run import run_and_tell
 from armtempo.ports.names import SIM
 
+_NEXT = """\
+report: {page}
+        open it in a browser: {uri}
+next:   armtempo new my_arm            a folder for an own arm and job, asked for step by step
+        armtempo demo --pick-and-place a gripper and a part sensor
+        armtempo --help                all commands"""
+
 
 @click.command()
 @options.out
@@ -51,7 +58,8 @@ def command(out: Path | None, port: str, pick_and_place: bool, log_traffic: Path
     with chosen.board(port, log_traffic, plan.arm) as board:
         run = run_and_tell(board, plan, 1, chosen.runs(out))
     try:
-        click.echo(f"report: {pipeline.report(run)}")
+        page = pipeline.report(run)
+        click.echo(_NEXT.format(page=page, uri=page.resolve().as_uri()))
     except MissingPackageError as error:
         messages.show(
             ArmtempoError(error.problem, f"{error.hint}, then: armtempo report {run.path}"), "no report"

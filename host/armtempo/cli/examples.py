@@ -32,12 +32,13 @@ EXAMPLES = {
     "status": ("status", "status --json"),
     "watch": ("watch", "watch --json > samples.jsonl"),
     "fetch": ("fetch", "fetch first.json"),
+    "panel": ("panel", "panel --port sim --arm ar4"),
     "report": ("report runs/first-001", "report runs/first-001 runs/first-002 --out both.html"),
     "ports": ("ports",),
     "deploy": ("deploy --port /dev/ttyACM0", "deploy --mpy"),
     "undeploy": ("undeploy",),
     "firmware": ("firmware --board STM32F4DISC --micropython ~/micropython",),
-    "flash": ("flash firmware-STM32F4DISC --port /dev/ttyACM0",),
+    "flash": ("flash", "flash --image armtempo-firmware-STM32F4DISC.zip --port /dev/ttyACM0"),
     "configure": ("configure --arm my_arm.toml",),
     "upload": ("upload first.json", "upload first.json --name pick --default"),
     "list": ("list",),
@@ -49,6 +50,7 @@ EXAMPLES = {
     "config": ("config",),
     "doctor": ("doctor", "doctor --port /dev/ttyACM0"),
     "paper": ("paper --quick",),
+    "help": ("help", "help recovery"),
     "completion": ("completion bash >> ~/.bashrc",),
 }
 

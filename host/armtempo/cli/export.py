@@ -42,7 +42,10 @@ def command(
     altered: bool,
     as_json: bool,
 ) -> None:
-    """Write the trajectory file TRAJECTORY as CSV or as a ROS JointTrajectory, sampled at any rate."""
+    """Write a motion as CSV or as a ROS JointTrajectory, sampled at any rate.
+
+    TRAJECTORY: a trajectory file, as 'armtempo plan' writes it.
+    """
     from armtempo.formats.atomic_file import check_not_input, check_replaceable, replace_text
     from armtempo.model.plan import Plan
 

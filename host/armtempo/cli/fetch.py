@@ -28,7 +28,7 @@ def command(
 ) -> None:
     """Fetch the samples that the board keeps of its last run, such as one that its button started.
 
-    WHAT is what was run: a trajectory file, or the name of a motion on the board; without it the motion that
+    WHAT: what was run: a trajectory file, or the name of a motion on the board; without it the motion that
     the button starts. A run under way is followed to its end. The samples go into a new run folder, once.
     """
     from armtempo.cli.live import repetition_line

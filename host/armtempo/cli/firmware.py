@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @click.option(
     "--board",
     metavar="NAME",
-    help="STM32F4DISC, OLIMEX_H407, VCC_GND_F407ZG, PYBV11, another board of MicroPython with an STM32F405 or "
+    help="STM32F4DISC, OLIMEX_H407, VCC_GND_F407ZG, another board of MicroPython with an STM32F405 or "
     "F407, or a folder that defines one.",
 )
 @click.option(
@@ -93,7 +93,7 @@ def command(
     if flash_too:
         put_on_board(folder, port, tool, as_json)
     else:
-        say(f"onto the board: armtempo flash {folder} --port PORT; then armtempo deploy --port PORT")
+        say(f"onto the board: armtempo flash --image {folder} --port PORT; then armtempo deploy --port PORT")
     if as_json:
         results.show_json({"folder": str(folder), **_values(made), "flashed": flash_too})
 

@@ -38,10 +38,10 @@ def command(
         angles_deg = spread_deg(arm, posture.via_deg(where[0], arm, job).tolist())
     elif len(where) == 1 and posture.is_named(where[0]):
         wanted = posture.NamedPosture.of(where[0], arm_path, altered)
-        arm = wanted.arm or chosen.arm_or_paper(arm_path)
+        arm = wanted.arm or chosen.arm_or_paper(arm_path, for_shape=True)
         angles_deg = spread_deg(arm, wanted.angles_deg(arm, job_path).tolist())
     else:
-        arm = chosen.arm_or_paper(arm_path)
+        arm = chosen.arm_or_paper(arm_path, for_shape=True)
         angles_deg = _angles(where, arm)
     if as_json:
         results.show_json(frame_listing.values(arm, angles_deg))

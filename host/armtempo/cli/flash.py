@@ -12,27 +12,37 @@ from armtempo.project.settings import PORT, ProjectSettings
 
 
 @click.command()
-@click.argument("folder", type=click.Path(path_type=Path))
+@click.option(
+    "--image",
+    "given",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="The zip file of a release, or a folder that 'armtempo firmware' made. Without it the only one here.",
+)
 @options.flash_port
 @options.flash_tool
 @options.as_json
-def command(folder: Path, port: str | None, tool: str | None, as_json: bool) -> None:
-    """Put a firmware on a board: FOLDER as 'armtempo firmware' makes it, or a release brings it.
+def command(given: Path | None, port: str | None, tool: str | None, as_json: bool) -> None:
+    """Put MicroPython with the board program in it on a board; 'armtempo deploy' comes next.
 
     The board of --port is put in its bootloader first, which is refused while it moves; without --port one that
-    is there already, or has an ST-LINK, is flashed. Files in its flash are kept.
+    is there already, or has an ST-LINK, is flashed. What was written is read back and compared. Files in its flash
+    are kept.
     """
-    found = put_on_board(folder, port, tool, as_json)
+    from armtempo.deploy.firmware import image
+
+    chosen = given or image.find(Path())
+    found = put_on_board(chosen, port, tool, as_json)
     if as_json:
-        results.show_json({"folder": str(folder), "port": found})
+        results.show_json({"image": str(chosen), "port": found})
 
 
-def put_on_board(folder: Path, port: str | None, tool: str | None, as_json: bool = False) -> str | None:
-    """Put the firmware in ``folder`` on the board, and say what comes next; gives the board's port, if it had one."""
+def put_on_board(given: Path, port: str | None, tool: str | None, as_json: bool = False) -> str | None:
+    """Put a firmware on the board, and say what comes next; gives the board's port, if it had one."""
     from armtempo.deploy.firmware.flash import flash
 
     found = ProjectSettings().get(PORT, port).value or None
     with ProgressBar("flashing") as progress:
-        flash(folder, found, tool, results.teller(as_json), progress)
+        flash(given, found, tool, results.teller(as_json), progress)
     results.teller(as_json)(f"flashed; the start files are next: armtempo deploy --port {found or 'PORT'}")
     return found

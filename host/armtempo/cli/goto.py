@@ -6,12 +6,13 @@ from pathlib import Path
 
 import click
 
+from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, options, posture
 from armtempo.cli.progress import ProgressBar
 
 
 @click.command(context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
-@click.argument("where", shell_complete=options.files)
+@click.argument("where", nargs=-1, required=True, shell_complete=options.files)
 @options.job
 @options.arm_of_board
 @options.replace_arm
@@ -20,7 +21,7 @@ from armtempo.cli.progress import ProgressBar
 @options.log_traffic
 @options.as_json
 def command(
-    where: str,
+    where: tuple[str, ...],
     job_path: Path | None,
     arm_path: Path | None,
     replace_arm: bool,
@@ -37,7 +38,12 @@ def command(
     """
     from armtempo.robot.stop_request import Stopped
 
-    wanted = posture.NamedPosture.of(where, arm_path, altered)
+    if len(where) > 1:
+        raise InputError(
+            f"{len(where)} values for one posture",
+            f"write them as one, with commas: armtempo goto {','.join(where)}",
+        )
+    wanted = posture.NamedPosture.of(where[0], arm_path, altered)
     with chosen.board(port, log_traffic, wanted.arm) as board:
         arm = chosen.arm_of_board(board, wanted.arm)
         target_deg = wanted.angles_deg(arm, job_path)

@@ -103,7 +103,7 @@ def command(
     from armtempo.kinematics.solver import PoseSolver
 
     wanted = [_within(pose, tolerance_mm, tolerance_deg) for pose in _poses(_Given(**given))]
-    solver = PoseSolver(chosen.arm_or_paper(arm_path))
+    solver = PoseSolver(chosen.arm_or_paper(arm_path, for_shape=True))
     found = listings(solver, wanted, _posture(previous, solver), numerical)
     show = _print_json if as_json else _print_text
     show(solver, found)

@@ -21,16 +21,22 @@ from armtempo.cli import options, results
 )
 @click.option("--base", metavar="LINK", help="Link that the arm stands on; without it the URDF's root.")
 @click.option(
-    "--tip", metavar="LINK", help="Link whose frame is the tool's; without it the chain's only end."
+    "--tip",
+    metavar="LINK",
+    help="Link whose frame is the tool's; without it the one that fingers follow, or the end.",
 )
 @click.option("--force", is_flag=True, help="Replace FILE if it is there.")
 @options.as_json
 def command(urdf: Path, out: Path, base: str | None, tip: str | None, force: bool, as_json: bool) -> None:
     """Make an arm file of a URDF's chain of revolute joints: its Denavit-Hartenberg rows and ranges.
 
+    URDF: the robot's description, a .urdf or .xacro file.
+
     The rows are held against the URDF's own forward kinematics at 1000 random postures before anything is
     written. Motors, which a URDF does not describe, are left as comments to fill in. Needs the extra 'urdf'.
     """
+    from armtempo_shared.limits import MAX_JOINTS
+
     from armtempo.basics.errors import InputError
     from armtempo.formats import toml_table
     from armtempo.formats.atomic_file import replace_text
@@ -63,4 +69,9 @@ def command(urdf: Path, out: Path, base: str | None, tip: str | None, force: boo
         f"worst error at {fit.postures} random postures: {fit.position_mm:.2g} mm and {fit.rotation_deg:.2g} degrees",
         f"wrote {out}; now put its motors in, then: armtempo check --arm {out}",
     ]
+    if len(chain.joints) > MAX_JOINTS:
+        lines.append(
+            f"the board drives {MAX_JOINTS} joints, this chain has {len(chain.joints)}: lock some of them by "
+            "fixed_deg = ANGLE in the place of their motors, or choose a part of it with --base and --tip"
+        )
     results.show(as_json, values, lines)

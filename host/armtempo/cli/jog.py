@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from armtempo.basics.errors import InputError
+from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.cli import chosen, options, posture
 
 if TYPE_CHECKING:
@@ -83,7 +83,11 @@ def command(
         else:
             along = by if axis else None
             board.jog(joint, None if axis else by, axis or about, along, speed / 100)
-        posture.say_where_it_is(board, as_json)
+        early = board.last_jog_ends
+        if not (early and as_json):
+            posture.say_where_it_is(board, as_json)
+        if early:
+            raise ArmtempoError(f"the jog ended early: {early}", "jog less far, or the other way")
 
 
 def prepare(board: Board, arm: Arm, replace_arm: bool = False) -> None:
@@ -126,6 +130,6 @@ def screen(
     from armtempo.cli.jog_screen import KEYS, SPEEDS, JogScreen
 
     click.echo(f"{KEYS}\n{told}" if told else KEYS)
-    made = JogScreen(board, pressed, more)
+    made = JogScreen(board, pressed, more, told)
     made.choice.speed = min(range(len(SPEEDS)), key=lambda index: abs(SPEEDS[index] - speed))
     return made

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -37,7 +38,7 @@ KEYS = f"""\
   + -, arrows  move                           f       axes of the base, or of the tool
   s            steps of 0.1, 1, 10 (deg, mm)  h       steps, or moving while + or - is held down
   < >          slower, faster                 space   stop
-  c            clear a fault                  q       end, with the arm at rest
+  c            clear a fault                  q       end, with the arm at rest; ? help
 A terminal tells no release: it is noticed {RELEASE_S:g} s after a held key's last repeat; then the arm brakes."""
 
 
@@ -92,9 +93,14 @@ class JogChoice:
 
 
 class JogScreen:
-    """``loop`` until the user ends it; ``more``: keys of the caller, each with what it does and gives to say."""
+    """``loop`` until the user ends it.
 
-    def __init__(self, board: Board, keys: Keys, more: dict[str, Callable[[], str]] | None = None) -> None:
+    ``more``: keys of the caller, each with what it does and gives to say; ``told``: what ``?`` says of them.
+    """
+
+    def __init__(
+        self, board: Board, keys: Keys, more: dict[str, Callable[[], str]] | None = None, told: str = ""
+    ) -> None:
         if board.arm is None:
             raise InputError("no arm is known to move", "say which with home(arm) or configure(arm)")
         self.choice = JogChoice()
@@ -102,6 +108,7 @@ class JogScreen:
         self._board = board
         self._keys = keys
         self._more = more or {}
+        self._more_told = told
         self._said = ""
         self._ended_by = ""
 
@@ -122,7 +129,9 @@ class JogScreen:
 
     def _act(self, key: str) -> None:
         try:
-            if key in self._more:
+            if key == "?":
+                click.echo(f"{_CLEAR_LINE}{KEYS}\n{self._more_told}".rstrip())
+            elif key in self._more:
                 self._said = self._more[key]()
             elif key in (*_FORWARD, *_BACKWARD):
                 self._move(key, 1 if key in _FORWARD else -1)
@@ -159,7 +168,7 @@ class JogScreen:
                     SPEEDS[choice.speed] / 100,
                     stop.request,
                 )
-            self._said = ""
+            self._said = self._board.last_jog_ends
         except Stopped:
             self._said = "stopped"
         self._end_if(stop.pressed)
@@ -206,19 +215,33 @@ class JogScreen:
         try:
             where = self._where(angles_deg or self._board.posture_deg().tolist())
         except LinkError as error:
-            where = error.problem
-        said = f" | {self._said}" if self._said else ""
-        click.echo(f"{_CLEAR_LINE}{self.choice.words(names)} | {where}{said}", nl=False)
+            where = [error.problem]
+        parts = (
+            [self.choice.words(names), self._said, *where]
+            if self._said
+            else [self.choice.words(names), *where]
+        )
+        click.echo(f"{_CLEAR_LINE}{fitted(parts, shutil.get_terminal_size().columns - 1)}", nl=False)
 
-    def _where(self, angles_deg: list[float]) -> str:
+    def _where(self, angles_deg: list[float]) -> list[str]:
+        """Angles and tool, what is chosen first."""
         from armtempo.kinematics.of_arm import forward
         from armtempo.model.pose import to_rpy_deg
 
         pose = forward(self._arm, angles_deg)
-        angles = " ".join(f"{angle + 0.0:.2f}" for angle in angles_deg)
-        position = " ".join(f"{value + 0.0:.1f}" for value in pose[:3, 3])
-        turned = " ".join(f"{value + 0.0:.1f}" for value in to_rpy_deg(pose))
-        return f"{angles} ° | tool {position} mm, rpy {turned} °"
+        angles = " ".join(f"{angle + 0.0:.2f}" for angle in angles_deg) + "°"
+        position = " ".join(f"{value + 0.0:.1f}" for value in pose[:3, 3]) + " mm"
+        turned = "rpy " + " ".join(f"{value + 0.0:.1f}" for value in to_rpy_deg(pose)) + "°"
+        return [angles, position, turned] if self.choice.joint is not None else [position, turned, angles]
+
+
+def fitted(parts: list[str], width: int) -> str:
+    """As many of the parts, most important first, as one line holds; what it would wrap, it drops."""
+    line = parts[0]
+    for number, part in enumerate(parts[1:]):
+        if len(line) + 3 + len(part) <= width or not number:
+            line += f" | {part}"
+    return line if len(line) <= width else f"{line[: width - 1]}…"
 
 
 class _StopKeys:

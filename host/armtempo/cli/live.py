@@ -31,6 +31,8 @@ class Live(Watcher):
         self._where = f", on {where}" if where else ""
         self._plot: LivePlot | None = None
         self._progress = ProgressBar("moving")
+        self._before = (0, 0)
+        """Ticks of the last sample, and of the motion's own time."""
 
     def begin(self, motion: EncodedMotion, folder: RunFolder) -> None:
         """Say what runs and where it is recorded."""
@@ -46,9 +48,17 @@ class Live(Watcher):
         errors = angles - self._motion.trajectory(time_s)
         pairs = (f"{angle:.1f}° ({error:+.2f})" for angle, error in zip(angles, errors, strict=True))
         elapsed = time.monotonic() - self._started_s
-        self._progress(time_s, duration_s, f"{elapsed:.0f} s  {'  '.join(pairs)}")
+        self._progress(time_s, duration_s, f"{elapsed:.0f} s{self._speed(sample)}  {'  '.join(pairs)}")
         if self._plot is not None:
             self._plot.add(time_s, angles)
+
+    def _speed(self, sample: Sample) -> str:
+        """How fast it goes since the sample before, where that is not as planned."""
+        (before, path_before), self._before = self._before, (sample.ticks, sample.path_ticks)
+        if sample.ticks <= before:
+            return ""
+        percent = round(100 * (sample.path_ticks - path_before) / (sample.ticks - before))
+        return "" if percent in (99, 100, 101) else f", at {percent} %" if percent > 0 else ", in a pause"
 
     def end(self, repetition: Repetition) -> None:
         """Say how it ended."""

@@ -26,7 +26,7 @@ Say = Callable[[float, str, list[str]], None]
 def command(file: Path | None, port: str | None, log_traffic: Path | None, as_json: bool) -> None:
     """Show decoded traffic.
 
-    With FILE, what '--log-traffic FILE' recorded; without, what another armtempo program that has the port says
+    FILE: what '--log-traffic FILE' recorded; without it, what another armtempo program that has the port says
     and hears, else the board is asked once a second. Ctrl-C ends it; a motion under way goes on.
     With --json each line is a document.
     """

@@ -19,4 +19,4 @@ def command(port: str | None, log_traffic: Path | None, as_json: bool) -> None:
 
     The drivers hold meanwhile. A run, its pauses counted, lasts at most 1 h 49 min.
     """
-    change(port, log_traffic, Asked("pause", 0, "paused"), as_json)
+    change(port, log_traffic, Asked("pause", lambda board: board.pause(), "paused", 0.0), as_json)

@@ -27,9 +27,15 @@ class ProgressBar:
         self._stack = ExitStack()
         self._bar: Any = None
         self._shown = 0
+        self._stage = ""
+
+    def stage(self, name: str) -> None:
+        """What is being done from here on: the note where none is given."""
+        self._stage = name
 
     def __call__(self, done: float, whole: float, note: str = "") -> None:
         """Show how far the work is, with a note before the bar."""
+        note = note or self._stage
         if self._bar is None and done < whole and self._wanted():
             self._bar = self._stack.enter_context(
                 click.progressbar(length=1000, label=self._label, file=sys.stderr, width=0)

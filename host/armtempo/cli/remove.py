@@ -15,7 +15,10 @@ from armtempo.cli import chosen, options, results
 @options.log_traffic
 @options.as_json
 def command(names: tuple[str, ...], port: str | None, log_traffic: Path | None, as_json: bool) -> None:
-    """Remove the stored motions NAMES from the board."""
+    """Remove stored motions from the board.
+
+    NAMES: as 'armtempo list' shows them.
+    """
     with chosen.board(port, log_traffic) as board:
         for name in names:
             board.remove(name)

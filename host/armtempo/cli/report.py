@@ -24,10 +24,10 @@ from armtempo.cli import messages, options, results
 @options.force("any other file too")
 @options.as_json
 def command(runs: tuple[Path, ...], out: Path | None, force: bool, as_json: bool) -> None:
-    """Write report.html and its figures into the run folder RUNS, of a motion or a sequence.
+    """Write report.html and its figures into a run folder, of a motion or a sequence.
 
-    With two or more run folders, each gets its page, and one more page compares them. One that cannot be read
-    is named there.
+    RUNS: run folders. With two or more, each gets its page, and one more page compares them. One that cannot be
+    read is named there.
     """
     from armtempo import pipeline
     from armtempo.basics.errors import InputError, RunFolderError

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
-from armtempo_shared.messages import RESUME
 
 from armtempo.cli import options
 from armtempo.cli.speed import Asked, change
@@ -17,4 +16,4 @@ from armtempo.cli.speed import Asked, change
 @options.as_json
 def command(port: str | None, log_traffic: Path | None, as_json: bool) -> None:
     """Go on along the path at the speed before the pause."""
-    change(port, log_traffic, Asked("resume", RESUME, "going on"), as_json)
+    change(port, log_traffic, Asked("resume", lambda board: board.resume(), "going on"), as_json)

@@ -46,7 +46,7 @@ def command(
 ) -> None:
     """Replay a motion and record it, or run a sequence.
 
-    WHAT is a trajectory file or the name of a motion on the board, or a planned sequence or the name of one on the
+    WHAT: a trajectory file or the name of a motion on the board, or a planned sequence or the name of one on the
     board, whose step and cycle are shown. The samples go into a new run folder.
     The arm must be homed ('armtempo home') and stand where the motion begins ('armtempo goto'); a virtual
     board sees to that itself. Between repetitions the arm returns along the same path. Ctrl-C brakes, and so

@@ -23,7 +23,10 @@ if TYPE_CHECKING:
 def command(
     name: str, arm_path: Path | None, port: str | None, log_traffic: Path | None, as_json: bool
 ) -> None:
-    """Show the stored motion NAME, read back."""
+    """Show a stored motion, read back.
+
+    NAME: as 'armtempo list' shows it.
+    """
     named = chosen.named_arm(arm_path)
     with chosen.board(port, log_traffic) as board:
         motion = board.read(name, chosen.arm_of_board(board, named))

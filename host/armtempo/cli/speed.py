@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
-from armtempo_shared.messages import RESUME
+from armtempo_shared import wire
 
-from armtempo.basics.errors import LinkError
+from armtempo.basics.errors import BoardError, LinkError
 from armtempo.cli import chosen, options, results
+
+if TYPE_CHECKING:
+    from armtempo.robot.board import Board
+    from armtempo.robot.shared_board import SharedBoard
 
 
 @click.command()
@@ -20,13 +26,15 @@ from armtempo.cli import chosen, options, results
 def command(percent: float, port: str | None, log_traffic: Path | None, as_json: bool) -> None:
     """Let what moves go on at PERCENT of its planned speed.
 
+    PERCENT: 1 to 100.
+
     The arm stays on its path; the speed goes over smoothly, in the time in which the motion can brake. Where another
     armtempo program has the port, it is asked to do it, and what it starts later runs at that speed too.
     """
-    from armtempo.robot.speed import permille
-
-    asked = Asked("speed", permille(percent / 100), f"{percent:g} % of the planned speed")
-    change(port, log_traffic, asked, as_json)
+    words = f"{percent:g} % of the planned speed"
+    change(
+        port, log_traffic, Asked("speed", lambda board: board.speed(percent / 100), words, percent), as_json
+    )
 
 
 @dataclass(frozen=True)
@@ -35,30 +43,33 @@ class Asked:
 
     what: str
     """The command."""
-    rate: int
-    """In thousandths of the planned speed, or RESUME."""
+    ask: Callable[[Board | SharedBoard], None]
     words: str
+    percent: float | None = None
+    """Of the planned speed; None: as before the pause."""
 
 
 def change(port: str | None, log_traffic: Path | None, asked: Asked, as_json: bool) -> None:
-    """Ask for a rate, through the program that has the port where there is one, and say so."""
+    """Ask for it, through the program that has the port where there is one, and say so."""
     name = chosen.port(port, others=True)
-    program = _ask(name, log_traffic, asked.rate)
-    percent = None if asked.rate == RESUME else asked.rate / 10
-    values = {"asked": asked.what, "speed_percent": percent, "port": name, "program": program}
+    program = _ask(name, log_traffic, asked)
+    values = {"asked": asked.what, "speed_percent": asked.percent, "port": name, "program": program}
     results.show(as_json, values, [asked.words + (f", through {program}" if program else "")])
 
 
-def _ask(name: str, log_traffic: Path | None, rate: int) -> str | None:
-    """Ask for the rate; through which program, None where over the port itself."""
+def _ask(name: str, log_traffic: Path | None, asked: Asked) -> str | None:
+    """Ask for it; through which program, None where over the port itself."""
     from armtempo.robot.shared_board import SharedBoard
-    from armtempo.robot.speed import change_speed
 
     with chosen.shared_or_own(name, log_traffic) as board:
-        if isinstance(board, SharedBoard):
-            board.speed(rate)
-            return board.program
-        if not board.status().moving:
+        if asked.what == "speed" and not isinstance(board, SharedBoard) and not board.status().moving:
             raise LinkError("nothing moves", "'armtempo run --speed' begins at a lower speed")
-        change_speed(board.client, rate)
-    return None
+        try:
+            asked.ask(board)
+        except BoardError as error:
+            if error.code != wire.ERROR_CODES["not_moving"]:
+                raise
+            raise LinkError(
+                f"there is nothing to {asked.what}: nothing moves", "start a motion first"
+            ) from None
+        return board.program if isinstance(board, SharedBoard) else None

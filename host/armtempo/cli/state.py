@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from armtempo.cli import chosen
-from armtempo.robot.board_state import BoardState, JointState, SequenceStand
+from armtempo.robot.board_state import BoardState, JointState, SequenceStand, ToolPlace
 
 
 def lines(state: BoardState) -> list[str]:
@@ -64,11 +64,19 @@ def _rest(state: BoardState) -> str:
 
 
 def joint_lines(state: BoardState) -> list[str]:
-    """A line a joint: its name, its angle with the steps, the encoder's angle with the counts."""
+    """A line a joint: its name, its angle with the steps, the encoder's angle with the counts; and the tool."""
     from armtempo.formats.text_table import aligned
 
     rows = [_cells(joint) for joint in state.joints]
-    return [row.rstrip() for row in aligned(rows, (12, 10, 1, 1))] if rows else []
+    lines = [row.rstrip() for row in aligned(rows, (12, 10, 1, 1))] if rows else []
+    return [*lines, f"tool at {tool_words(state.tool)}"] if state.tool else lines
+
+
+def tool_words(tool: ToolPlace) -> str:
+    """Where the tool is, in one line."""
+    x, y, z = tool.position_mm
+    roll, pitch, yaw = tool.rpy_deg
+    return f"{x:.1f} {y:.1f} {z:.1f} mm, roll {roll:.1f}° pitch {pitch:.1f}° yaw {yaw:.1f}°"
 
 
 def _link(state: BoardState) -> str:

@@ -41,7 +41,7 @@ def command(
 ) -> None:
     """Teach: keep where the arm stands.
 
-    JOB.toml collects via points into a job file that plans at once: by the keys of 'armtempo jog' and p for a point,
+    JOB.toml: a job file that collects via points and plans at once: by the keys of 'armtempo jog' and p for a point,
     or --by-hand. --posture NAME writes one posture into the arm file, whose comments and layout stay, and moves
     nothing; then 'armtempo goto NAME' brings the arm there, and a job may pass it: [[via]] posture = "NAME".
     """

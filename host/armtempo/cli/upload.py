@@ -33,7 +33,10 @@ def command(
     log_traffic: Path | None,
     as_json: bool,
 ) -> None:
-    """Store a trajectory file, or a planned sequence with its motions, on the board."""
+    """Store a trajectory file, or a planned sequence with its motions, on the board.
+
+    FILE: what 'armtempo plan' has written.
+    """
     from armtempo.model.sequence_plan import is_sequence_plan
     from armtempo.records import encoded_motion
 

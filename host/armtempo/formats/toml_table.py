@@ -6,7 +6,7 @@ import math
 import reprlib
 import sys
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -180,12 +180,16 @@ class Table:
                 found.append((name, table))
         return found
 
-    def tables(self, key: str) -> list[Table]:
-        """A list of tables ([[key]]), at least one."""
+    def tables(self, key: str, called: Callable[[int], str] | None = None) -> list[Table]:
+        """A list of tables ([[key]]), at least one; ``called``: what a message calls each, by its number from 0."""
         entries = self.array(key, f"a list of tables, [[{key}]]")
         if not all(isinstance(entry, dict) for entry in entries):
             raise self.fail(key, f"a list of tables, [[{key}]]")
-        return [Table(entry, self.file, f"{self.place}{key}[{n}].") for n, entry in enumerate(entries, 1)]
+        names = map(called or (lambda n: f"{key}[{n + 1}]"), range(len(entries)))
+        return [
+            Table(entry, self.file, f"{self.place}{name}.")
+            for entry, name in zip(entries, names, strict=True)
+        ]
 
     def rest(self) -> dict[str, Any]:
         """All values of the table, for a caller that checks the keys itself."""

@@ -46,13 +46,13 @@ BRANCHES = tuple(Branch(base, elbow, wrist) for base in BASES for elbow in ELBOW
 
 
 def branch_of(geometry: Geometry, angles_rad: ArrayLike) -> Branch:
-    """Name the branch of joint angles, shape (6,). Raises InputError for an arm outside the class."""
+    """Name the branch of joint angles, shape (joints,). Raises InputError for an arm outside the class."""
     shape = Shape.of(geometry)
-    theta = np.asarray(angles_rad, dtype=np.float64) + np.array(shape.joint_offset)
+    theta = np.asarray(angles_rad, dtype=np.float64)[geometry.core] + np.array(shape.joint_offset)
     stretch = shape.sign2 * theta[2] + shape.bend
     direction = theta[1] - shape.turn2
     forward = shape.shoulder + shape.upper * np.cos(direction) + shape.fore * np.cos(direction + stretch)
-    base = _sign(forward / geometry.reach)
+    base = _sign(forward / geometry.moving.reach)
     elbow = -shape.sign1 * (base or 1) * _sign(np.sin(stretch))
     return Branch(_word(BASES, base), _word(ELBOWS, elbow), _word(WRISTS, _sign(np.sin(theta[4]))))
 

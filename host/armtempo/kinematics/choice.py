@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from armtempo.basics.arrays import Array
 from armtempo.kinematics.branches import BRANCHES, Branch
+from armtempo.kinematics.folding import folded
 from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.inverse import inverse_of_pose, wrist_centre
 from armtempo.kinematics.ranges import Ranges
@@ -26,7 +27,7 @@ class Candidate:
     """1 to 8."""
     branch: Branch
     angles_rad: Array
-    """(6,): whole turns added to lie in the ranges, nearest to the previous posture; NaN if unreachable."""
+    """(joints,): whole turns added to lie in the ranges, nearest to the previous posture; NaN if unreachable."""
     rejections: tuple[Rejection, ...]
     """Why not; empty for a solution that can be used."""
     singular: int
@@ -53,7 +54,7 @@ class Choice:
 def choose(
     geometry: Geometry, pose: ArrayLike, ranges: Ranges, previous_rad: ArrayLike, unit: str = "mm"
 ) -> Choice:
-    """Solve one pose, shape (4, 4), and choose; ``previous_rad`` has shape (6,).
+    """Solve one pose, shape (4, 4), and choose; ``previous_rad`` has shape (joints,).
 
     ``unit`` names the geometry's unit of length in the reasons. Raises InputError for an arm outside the
     class.
@@ -62,7 +63,7 @@ def choose(
     matrix = np.asarray(pose, dtype=np.float64)
     previous = np.asarray(previous_rad, dtype=np.float64).tolist()
     solutions = inverse_of_pose(geometry, matrix.ravel().tolist(), previous)
-    wrist = WristCentre(shape, wrist_centre(shape, matrix.reshape(16, 1))[:, 0], unit)
+    wrist = WristCentre(shape, wrist_centre(shape, folded(geometry, matrix).reshape(16, 1))[:, 0], unit)
     candidates = []
     for i, branch in enumerate(BRANCHES):
         placed = ranges.placed(solutions.angles_rad[i], previous)

@@ -25,6 +25,10 @@ class Link(NamedTuple):
     offset: float
 
 
+STILL_DEG = 0.01
+"""A joint without a motor whose range is no wider than this never turns."""
+
+
 @dataclass(frozen=True)
 class Geometry:
     """Denavit-Hartenberg rows, standard (distal) convention, revolute joints only.
@@ -41,6 +45,8 @@ class Geometry:
     linked: tuple[int, ...] = ()
     """Indices of the joints that a parallel linkage turns: their angle less that of the joint before is what the
     row turns by."""
+    still: tuple[tuple[int, float], ...] = ()
+    """Indices and angles of rows that never turn: a pedestal under the arm, a tool on it."""
 
     @classmethod
     def of(cls, arm: Arm) -> Geometry:
@@ -51,6 +57,11 @@ class Geometry:
             alpha=tuple(math.radians(joint.alpha_deg) for joint in arm.joints),
             offset=tuple(math.radians(joint.theta_offset_deg) for joint in arm.joints),
             linked=tuple(i for i, joint in enumerate(arm.joints) if joint.parallel_linkage),
+            still=tuple(
+                (i, math.radians(joint.home_deg))
+                for i, joint in enumerate(arm.joints)
+                if joint.motor is None and joint.range_deg[1] - joint.range_deg[0] <= STILL_DEG
+            ),
         )
 
     @cached_property
@@ -67,6 +78,28 @@ class Geometry:
         for joint in self.linked:
             turns[joint] = angles[joint] - angles[joint - 1]
         return turns
+
+    @cached_property
+    def core(self) -> slice:
+        """The joints between the rows that never turn at the base and at the tool."""
+        still = {index for index, _ in self.still}
+        first, end = 0, self.joints
+        while first in still:
+            first += 1
+        while end - 1 in still and end > first:
+            end -= 1
+        return slice(first, end)
+
+    @cached_property
+    def moving(self) -> Geometry:
+        """That of the joints of ``core`` alone; itself where these are all."""
+        if self.core == slice(0, self.joints):
+            return self
+        first, end = self.core.start, self.core.stop
+        d, a, alpha, offset = (row[self.core] for row in (self.d, self.a, self.alpha, self.offset))
+        linked = tuple(joint - first for joint in self.linked)
+        still = tuple((index - first, angle) for index, angle in self.still if first <= index < end)
+        return Geometry(d, a, alpha, offset, linked, still)
 
     @property
     def joints(self) -> int:

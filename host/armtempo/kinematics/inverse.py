@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armtempo.basics.arrays import Array
 from armtempo.kinematics import formulas
+from armtempo.kinematics.folding import folded, spread, unfolded
 from armtempo.kinematics.formulas import ARRAYS
 from armtempo.kinematics.geometric import ArmPart, duplicates, on_border, solve_arm
 from armtempo.kinematics.geometry import Geometry
@@ -34,9 +36,13 @@ CHUNK = 8192
 def inverse(geometry: Geometry, poses: ArrayLike, previous_rad: ArrayLike | None = None) -> Solutions:
     """Return all solutions for ``poses``, shape (N, 4, 4) or (4, 4), lengths in the geometry's unit.
 
-    ``previous_rad``, (6,) or (N, 6), default all zero, decides what a singular pose leaves free. The rotation
+    ``previous_rad``, (joints,) or (N, joints), default all zero, decides what a singular pose leaves free. The rotation
     part must be a rotation, see ``pose.checked``. Raises InputError for an arm outside the class.
     """
+    if geometry.moving is not geometry:
+        own = None if previous_rad is None else np.asarray(previous_rad, dtype=float)[..., geometry.core]
+        found = inverse(geometry.moving, folded(geometry, np.asarray(poses, dtype=np.float64)), own)
+        return replace(found, angles_rad=unfolded(geometry, found.angles_rad))
     shape = Shape.of(geometry)
     matrices = np.asarray(poses, dtype=np.float64)
     previous = np.zeros(6) if previous_rad is None else np.asarray(previous_rad, dtype=np.float64)
@@ -63,13 +69,18 @@ def inverse(geometry: Geometry, poses: ArrayLike, previous_rad: ArrayLike | None
 
 
 def inverse_of_pose(
-    geometry: Geometry, pose: Sequence[float], previous_rad: Sequence[float] = (0.0,) * 6
+    geometry: Geometry, pose: Sequence[float], previous_rad: Sequence[float] | None = None
 ) -> PoseSolutions:
     """Return all solutions for one pose with plain numbers alone, several times as fast as by arrays.
 
-    ``pose``: its 12 or 16 elements in row order; ``previous_rad``: 6 angles. Otherwise as ``inverse``.
+    ``pose``: its 12 or 16 elements in row order; ``previous_rad``: an angle for each joint. Otherwise as ``inverse``.
     """
+    if geometry.moving is not geometry:
+        rows = folded(geometry, np.append(pose[:12], (0.0, 0.0, 0.0, 1.0)).reshape(4, 4)).ravel().tolist()
+        found = inverse_of_pose(geometry.moving, rows, previous_rad and previous_rad[geometry.core])
+        return found._replace(angles_rad=[spread(geometry, angles) for angles in found.angles_rad])
     shape = Shape.of(geometry)
+    previous_rad = (0.0,) * 6 if previous_rad is None else previous_rad
     previous = [angle + offset for angle, offset in zip(previous_rad, shape.joint_offset, strict=True)]
     return solve_pose(shape, pose, previous)
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from armtempo.basics.arguments import checked
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.kinematics.chain import spread_deg
@@ -17,7 +19,7 @@ from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.numerical import NumericalSolution
 from armtempo.kinematics.solver import Answer, PoseSolver
 from armtempo.model.arm import Arm
-from armtempo.model.pose import checked
+from armtempo.model.pose import checked as checked_pose
 from armtempo.model.tool_pose import Pose
 
 
@@ -44,26 +46,33 @@ class Solution:
         return not self.rejections
 
 
-def forward(arm: Arm, angles_deg: ArrayLike) -> Array:
+@checked
+def forward(arm: Arm | Path | str, angles_deg: ArrayLike) -> Array:
     """The tool's pose, Eq. (1): (..., 4, 4), lengths in mm, in the frame of the base.
 
-    ``angles_deg``: of all joints, (..., joints), or of the driven ones, (..., J), with the others at home.
-    Raises InputError for another number of angles.
+    ``arm``: or its file or name. ``angles_deg``: of all joints, (..., joints), or of the driven ones, (..., J), with
+    the others at home. Raises InputError for another number of angles.
     """
+    arm = Arm.shape(arm)
     return forward_rad(Geometry.of(arm), np.radians(spread_deg(arm, angles_deg)))
 
 
-def inverse(arm: Arm, pose: Pose | ArrayLike, near_deg: ArrayLike | None = None) -> tuple[Solution, ...]:
+@checked
+def inverse(
+    arm: Arm | Path | str, pose: Pose | ArrayLike, near_deg: ArrayLike | None = None
+) -> tuple[Solution, ...]:
     """All solutions for a pose of the tool: those that can be used first, the nearest to ``near_deg`` first.
 
     ``pose``: (4, 4) or (3, 4), lengths in mm, or a Pose, which may ask for less than the whole orientation.
     ``near_deg``, (joints,) or (J,), is the posture to stay near to; None: home. A whole pose of an arm of the
     closed form's class has eight solutions, some perhaps rejected. Any other arm or pose gets what a numerical
-    search finds with the joints that have a motor, perhaps nothing; a pose that leaves joints free gets the one
-    solution that the search comes to first. Raises InputError for a matrix that is no pose.
+    search finds with the joints that have a motor, perhaps nothing: of a pose that asks for fewer numbers than joints
+    move the one that the search comes to first, else all, but at most 16 where one turns into the next, as at a
+    singular pose. Raises InputError for a matrix that is no pose.
     """
+    arm = Arm.shape(arm)
     near = PoseSolver(arm).home_rad if near_deg is None else _posture(arm, near_deg)
-    target = pose.exact() if isinstance(pose, Pose) else Pose.of_matrix(checked(pose))
+    target = pose.exact() if isinstance(pose, Pose) else Pose.of_matrix(checked_pose(pose))
     solutions = _solutions(PoseSolver(arm).solve(target, tuple(near)))
     return tuple(
         sorted(solutions, key=lambda one: (not one.usable, np.nan_to_num(one.distance_deg, nan=np.inf)))

@@ -99,8 +99,9 @@ class Shape:
     @classmethod
     @lru_cache(maxsize=64)
     def of(cls, geometry: Geometry) -> Shape:
-        """Take the constants of ``geometry``; InputError with all reasons if it is outside the class."""
+        """Take the constants of ``geometry.moving``; InputError with all reasons if it is outside the class."""
         reasons = refusals(geometry)
+        geometry = geometry.moving
         if reasons:
             raise InputError(
                 "no closed-form inverse for this arm: " + "; ".join(reasons), "use the numerical solver"
@@ -133,7 +134,11 @@ class Shape:
 
 
 def refusals(geometry: Geometry) -> list[str]:
-    """Say why the closed form does not serve ``geometry``, one reason a line; empty if it does."""
+    """Say why the closed form does not serve ``geometry``, one reason a line; empty if it does.
+
+    Rows at the base and at the tool that never turn do not count.
+    """
+    geometry = geometry.moving
     if geometry.joints != 6:
         return [f"it has {geometry.joints} joints, not 6"]
     if geometry.linked:

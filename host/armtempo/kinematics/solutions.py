@@ -27,7 +27,7 @@ class Solutions:
     """
 
     angles_rad: Array
-    """(N, 8, 6): joint angles in [-pi, pi]; NaN where out of reach."""
+    """(N, 8, joints): joint angles in [-pi, pi]; NaN where out of reach."""
     outcome: NDArray[np.uint8]
     """(N, 8): OK, TOO_FAR, TOO_NEAR, IN_OFFSET or DUPLICATE."""
     singular: NDArray[np.uint8]
@@ -38,7 +38,7 @@ class PoseSolutions(NamedTuple):
     """The eight solutions of one pose, as plain numbers; order and meaning as in ``Solutions``."""
 
     angles_rad: list[tuple[float, ...]]
-    """8 times 6."""
+    """8 times joints."""
     outcome: list[int]
     """8"""
     singular: list[int]

@@ -125,10 +125,10 @@ def _check_program(board: Client) -> None:
     if board.info.program_crc != own_crc():
         raise LinkError(
             (
-                f"the board on {board.session.transport.name} runs another version of the board program than the "
-                "one installed here"
+                f"the board on {board.session.transport.name} runs version {board.info.program_crc:08x} of the board "
+                f"program, installed here is {own_crc():08x}"
             ),
-            "bring it up to date with 'armtempo deploy'",
+            "bring it up to date: 'armtempo flash' if the program is in its firmware, else 'armtempo deploy'",
         )
 
 

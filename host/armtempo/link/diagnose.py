@@ -13,8 +13,10 @@ _REPL_SIGNS = (b">>>", b"raw REPL")
 """Bytes by which a REPL is known; not the firmware's name, which the program's answer to ``hello`` has too."""
 _FRAME_SIGNS = (bytes((SYNC,)), bytes((wire.EVENT["ok"][1], wire.COMMAND["hello"][1])))
 """A frame's first byte, or what an answer to ``hello`` begins with."""
-_NUDGE = b"\r\x02\r"
-"""Ends a line, leaves a raw REPL, asks for a prompt; the board program ignores it."""
+_ECHO = b"#armtempo?"
+_NUDGE = b"\r\x02\r" + _ECHO + b"\r"
+"""Ends a line, leaves a raw REPL, and writes a comment, which a prompt echoes even inside an unfinished line; the board
+program ignores it."""
 
 _ASK = b"print('armtempo','is','here')if'armtempo'in open('/flash/main.py').read()else 0\r"
 _HERE = b"armtempo is here"
@@ -26,7 +28,7 @@ def explain(transport: Transport, heard: bytes) -> LinkError:
     transport.write(_NUDGE)
     heard += _listen(transport)
     where = f"the board on {transport.name}"
-    if any(sign in heard for sign in _REPL_SIGNS):
+    if _ECHO in heard or any(sign in heard for sign in _REPL_SIGNS):
         transport.write(_ASK)
         if _HERE in _listen(transport):
             return NoProgramError(
@@ -36,7 +38,7 @@ def explain(transport: Transport, heard: bytes) -> LinkError:
             )
         return NoProgramError(
             f"{where} runs MicroPython but not the armtempo program",
-            "install it with 'armtempo deploy'",
+            "'armtempo flash' puts it into the firmware; 'armtempo deploy' then starts it",
         )
     if any(sign in heard for sign in _FRAME_SIGNS):
         return DisturbedError(

@@ -65,8 +65,8 @@ class Session:
         """Whether a stop was asked for: then a broken port is tried again for STOPPING_RECONNECT_S only."""
         self.check: Callable[[], None] = lambda: None
         """Called before the port is used; raises PortError where it is no longer this program's."""
-        self.heard: Callable[[board_messages.Event], None] = lambda event: None
-        """Called with each event when it arrives."""
+        self.listeners: list[Callable[[board_messages.Event], None]] = []
+        """Each is called with every event when it arrives, in the thread that reads the port."""
         self.turns = Turns()
         self.events: deque[board_messages.Event] = deque()
         self.recent = bytearray()
@@ -253,7 +253,8 @@ class Session:
         except wire.WireError:
             return  # a reply to an older command, or a message of a newer protocol
         self.events.append(event)
-        self.heard(event)
+        for listener in self.listeners:
+            listener(event)
 
 
 _REPLY_IDS = tuple(wire.EVENT[name][1] for name in ("ok", "error"))

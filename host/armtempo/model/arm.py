@@ -9,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
+from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
 from armtempo.formats import json_codec, toml_table
 from armtempo.formats.spelling import did_you_mean
@@ -16,13 +17,17 @@ from armtempo.formats.toml_table import Table
 from armtempo.model import boards, outputs_file, parts_file, pin_use, pose_table, shipped
 from armtempo.model import posture as named
 from armtempo.model.outputs import Input, Output
-from armtempo.model.parts import DrivenJoint, Driver, Joint, Motor, Safety
+from armtempo.model.parts import DrivenJoint, Driver, Joint, Limits, Motor, Safety
 from armtempo.model.posture import ArmPosture
 from armtempo.model.tool_pose import Pose
 
 _REACHES_MM = 1e-6
+STILL_DEG = 0.01
+"""A joint of so narrow a range is a constant row of the table, such as a tool's."""
 
 
+@checked
+@checked_fields
 @dataclass(frozen=True)
 class Arm:
     """An arm; ``source`` is the file that it was read from."""
@@ -42,6 +47,22 @@ class Arm:
     homing: tuple[tuple[str, ...], ...] = field(default=(), metadata=json_codec.ADDED)
     """Names of the joints that are homed first, together those of an entry; the others follow one by one."""
 
+    def __post_init__(self) -> None:
+        """InputError for what no file could say either."""
+        object.__setattr__(self, "joints", tuple(self.joints))
+        if not self.joints:
+            raise InputError(f"arm {self.name!r} has no joints", "give at least one Joint")
+        if self.board not in boards.BOARDS:
+            raise InputError(
+                f"arm {self.name!r}: board {self.board!r} is not known",
+                f"give one of {', '.join(boards.BOARDS)}",
+            )
+
+    @classmethod
+    def of(cls, arm: Arm | Path | str) -> Arm:
+        """The arm itself, or the one of a file or name as ``load`` finds it."""
+        return arm if isinstance(arm, Arm) else cls.load(arm)
+
     @classmethod
     def load(cls, path: Path | str) -> Arm:
         """The arm described by a TOML file, or the one of that name that ships, such as ``"ar4"``; a file wins.
@@ -55,6 +76,25 @@ class Arm:
         for problem in pin_use.problems(arm):
             raise InputError(f"{path}: {problem.where}: {problem.what}", problem.next_step)
         return arm
+
+    @classmethod
+    def shape(cls, arm: Arm | Path | str) -> Arm:
+        """The arm for its kinematics: as ``of``, but where no joint has a motor yet, each that can turn gets one."""
+        if not isinstance(arm, Arm):
+            path = shipped.find(arm).path
+            arm = cls.read(path)
+            if arm.driven_indices:
+                return cls.load(path)
+        if arm.driven_indices:
+            return arm
+        motor, limits = Motor(1, 200, 16, 1.0), Limits(1.0, 1.0, 1.0)
+        turning = [
+            replace(joint, motor=motor, limits=limits)
+            if joint.range_deg[1] - joint.range_deg[0] > STILL_DEG
+            else joint
+            for joint in arm.joints
+        ]
+        return replace(arm, joints=tuple(turning))
 
     @classmethod
     def read(cls, path: Path | str) -> Arm:

@@ -70,13 +70,8 @@ def _output_problem(output: Output) -> str:
 
 
 def _problem(joint: Joint) -> str:
-    motor, encoder = joint.motor, joint.encoder
-    if motor is None:
+    if joint.motor is None:
         return ""
     if joint.limits is None or min(joint.limits.values) <= 0:
         return "has no limits above 0"
-    if min(motor.steps_per_rev, motor.microsteps, motor.gear_ratio) <= 0:
-        return "its motor's figures must be above 0"
-    if encoder is not None and encoder.counts_per_rev <= 0:
-        return "its encoder's counts_per_rev must be above 0"
     return ""

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from armtempo_shared.limits import MAX_NAME, MAX_SEGMENTS
 
+from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
 from armtempo.formats import json_codec, toml_table
 from armtempo.formats.toml_table import Table
@@ -26,11 +27,17 @@ AUTO = "auto"
 
 REFINE, POPULATION, ITERATIONS, STARTS = (1, 64), (4, 100_000), (1, 1_000_000), (1, 1000)
 """Least and largest values of these settings."""
+SEED = (0, 2**63 - 1)
+DEGREES = (3, 5)
+_BOUNDS = "two times in seconds above 0, the shorter first"
 MOST_DWELL_S = 600.0
+NAME_RULE = f"at most {MAX_NAME} of the characters a-z A-Z 0-9 - _"
+_LETTERS = string.ascii_letters + string.digits + "-_"
 OPTIMISERS = (*ALGORITHMS, GRADIENT)
 """Names that a job may give as its optimiser."""
 
 
+@checked_fields
 @dataclass(frozen=True)
 class Stop:
     """A rest at via point ``via``, counted from 0, for ``dwell_s``."""
@@ -39,6 +46,8 @@ class Stop:
     dwell_s: float = 0.0
 
 
+@checked
+@checked_fields
 @dataclass(frozen=True)
 class Job:
     """A motion to plan: through ``via`` in order, from rest to rest.
@@ -80,16 +89,54 @@ class Job:
 
     def __post_init__(self, via_deg: Sequence[Sequence[float]] | None) -> None:
         if via_deg is not None:
-            rows = tuple(tuple(float(angle) for angle in row) for row in via_deg)
-            object.__setattr__(self, "via", rows)
+            object.__setattr__(self, "via", via_deg)
+        vias = (via if isinstance(via, Pose) else tuple(map(float, via)) for via in self.via)
+        object.__setattr__(self, "via", tuple(vias))
+        self._check()
+
+    def _check(self) -> None:
+        """InputError for settings that no planner knows or the board cannot keep."""
+        if not is_name(self.name):
+            raise InputError(f"job {self.name!r}: the board keeps no such name", f"give {NAME_RULE}")
+        for key, allowed in (
+            ("timing", TIMINGS),
+            ("path", PATHS),
+            ("degree", DEGREES),
+            ("optimiser", OPTIMISERS),
+        ):
+            if (value := getattr(self, key)) not in allowed:
+                raise InputError(
+                    f"job {self.name!r}: {key} {value!r} is not allowed",
+                    f"give {' or '.join(map(repr, allowed))}",
+                )
+        if isinstance(self.refine, str) and self.refine != AUTO:
+            raise InputError(
+                f"job {self.name!r}: refine {self.refine!r} is not allowed", f"give {AUTO!r} or a number"
+            )
+        if self.bounds_s is not None and not 0.0 < self.bounds_s[0] < self.bounds_s[1]:
+            raise InputError(f"job {self.name!r}: bounds_s {self.bounds_s} is not allowed", f"give {_BOUNDS}")
+        ranges = {"population": POPULATION, "iterations": ITERATIONS, "starts": STARTS, "seed": SEED}
+        if not isinstance(self.refine, str):
+            ranges["refine"] = REFINE
+        for key, (least, most) in ranges.items():
+            if not least <= getattr(self, key) <= most:
+                raise InputError(
+                    f"job {self.name!r}: {key} {getattr(self, key)} must be a whole number from {least} to {most}",
+                    f"give {key} such a number, or leave it out",
+                )
 
     @classmethod
-    def load(cls, path: Path | str, arm: Arm) -> Job:
+    def of(cls, job: Job | Path | str, arm: Arm) -> Job:
+        """The job itself, or the one of a file as ``load`` finds it."""
+        return job if isinstance(job, Job) else cls.load(job, arm)
+
+    @classmethod
+    def load(cls, path: Path | str, arm: Arm | Path | str) -> Job:
         """The job described by a TOML file, for this arm.
 
         Raises InputError, naming file, key and value, for anything missing, unknown or not allowed.
         """
-        return cls.of_table(toml_table.read(path), arm)
+        return cls.of_table(toml_table.read(path), Arm.of(arm))
 
     @classmethod
     def of_table(cls, top: Table, arm: Arm) -> Job:
@@ -103,7 +150,7 @@ class Job:
             path=top.choice("path", PATHS, cls.path),
             corridor_deg=_corridor(top, "corridor_deg"),
             corridor_mm=_corridor(top, "corridor_mm"),
-            degree=top.choice("degree", (3, 5), cls.degree),
+            degree=top.choice("degree", DEGREES, cls.degree),
             timing=top.choice("timing", TIMINGS, cls.timing),
             refine=_refine(top),
             optimiser=top.choice("optimiser", OPTIMISERS, cls.optimiser),
@@ -111,7 +158,7 @@ class Job:
             iterations=top.integer("iterations", cls.iterations, least=ITERATIONS[0], most=ITERATIONS[1]),
             parameters=parameters.rest() if parameters else {},
             starts=top.integer("starts", cls.starts, least=STARTS[0], most=STARTS[1]),
-            seed=top.integer("seed", cls.seed, least=0, most=2**63 - 1),
+            seed=top.integer("seed", cls.seed, least=SEED[0], most=SEED[1]),
             bounds_s=_bounds(top),
             polish=top.boolean("polish", cls.polish),
             source=top.file,
@@ -121,7 +168,11 @@ class Job:
 
     @classmethod
     def from_csv(
-        cls, path: Path | str, arm: Arm, radians: bool = False, tolerance_deg: float | None = None
+        cls,
+        path: Path | str,
+        arm: Arm | Path | str,
+        radians: bool = False,
+        tolerance_deg: float | None = None,
     ) -> Job:
         """A job through the via points of a CSV file: a line for each point, a column for each driven joint.
 
@@ -130,14 +181,14 @@ class Job:
         with line and value for what is no angle.
         """
         file = Path(path)
-        found = via_table.via_from_csv(file, arm, radians, tolerance_deg)
+        found = via_table.via_from_csv(file, Arm.of(arm), radians, tolerance_deg)
         timing = cls.timing if found.thinned_to_deg is None else "shared"
         return cls(file.stem, via_deg=found.via_deg.tolist(), timing=timing)
 
     @classmethod
-    def paper(cls, arm: Arm | None = None) -> Job:
+    def paper(cls, arm: Arm | Path | str | None = None) -> Job:
         """The job that ships with armtempo: the paper's feeding motion, for its arm or ``arm``."""
-        return cls.load(shipped.job_path(), arm or Arm.paper())
+        return cls.load(shipped.job_path(), arm or shipped.arm_path())
 
 
 def _corridor(top: Table, key: str) -> float | None:
@@ -158,17 +209,21 @@ def _bounds(top: Table) -> tuple[float, float] | None:
         return None
     low, high = top.numbers("bounds_s", 2)
     if not 0.0 < low < high:
-        raise top.fail("bounds_s", "two times in seconds above 0, the shorter first")
+        raise top.fail("bounds_s", _BOUNDS)
     return low, high
 
 
 def name_of(top: Table, longest: int = MAX_NAME, key: str = "name") -> str:
     """The ``name`` of a job or sequence, or what else the board is to keep as a name."""
     name = top.text(key)
-    allowed = string.ascii_letters + string.digits + "-_"
-    if len(name) > longest or any(letter not in allowed for letter in name):
-        raise top.fail(key, f"at most {longest} of the characters a-z A-Z 0-9 - _")
+    if not is_name(name, longest):
+        raise top.fail(key, NAME_RULE.replace(str(MAX_NAME), str(longest)))
     return name
+
+
+def is_name(name: str, longest: int = MAX_NAME) -> bool:
+    """Whether the board can keep something under this name."""
+    return 0 < len(name) <= longest and all(letter in _LETTERS for letter in name)
 
 
 def _vias(top: Table, arm: Arm) -> tuple[tuple[tuple[float, ...] | Pose, ...], tuple[Stop, ...]]:
@@ -178,14 +233,14 @@ def _vias(top: Table, arm: Arm) -> tuple[tuple[tuple[float, ...] | Pose, ...], t
     stops: list[Stop] = []
     if top.has("via_deg"):
         rows = top.array("via_deg", "a list of at least 2 lists of angles")
-        named = Table({f"via_deg[{n}]": row for n, row in enumerate(rows, 1)}, top.file)
+        named = Table({f"via_deg P{n}": row for n, row in enumerate(rows)}, top.file)
         vias: list[tuple[float, ...] | Pose] = [
-            read_angles(named, f"via_deg[{n}]", arm) for n in range(1, len(rows) + 1)
+            read_angles(named, f"via_deg P{n}", arm) for n in range(len(rows))
         ]
     else:
-        tables = top.tables("via")
+        tables = top.tables("via", lambda n: f"via P{n}")
         stops = [_stop(table, n, len(tables)) for n, table in enumerate(tables) if _stops(table)]
-        vias = [_via(table, f"{top.file}: via[{n}]", arm) for n, table in enumerate(tables, 1)]
+        vias = [_via(table, f"{top.file}: via P{n}", arm) for n, table in enumerate(tables)]
     if len(vias) < 2:
         raise InputError(f"{top.file}: {len(vias)} via point is not a motion", "at least 2 are needed")
     if len(vias) - 1 > MAX_SEGMENTS:

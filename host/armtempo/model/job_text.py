@@ -10,7 +10,7 @@ from armtempo_shared.limits import MAX_NAME
 from armtempo.basics.errors import InputError
 
 _HEAD = """\
-# Via points that were taught with 'armtempo teach'; every key: host/docs/files.md
+# Via points that were taught with 'armtempo teach'; every key: armtempo help files
 name = "{name}"
 """
 _VIA = """

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from armtempo_shared.limits import FULL_OUTPUT
 
+from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
 from armtempo.formats.spelling import did_you_mean
 
@@ -16,6 +17,8 @@ _RANGES = {SWITCH: (0.0, 1.0), PWM: (0.0, 1.0)}
 _UNITS = {SWITCH: "", PWM: "duty", SERVO: "deg"}
 
 
+@checked
+@checked_fields
 @dataclass(frozen=True)
 class Output:
     """A pin that is on or off, a pulse width (duty 0 to 1), or a hobby servo (degrees)."""
@@ -110,6 +113,7 @@ class Output:
         return f", or a state: {', '.join(name for name, _ in self.states)}" if self.states else ""
 
 
+@checked_fields
 @dataclass(frozen=True)
 class Input:
     """A pin that is active or not."""

@@ -2,12 +2,41 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 
+from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS
+
+from armtempo.basics.arguments import checked_fields
+from armtempo.basics.errors import InputError
 from armtempo.formats import json_codec
 
+Range = tuple[float, float]
+MOTOR: dict[str, Range] = {
+    "channel": (1, MAX_JOINTS),
+    "steps_per_rev": (4, 10_000),
+    "microsteps": (1, 256),
+    "gear_ratio": (0.1, 10_000.0),
+}
+ENCODER: dict[str, Range] = {
+    "channel": (1, MAX_ENCODERS),
+    "counts_per_rev": (4, 10_000_000),
+    "following_error_deg": (0.0, 360.0),
+}
+"""Least and largest value of each figure."""
 
+
+def _check(part: Motor | Encoder, ranges: Mapping[str, Range]) -> None:
+    """InputError for a figure that no drive has."""
+    for key, (least, most) in ranges.items():
+        if not least <= (value := getattr(part, key)) <= most:
+            raise InputError(f"{type(part).__name__}: {key} is {value:g}", f"give {least:g} to {most:g}")
+    if part.direction not in (1, -1):
+        raise InputError(f"{type(part).__name__}: direction is {part.direction}", "give 1 or -1")
+
+
+@checked_fields
 @dataclass(frozen=True)
 class Limits:
     """Largest magnitudes of one joint's motion (Table 5)."""
@@ -22,6 +51,7 @@ class Limits:
         return self.speed_deg_s, self.acceleration_deg_s2, self.jerk_deg_s3
 
 
+@checked_fields
 @dataclass(frozen=True)
 class Motor:
     """Stepper, driver and gear of one joint (Table 7)."""
@@ -36,12 +66,17 @@ class Motor:
     direction: int = 1
     """1, or -1 where the DIR signal is inverted."""
 
+    def __post_init__(self) -> None:
+        """InputError for figures that no motor has."""
+        _check(self, MOTOR)
+
     @property
     def steps_per_deg(self) -> float:
         """Step pulses per degree of the joint."""
         return self.steps_per_rev * self.microsteps * self.gear_ratio / 360.0
 
 
+@checked_fields
 @dataclass(frozen=True)
 class Encoder:
     """Incremental encoder of one joint."""
@@ -56,7 +91,14 @@ class Encoder:
     following_error_deg: float = 0.0
     """Largest deviation from the command, in degrees of the joint; 0: not watched."""
 
+    def __post_init__(self) -> None:
+        """InputError for figures that no encoder has."""
+        _check(self, ENCODER)
+        if self.on not in ("joint", "motor"):
+            raise InputError(f"Encoder: on is {self.on!r}", "give 'joint' or 'motor'")
 
+
+@checked_fields
 @dataclass(frozen=True)
 class LimitSwitches:
     """Switches of one joint.
@@ -73,6 +115,7 @@ class LimitSwitches:
     high_deg: float | None = None
 
 
+@checked_fields
 @dataclass(frozen=True)
 class JointModel:
     """What the virtual arm simulates of one joint beyond its drive."""
@@ -96,6 +139,7 @@ class JointModel:
     """Standard deviation between repetitions."""
 
 
+@checked_fields
 @dataclass(frozen=True)
 class Joint:
     """One Denavit-Hartenberg row (standard convention) and what moves it; ``motor`` None: not driven."""
@@ -152,6 +196,7 @@ class DrivenJoint:
         return float(self.counts_per_step) * self.steps_per_deg
 
 
+@checked_fields
 @dataclass(frozen=True)
 class Driver:
     """Timing and polarity of the signals that the stepper drivers need."""
@@ -163,6 +208,7 @@ class Driver:
     enable_active: str = "low"
 
 
+@checked_fields
 @dataclass(frozen=True)
 class Safety:
     """E-stop input, and what the board does when it trips or the host disappears."""

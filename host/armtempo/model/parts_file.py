@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS
+from collections.abc import Mapping
 
+from armtempo.basics.errors import InputError
 from armtempo.formats.toml_table import Table
 from armtempo.model import outputs_file
 from armtempo.model.parts import (
+    ENCODER,
+    MOTOR,
     Driver,
     Encoder,
     Joint,
@@ -14,6 +17,7 @@ from armtempo.model.parts import (
     Limits,
     LimitSwitches,
     Motor,
+    Range,
     Safety,
 )
 
@@ -23,9 +27,9 @@ MAX_ANGLE_DEG = 36_000.0
 MAX_LENGTH_MM = 1e6
 """Longest link that an arm file may describe."""
 
-_GEAR_RATIO = (0.1, 10_000.0)
 _LIMITS = {"speed_deg_s": 1e5, "acceleration_deg_s2": 1e7, "jerk_deg_s3": 1e9}
 _LEAST_LIMIT = 0.001
+_LOCKED_DEG = 0.001
 _MODEL = {
     "holding_torque_nm": (0.0, 1e3),
     "rotor_inertia_kg_m2": (0.0, 1.0),
@@ -70,7 +74,13 @@ def safety(table: Table | None) -> Safety:
 
 def joint(table: Table, number: int) -> Joint:
     """A [[joint]] table; ``number`` from 1."""
-    low, high = table.numbers("range_deg", 2)
+    if slides := [key for key in ("type", "range_mm", "mm_per_rev", "home_mm") if table.has(key)]:
+        raise InputError(
+            f"{table.file}: joint[{number}].{slides[0]}: an arm file describes turning joints; sliding ones are not "
+            "supported",
+            "leave the joint out, and move it by other means",
+        )
+    low, high = _locked(table) if table.has("fixed_deg") else table.numbers("range_deg", 2)
     if not -MAX_ANGLE_DEG <= low < high <= MAX_ANGLE_DEG:
         raise table.fail(
             "range_deg", f"two angles, the smaller first, of at most {MAX_ANGLE_DEG:g} either way"
@@ -92,7 +102,7 @@ def joint(table: Table, number: int) -> Joint:
         alpha_deg=table.number("alpha_deg", least=-180.0, most=180.0),
         theta_offset_deg=table.number("theta_offset_deg", 0.0, least=-360.0, most=360.0),
         range_deg=(low, high),
-        home_deg=table.number("home_deg", min(max(0.0, low), high), least=low, most=high),
+        home_deg=_home(table, low, high),
         limits=limits,
         motor=motor,
         encoder=encoder,
@@ -102,6 +112,22 @@ def joint(table: Table, number: int) -> Joint:
     )
     table.done()
     return found
+
+
+def _home(table: Table, low: float, high: float) -> float:
+    if table.has("fixed_deg"):
+        return (low + high) / 2
+    return table.number("home_deg", min(max(0.0, low), high), least=low, most=high)
+
+
+def _locked(table: Table) -> tuple[float, float]:
+    """The range of a joint that ``fixed_deg`` locks: just about that angle."""
+    angle = table.number("fixed_deg", least=1 - MAX_ANGLE_DEG, most=MAX_ANGLE_DEG - 1)
+    table.known("range_deg", "limits")
+    for key in ("motor", "home_deg"):
+        if table.has(key):
+            raise table.fail(key, "left out where fixed_deg locks the joint")
+    return angle - _LOCKED_DEG, angle + _LOCKED_DEG
 
 
 def _limits(table: Table | None) -> Limits | None:
@@ -114,14 +140,24 @@ def _limits(table: Table | None) -> Limits | None:
     return limits
 
 
+def _whole(table: Table, key: str, ranges: Mapping[str, Range]) -> int:
+    least, most = ranges[key]
+    return table.integer(key, least=int(least), most=int(most))
+
+
+def _number(table: Table, key: str, ranges: Mapping[str, Range], *default: float) -> float:
+    least, most = ranges[key]
+    return table.number(key, *default, least=least, most=most)
+
+
 def _motor(table: Table | None) -> Motor | None:
     if table is None:
         return None
     motor = Motor(
-        channel=table.integer("channel", least=1, most=MAX_JOINTS),
-        steps_per_rev=table.integer("steps_per_rev", least=4, most=10_000),
-        microsteps=table.integer("microsteps", least=1, most=256),
-        gear_ratio=table.number("gear_ratio", least=_GEAR_RATIO[0], most=_GEAR_RATIO[1]),
+        channel=_whole(table, "channel", MOTOR),
+        steps_per_rev=_whole(table, "steps_per_rev", MOTOR),
+        microsteps=_whole(table, "microsteps", MOTOR),
+        gear_ratio=_number(table, "gear_ratio", MOTOR),
         direction=table.choice("direction", (1, -1), 1),
     )
     table.done()
@@ -132,11 +168,11 @@ def _encoder(table: Table | None) -> Encoder | None:
     if table is None:
         return None
     encoder = Encoder(
-        channel=table.integer("channel", least=1, most=MAX_ENCODERS),
-        counts_per_rev=table.integer("counts_per_rev", least=4, most=10_000_000),
+        channel=_whole(table, "channel", ENCODER),
+        counts_per_rev=_whole(table, "counts_per_rev", ENCODER),
         on=table.choice("on", ("joint", "motor"), "joint"),
         direction=table.choice("direction", (1, -1), 1),
-        following_error_deg=table.number("following_error_deg", 0.0, least=0.0, most=360.0),
+        following_error_deg=_number(table, "following_error_deg", ENCODER, 0.0),
     )
     table.done()
     return encoder

@@ -10,7 +10,7 @@ from armtempo.model.boards import BOARDS, DEFAULT, TIMER_OUTPUTS, BoardPins, Tim
 from armtempo.model.engine_pins import ChannelUser
 from armtempo.model.outputs import SWITCH, Input, Output
 
-_MORE = "board/docs/hardware.md lists what is free"
+_MORE = "'armtempo help hardware' lists what is free"
 _MOST_COUNTS = 65_535
 
 

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from armtempo_shared.basis import BASIS
 
+from armtempo.basics.arguments import checked
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.formats import json_codec
@@ -63,7 +64,8 @@ class Search:
     """Of a gradient search, the motion time that each start led to on few segments; else empty."""
 
 
-@dataclass(frozen=True, eq=False)
+@checked
+@dataclass(frozen=True, eq=False, repr=False)
 class Plan:
     """A motion for ``arm`` that does ``job`` and keeps every limit.
 
@@ -83,6 +85,9 @@ class Plan:
     """Largest speed, acceleration and jerk of each driven joint, as proven bounds."""
     versions: Mapping[str, str]
     """What the numbers depend on besides arm and job: armtempo, numpy, scipy, Python, processor."""
+
+    def __repr__(self) -> str:
+        return f"<Plan {self.job.name!r} for {self.arm.name!r}: {len(self.via_deg)} via points, {self.total_s:.3f} s>"
 
     @property
     def total_s(self) -> float:

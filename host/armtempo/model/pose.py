@@ -64,6 +64,25 @@ def checked(matrix: ArrayLike, what: str = "the pose") -> Array:
     return pose
 
 
+def checked_all(matrices: ArrayLike) -> Array:
+    """The same for N poses, (N, 4, 4) or (N, 3, 4): (N, 4, 4). The InputError names the first that is no pose."""
+    given = np.array(matrices, dtype=np.float64)
+    if given.ndim != 3 or given.shape[1:] not in ((3, 4), (4, 4)):
+        raise InputError(
+            f"poses of shape {given.shape} are no list of poses", "give N times 4 rows of 4 numbers"
+        )
+    poses = np.tile(np.eye(4), (len(given), 1, 1))
+    poses[:, : given.shape[1]] = given
+    with np.errstate(invalid="ignore", over="ignore"):
+        off = np.abs(np.swapaxes(poses[:, :3, :3], 1, 2) @ poses[:, :3, :3] - np.eye(3)).max(axis=(1, 2))
+        fine = (off < 1e-14) & (np.linalg.det(np.nan_to_num(poses[:, :3, :3])) > 0.0)
+        fine &= np.all(poses[:, 3] == (0.0, 0.0, 0.0, 1.0), axis=1)
+        fine &= np.all(np.abs(poses) <= LARGEST, axis=(1, 2))
+    for number in np.flatnonzero(~fine):  # rounded, or none
+        poses[number] = checked(poses[number], f"pose {number + 1}")
+    return poses
+
+
 def _nearest_rotation(part: Array, what: str) -> Array:
     left, stretch, right = np.linalg.svd(part)
     off = float(np.abs(stretch - 1.0).max())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from armtempo.basics.arguments import checked_fields
 from armtempo.model.tool_pose import Pose
 
 HOME = "home"
@@ -14,6 +15,7 @@ _VIA = re.compile(r"[Pp]\d+")
 _NUMBERS = ("nan", "inf", "infinity")
 
 
+@checked_fields
 @dataclass(frozen=True)
 class ArmPosture:
     """A posture that has a name."""

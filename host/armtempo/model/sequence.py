@@ -7,18 +7,20 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from armtempo_shared.sequence import MAX_NESTING, MAX_REPEATS, MAX_WAIT_MS
+from armtempo_shared.sequence import MAX_NESTING, MAX_REPEATS
 
+from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
 from armtempo.formats import toml_table
 from armtempo.formats.spelling import did_you_mean
 from armtempo.formats.toml_table import Table
 from armtempo.model.arm import Arm, read_posture
-from armtempo.model.job import Job, name_of, read_angles
+from armtempo.model.job import Job, is_name, name_of, read_angles
 from armtempo.model.plan import Plan
 from armtempo.model.posture import ArmPosture
 from armtempo.model.steps import (
     FOR_EVER,
+    MOST_S,
     ON_TIMEOUT,
     STOP,
     Count,
@@ -35,7 +37,6 @@ from armtempo.model.steps import (
 LONGEST_NAME = 20
 """Of a sequence: its motions are stored as NAME-1, NAME-2 …, within the board's 24 characters."""
 HOME = "home"
-_MOST_S = MAX_WAIT_MS / 1000
 _KINDS = ("goto", "run", "output", "wait_s", "wait_input", "count", "repeat", "end", "call")
 
 
@@ -44,29 +45,46 @@ def is_sequence(path: Path | str) -> bool:
     return Path(path).suffix == ".toml" and toml_table.read(path).has("step")
 
 
+@checked
+@checked_fields
 @dataclass(frozen=True)
 class Sequence:
     """What the arm is to do, step by step."""
 
     name: str
-    start: ArmPosture | None
-    """Where it begins; None: where its first step that moves says."""
     steps: tuple[Step, ...]
-    source: str
+    start: ArmPosture | None = None
+    """Where it begins; None: where its first step that moves says."""
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        """InputError for a name that the board cannot keep."""
+        object.__setattr__(self, "steps", tuple(self.steps))
+        if not is_name(self.name, LONGEST_NAME):
+            raise InputError(
+                f"sequence {self.name!r}: the board keeps no such name",
+                f"give at most {LONGEST_NAME} of the characters a-z A-Z 0-9 - _",
+            )
 
     @classmethod
-    def load(cls, path: Path | str, arm: Arm) -> Sequence:
+    def of(cls, sequence: Sequence | Path | str, arm: Arm) -> Sequence:
+        """The sequence itself, or the one of a file as ``load`` finds it."""
+        return sequence if isinstance(sequence, Sequence) else cls.load(sequence, arm)
+
+    @classmethod
+    def load(cls, path: Path | str, arm: Arm | Path | str) -> Sequence:
         """The sequence described by a TOML file, for this arm.
 
         Raises InputError, naming file, step and key, for anything missing, unknown or not allowed.
         """
+        arm = Arm.of(arm)
         top = toml_table.read(path)
         name = name_of(top, LONGEST_NAME)
         reader = _Reader(arm, Path(path), _postures(top, arm))
         start = reader.posture(top, "start") if top.has("start") else None
         steps = reader.steps(top)
         top.done()
-        return cls(name, start, steps, str(path))
+        return cls(name, steps, start, str(path))
 
 
 def arm_named(path: Path | str) -> Path | None:
@@ -125,7 +143,7 @@ class _Reader:
                     raise table.fail("end", "given behind a step with repeat")
                 row, number, times = begun.pop()
                 inner = tuple(found.pop())
-                found[-1].append(Repeat(_place(row), number, times, inner))
+                found[-1].append(Repeat(inner, times, where=_place(row), step=number))
             else:
                 found[-1].extend(_GETTERS[kind](self, table, step))
             table.done()
@@ -161,7 +179,7 @@ class _Reader:
             target = self._motion(table, "goto")
         else:
             target = self.posture(table, "goto")
-        return [Goto(_place(table), step, target)]
+        return [Goto(target, where=_place(table), step=step)]
 
     def posture(self, table: Table, key: str) -> ArmPosture:
         """A posture by name, or as angles."""
@@ -179,7 +197,7 @@ class _Reader:
 
     def run(self, table: Table, step: int) -> list[Step]:
         only(table, "run")
-        return [RunMotion(_place(table), step, self._motion(table, "run"))]
+        return [RunMotion(self._motion(table, "run"), where=_place(table), step=step)]
 
     def _motion(self, table: Table, key: str) -> SourceMotion:
         path = self.file.parent / table.text(key)
@@ -191,36 +209,35 @@ class _Reader:
     def output(self, table: Table, step: int) -> list[Step]:
         only(table, "output", "to", "wait_s")
         name, place = table.text("output"), _place(table)
-        number = _placed(place, self.arm.output, name)
+        _placed(place, self.arm.output, name)
         to = table.peek("to")
         if isinstance(to, bool) or not isinstance(to, str | int | float):
             raise table.fail("to", "a state of the output, or a number in its unit")
-        raw = _placed(f"{place}to: ", self.arm.outputs[number].raw, to)
+        _placed(f"{place}to: ", self.arm.outputs[self.arm.output(name)].raw, to)
         table.known("to")
-        found: list[Step] = [SetOutput(place, step, number, raw, f"{name} {to}")]
+        found: list[Step] = [SetOutput(name, to, where=place, step=step)]
         return found + (self.wait(table, step) if table.has("wait_s") else [])
 
     def wait(self, table: Table, step: int) -> list[Step]:
         only(table, "output", "to", "wait_s")
-        return [Wait(_place(table), step, table.number("wait_s", least=0.001, most=_MOST_S))]
+        return [Wait(table.number("wait_s", least=0.001, most=MOST_S), where=_place(table), step=step)]
 
     def wait_input(self, table: Table, step: int) -> list[Step]:
         only(table, "wait_input", "active", "timeout_s", "on_timeout")
         name, place = table.text("wait_input"), _place(table)
-        number = _placed(place, self.arm.input, name)
+        _placed(place, self.arm.input, name)
         active = table.boolean("active", True)
         timeout_s = (
-            table.number("timeout_s", 0.0, least=0.001, most=_MOST_S) if table.has("timeout_s") else 0.0
+            table.number("timeout_s", 0.0, least=0.001, most=MOST_S) if table.has("timeout_s") else 0.0
         )
         if table.has("on_timeout") and not timeout_s:
             raise table.fail("on_timeout", "given together with timeout_s only")
         then = table.choice("on_timeout", ON_TIMEOUT, STOP)
-        words = name if active else f"{name} not"
-        return [WaitInput(place, step, number, active, timeout_s, then, words)]
+        return [WaitInput(name, active, timeout_s, then, where=place, step=step)]
 
     def count(self, table: Table, step: int) -> list[Step]:
         only(table, "count")
-        return [Count(_place(table), step, name_of(table, key="count"))]
+        return [Count(name_of(table, key="count"), where=_place(table), step=step)]
 
     def call(self, table: Table, step: int) -> list[Step]:
         only(table, "call")

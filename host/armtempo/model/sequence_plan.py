@@ -12,6 +12,7 @@ from typing import Any
 from armtempo_shared import sequence as record
 from armtempo_shared.sequence import COUNT, END, MOVE, REPEAT, WAIT
 
+from armtempo.basics.arguments import checked
 from armtempo.basics.errors import InputError
 from armtempo.formats import json_codec
 from armtempo.formats.atomic_file import check_replaceable, replace_text, why
@@ -71,7 +72,8 @@ class Cycle:
     share: Share
 
 
-@dataclass(frozen=True, eq=False)
+@checked
+@dataclass(frozen=True, eq=False, repr=False)
 class SequencePlan:
     """A sequence for ``arm``, ready for the board."""
 
@@ -83,6 +85,9 @@ class SequencePlan:
     counters: tuple[str, ...]
     """Their names, by their number in the rows."""
     versions: Mapping[str, str]
+
+    def __repr__(self) -> str:
+        return f"<SequencePlan {self.name!r} for {self.arm.name!r}: {len(self.rows)} rows, {len(self.legs)} motions>"
 
     @property
     def start_deg(self) -> tuple[float, ...] | None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from armtempo_shared.limits import MAX_SEGMENTS
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
@@ -49,6 +48,8 @@ def _enough(places: Array, points: Array, tolerance_deg: float) -> NDArray[np.in
 
 def _errors_deg(places: Array, points: Array, kept: NDArray[np.int64]) -> Array:
     """How far off each point is from the spline through those kept, the largest of its joints: (n,)."""
+    from scipy.interpolate import CubicSpline  # here, because loading it takes longer than a plan
+
     spline = CubicSpline(places[kept], points[kept], bc_type="clamped")
     return np.asarray(np.abs(spline(places) - points).max(axis=1))
 

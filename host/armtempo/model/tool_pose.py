@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.formats import json_codec
@@ -36,6 +37,8 @@ SMALLEST, LARGEST_MM, LARGEST_DEG = 1e-6, 1000.0, 180.0
 """Tolerances that make sense."""
 
 
+@checked
+@checked_fields
 @dataclass(frozen=True)
 class Pose:
     """A tool pose, or as much of one as ``fixed`` says.
@@ -54,6 +57,11 @@ class Pose:
 
     def __post_init__(self) -> None:
         """InputError for what makes no pose."""
+        if [len(row) for row in self.matrix] != [4] * 4:
+            raise InputError(
+                "the matrix of a pose has 4 rows of 4", "give them, or use Pose.of_angles or Pose.of_approach"
+            )
+        object.__setattr__(self, "fixed", tuple(self.fixed))
         if self.fixed not in CONSTRAINTS:
             allowed = ", ".join("+".join(fixed) or "nothing" for fixed in CONSTRAINTS)
             raise InputError(
@@ -86,7 +94,8 @@ class Pose:
     @classmethod
     def of_matrix(cls, matrix: Array, fixed: tuple[str, ...] = WHOLE) -> Pose:
         """Of a checked matrix, (4, 4)."""
-        return cls(_rows(matrix), fixed=fixed)
+        rows = np.asarray(matrix, dtype=float)
+        return cls(_rows(rows) if rows.shape == (4, 4) else (), fixed=fixed)
 
     @classmethod
     def of_angles(
@@ -106,6 +115,8 @@ class Pose:
         cls, position: Sequence[float], direction: Sequence[float], what: str = "the pose"
     ) -> Pose:
         """A position with the direction, of any length, in which the tool's z axis points."""
+        if (len(position), len(direction)) != (3, 3):
+            raise InputError(f"{what}: position and direction have 3 numbers each", "give x, y and z")
         length = math.hypot(*direction)
         if not 1e-9 <= length <= pose.LARGEST:
             raise InputError(

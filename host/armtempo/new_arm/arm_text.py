@@ -33,7 +33,7 @@ _MOTOR = """\
 _ENCODER = """\
 # encoder = {{ channel = {channel}, counts_per_rev = 4000, on = "joint", following_error_deg = 2.0 }}  # if fitted
 """
-_NO_CHANNEL = f"# The board drives {MAX_JOINTS} joints: this one stands still, unless another one does.\n"
+_NO_CHANNEL = f"# The board drives {MAX_JOINTS} joints: lock this one or another, by fixed_deg = ANGLE.\n"
 
 
 def arm_text(chain: Chain, fit: Fit, source: str) -> str:

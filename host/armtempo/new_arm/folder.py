@@ -71,8 +71,7 @@ def write(folder: Path, arm: ArmText, port: str) -> list[Path]:
 
     Raises InputError where the folder is there and not empty, or cannot be written; nothing is left then.
     """
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError(f"{folder}: is there already and not empty", "choose another name")
+    check_free(folder)
     files = {"arm.toml": arm.text, "armtempo.toml": _SETTINGS.format(port=_quoted(port))}
     if arm.arm.driven_indices:
         files["first.toml"] = _JOB.format(rows=_rows(arm.arm))
@@ -83,6 +82,12 @@ def write(folder: Path, arm: ArmText, port: str) -> list[Path]:
     except OSError as error:
         raise InputError(f"{folder}: cannot be written: {why(error)}", "choose another place") from None
     return [folder / name for name in files]
+
+
+def check_free(folder: Path) -> None:
+    """InputError where the folder is there and not empty."""
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError(f"{folder}: is there already and not empty", "choose another name")
 
 
 def _put(folder: Path, files: dict[str, str]) -> None:

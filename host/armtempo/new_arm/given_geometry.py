@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from armtempo.basics.errors import InputError
@@ -47,10 +47,24 @@ def from_urdf(urdf: Path) -> ArmText:
     return _checked(arm_text.arm_text(chain, fitting.fit(chain), urdf.name))
 
 
-def from_joints(name: str, joints: Sequence[JointEntry]) -> ArmText:
-    """An arm of these joints, base first. Raises InputError for what an arm file does not allow."""
+def from_joints(name: str, joints: Sequence[JointEntry], modified: bool = False) -> ArmText:
+    """An arm of these joints, base first. Raises InputError for what an arm file does not allow.
+
+    ``modified``: ``a_mm`` and ``alpha_deg`` of a joint are those from the axis before to its own, as in J. J. Craig,
+    Introduction to Robotics, section 3.4. In an arm file they belong to the row before; to a constant one at the base.
+    """
+    base = []
+    if modified:
+        first = joints[0]
+        if first.a_mm or first.alpha_deg:
+            base = [joint_entry.constant("base", first.a_mm, first.alpha_deg)]
+        behind = [*((joint.a_mm, joint.alpha_deg) for joint in joints[1:]), (0.0, 0.0)]
+        joints = [
+            replace(joint, a_mm=a_mm, alpha_deg=alpha_deg)
+            for joint, (a_mm, alpha_deg) in zip(joints, behind, strict=True)
+        ]
     tables = [joint_entry.table(joint, number, len(joints)) for number, joint in enumerate(joints, 1)]
-    return _checked("\n".join([f"name = {json.dumps(name, ensure_ascii=False)}\n", *tables]))
+    return _checked("\n".join([f"name = {json.dumps(name, ensure_ascii=False)}\n", *base, *tables]))
 
 
 def _checked(text: str) -> ArmText:

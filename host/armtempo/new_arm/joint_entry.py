@@ -31,6 +31,8 @@ class JointEntry:
     """None: what ``most_speed_deg_s`` allows, or 60 if that is less."""
     encoder_counts: int = 0
     """Counts for a turn of the joint; 0: no encoder."""
+    parallel_linkage: bool = False
+    """A parallelogram turns it: see the arm file's key."""
 
     @property
     def steps_per_deg(self) -> float:
@@ -45,6 +47,8 @@ class JointEntry:
 
 NUMBERS = tuple(field.name for field in fields(JointEntry) if field.name != "name")
 """Keys of a joint that take a number."""
+
+INTEGERS = ("steps_per_rev", "microsteps", "encoder_counts", "parallel_linkage")
 
 
 def parse(text: str, number: int) -> JointEntry:
@@ -68,7 +72,7 @@ def parse(text: str, number: int) -> JointEntry:
 
 def _number(number: int, key: str, value: str) -> float | int:
     try:
-        if key in ("steps_per_rev", "microsteps", "encoder_counts"):
+        if key in INTEGERS:
             return int(value)
         return float(value)
     except ValueError:
@@ -88,6 +92,7 @@ def table(entry: JointEntry, channel: int, joints: int) -> str:
         f"a_mm = {entry.a_mm!r}",
         f"alpha_deg = {entry.alpha_deg!r}",
         f"theta_offset_deg = {entry.theta_offset_deg!r}",
+        *(["parallel_linkage = true"] if entry.parallel_linkage else []),
         f"range_deg = [{entry.low_deg!r}, {entry.high_deg!r}]",
         f"# {entry.steps_per_deg:.5g} steps/deg; the board's step rate and {MOTOR_RPM:g} rpm allow {most:.4g} deg/s",
         f"limits = {{ speed_deg_s = {speed:g}, acceleration_deg_s2 = {speed:g}, jerk_deg_s3 = {4 * speed:g} }}",
@@ -98,3 +103,8 @@ def table(entry: JointEntry, channel: int, joints: int) -> str:
         counts = entry.encoder_counts
         lines.append(f'encoder = {{ channel = {channel}, counts_per_rev = {counts}, on = "joint" }}')
     return "\n".join(lines) + "\n"
+
+
+def constant(name: str, a_mm: float, alpha_deg: float) -> str:
+    """The table of a row that never moves."""
+    return f'[[joint]]\nname = "{name}"\nd_mm = 0.0\na_mm = {a_mm!r}\nalpha_deg = {alpha_deg!r}\nfixed_deg = 0.0\n'

@@ -14,6 +14,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, MissingPackageError
 from armtempo.formats.atomic_file import why
 from armtempo.model.parts_file import MAX_ANGLE_DEG
+from armtempo.new_arm import urdf_tip
 
 MM = 1000.0
 """Millimetres in the URDF's unit, the metre."""
@@ -21,6 +22,8 @@ MM = 1000.0
 CONTINUOUS_DEG = (-180.0, 180.0)
 """Range that a continuous joint gets: a URDF gives it none."""
 
+_WHEEL_JOINTS = 2
+"""An axle with its steering; a chain of so few joints is an arm only where each has limits."""
 _REASONS = {
     "prismatic": "it slides, and an arm file describes turning joints only",
     "floating": "it is free in all directions, and a motor turns about one axis",
@@ -66,7 +69,7 @@ class Chain:
 
 
 def read(path: Path, base: str | None = None, tip: str | None = None) -> Chain:
-    """The chain from link ``base`` (None: the root) to link ``tip`` (None: the only end there is).
+    """The chain from link ``base`` (None: the root) to link ``tip`` (None: see ``urdf_tip.choose``).
 
     Raises MissingPackageError without yourdfpy, InputError where the file is no URDF, the chain is not one, or
     a joint in it is of a kind that an arm file cannot describe: with every reason.
@@ -88,6 +91,7 @@ def read(path: Path, base: str | None = None, tip: str | None = None) -> Chain:
     joints = _path(path, model, base, tip)
     _refuse(path, joints)
     moving = [joint for joint in joints if joint.type != "fixed"]
+    _refuse_wheels(path, moving)
     if not moving:
         raise InputError(
             f"{path}: no joint between {joints[0].parent!r} and {joints[-1].child!r} turns",
@@ -123,8 +127,14 @@ def _check_text(path: Path) -> None:
         raise InputError(f"{path}: its outermost element is <{root.tag}>, not <robot>", "give a URDF file")
     if root.get("name") is None:
         raise InputError(f"{path}: its <robot> element has no name", 'give it one: <robot name="my_arm">')
-    if any("xacro" in element.tag for element in root.iter()):
-        raise InputError(f"{path}: is a xacro file", f"make a URDF of it first: xacro {path} > robot.urdf")
+    values = [value for element in root.iter() for value in element.attrib.values()]
+    unfilled = next((value for value in values if "$(" in value or "${" in value), "")
+    if unfilled or any("xacro" in element.tag for element in root.iter()):
+        left = f", with {unfilled!r} still to be filled in" if unfilled else ""
+        raise InputError(
+            f"{path}: is a xacro file{left}",
+            f"make a URDF of it first: xacro {path} > robot.urdf (xacro is a part of ROS)",
+        )
 
 
 def _path(path: Path, model: Any, base: str | None, tip: str | None) -> list[Any]:
@@ -137,7 +147,7 @@ def _path(path: Path, model: Any, base: str | None, tip: str | None) -> list[Any
             )
     above = {joint.child: joint for joint in model.robot.joints}
     first = base or model.base_link
-    last = tip or _only_end(path, above, first)
+    last = tip or urdf_tip.choose(path, model.robot.joints, first, _reason)
     joints: list[Any] = []
     link = last
     while link != first:
@@ -152,26 +162,6 @@ def _path(path: Path, model: Any, base: str | None, tip: str | None) -> list[Any
     return joints
 
 
-def _only_end(path: Path, above: dict[str, Any], first: str) -> str:
-    """The one link below ``first`` that carries no other."""
-    parents = {joint.parent for joint in above.values()}
-    ends = [link for link in above if link not in parents and _is_below(above, link, first)]
-    if len(ends) != 1:
-        found = ", ".join(ends) or "none"
-        raise InputError(
-            f"{path}: which end of the robot is the tool is not clear", f"choose with --tip: {found}"
-        )
-    return ends[0]
-
-
-def _is_below(above: dict[str, Any], link: str, first: str) -> bool:
-    for _ in above:
-        if link == first or link not in above:
-            break
-        link = above[link].parent
-    return link == first
-
-
 def _refuse(path: Path, joints: list[Any]) -> None:
     """Raise InputError naming every joint that an arm file cannot describe."""
     reasons = [f"\n  joint {joint.name!r}: {reason}" for joint in joints if (reason := _reason(joint))]
@@ -179,6 +169,16 @@ def _refuse(path: Path, joints: list[Any]) -> None:
         raise InputError(
             f"{path}: this chain does not fit an arm file:{''.join(reasons)}",
             "choose another chain with --base and --tip, or change the URDF",
+        )
+
+
+def _refuse_wheels(path: Path, moving: list[Any]) -> None:
+    """Raise InputError for a chain that is rather a wheel, steered or not."""
+    endless = [joint.name for joint in moving if joint.type == "continuous"]
+    if endless and (len(endless) == len(moving) or len(moving) <= _WHEEL_JOINTS):
+        raise InputError(
+            f"{path}: {', '.join(map(repr, endless))} turn without end, as wheels do: this chain is no arm",
+            "choose another chain with --base and --tip; a joint of an arm gets limits (type='revolute') in the URDF",
         )
 
 

@@ -16,6 +16,7 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import ArrayLike
 
+from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.basics.progress import Progress
@@ -35,6 +36,7 @@ ALGORITHMS = {
 """Name of an algorithm (Table 4): the module that holds it."""
 
 
+@checked_fields
 @dataclass(frozen=True)
 class Settings:
     """Which search looks for the smallest value, and how long."""
@@ -47,12 +49,14 @@ class Settings:
     """The algorithm's own parameters that are not to have their defaults."""
 
 
+@checked
 def parameters(algorithm: str) -> Mapping[str, Parameter]:
     """The parameters of an algorithm by name. Raises InputError for an unknown algorithm."""
     known: Mapping[str, Parameter] = _module(algorithm).PARAMETERS
     return known
 
 
+@checked
 def minimise(
     function: Function,
     bounds: ArrayLike,

@@ -93,11 +93,11 @@ class Differences(Nests):
 VARIANTS: dict[str, type[Nests]] = {"differences": Differences, "paper": Paper}
 
 PARAMETERS: dict[str, Parameter] = {
-    "a": Number(0.7, 0.0, 100.0),
-    "b": Number(0.5, -5.0, 5.0),
-    "pa": Number(0.25, 0.001, 1.0),
+    "a": Number(0.7, 0.0, 100.0, "of Eq. (25)"),
+    "b": Number(0.5, -5.0, 5.0, "of Eq. (25)"),
+    "pa": Number(0.25, 0.001, 1.0, "part of the nests, or chance of a variable, to be abandoned"),
     "beta": BETA,
-    "variant": OneOf("differences", tuple(VARIANTS)),
+    "variant": OneOf("differences", tuple(VARIANTS), "see [acs.md](acs.md)"),
 }
 
 

@@ -15,8 +15,8 @@ from armtempo.optimise.parameters import Number, Parameter
 from armtempo.optimise.tracker import Result, Task, Tracker
 
 PARAMETERS: dict[str, Parameter] = {
-    "alpha": Number(0.01, 0.0, 100.0),
-    "pa": Number(0.25, 0.0, 1.0),
+    "alpha": Number(0.01, 0.0, 100.0, "scale of the flights"),
+    "pa": Number(0.25, 0.0, 1.0, "chance of a variable to be abandoned"),
     "beta": BETA,
 }
 

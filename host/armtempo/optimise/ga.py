@@ -12,8 +12,8 @@ from armtempo.optimise.tracker import Result, Task, Tracker
 
 PARAMETERS: dict[str, Parameter] = {
     "bits": BITS,
-    "crossover_rate": Number(0.6, 0.0, 1.0),
-    "mutation_rate": Number(0.01, 0.0, 1.0),
+    "crossover_rate": Number(0.6, 0.0, 1.0, "chance of a pair to be crossed"),
+    "mutation_rate": Number(0.01, 0.0, 1.0, "chance of a bit to flip"),
 }
 
 

@@ -11,7 +11,7 @@ from armtempo.optimise.parameters import Number
 Bits = NDArray[np.bool_]
 """A population: individuals × variables × bits, the first bit of a variable counting most."""
 
-BITS = Number(16, 2, 52)
+BITS = Number(16, 2, 52, "bits that code a variable")
 """Bits that code a variable; a double has 52 behind its point."""
 
 

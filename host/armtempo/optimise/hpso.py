@@ -12,7 +12,7 @@ from armtempo.optimise import swarm
 from armtempo.optimise.parameters import Number
 from armtempo.optimise.tracker import Result, Task
 
-PARAMETERS = {**swarm.PARAMETERS, "rivals": Number(5, 1, 1000)}
+PARAMETERS = {**swarm.PARAMETERS, "rivals": Number(5, 1, 1000, "others that a particle is scored against")}
 
 
 def search(

@@ -15,11 +15,11 @@ from armtempo.optimise.tracker import Result, Task, Tracker
 
 PARAMETERS: dict[str, Parameter] = {
     "bits": BITS,
-    "k1": Number(1.0, 0.0, 1.0),
-    "k2": Number(0.5, 0.0, 1.0),
-    "k3": Number(1.0, 0.0, 1.0),
-    "k4": Number(0.5, 0.0, 1.0),
-    "least_mutation": Number(0.005, 0.0, 1.0),
+    "k1": Number(1.0, 0.0, 1.0, "chance of crossover above the mean"),
+    "k2": Number(0.5, 0.0, 1.0, "chance of mutation above the mean"),
+    "k3": Number(1.0, 0.0, 1.0, "chance of crossover below the mean"),
+    "k4": Number(0.5, 0.0, 1.0, "chance of mutation below the mean"),
+    "least_mutation": Number(0.005, 0.0, 1.0, "added to the chance of mutation, whatever the merit"),
 }
 
 

@@ -16,7 +16,8 @@ from typing import Protocol
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.optimise.kkt import BandedKkt, Equalities, Factor
+from armtempo.basics.progress import alive
+from armtempo.optimise.kkt import Equalities
 
 
 class Linearised(Protocol):
@@ -39,10 +40,24 @@ class Linearised(Protocol):
         """
 
 
+class Factorised(Protocol):
+    """A factorised matrix of Newton's equations; see ``kkt.Factor``."""
+
+    def solve(self, gradient: Array, residual: Array) -> Array: ...
+
+
+class Kkt(Protocol):
+    """Newton's equations; see ``kkt.BandedKkt``."""
+
+    def factor(self, entries: Array) -> Factorised: ...
+
+
 class Program(Protocol):
     """What is minimised."""
 
-    kkt: BandedKkt
+    @property
+    def kkt(self) -> Kkt: ...
+
     equalities: Equalities
 
     def objective(self, x: Array) -> float:
@@ -134,6 +149,7 @@ class _Solver:
         if not np.all(self.g > 0.0):
             return self._solution(0, False)
         for number in range(1, self.settings.iterations + 1):
+            alive()
             step = self._step()
             size = self.barrier * np.sqrt(self.count)
             if self.barrier <= self.last and (step.length == 0.0 or step.decrement < _DONE * size):
@@ -165,9 +181,11 @@ class _Solver:
         self.exact = self.settings.curvature
         return _Step(0.0, self.x, self.g)
 
-    def _along(self, at: Linearised, factor: Factor, gradient: Array, step: Array) -> _Step:
+    def _along(self, at: Linearised, factor: Factorised, gradient: Array, step: Array) -> _Step:
         """The better of a straight and, where that is short, a bent step."""
-        slope = float(gradient @ step)
+        slope = float(
+            np.sum(gradient * step)
+        )  # not by @, for which BLAS starts threads from 10 000 elements on
         if not np.all(np.isfinite(step)) or slope >= 0.0:
             return _Step(0.0, self.x, self.g)
         change = at.forward(step)

@@ -9,7 +9,7 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.optimise.parameters import Number
 
-BETA = Number(1.5, 0.3, 1.99)
+BETA = Number(1.5, 0.3, 1.99, "index of the Lévy distribution, Eq. (23)")
 """The index of the distribution, in the range that Mantegna gives for his method (Physical Review E 49 (5),
 1994, pp. 4677-4683)."""
 

@@ -14,6 +14,7 @@ class Number:
     default: float
     least: float
     most: float
+    meaning: str
 
     @property
     def allowed(self) -> str:
@@ -36,6 +37,7 @@ class OneOf:
 
     default: str
     words: tuple[str, ...]
+    meaning: str
 
     @property
     def allowed(self) -> str:

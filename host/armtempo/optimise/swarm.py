@@ -8,14 +8,13 @@ from armtempo.optimise.parameters import Number, Parameter
 from armtempo.optimise.tracker import Task, Tracker
 
 PARAMETERS: dict[str, Parameter] = {
-    "inertia_start": Number(0.9, 0.0, 2.0),
-    "inertia_end": Number(0.4, 0.0, 2.0),
-    "own": Number(2.0, 0.0, 10.0),
-    "common": Number(2.0, 0.0, 10.0),
-    "top_speed": Number(0.2, 0.001, 1.0),
+    "inertia_start": Number(0.9, 0.0, 2.0, "inertia in the first iteration"),
+    "inertia_end": Number(0.4, 0.0, 2.0, "and in the last"),
+    "own": Number(2.0, 0.0, 10.0, "pull towards a particle's own best point"),
+    "common": Number(2.0, 0.0, 10.0, "pull towards the best point of all"),
+    "top_speed": Number(0.2, 0.001, 1.0, "longest move as a part of the bounds' width"),
 }
-"""Of every swarm: ``inertia_start`` falls to ``inertia_end`` over the run, ``own`` and ``common`` pull towards a
-particle's own best point and the best of all, ``top_speed`` is the longest move as a part of the bounds' width."""
+"""Of every swarm."""
 
 
 class Swarm:

@@ -56,7 +56,8 @@ def _extent(searched: Sequence[Row], series: Sequence[Series]) -> list[tuple[str
 
 
 def _row(claim: Claim) -> tuple[object, ...]:
-    kind = html_page.BAD if claim.verdict == DIFFERS and not claim.because else html_page.GOOD
+    differs = html_page.OPEN if claim.because else html_page.BAD
+    kind = differs if claim.verdict == DIFFERS else html_page.GOOD
     return claim.what, claim.printed, claim.found, (claim.verdict, kind), claim.because
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import perm
 
 import numpy as np
 
@@ -10,7 +11,6 @@ from armtempo.basics.arrays import Array
 from armtempo.planning.fitness import stretch_of
 from armtempo.planning.variables import Index
 from armtempo.splines import bspline, extremes, time_axis
-from armtempo.splines.trajectory import derivatives
 
 _APART = 1e-7
 """Points of one segment nearer than this are one."""
@@ -46,11 +46,20 @@ class Curve:
 
     def ratios(self, segment: Index, u: Array) -> Array:
         """|speed|, |acceleration|, |jerk| over their limits at points (P,): (3, J, P)."""
-        joints = []
-        for angle, limits in zip(self.angle, self.limits, strict=True):
-            values = [derivatives(angle, self.time, segment, u, order) for order in (1, 2, 3)]
-            joints.append(np.abs(np.stack(values)) / limits[:, None])
-        return np.stack(joints, axis=1)
+        return self._ratios(self.angle[:, segment], self.limits.T[:, :, None], segment, u)
+
+    def own_ratios(self, joint: Index, segment: Index, u: Array) -> Array:
+        """The same of one joint at each point, (P,): (3, P)."""
+        return self._ratios(self.angle[joint, segment], self.limits[joint].T, segment, u)
+
+    def _ratios(self, angle: Array, limits: Array, segment: Index, u: Array) -> Array:
+        """For power coefficients of angles (..., P, k + 1) and limits that go with them."""
+        q1, q2, q3 = _derivatives(angle, u)
+        t1, t2, t3 = _derivatives(self.time[segment], u)
+        speed = q1 / t1
+        acceleration = (q2 - speed * t2) / t1**2
+        jerk = (q3 - speed * t3 - acceleration * (3.0 * t1 * t2)) / t1**3
+        return np.abs(np.stack([speed, acceleration, jerk])) / limits
 
     def angles_at(self, time_s: Array) -> Array:
         """Angles at times (N,): (N, J)."""
@@ -93,11 +102,11 @@ def peaks(curve: Curve, parts: int, least: float) -> Points:
 def _zoomed(curve: Curve, which: Index, segment: Index, u: Array, step: float) -> Points:
     """The peaks near these points, by parabolas on ever smaller steps."""
     column = np.arange(len(u))
+    kind, joint = np.divmod(which, len(curve.angle))
     for _ in range(_ZOOMS):
         middle = np.clip(u, step, 1.0 - step)
         left, here, right = (
-            curve.ratios(segment, middle + shift).reshape(-1, len(u))[which, column]
-            for shift in (-step, 0.0, step)
+            curve.own_ratios(joint, segment, middle + shift)[kind, column] for shift in (-step, 0.0, step)
         )
         bend = 2.0 * here - left - right
         offset = np.divide(right - left, 2.0 * bend, out=np.sign(right - left), where=bend > 0)
@@ -105,3 +114,15 @@ def _zoomed(curve: Curve, which: Index, segment: Index, u: Array, step: float) -
         step *= 0.25
     order = np.lexsort((u, segment))
     return Points(segment[order], u[order])
+
+
+def _derivatives(coefficients: Array, u: Array) -> list[Array]:
+    """First three derivatives at u (P,) of polynomials (..., P, k + 1), each (..., P)."""
+    found = []
+    for order in (1, 2, 3):
+        factors = [perm(power, order) for power in range(coefficients.shape[-1])]
+        value = factors[-1] * coefficients[..., -1]
+        for power in range(len(factors) - 2, order - 1, -1):
+            value = value * u + factors[power] * coefficients[..., power]
+        found.append(value)
+    return found

@@ -26,7 +26,8 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.optimise import interior_point
 from armtempo.optimise.interior_point import Linearised, Schedule
-from armtempo.optimise.kkt import BandedKkt, Equalities
+from armtempo.optimise.kkt import Equalities
+from armtempo.planning.dual_kkt import DualKkt
 from armtempo.planning.variables import Index
 from armtempo.splines import bspline
 
@@ -99,8 +100,6 @@ class _Dual:
     equalities = Equalities.none()
 
     def __init__(self, cells: Cells) -> None:
-        from scipy.sparse import csr_array  # here, because loading it takes longer than most commands
-
         self._cells = cells
         count, joints = cells.count, cells.joints
         sizes = [2 * joints * (count + 2), 2 * joints * (count + 1), joints * count]
@@ -111,21 +110,13 @@ class _Dual:
         nodes, weights = np.polynomial.legendre.leggauss(_NODES)
         self._weights = np.tile(weights / 2 / count, count)
         self._slopes = self._local_slopes((nodes + 1) / 2)
-        width, points = columns.shape[1], count * _NODES
-        each, starts = np.repeat(columns, _NODES, axis=0).ravel(), np.arange(0, points * width + 1, width)
-        self._w, self._c = (
-            csr_array((self._slopes[:, :, form].ravel(), each, starts), shape=(points, sum(sizes)))
-            for form in (0, 1)
-        )
         self._cost = np.zeros(sum(sizes))
         self._cost[self._speed] = 1.0 / count
         self._cost[self._acceleration] = 1.0 / count
         self._cost[self._acceleration[:, [0, -1]]] = 0.5 / count
         if not cells.rests:
             self._cost[self._jerk[:, [0, 1, -2, -1]]] = 1.0 / count  # so that they vanish
-        rows = np.concatenate([np.repeat(columns, width, axis=1).ravel(), np.arange(sum(sizes))])
-        others = np.concatenate([np.tile(columns, (1, width)).ravel(), np.arange(sum(sizes))])
-        self.kkt = BandedKkt(self._places(), rows, others, self.equalities)
+        self.kkt = DualKkt(columns, self._slopes)
 
     def _local(self) -> Index:
         """Variables that matter in each cell: (N, 11 J)."""
@@ -133,14 +124,6 @@ class _Dual:
         jerk = [self._jerk[sign, cell + offset] for sign in (0, 1) for offset in range(3)]
         acceleration = [self._acceleration[sign, cell + offset] for sign in (0, 1) for offset in range(2)]
         return np.concatenate([*jerk, *acceleration, self._speed], axis=1)
-
-    def _places(self) -> Array:
-        """Where each variable stands along the path."""
-        places = np.empty(self._jerk.size + self._acceleration.size + self._speed.size)
-        places[self._jerk] = (np.arange(self._jerk.shape[1]) - 1.0)[:, None]
-        places[self._acceleration] = (np.arange(self._acceleration.shape[1]) - 0.5)[:, None]
-        places[self._speed] = np.arange(self._cells.count, dtype=float)[:, None]
-        return places
 
     def _local_slopes(self, v: Array) -> Array:
         """Derivatives of w and c at v (G,) of each cell by its variables: (N, G, 2, 11 J)."""
@@ -186,7 +169,9 @@ class _Dual:
 
     def objective(self, x: Array) -> float:
         w, c = self._forms(x)
-        return float(self._cost @ x - SHARE * self._weights @ (np.cbrt(w) ** 2 * np.cbrt(c)))
+        # Not by @, for which BLAS starts threads from 10 000 elements on.
+        least = SHARE * np.sum(self._weights * np.cbrt(w) ** 2 * np.cbrt(c))
+        return float(np.sum(self._cost * x) - least)
 
     def inequalities(self, x: Array) -> Array:
         return np.concatenate([x, *self._forms(x)])
@@ -195,7 +180,8 @@ class _Dual:
         return _Linearised(self, *self._forms(x))
 
     def _forms(self, x: Array) -> tuple[Array, Array]:
-        return 1.0 + self._w @ x, self._c @ x
+        w, c = self.kkt.forward(x).reshape(-1, 2).T
+        return 1.0 + w, c
 
 
 class _Linearised:
@@ -204,27 +190,25 @@ class _Linearised:
         with np.errstate(all="ignore"):
             least = SHARE * dual._weights * np.cbrt(w) ** 2 * np.cbrt(c)
             by_w, by_c = 2.0 / 3.0 * least / w, 1.0 / 3.0 * least / c
-        self.gradient = dual._cost - dual._w.T @ by_w - dual._c.T @ by_c
+        self.gradient = dual._cost - dual.kkt.backward(np.stack([by_w, by_c], axis=1))
         bend = 2.0 / 9.0 * least
         self._curvature = np.array([[bend / w**2, -bend / (w * c)], [-bend / (w * c), bend / c**2]])
 
     def forward(self, step: Array) -> Array:
-        return np.concatenate([step, self._dual._w @ step, self._dual._c @ step])
+        w, c = self._dual.kkt.forward(step).reshape(-1, 2).T
+        return np.concatenate([step, w, c])
 
     def backward(self, weights: Array) -> Array:
         own, w, c = self._split(weights)
-        return np.asarray(own + self._dual._w.T @ w + self._dual._c.T @ c)
+        return own + self._dual.kkt.backward(np.stack([w, c], axis=1))
 
     def hessian(self, weights: Array, _: Array, __: bool) -> Array:
+        """Entries for ``DualKkt``: the 2 x 2 matrices of w and c at each point, and the diagonal."""
         own, w, c = self._split(weights)
         both = self._curvature.copy()
         both[0, 0] += w
         both[1, 1] += c
-        slopes = self._dual._slopes
-        cells, nodes, _forms, width = slopes.shape
-        weighted = np.einsum("abng,ngbi->ngai", both.reshape(2, 2, cells, nodes), slopes)
-        blocks = slopes.reshape(cells, -1, width).swapaxes(1, 2) @ weighted.reshape(cells, -1, width)
-        return np.concatenate([blocks.ravel(), own])
+        return np.concatenate([both.ravel(), own])
 
     def _split(self, weights: Array) -> list[Array]:
         points = len(self._dual._weights)

@@ -89,7 +89,18 @@ class Fitness:
 
     def stretch(self, intervals_s: Array) -> Array:
         """The factor on X that brings it just within the limits, on the grid: (N,)."""
-        return stretch_of(self.peaks(intervals_s).max(axis=(1, 2)))
+        return stretch_of(self._highest(self.ratios(intervals_s)))
+
+    def _highest(self, ratios: Array) -> Array:
+        """The largest of ``peaks``, (3, N): parabolas rise above their middle by a quarter of the largest at most."""
+        flat = ratios.reshape(3, len(ratios[0]), -1, ratios.shape[-1])
+        highest = flat.max(axis=(1, 2))
+        kind, point, place, candidate = np.nonzero(flat[:, 1:-1] > 0.75 * highest[:, None, None])
+        left, middle, right = (flat[kind, point + shift, place, candidate] for shift in (0, 1, 2))
+        slope = np.abs(left - right)
+        bend = np.maximum(2.0 * middle - left - right, 0.5 * slope) + _TINY
+        np.maximum.at(highest, (kind, candidate), middle + slope**2 / (8.0 * bend))
+        return np.asarray(highest)
 
 
 def stretch_of(ratios: Array) -> Array:

@@ -14,9 +14,9 @@ from armtempo.optimise.interior_point import Schedule
 from armtempo.optimise.kkt import Equalities
 from armtempo.planning import collocation
 from armtempo.planning.collocation import Curve, Points
-from armtempo.planning.limit_rows import LimitRows
 from armtempo.planning.motion_program import MotionProgram, time_weights
-from armtempo.planning.variables import MotionVariables, time_points
+from armtempo.planning.path_rows import PathRows, Rows
+from armtempo.planning.variables import MotionVariables, time_basis, time_points
 from armtempo.splines import bspline, time_axis
 
 _ROUNDS = 12
@@ -96,10 +96,12 @@ class FixedPath:
         parts = max(_LEAST_PARTS, min(_PARTS // self.refine, _POINTS // self.variables.segments))
         points = collocation.grid(self.variables.segments, parts, ends=self.degree == 3)
         settings, bound, here = _COARSE, 0.0, best
+        seen: list[Array] = []
         for _ in range(_ROUNDS):
             if not np.all(np.isfinite(here) & (here > 0.0)):
                 break
-            here, bound = self._solve(here, points, settings)
+            seen.append(here)
+            here, bound = self._solve(seen, points, settings)
             curve = self.curve(here)
             stretch = curve.stretch()
             if self.duration_s(here) * stretch < self.duration_s(best):
@@ -111,12 +113,18 @@ class FixedPath:
             settings = Schedule(_AGAIN, min(_AGAIN, 0.3 * gap))
         return Optimum(best, self.duration_s(best), min(bound, self.duration_s(best)))
 
-    def _solve(self, differences_s: Array, points: Points, settings: Schedule) -> tuple[Array, float]:
-        """The best axis that keeps the limits at these points, and a bound from below on its motion time."""
+    def _solve(self, seen: list[Array], points: Points, settings: Schedule) -> tuple[Array, float]:
+        """The best axis that keeps the limits at these points, and a bound from below on its motion time.
+
+        From the last of those ``seen``, with what could be reached near any of them.
+        """
+        differences_s = seen[-1]
         unit_s = self.duration_s(differences_s) / self.variables.segments
         limits = self.limits * unit_s ** np.arange(1, 4)
         angle = np.stack([_at(self.angle, points, order) for order in (1, 2, 3)])
-        rows = LimitRows(self.variables, points, limits, angle)
+        basis, window = time_basis(self.degree, points.u), points.segment[:, None] + np.arange(self.degree)
+        times = [(basis @ (one / unit_s)[window][:, :, None])[..., 0].T for one in seen]
+        rows = PathRows(self.variables, points, Rows.reachable(angle, times, limits))
         program = MotionProgram(self.variables, [rows], self._equalities)
         found = interior_point.minimise(program, differences_s / unit_s * _AWAY, settings)
         here = found.x * unit_s

@@ -2,35 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.planning import limit_ratios
 from armtempo.planning.collocation import Points
-from armtempo.planning.variables import Index, MotionVariables, angle_basis, time_basis
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
+from armtempo.planning.variables import Index, MotionVariables, angle_basis, derivative_matrix, time_basis
 
 
 class LimitRows:
     """1 - ratio > 0 and 1 + ratio > 0 for speed, acceleration and jerk of each joint at each point.
 
-    ``points``: P of them, at least one in every segment; ``limits``: (J, 3); ``angle``: (3, P, J), derivatives of
-    the angles at the points where the path is fixed, else None.
+    ``points``: P of them, at least one in every segment; ``limits``: (J, 3).
     """
 
-    def __init__(
-        self, variables: MotionVariables, points: Points, limits: Array, angle: Array | None
-    ) -> None:
-        self.limits, self._angle, self._variables = limits, angle, variables
+    def __init__(self, variables: MotionVariables, points: Points, limits: Array) -> None:
+        self.limits, self._variables = limits, variables
         self._starts = np.searchsorted(points.segment, np.arange(variables.segments))
         self._bases = angle_basis(variables.degree, points.u)
         self._time_bases = time_basis(variables.degree, points.u)
-        self.by_angle = _derivative_matrix(self._bases, points.segment, variables.angles)
-        self.by_time = _derivative_matrix(self._time_bases, points.segment, variables.differences)
+        self.by_angle = derivative_matrix(self._bases, points.segment, variables.angles)
+        self.by_time = derivative_matrix(self._time_bases, points.segment, variables.differences)
         self.rows, self.columns = self._pattern()
 
     def _pattern(self) -> tuple[Index, Index]:
@@ -52,15 +44,11 @@ class LimitRows:
     def derivatives(self, x: Array) -> tuple[Array, Array]:
         """q', q'', q''' (3, P, J) and t', t'', t''' (3, P) at the points, or their changes by a step."""
         time = (self.by_time @ self._variables.time_differences(x)).reshape(3, -1)
-        if self._angle is not None:
-            return self._angle, time
         return (self.by_angle @ self._variables.angle_points(x)).reshape(3, time.shape[1], -1), time
 
     def gradient(self, local: Array) -> Array:
         """Gradient (n,) of what has the derivatives ``local`` (6, P, J) by the six derivatives at each point."""
         by_time = self.by_time.T @ local[3:].sum(axis=2).ravel()
-        if self._angle is not None:
-            return np.asarray(by_time)
         by_angle = self.by_angle.T @ local[:3].reshape(-1, local.shape[2])
         return self._variables.pack(by_angle, by_time)
 
@@ -74,33 +62,31 @@ class LimitRows:
         bases = self._time_bases
         by_time = np.einsum("pak,abp,pbl->pkl", bases, local[3:, 3:].sum(axis=3), bases, optimize=True)
         entries = [np.add.reduceat(by_time, self._starts).ravel()]
-        if self._angle is None:
-            half = np.einsum("pac,abpj->jpcb", self._bases, local[:3], optimize=True)
-            own = np.add.reduceat(half[..., :3] @ self._bases, self._starts, axis=1)
-            mixed = np.add.reduceat(half[..., 3:] @ bases, self._starts, axis=1)
-            for joint in range(local.shape[3]):
-                entries.extend([own[joint].ravel(), mixed[joint].ravel()])
-                entries.append(mixed[joint].swapaxes(1, 2).ravel())
+        half = np.einsum("pac,abpj->jpcb", self._bases, local[:3], optimize=True)
+        own = np.add.reduceat(half[..., :3] @ self._bases, self._starts, axis=1)
+        mixed = np.add.reduceat(half[..., 3:] @ bases, self._starts, axis=1)
+        for joint in range(local.shape[3]):
+            entries.extend([own[joint].ravel(), mixed[joint].ravel()])
+            entries.append(mixed[joint].swapaxes(1, 2).ravel())
         return np.concatenate(entries)
 
     def linearise(self, x: Array) -> LinearisedLimits:
         """Their derivatives at x."""
-        return LinearisedLimits(self, *self.derivatives(x), self._angle is not None)
+        return LinearisedLimits(self, *self.derivatives(x))
 
 
 class LinearisedLimits:
     """Derivatives of the rows at one point; see ``optimise.interior_point.Linearised``."""
 
-    def __init__(self, rows: LimitRows, angle: Array, time: Array, fixed: bool) -> None:
-        self._rows, self._angle, self._time, self._fixed = rows, angle, time, fixed
+    def __init__(self, rows: LimitRows, angle: Array, time: Array) -> None:
+        self._rows, self._angle, self._time = rows, angle, time
         self._gradient = limit_ratios.gradient(angle, time, rows.limits)
 
     def forward(self, step: Array) -> Array:
         """See there."""
         angle, time = self._rows.derivatives(step)
         change = np.einsum("kopj,op->kpj", self._gradient[:, 3:], time)
-        if not self._fixed:
-            change += np.einsum("kopj,opj->kpj", self._gradient[:, :3], angle)
+        change += np.einsum("kopj,opj->kpj", self._gradient[:, :3], angle)
         return np.concatenate([-change.ravel(), change.ravel()])
 
     def backward(self, weights: Array) -> Array:
@@ -118,13 +104,3 @@ class LinearisedLimits:
             upper, lower = multipliers.reshape(shape)
             local += limit_ratios.curvature(self._angle, self._time, rows.limits, upper - lower)
         return rows.assemble(local)
-
-
-def _derivative_matrix(bases: Array, segment: Index, count: int) -> csr_array:
-    """First, second and third derivatives at all points, (3 P, count), from ``bases`` (P, 3, w) of their segments."""
-    from scipy.sparse import csr_array  # here, because loading it takes longer than most commands
-
-    points, _, width = bases.shape
-    columns = np.tile(segment[:, None] + np.arange(width), (3, 1)).ravel()
-    starts = np.arange(0, 3 * points * width + 1, width)
-    return csr_array((bases.swapaxes(0, 1).ravel(), columns, starts), shape=(3 * points, count))

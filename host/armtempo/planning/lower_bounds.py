@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.progress import stage
 from armtempo.model.parts import Limits
 from armtempo.planning import dual_bound, dual_value, rest_to_rest
 from armtempo.planning.dual_bound import Cells
@@ -56,6 +57,7 @@ def of_path(angle_points_deg: Array, degree: int, limits: Sequence[Limits], abou
 
 def _path_s(angle_points_deg: Array, degree: int, limits: Sequence[Limits], about_s: float) -> float:
     """By duality, on more cells where few prove nothing; 0 where that does not help."""
+    stage("proving the floor")
     segments = len(angle_points_deg) - degree
     parts = min(max(_WORK // (segments * len(limits) ** 2), _LEAST_CELLS), _MOST_CELLS)
     found = _by_cells(angle_points_deg, degree, limits, about_s, parts)

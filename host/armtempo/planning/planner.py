@@ -10,7 +10,7 @@ from importlib.metadata import version
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.progress import Progress
+from armtempo.basics.progress import Progress, watched
 from armtempo.basics.version import installed_version
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
@@ -26,22 +26,20 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     """A motion through the job's via points, from rest to rest, as short as the search finds it.
 
     The same arm, job and seed give the same plan on the same machine and versions. Raises InputError where
-    job and arm do not fit each other, PlanError where there is no motion under these limits and ranges.
+    job and arm do not fit each other, PlanError where there is no motion under these limits and ranges; what
+    ``progress`` raises ends the planning.
     """
     checks.limits_of(arm)
     checks.check_job(arm, job)
     via, notes = via_angles(arm, job)
     way = free_plan.motion if checks.is_free(job) else through_plan.motion
-    planned = way(arm, job, via, progress or _silent)
+    with watched(progress) as told:
+        planned = way(arm, job, via, told)
     trajectory = planned.trajectory
     checks.check_time(trajectory)
     reached = extremes.of_joints(trajectory.joints)
     checks.check_reached(arm, reached)
     return Plan(arm, job, via, (*notes, *planned.notes), trajectory, planned.searches, reached, versions())
-
-
-def _silent(_done: float, _whole: float) -> None:
-    """Progress that nobody watches."""
 
 
 @cache

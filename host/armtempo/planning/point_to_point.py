@@ -21,17 +21,17 @@ _MARGIN = 1.001
 """The move is this much slower than the limits allow, so that rounding never exceeds them."""
 
 
-def straight(name: str, start_deg: ArrayLike, end_deg: ArrayLike, arm: Arm) -> Trajectory:
+def straight(name: str, start_deg: ArrayLike, end_deg: ArrayLike, arm: Arm, speed: float = 1.0) -> Trajectory:
     """The quintic from rest at ``start_deg`` (J,) to rest at ``end_deg`` (J,), all joints arriving together.
 
-    As fast as the limits of the slowest joint allow. Raises InputError where a posture has another number
-    of joints than the arm drives or leaves a joint's range.
+    As fast as the limits of the slowest joint allow, times ``speed``. Raises InputError where a posture has another
+    number of joints than the arm drives or leaves a joint's range.
     """
     start, end = posture(start_deg, arm), posture(end_deg, arm)
     duration_s = max(
         _duration_s(joint, abs(to - here)) for joint, here, to in zip(arm.driven, start, end, strict=True)
     )
-    times = time_axis.control_points([duration_s], DEGREE)
+    times = time_axis.control_points([duration_s / speed], DEGREE)
     joints = tuple(
         JointSpline(DEGREE, 1, bspline.fit([here, to], DEGREE), times)
         for here, to in zip(start, end, strict=True)
@@ -46,7 +46,12 @@ def backwards(trajectory: Trajectory, name: str) -> Trajectory:
 
 def posture(angles_deg: ArrayLike, arm: Arm) -> Array:
     """The angles as an array (J,); InputError where their number or a range does not fit the arm."""
-    found = np.asarray(angles_deg, dtype=float)
+    try:
+        found = np.asarray(angles_deg, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"{angles_deg!r:.40} is no posture", "give an angle in degrees for each joint with a motor"
+        ) from None
     if found.shape != (len(arm.driven),):
         raise InputError(
             f"a posture of arm {arm.name!r} has {len(arm.driven)} angles, not {found.size}",

@@ -35,13 +35,13 @@ def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> Sequ
     left to do; PlanError where a motion cannot be planned.
     """
     compiler = _Compiler(arm, progress)
-    start = (
-        compiler.posture(sequence.start, f"{sequence.source}: start: ") if sequence.start else _End(None, "")
-    )
+    source = sequence.source or f"sequence {sequence.name!r}"
+    source = sequence.source or f"sequence {sequence.name!r}"
+    start = compiler.posture(sequence.start, f"{source}: start: ") if sequence.start else _End(None, "")
     rows, _ = compiler.rows(sequence.steps, start.angles_deg, start.name)
     if not rows:
-        raise InputError(f"{sequence.source}: nothing is left to do", "add a step that moves, sets or waits")
-    check_size(len(rows), len(compiler.legs), len(compiler.counters), sequence.source)
+        raise InputError(f"{source}: nothing is left to do", "add a step that moves, sets or waits")
+    check_size(len(rows), len(compiler.legs), len(compiler.counters), source)
     legs = [replace(leg, name=f"{sequence.name}-{number}") for number, leg in enumerate(compiler.legs, 1)]
     return SequencePlan(
         arm, sequence.name, tuple(legs), tuple(rows), tuple(compiler.counters), planner.versions()
@@ -72,6 +72,7 @@ class _Compiler:
     counters: list[str] = field(default_factory=list)
     _known: dict[tuple[object, ...], int] = field(default_factory=dict)
     _plans: dict[int, Trajectory] = field(default_factory=dict)
+    _motions: dict[int, SourceMotion] = field(default_factory=dict)
     _depth: int = 0
 
     def rows(self, steps: tuple[Step, ...], here: Angles | None, name: str) -> tuple[list[SequenceRow], _End]:
@@ -120,26 +121,44 @@ class _Compiler:
         return [_move(self._known[key], step.step, words)], _End(target.angles_deg, target.name)
 
     def _run(self, step: kinds.RunMotion, here: _End) -> tuple[list[SequenceRow], _End]:
-        trajectory = self._planned(step.motion, step.where)
+        motion = self._motion(step.motion)
+        trajectory = self._planned(motion, step.where)
         start, end = _angles(trajectory(0.0)), _angles(trajectory(trajectory.duration_s))
         if here.angles_deg is not None and not self._same(here.angles_deg, start):
             raise InputError(
-                f"{step.where}run: {step.motion.name} begins at {_words(start)}, but the arm is at "
+                f"{step.where}run: {motion.name} begins at {_words(start)}, but the arm is at "
                 f"{here.name or _words(here.angles_deg)} ({_words(here.angles_deg)})",
-                f"put a step before it that goes there: goto with the same file as run, {step.motion.name!r}",
+                f"put a step before it that goes there: goto with the same file as run, {motion.name!r}",
             )
-        key = ("run", id(step.motion))
+        key = ("run", id(motion))
         if key not in self._known:
             self._known[key] = self._add(trajectory)
-        return [_move(self._known[key], step.step, f"run {step.motion.name}")], _End(
-            end, f"the end of {step.motion.name}"
+        return [_move(self._known[key], step.step, f"run {motion.name}")], _End(
+            end, f"the end of {motion.name}"
         )
 
+    def _motion(self, motion: SourceMotion | Job | Plan) -> SourceMotion:
+        """The same object for the same motion."""
+        if isinstance(motion, SourceMotion):
+            return motion
+        if id(motion) not in self._motions:
+            name = motion.name if isinstance(motion, Job) else motion.job.name
+            self._motions[id(motion)] = SourceMotion(name, motion)
+        return self._motions[id(motion)]
+
     def _target(self, step: kinds.Goto) -> _Place:
-        if isinstance(step.target, ArmPosture):
-            return self.posture(step.target, f"{step.where}goto: ")
-        trajectory = self._planned(step.target, "")
-        return _Place(_angles(trajectory(0.0)), f"the start of {step.target.name}")
+        target = step.target
+        if isinstance(target, str):
+            target = self.arm.posture(target)
+        elif isinstance(target, list | tuple):
+            if problem := self.arm.angles_problem(target):
+                raise InputError(f"{step.where}goto: {problem}", "give one angle for each joint with a motor")
+            target = ArmPosture(_words(target), tuple(target))
+        if isinstance(target, ArmPosture):
+            return self.posture(target, f"{step.where}goto: ")
+        motion = self._motion(target)
+        trajectory = self._planned(motion, "")
+        return _Place(_angles(trajectory(0.0)), f"the start of {motion.name}")
 
     def posture(self, posture: ArmPosture, where: str) -> _Place:
         """Where the arm stands then; PlanError where it cannot."""
@@ -174,7 +193,9 @@ class _Compiler:
     def _still(self, step: kinds.SetOutput | kinds.Wait | kinds.WaitInput | kinds.Count) -> SequenceRow:
         """The row of a step that moves nothing."""
         if isinstance(step, kinds.SetOutput):
-            return SequenceRow(record.OUTPUT, step.number, step.raw, 0, step.step, f"output {step.words}")
+            output = self.arm.output(step.output)
+            raw = self.arm.outputs[output].raw(step.to)
+            return SequenceRow(record.OUTPUT, output, raw, 0, step.step, f"output {step.output} {step.to}")
         if isinstance(step, kinds.Wait):
             return SequenceRow(
                 record.WAIT, 0, 0, round(step.wait_s * 1000), step.step, f"wait {step.wait_s:g} s"
@@ -186,9 +207,14 @@ class _Compiler:
             return SequenceRow(record.COUNT, number, 0, 0, step.step, f"count {step.counter}")
         value = int(step.active) | _THEN.get(step.on_timeout, record.STOP_THEN)
         limit = f", at most {step.timeout_s:g} s, then {step.on_timeout}" if step.timeout_s else ""
-        words = f"wait for input {step.words}{limit}"
+        words = f"wait for input {step.input}{'' if step.active else ' not'}{limit}"
         return SequenceRow(
-            record.WAIT_INPUT, step.number, value, round(step.timeout_s * 1000), step.step, words
+            record.WAIT_INPUT,
+            self.arm.input(step.input),
+            value,
+            round(step.timeout_s * 1000),
+            step.step,
+            words,
         )
 
     def _add(self, trajectory: Trajectory) -> int:

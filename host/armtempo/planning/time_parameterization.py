@@ -11,7 +11,7 @@ from armtempo_shared import motion
 from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.progress import Progress
+from armtempo.basics.progress import Progress, stage
 from armtempo.model.job import REFINE, Job
 from armtempo.model.parts import Limits
 from armtempo.optimise.tracker import Result
@@ -26,7 +26,7 @@ MIN_DURATION_S = 0.01
 _POLISHED_GAP = 1e-8
 _REFINED_GAP = 1e-4
 """How near to its local optimum an axis should come."""
-_FINER = 4
+_FINER = 8
 _PAYS = 1e-3
 """With ``refine = "auto"`` each axis gets so many times more segments while that saves this part of its time."""
 
@@ -76,15 +76,16 @@ def axes(groups: Sequence[Group], job: Job, most: int, progress: Progress | None
     """
     levels = _levels(job, most)
     stages = _Stages(progress, len(groups), levels)
-    timed = [_searched(group, job, stages) for group in groups]
+    timed = [_searched(group, job, stages, not levels) for group in groups]
     for before, refine in pairwise([1, *levels]):
         finer = []
         for group, axis in zip(groups, timed, strict=True):
             finer.append(_refined(group, job, axis, before, refine))
             stages.done()
         pays = any(new.total_s < old.total_s * (1 - _PAYS) for new, old in zip(finer, timed, strict=True))
-        timed = finer
-        if job.refine == "auto" and not pays:
+        if job.refine != "auto" or _longest_s(finer) <= _longest_s(timed):
+            timed = finer
+        if not pays:
             break
     stages.end()
     return [_long_enough(axis) for axis in timed]
@@ -101,7 +102,14 @@ def _levels(job: Job, most: int) -> list[int]:
     return levels
 
 
-def _searched(group: Group, job: Job, stages: _Stages) -> Timed:
+def _longest_s(timed: Sequence[Timed]) -> float:
+    """Motion time of all groups."""
+    return max(axis.total_s for axis in timed)
+
+
+def _searched(group: Group, job: Job, stages: _Stages, last: bool) -> Timed:
+    """The axis that the search finds, polished where no finer one follows."""
+    stage("searching")
     rng = np.random.default_rng([job.seed, group.joints[0]])
     found = interval_search.search(group.angle_points_deg, group.limits, job, rng, stages.within)
     stages.done()
@@ -109,7 +117,8 @@ def _searched(group: Group, job: Job, stages: _Stages) -> Timed:
     differences = path.stretched(path.of_intervals(found.result.x))
     searched = path.duration_s(differences)
     optimum = Optimum(differences, searched, 0.0)
-    if job.polish and job.refine == 1:
+    if job.polish and last:
+        stage("polishing")
         optimum = path.optimum(differences, _POLISHED_GAP)
     stages.done()
     intervals = path.intervals(optimum.differences_s)
@@ -128,8 +137,9 @@ def _searched(group: Group, job: Job, stages: _Stages) -> Timed:
 
 def _refined(group: Group, job: Job, axis: Timed, before: int, refine: int) -> Timed:
     """The same axis cut finer, then improved, so that it is never slower."""
+    stage(f"refining to {refine}")
     differences = np.diff(axis.time_points_s)
-    start = _cut(differences, before, refine, job.degree)
+    start = time_axis.cut(differences, before, refine, job.degree)
     path = FixedPath(group.angle_points_deg, job.degree, group.limits, refine)
     optimum = path.optimum(start, _REFINED_GAP)
     return replace(
@@ -140,15 +150,6 @@ def _refined(group: Group, job: Job, axis: Timed, before: int, refine: int) -> T
         total_s=optimum.total_s,
         optimum_s=optimum.bound_s,
     )
-
-
-def _cut(differences_s: Array, before: int, refine: int, degree: int) -> Array:
-    """The axis with ``refine`` instead of ``before`` segments; the same where that is a multiple, else much like it."""
-    if refine % before == 0:
-        return time_axis.refined(differences_s, refine // before, degree)
-    fine = time_axis.refined(differences_s, refine, degree)
-    count = (len(differences_s) - degree + 1) // before * refine + degree - 1
-    return np.asarray(np.interp(np.linspace(0, 1, count), np.linspace(0, 1, len(fine)), fine) * before)
 
 
 def _long_enough(axis: Timed) -> Timed:

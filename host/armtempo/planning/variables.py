@@ -8,12 +8,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import perm
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
 from armtempo.splines import bspline
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 Index = NDArray[np.intp]
 
@@ -89,3 +93,13 @@ def time_points(differences: Array, degree: int) -> Array:
     """Time control points (m + k,) of their differences, with t = 0 at the start."""
     points = np.concatenate([[0.0], np.cumsum(differences)])
     return np.asarray(points - points[: degree + 1] @ bspline.basis(degree)[0])
+
+
+def derivative_matrix(bases: Array, segment: Index, count: int) -> csr_array:
+    """First, second and third derivatives at all points, (3 P, count), from ``bases`` (P, 3, w) of their segments."""
+    from scipy.sparse import csr_array  # here, because loading it takes longer than most commands
+
+    points, _, width = bases.shape
+    columns = np.tile(segment[:, None] + np.arange(width), (3, 1)).ravel()
+    starts = np.arange(0, 3 * points * width + 1, width)
+    return csr_array((bases.swapaxes(0, 1).ravel(), columns, starts), shape=(3 * points, count))

@@ -48,7 +48,7 @@ class Note:
     """"undriven": the pose needs joints without a motor; "miss": the tool comes near to the pose, within its
     tolerance; "branch": the arm changes its branch before it."""
     via: int
-    """Number of the via point, from 1."""
+    """Number of the via point, from 0."""
     text: str
 
 
@@ -106,8 +106,8 @@ def resolve(arm: Arm, job: Job) -> Resolved:
     notes: list[Note] = []
     posture = setup.home
     branch: Branch | None = None
-    for number, via in enumerate(job.via, 1):
-        where = f"job {job.name!r}, via {number}"
+    for number, via in enumerate(job.via):
+        where = f"job {job.name!r}, P{number}"
         choice = None
         if isinstance(via, Pose):
             target = via.exact(where)
@@ -121,7 +121,7 @@ def resolve(arm: Arm, job: Job) -> Resolved:
         postures.append(posture)
         if setup.closed_form:
             before, branch = branch, _branch(setup, posture, branch)
-            if before and Pose in (type(via), type(job.via[number - 2])):
+            if before and Pose in (type(via), type(job.via[number - 1])):
                 notes += _branch_note(before, branch, choice, number)
     return Resolved(np.degrees(np.array(postures)[:, setup.driven]), tuple(notes))
 
@@ -210,13 +210,13 @@ def _miss_note(setup: _Setup, target: Pose, needed: Array, number: int) -> list[
     miss = setup.miss(target, needed)
     if not Constraint.of(target).reached(miss):
         text = (
-            f"via {number}: the pose needs joints that have no motor: {_needs(setup, needed)}; the tool misses the "
+            f"P{number}: the pose needs joints that have no motor: {_needs(setup, needed)}; the tool misses the "
             f"pose by {miss}"
         )
         return [Note("undriven", number, text)]
     if max(miss.position_mm / target.tolerance_mm, miss.rotation_deg / target.tolerance_deg) > WORTH_SAYING:
         allowed = f"{target.tolerance_mm:g} mm and {target.tolerance_deg:g} deg"
-        return [Note("miss", number, f"via {number}: the tool misses the pose by {miss} ({allowed} allowed)")]
+        return [Note("miss", number, f"P{number}: the tool misses the pose by {miss} ({allowed} allowed)")]
     return []
 
 
@@ -239,7 +239,7 @@ def _branch_note(old: Branch, new: Branch, choice: Choice | None, number: int) -
     if not changed:
         return []
     text = (
-        f"between via {number - 1} and via {number} the arm changes its branch ({', '.join(changed)}): from "
+        f"between P{number - 1} and P{number} the arm changes its branch ({', '.join(changed)}): from "
         f"{old} to {new}, so the joints pass through a singular posture on the way"
     )
     for candidate in choice.candidates if choice else ():

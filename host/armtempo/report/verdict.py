@@ -70,7 +70,8 @@ def of(found: Evaluation) -> Verdict:
 def _repetitions(found: Evaluation) -> Iterator[VerdictItem]:
     states = [repetition.state for repetition in found.run.repetitions]
     done = states.count(COMPLETE)
-    text = f"{done} of {len(states)} repetitions complete"
+    where = ", on a virtual board" if found.run.meta.get("virtual") else ""
+    text = f"{done} of {len(states)} repetitions complete{where}"
     yield VerdictItem(GOOD if done == len(states) else BAD, text)
 
 

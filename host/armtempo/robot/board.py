@@ -13,12 +13,14 @@ import numpy as np
 from armtempo_shared.messages import RESUME
 from armtempo_shared.sequence import KIND_BYTES, MAGIC
 
+from armtempo.basics.arguments import checked
 from armtempo.basics.arrays import Array
-from armtempo.basics.errors import InputError
+from armtempo.basics.errors import InputError, LinkError
 from armtempo.basics.progress import Progress
 from armtempo.link import Client
 from armtempo.link.board_messages import Hello, SequenceState, Status, StoredMotion
 from armtempo.model.arm import Arm
+from armtempo.model.job import NAME_RULE, is_name
 from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequencePlan
 from armtempo.planning.jog.jog_motion import SPEED, move_of
@@ -49,6 +51,7 @@ from armtempo.robot.where import Where, posture_deg
 from armtempo.runs.sequence_reader import SequenceRun
 
 
+@checked
 class Board:
     """A board and the arm that it moves; ``connect`` gives one.
 
@@ -65,14 +68,20 @@ class Board:
         """The arm that the board was last set up for through this object."""
         self.stops: list[StopRequest] = []
         """The stop requests of what this object has under way."""
+        self.last_jog_ends = ""
+        """Why the last jog ended before it was to, in words; "" where it did not."""
         self._stack = stack or ExitStack()
         self._start = StartPosition(client, port)
         self._last_folder: Path | None = None
         self._last_sequence: Path | None = None
 
     def close(self) -> None:
-        """Free the port; a virtual board ends."""
+        """Free the port; a virtual board ends. Nothing else can be done with this object then."""
         self._stack.close()
+        self.client.session.check = self._closed
+
+    def _closed(self) -> None:
+        raise LinkError(f"the board on {self.port} was closed", "open it again with armtempo.connect")
 
     def __enter__(self) -> Self:
         return self
@@ -80,7 +89,10 @@ class Board:
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._stack.__exit__(kind, value, trace)
+        try:
+            self._stack.__exit__(kind, value, trace)
+        finally:
+            self.close()
 
     @property
     def info(self) -> Hello:
@@ -91,20 +103,21 @@ class Board:
         """What the board is doing, its fault, and where the joints are in steps and counts."""
         return self.client.status()
 
-    def state(self, arm: Arm | None = None) -> BoardState:
+    def state(self, arm: Arm | Path | str | None = None) -> BoardState:
         """The same with what the board says of itself, in degrees and with the names of the joints.
 
         ``arm``: where the board is set up for it; None: the one that was named to this object.
         """
-        return board_state.read(self.client, self.port).named(arm or self.arm)
+        return board_state.read(self.client, self.port).named(self.arm if arm is None else Arm.of(arm))
 
-    def configure(self, arm: Arm, replace: bool = False) -> None:
-        """Make sure that the board has this arm's record.
+    def configure(self, arm: Arm | Path | str, replace: bool = False) -> None:
+        """Make sure that the board has this arm's record; ``arm``: or its file, or the name of one that ships.
 
         ``replace``: put it in the place of another one. All positions are unknown then, unless the two differ
         in limits alone; stored motions of the other record are refused. Raises LinkError where the board has
         another record and ``replace`` is false, InputError where a figure of the arm does not fit the board.
         """
+        arm = Arm.of(arm)
         arm_state.configure(self.client, arm, replace)
         self.arm = arm
 
@@ -112,7 +125,7 @@ class Board:
 
     def upload(
         self,
-        motion: Plan | EncodedMotion,
+        motion: Plan | EncodedMotion | Path | str,
         name: str | None = None,
         default: bool = False,
         progress: Progress | None = None,
@@ -120,10 +133,12 @@ class Board:
     ) -> EncodedMotion:
         """Store a motion, unless the board has just this one already; ``progress`` counts bytes.
 
-        ``name``: on the board, else made of the job's name. ``default``: let the board's button start it.
-        ``replace``: also in the place of another motion of this name, which the button then starts no longer.
-        Raises LinkError where there is such a motion, or the board is set up for another arm.
+        ``motion``: a plan or its file. ``name``: on the board, else made of the job's name. ``default``: let the
+        board's button start it. ``replace``: also in the place of another motion of this name, which the button then
+        starts no longer. Raises LinkError where there is such a motion, or the board is set up for another arm.
         """
+        if isinstance(motion, Path | str):
+            motion = Plan.load(motion)
         encoded = encoded_motion.of_plan(motion, name) if isinstance(motion, Plan) else motion
         self.configure(encoded.arm)
         stored_motion.store(self.client, encoded.name, encoded.data, progress, replace)
@@ -150,43 +165,54 @@ class Board:
         """The stored motions and sequences."""
         return tuple(self.client.stored())
 
-    def read(self, name: str, arm: Arm | None = None) -> EncodedMotion:
+    def read(self, name: str, arm: Arm | Path | str | None = None) -> EncodedMotion:
         """A stored motion of ``arm``, else of the arm that the board is set up for, read back.
 
         InputError where the record is damaged or does not fit the arm.
         """
-        data = self.client.fetch(name)
+        data = self.client.fetch(self._stored_name(name))
         if data.startswith(MAGIC[:KIND_BYTES]):
             raise InputError(f"{name!r} is a sequence, not a motion", f"run it with: armtempo run {name}")
-        return encoded_motion.of_record(name, data, arm or self._known_arm())
+        return encoded_motion.of_record(name, data, self._known_arm() if arm is None else Arm.of(arm))
+
+    def _stored_name(self, name: str) -> str:
+        """The name, where it can be one: InputError with what is meant else."""
+        if not is_name(name):
+            raise InputError(
+                f"{name!r} is no name for a motion on the board",
+                f"give the name of one that it keeps: {NAME_RULE}; armtempo.Plan.load reads a file",
+            )
+        return name
 
     def remove(self, name: str) -> None:
         """Remove a stored motion."""
-        self.client.remove(name)
+        self.client.remove(self._stored_name(name))
 
     def rename(self, old: str, new: str) -> None:
         """Give a stored motion another name."""
-        self.client.rename(old, new)
+        self.client.rename(self._stored_name(old), self._stored_name(new))
 
     def set_default(self, name: str) -> None:
         """What the board's button starts; "" for nothing."""
-        self.client.set_default(name)
+        self.client.set_default(self._stored_name(name) if name else name)
 
     # where the arm is
 
-    def home(self, arm: Arm, where: Where | None = None) -> None:
+    def home(self, arm: Arm | Path | str, where: Where | None = None) -> None:
         """Declare that ``arm`` is at ``where``, or at its home posture; nothing moves.
 
         Raises InputError for a posture that does not fit the arm, LinkError where the board is set up for another.
         """
+        arm = Arm.of(arm)
         self.configure(arm)
         arm_state.home(self.client, arm, None if where is None else posture_deg(where, arm))
 
-    def home_to_switches(self, arm: Arm, stop: StopRequest | None = None) -> None:
+    def home_to_switches(self, arm: Arm | Path | str, stop: StopRequest | None = None) -> None:
         """Home the joints that have a switch of known angle: to it, off it, slowly to it again, to their home angle.
 
         Raises InputError where no joint has one, LinkError where a switch does not trip.
         """
+        arm = Arm.of(arm)
         self.configure(arm)
         with self._stoppable(stop) as wanted:
             self._start.moved = True
@@ -208,16 +234,24 @@ class Board:
 
     # moving
 
-    def goto(self, where: Where, progress: Progress | None = None, stop: StopRequest | None = None) -> None:
+    def goto(
+        self,
+        where: Where,
+        progress: Progress | None = None,
+        stop: StopRequest | None = None,
+        speed: float = 1.0,
+    ) -> None:
         """Move straight to a posture, all joints together within their limits; ``progress`` counts seconds.
 
-        Raises LinkError where the position is unknown, InputError for a posture that does not fit the arm.
+        ``where``: also the file of a plan, for where it begins. ``speed``: part of the quickest, 0.01 to 1. Raises
+        LinkError where the position is unknown, InputError for a posture that does not fit the arm.
         """
+        permille(speed)  # InputError for one that is none
         arm = self._known_arm()
         target_deg = posture_deg(where, arm)
         with self._stoppable(stop) as wanted:
             self._start.home_virtual_arm(arm)
-            goto.go_to(self.client, arm, target_deg, wanted, progress)
+            goto.go_to(self.client, arm, target_deg, wanted, progress, speed)
 
     def jog(
         self,
@@ -233,14 +267,14 @@ class Board:
         ``joint``: number, from 1, or name; ``axis``: "x", "y", "z" of the base or "tool-x", "tool-y", "tool-z", along
         which the tool moves by ``by_mm``, or about which it turns by ``by_deg``; ``speed``: part of the speed limits,
         0.01 to 1. The jog ends at the end of a range, or where the tool cannot go on along the line, at the latest.
-        Gives the posture in degrees, (J,). Raises LinkError where the position is unknown, InputError where nothing
-        can move that way.
+        Gives the posture in degrees, (J,); ``last_jog_ends`` says why it ended early. Raises LinkError where the
+        position is unknown, InputError where nothing can move that way.
         """
         arm = self._known_arm()
         move = move_of(arm, joint, axis, by_deg, by_mm)
         with self._stoppable(stop) as wanted:
             self._start.home_virtual_arm(arm)
-            jog.step(self.client, arm, move, speed, wanted)
+            self.last_jog_ends = jog.step(self.client, arm, move, speed, wanted).ends
         return self.posture_deg()
 
     def held_jog(
@@ -273,7 +307,7 @@ class Board:
 
     def run(
         self,
-        motion: Plan | EncodedMotion | str,
+        motion: Plan | EncodedMotion | Path | str,
         repeat: int = 1,
         out: Path | str = "runs",
         progress: Progress | None = None,
@@ -282,13 +316,15 @@ class Board:
     ) -> Run:
         """Replay a motion ``repeat`` times and record what comes back in a new run folder below ``out``.
 
-        ``motion``: a plan, or the name of a motion on the board. The arm must be homed and be where the motion
-        begins, else LinkError, as where the board keeps another motion under its name (``upload`` can replace it)
-        or is set up for another arm. The arm of a virtual board is brought there. Between repetitions it returns along
-        the same path, all at the speed that ``speed`` was told last. ``progress`` counts seconds of
-        motion; ``watcher`` sees folder, samples and repetitions.
-        Whatever ends the run early raises, and what was recorded until then is ``last_run``.
+        ``motion``: a plan, its file (FILE.json), or the name of a motion on the board. The arm must be homed and be
+        where the motion begins, else LinkError, as where the board keeps another motion under its name (``upload``
+        can replace it) or is set up for another arm. The arm of a virtual board is brought there. Between repetitions
+        it returns along the same path, all at the speed that ``speed`` was told last. ``progress`` counts seconds of
+        motion; ``watcher`` sees folder, samples and repetitions. Whatever ends the run early raises, and what was
+        recorded until then is ``last_run``.
         """
+        if repeat < 1:
+            raise InputError(f"a run of {repeat} repetitions is none", "give repeat 1 or more")
         encoded = self._encoded(motion)
         seen = recording.ProgressWatcher(progress, repeat, watcher or Watcher())
         with self._stoppable(stop) as wanted:
@@ -339,7 +375,7 @@ class Board:
     def _sequence(self, sequence: SequencePlan | str, stop: StopRequest, replace: bool) -> MotionKey:
         """What the board has it as; a virtual arm is brought to its start."""
         if isinstance(sequence, str):
-            found = self.client.find(sequence)
+            found = self.client.find(self._stored_name(sequence))
             if found is None or not found.sequence:
                 raise InputError(f"the board has no sequence {sequence!r}", "see 'armtempo list'")
             if self.arm is not None:
@@ -365,7 +401,7 @@ class Board:
         """The last sequence that this object recorded, however it ended; None before the first."""
         return SequenceRun.load(self._last_sequence) if self._last_sequence else None
 
-    def fetch(self, motion: Plan | EncodedMotion | str | None = None, out: Path | str = "runs") -> Run:
+    def fetch(self, motion: Plan | EncodedMotion | Path | str | None = None, out: Path | str = "runs") -> Run:
         """The samples that the board keeps of its last run, in a new run folder below ``out``.
 
         ``motion`` is what was run; None: the motion that the button starts. Such a run needs no host; one under
@@ -384,14 +420,22 @@ class Board:
         """
         stored_motion.stop(self.client, now)
 
-    def speed(self, part: float) -> None:
-        """Run at a part of the planned speed, 0.01 to 1: what this object starts from now on, and what moves.
+    def request_stop(self, now: bool = False, by: str = "another thread") -> bool:
+        """Stop what moves from another thread than the one that waits for it, which gets Stopped; whether
+        something moved. Does not wait for rest.
+
+        ``by``: who asks for it, in words. NoAnswerError if the board is silent.
+        """
+        return stored_motion.request_stop(self.client, self.stops, now, by)
+
+    def speed(self, fraction: float) -> None:
+        """Run at a fraction of the planned speed, 0.01 to 1: what this object starts from now on, and what moves.
 
         The path stays as it is; while it moves, the speed goes over smoothly in the motion's brake time: from a
         ``Watcher``, from another thread than the one that waits in ``run``, or for what the button started.
-        Raises InputError for another part, BoardError where the board refuses.
+        Raises InputError for another fraction, BoardError where the board refuses.
         """
-        change_speed(self.client, permille(part))
+        change_speed(self.client, permille(fraction))
 
     def pause(self) -> None:
         """Let what moves come to rest on its path, to go on with ``resume``; BoardError where nothing moves."""
@@ -425,8 +469,10 @@ class Board:
         self.configure(arm)
         return arm
 
-    def _encoded(self, motion: Plan | EncodedMotion | str) -> EncodedMotion:
+    def _encoded(self, motion: Plan | EncodedMotion | Path | str) -> EncodedMotion:
         """The motion for a board that is set up for its arm."""
+        if isinstance(motion, Path) or (isinstance(motion, str) and motion.endswith(".json")):
+            motion = Plan.load(motion)
         if isinstance(motion, str):
             return self.read(motion)
         encoded = encoded_motion.of_plan(motion) if isinstance(motion, Plan) else motion

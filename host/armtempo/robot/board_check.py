@@ -14,7 +14,7 @@ def examine_board(state: BoardState | ArmtempoError) -> list[Item]:
     """What a board says of itself, or why it says nothing."""
     if isinstance(state, ArmtempoError):
         return [
-            Item("board", str(state), Condition.WRONG, "see host/docs/recovery.md for each of its states")
+            Item("board", str(state), Condition.WRONG, "see 'armtempo help recovery' for each of its states")
         ]
     found = [
         Item("board", f"{state.board_id}{' (virtual)' if state.virtual else ''}, port {state.port}"),

@@ -51,6 +51,15 @@ class SequenceStand:
 
 
 @dataclass(frozen=True)
+class ToolPlace:
+    """Where the tool is by the steps commanded, in the frame of the base."""
+
+    position_mm: tuple[float, float, float]
+    rpy_deg: tuple[float, float, float]
+    """Roll, pitch and yaw: about x, then y, then z of the base."""
+
+
+@dataclass(frozen=True)
 class BoardState:
     """A board, the arm it is set up for, and where that is."""
 
@@ -94,6 +103,8 @@ class BoardState:
     joints: tuple[JointState, ...]
     sequence: SequenceStand | None
     """None where none was started since the board's start."""
+    tool: ToolPlace | None = None
+    """None where the arm or a position is not known."""
 
     def to_json(self) -> dict[str, Any]:
         """Plain values."""
@@ -105,8 +116,9 @@ class BoardState:
         try:
             joints = tuple(JointState(**joint) for joint in values["joints"])
             stand = SequenceStand(**values["sequence"]) if values["sequence"] else None
-            return cls(**{**values, "joints": joints, "sequence": stand})
-        except (TypeError, KeyError) as error:
+            tool = ToolPlace(*map(tuple, values["tool"].values())) if values["tool"] else None
+            return cls(**{**values, "joints": joints, "sequence": stand, "tool": tool})
+        except (TypeError, KeyError, AttributeError) as error:
             raise LinkError(
                 "the program that has the port is of another version of armtempo", "end it and start it again"
             ) from error
@@ -124,7 +136,18 @@ class BoardState:
             )
             for joint, driven in zip(self.joints, arm.driven, strict=True)
         )
-        return replace(self, arm=arm.name, arm_source=arm.source, joints=joints)
+        tool = _tool(arm, joints) if all(joint.known for joint in joints) else None
+        return replace(self, arm=arm.name, arm_source=arm.source, joints=joints, tool=tool)
+
+
+def _tool(arm: Arm, joints: tuple[JointState, ...]) -> ToolPlace:
+    from armtempo.kinematics.of_arm import forward
+    from armtempo.model.pose import to_rpy_deg
+
+    pose = forward(arm, [joint.angle_deg or 0.0 for joint in joints])
+    x, y, z = (round(float(value), 3) + 0.0 for value in pose[:3, 3])
+    roll, pitch, yaw = (round(value, 3) + 0.0 for value in to_rpy_deg(pose))
+    return ToolPlace((x, y, z), (roll, pitch, yaw))
 
 
 def read(client: Client, port: str) -> BoardState:

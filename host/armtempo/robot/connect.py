@@ -7,6 +7,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 
+from armtempo.basics.arguments import checked
 from armtempo.link.connect import open_board, patiently
 from armtempo.link.traffic import Chunk, Sink
 from armtempo.model.arm import Arm
@@ -17,11 +18,12 @@ from armtempo.robot.sharing import Sharing
 LOG = logging.getLogger("armtempo")
 
 
+@checked
 def connect(
     port: str | None = None,
-    arm: Arm | None = None,
+    arm: Arm | Path | str | None = None,
     *,
-    log_traffic: Path | None = None,
+    log_traffic: Path | str | None = None,
     sink: Sink | None = None,
     any_program: bool = False,
     tell: Callable[[str], object] = LOG.warning,
@@ -40,12 +42,13 @@ def connect(
     Raises InputError where there is no such port, or none is named and not exactly one board is there;
     PortInUseError where another program keeps it, LinkError where it is silent or runs something else.
     """
+    moved = None if arm is None else Arm.of(arm)
     chosen = board_port.choose(port)
     if chosen.source in board_port.UNASKED:
         tell(f"port {chosen.value}: {chosen.source}")
     return patiently(
         lambda: connect_now(
-            chosen.value, arm, log_traffic=log_traffic, sink=sink, any_program=any_program, tell=tell
+            chosen.value, moved, log_traffic=log_traffic, sink=sink, any_program=any_program, tell=tell
         )
     )
 
@@ -54,7 +57,7 @@ def connect_now(
     port: str,
     arm: Arm | None = None,
     *,
-    log_traffic: Path | None = None,
+    log_traffic: Path | str | None = None,
     sink: Sink | None = None,
     any_program: bool = False,
     tell: Callable[[str], object] = LOG.warning,
@@ -62,7 +65,8 @@ def connect_now(
     """``connect`` to the port that is named, without waiting; PortInUseError where another program has it."""
     stack = ExitStack()
     taps = _Taps(sink)
-    client = stack.enter_context(open_board(port, log_traffic, taps, arm, any_program, tell))
+    log = Path(log_traffic) if log_traffic else None
+    client = stack.enter_context(open_board(port, log, taps, arm, any_program, tell))
     client.session.tell = tell
     board = Board(client, port, stack)
     sharing = Sharing(client, board.state, board.stops, lambda: board.arm)

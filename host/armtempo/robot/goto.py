@@ -21,15 +21,20 @@ from armtempo.robot.stored_motion import TEMPORARY, SampleSink, raise_fault, rep
 
 
 def go_to(
-    client: Client, arm: Arm, target_deg: Array, stop: StopRequest, progress: Progress | None = None
+    client: Client,
+    arm: Arm,
+    target_deg: Array,
+    stop: StopRequest,
+    progress: Progress | None = None,
+    speed: float = 1.0,
 ) -> None:
-    """Move straight to a posture (J,) within the limits; nothing happens where the arm is there already.
+    """Move straight to a posture (J,), ``speed`` times as fast as the limits allow; nothing happens if it is there.
 
     Raises LinkError where the position is unknown, BoardError where the board refuses or a fault ends the move.
     """
     if not arm_state.is_at(client, arm, target_deg):
         here = arm_state.posture_deg(client, arm)
-        trajectory = point_to_point.straight(TEMPORARY + "goto", here, target_deg, arm)
+        trajectory = point_to_point.straight(TEMPORARY + "goto", here, target_deg, arm, speed)
         move_once(client, encoded_motion.of_trajectory(trajectory, arm), stop, progress)
 
 

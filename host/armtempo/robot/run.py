@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from armtempo.basics.arguments import checked
 from armtempo.model.plan import Plan
 from armtempo.report import run_report
 from armtempo.runs import reader, replayed
@@ -17,6 +18,7 @@ from armtempo.runs.run_folder import COMPLETE, Repetition
 from armtempo.splines.trajectory import Trajectory
 
 
+@checked
 class Run:
     """A run folder: what was run, and what came back."""
 

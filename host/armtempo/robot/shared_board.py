@@ -10,7 +10,9 @@ from collections.abc import Iterator
 from types import TracebackType
 from typing import Any, Self
 
-from armtempo.basics.errors import LinkError
+from armtempo_shared.messages import RESUME
+
+from armtempo.basics.errors import InputError, LinkError
 from armtempo.link.board_messages import Levels
 from armtempo.ports import claim, names
 from armtempo.ports.caller import Caller
@@ -46,9 +48,19 @@ class SharedBoard:
         """
         return bool(self._caller.ask("stop", ANSWER_S, now=now, by=by)["moving"])
 
-    def speed(self, rate: int) -> None:
-        """Let what moves go on at ``rate`` thousandths of its planned speed; 0: pause, RESUME: as before it."""
-        self._caller.ask("speed", ANSWER_S, rate=rate)
+    def speed(self, fraction: float) -> None:
+        """Run at a fraction of the planned speed, 0.01 to 1, as ``Board.speed``; InputError for another one."""
+        from armtempo.robot.speed import permille
+
+        self._caller.ask("speed", ANSWER_S, rate=permille(fraction))
+
+    def pause(self) -> None:
+        """Let what moves come to rest on its path, to go on with ``resume``; BoardError where nothing moves."""
+        self._caller.ask("speed", ANSWER_S, rate=0)
+
+    def resume(self) -> None:
+        """Go on along the path at the speed before the pause; BoardError where nothing moves."""
+        self._caller.ask("speed", ANSWER_S, rate=RESUME)
 
     def set_output(self, number: int, value: int) -> None:
         """Set an output of the arm record (from 0) to a value of 0 to 65535."""
@@ -112,6 +124,8 @@ def attach(port: str | None = None) -> SharedBoard:
     """
     from armtempo.project import board_port
 
+    if not (port is None or (isinstance(port, str) and port.isprintable())):
+        raise InputError(f"attach: port is {port!r:.40}", "give the name of a port, or None")
     chosen = board_port.choose(port, others=True)
     found = find(chosen.value)
     if found is None:

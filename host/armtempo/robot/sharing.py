@@ -26,10 +26,8 @@ from armtempo.ports.server import Server
 from armtempo.robot.board_state import BoardState
 from armtempo.robot.speed import change_speed
 from armtempo.robot.stop_request import StopRequest
-from armtempo.robot.stored_motion import fault_name, send_stop
+from armtempo.robot.stored_motion import TURN_S, fault_name, request_stop
 
-TURN_S = 1.0
-"""A request waits so long for its turn to talk to the board."""
 EVERY_S = 0.5
 """Interval of the states that are handed out."""
 
@@ -71,7 +69,7 @@ class Sharing:
         }
         self._server = Server(claim.new(name, port, device), handlers)
         session.check = self._server.check
-        session.heard = self._heard
+        session.listeners.append(self._heard)
         Thread(target=self._hand_out_states, name="armtempo states", daemon=True).start()
 
     def close(self) -> None:
@@ -93,15 +91,7 @@ class Sharing:
 
     def _stop(self, request: Message) -> Message:
         now = request.get("now", False)
-        for stop in [*self._stops]:
-            stop.ask(request.get("by") or "another program")
-        with self._client.session.in_a_hurry(TURN_S) as mine:
-            if not mine:
-                raise NoAnswerError(
-                    "the board does not answer the program that has its port",
-                    "it is told to stop as soon as it does; where that takes too long, switch off the motors' power",
-                )
-            moving = send_stop(self._client, now)
+        moving = request_stop(self._client, self._stops, now, request.get("by") or "another program")
         if self._server is not None:
             self._server.publish("event", {"event": "stop", "now": now})
         return {"moving": moving}

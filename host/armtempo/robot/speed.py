@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from armtempo_shared.messages import PERMILLE, RESUME, SLOWEST_PERMILLE
 
+from armtempo.basics.arguments import checked
 from armtempo.basics.errors import InputError
 from armtempo.link import Client
 
 
+@checked
 def permille(fraction: float) -> int:
     """The board's number for a part of the planned speed, 0.01 to 1; InputError for another."""
     rate = round(fraction * PERMILLE)
     if not SLOWEST_PERMILLE <= rate <= PERMILLE:
         raise InputError(
-            f"speed {100 * fraction:g} %: it must be from {100 * SLOWEST_PERMILLE / PERMILLE:g} to 100 % of the "
-            "planned one",
-            "a quicker motion needs a plan with higher limits",
+            f"a speed of {fraction:g} times the planned one, {100 * fraction:g} %, is not allowed",
+            f"give a fraction of {SLOWEST_PERMILLE / PERMILLE:g} to 1 (1 to 100 % on the command line); a quicker "
+            "motion needs a plan with higher limits",
         )
     return rate
 

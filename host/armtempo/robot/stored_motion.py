@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 
 from armtempo_shared import wire
@@ -26,8 +26,8 @@ BRAKE_S = 5.0
 _LATER_S = 1.0
 FREEZE_S = 2.0
 """Freezing takes no longer than this."""
-
-
+TURN_S = 1.0
+"""A request from another thread waits this long for its turn to talk to the board."""
 TEMPORARY = "tmp-"
 """Names of motions that are removed after use begin so."""
 
@@ -162,6 +162,22 @@ def send_stop(client: Client, now: bool = False) -> bool:
         if error.code != wire.ERROR_CODES["not_moving"]:
             raise
         return False
+
+
+def request_stop(client: Client, stops: Iterable[StopRequest], now: bool, by: str) -> bool:
+    """Ask for a stop from another thread than the one that waits for the motion; whether something moved.
+
+    ``stops``: the requests of what this program has under way, which end. NoAnswerError if the board is silent.
+    """
+    for request in [*stops]:
+        request.ask(by)
+    with client.session.in_a_hurry(TURN_S) as mine:
+        if not mine:
+            raise NoAnswerError(
+                "the board does not answer the program that has its port",
+                "it is told to stop as soon as it does; if that takes too long, switch off the motors' power",
+            )
+        return send_stop(client, now)
 
 
 def stop(client: Client, now: bool) -> None:

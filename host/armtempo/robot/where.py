@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from numpy.typing import ArrayLike
 
 from armtempo.basics.arrays import Array
@@ -11,8 +13,8 @@ from armtempo.model.sequence_plan import SequencePlan
 from armtempo.planning import point_to_point, via_points
 from armtempo.records.encoded_motion import EncodedMotion
 
-Where = Plan | EncodedMotion | SequencePlan | str | ArrayLike
-"""A posture: by its name in the arm file, the driven joints' angles in degrees, (J,), or a motion
+Where = Plan | EncodedMotion | SequencePlan | Path | str | ArrayLike
+"""A posture: by its name in the arm file, the driven joints' angles in degrees, (J,), or a motion (or its file)
 or sequence for its start."""
 
 
@@ -21,6 +23,8 @@ def posture_deg(where: Where, arm: Arm) -> Array:
 
     Raises InputError for a posture that does not fit the arm, or that it has no name for.
     """
+    if isinstance(where, Path) or (isinstance(where, str) and where.endswith(".json")):
+        where = Plan.load(where)
     if isinstance(where, Plan):
         return where.trajectory(0.0)
     if isinstance(where, EncodedMotion):

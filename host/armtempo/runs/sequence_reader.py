@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armtempo.basics.arguments import checked
 from armtempo.basics.errors import ArmtempoError, RunFolderError
 from armtempo.formats.plain_text import visible
 from armtempo.records import decode
@@ -44,6 +45,7 @@ class RowPassed:
     words: str
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class SequenceRun:
     """A sequence that was recorded, whole or cut short."""

@@ -9,12 +9,14 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from armtempo.basics.arguments import checked_fields
 from armtempo.basics.virtual_id import PREFIX
 from armtempo.model.arm import Arm
 
 DEFAULT_MACHINE = "STM32F4DISC with STM32F407"
 
 
+@checked_fields
 @dataclass(frozen=True)
 class InjectedFault:
     """Something that goes wrong ``at_s`` seconds into the ``run``-th motion since power-up.
@@ -35,6 +37,7 @@ class InjectedFault:
     counts: int = 0
 
 
+@checked_fields
 @dataclass(frozen=True)
 class LaunchOptions:
     """What a virtual board may be started with; the defaults make one that is new and undamaged."""
@@ -82,8 +85,8 @@ class ProcessOptions:
     """Folders with the packages of the board program: how its pins are wired, what an arm record says."""
     program: list[str]
     """Folders with the board's packages, as if they were deployed; empty: only what the flash has."""
-    flash_blocks: int = 190
-    """Size of the flash: what an STM32F4DISC's file system has for files."""
+    flash_blocks: int | None
+    """Size of the flash; None: what an STM32F4DISC's file system has for files."""
     speed: float
     """Motions run at this multiple of real time; 0: as fast as they can."""
     edge_log: str | None

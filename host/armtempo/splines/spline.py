@@ -7,11 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.splines import bspline
 
+DEGREES = (3, 5)
 
+
+@checked
+@checked_fields
 @dataclass(frozen=True, eq=False)
 class Spline:
     """A uniform B-spline of degree 3 or 5 over u from 0 to n, with n segments.
@@ -22,6 +27,15 @@ class Spline:
     control_points: Array
     degree: int = 5
 
+    def __post_init__(self) -> None:
+        """InputError for what is no spline."""
+        object.__setattr__(self, "control_points", np.asarray(self.control_points, dtype=float))
+        if self.degree not in DEGREES or self.control_points.ndim not in (1, 2) or self.segments < 1:
+            raise InputError(
+                f"control points of shape {self.control_points.shape} make no spline of degree {self.degree}",
+                "give more of them than the degree, which is 3 or 5; Spline.through takes points to pass",
+            )
+
     @classmethod
     def through(cls, points: ArrayLike, degree: int = 5) -> Spline:
         """The spline through ``points``, (n + 1,) or (n + 1, J): at u = 0, 1, … n; at rest at both ends.
@@ -29,6 +43,11 @@ class Spline:
         The cubic rests in its first derivative, the quintic in its second too (Eqs. 13 and 14). Raises
         InputError for another degree, fewer than two points or values that are not finite.
         """
+        if degree not in DEGREES or np.ndim(points) not in (1, 2):
+            raise InputError(
+                f"no spline of degree {degree} through an array of {np.ndim(points)} dimensions",
+                "give degree 3 or 5, and points (n + 1,) or (n + 1, J)",
+            )
         return cls(bspline.fit(points, degree), degree)
 
     @property
@@ -42,6 +61,11 @@ class Spline:
         ``u`` of any shape gives an array of that shape, with J in a last axis where the points have it. Raises
         InputError for a u outside of 0 to n.
         """
+        if not 0 <= order <= self.degree:
+            raise InputError(
+                f"a derivative of order {order} is none",
+                f"give 0 for the value, 1 for the slope, up to {self.degree}",
+            )
         at = np.asarray(u, dtype=float)
         if not np.all((at >= 0.0) & (at <= self.segments)):
             raise InputError(

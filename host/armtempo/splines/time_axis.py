@@ -89,3 +89,12 @@ def parameter(coefficients: Array, time_s: Array) -> tuple[NDArray[np.intp], Arr
         moves = step != now
         moving, wanted, at, now, low, high = (each[moves] for each in (moving, wanted, at, step, low, high))
     return segment, found.reshape(np.shape(time_s))
+
+
+def cut(differences_s: Array, before: int, refine: int, degree: int) -> Array:
+    """The axis with ``refine`` instead of ``before`` segments; the same where that is a multiple, else much like it."""
+    if refine % before == 0:
+        return refined(differences_s, refine // before, degree)
+    fine = refined(differences_s, refine, degree)
+    count = (len(differences_s) - degree + 1) // before * refine + degree - 1
+    return np.asarray(np.interp(np.linspace(0, 1, count), np.linspace(0, 1, len(fine)), fine) * before)

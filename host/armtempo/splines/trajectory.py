@@ -8,6 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armtempo.basics.arguments import checked
+from armtempo.basics.errors import InputError
 from armtempo.formats import json_codec
 from armtempo.splines import bspline, time_axis
 from armtempo.splines.bspline import Array
@@ -82,13 +84,17 @@ def derivatives(angle: Array, time: Array, segment: NDArray[np.intp], u: Array, 
     return (at(angle, 3) - 3 * acceleration * t1 * t2 - speed * at(time, 3)) / t1**3
 
 
-@dataclass(frozen=True, eq=False)
+@checked
+@dataclass(frozen=True, eq=False, repr=False)
 class Trajectory:
     """All joints of a motion; with shared timing all joints hold the same ``time_points_s``."""
 
     name: str
     joints: tuple[JointSpline, ...]
     shared: bool
+
+    def __repr__(self) -> str:
+        return f"<Trajectory {self.name!r}: {len(self.joints)} joints, {self.duration_s:.3f} s>"
 
     @property
     def duration_s(self) -> float:
@@ -97,4 +103,8 @@ class Trajectory:
 
     def __call__(self, time_s: ArrayLike, order: int = 0) -> Array:
         """Like ``JointSpline.__call__``, all joints in the last axis: (..., J)."""
+        if not 0 <= order <= 3:
+            raise InputError(
+                f"a derivative of order {order} is not known", "give 0 (angle), 1 (speed), 2 or 3 (jerk)"
+            )
         return np.stack([joint(time_s, order) for joint in self.joints], axis=-1)

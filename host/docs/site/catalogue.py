@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import click
 from armtempo.cli import main
 from armtempo_shared import meanings
@@ -41,10 +44,50 @@ class Commands(Directive):
         )
         for paragraph in (command.help or "").split("\n\n"):
             section += nodes.paragraph(text=" ".join(paragraph.replace("\b", "").split()))
-        records = [parameter.get_help_record(context) for parameter in command.params]
+        arguments = [(name, described(command, name)) for name in names_of_arguments(command)]
+        if arguments:
+            section += table(("argument", "what it is"), arguments)
+        records = [_plain(parameter.get_help_record(context)) for parameter in command.params]
         if any(records):
             section += table(("option", "what it does"), [record for record in records if record])
         return section
+
+
+class PaperPage(Directive):
+    """``{paper}``: the body of the page that ``armtempo paper`` writes, below this page's own title."""
+
+    def run(self) -> list[nodes.Node]:
+        """As it is, in a box that the style sheet knows."""
+        page = Path(__file__).parents[1] / "paper.html"
+        self.state.document.settings.env.note_dependency(str(page))
+        body = page.read_text(encoding="utf-8").partition("<body>")[2].partition("</body>")[0]
+        _, _, content = body.partition("</p>")  # after its title and first lines
+        return [nodes.raw("", f'<div class="paper">{content}</div>', format="html")]
+
+
+def names_of_arguments(command: click.Command) -> list[str]:
+    """What the usage line calls the arguments."""
+    context = click.Context(command)
+    return [
+        parameter.make_metavar(context).strip("[].")
+        for parameter in command.params
+        if isinstance(parameter, click.Argument)
+    ]
+
+
+def described(command: click.Command, name: str) -> str:
+    """What the help says of an argument: ``NAME: a sentence.``; "" where it says nothing."""
+    text = " ".join((command.help or "").split())
+    found = re.search(rf"(?:^|\s){re.escape(name)}: (.+?\.)(?=\s[A-Z]|$)", text)
+    return found[1] if found else ""
+
+
+def _plain(record: tuple[str, str] | None) -> tuple[str, str] | None:
+    """Ranges in words."""
+    if record is None:
+        return None
+    words = re.sub(r"\b([\d.]+)<=x<=([\d.]+)", r"\1 to \2", record[1])
+    return record[0], re.sub(r"\bx>=([\d.]+)", r"at least \1", words)
 
 
 def table(heads: tuple[str, ...], rows: list[tuple[str, ...]]) -> nodes.table:
@@ -63,8 +106,27 @@ def row(cells: list[nodes.Node]) -> nodes.row:
     return nodes.row("", *(nodes.entry("", nodes.paragraph("", "", cell)) for cell in cells))
 
 
+def without_modules(
+    _app: Sphinx,
+    _what: str,
+    _name: str,
+    _object: object,
+    _options: object,
+    signature: str | None,
+    returns: str | None,
+) -> tuple[str | None, str | None]:
+    """A signature as a person writes it: types without their modules, defaults without what only Python knows."""
+
+    def short(text: str | None) -> str | None:
+        return text and re.sub(r"~?\b(?:[a-z_]\w*\.)+(?=[A-Z])|~", "", re.sub(r"<[^<>]*>", "...", text))
+
+    return short(signature), short(returns)
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     """Called by Sphinx: makes the directives known."""
     app.add_directive("board-codes", BoardCodes)
     app.add_directive("commands", Commands)
+    app.add_directive("paper", PaperPage)
+    app.connect("autodoc-process-signature", without_modules)
     return {"parallel_read_safe": True}

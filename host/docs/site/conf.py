@@ -13,6 +13,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 project = "armtempo"
 author = "the armtempo authors"
+project_copyright = "2026, the armtempo authors; MIT licence"
 version = release = __version__
 language = "en"
 smartquotes = False  # "--port" keeps its hyphens
@@ -21,12 +22,16 @@ root_doc = "host/docs/index"
 include_patterns = ["host/docs/**.md", "board/docs/**.md", "shared/docs/**.md"]
 extensions = ["myst_parser", "sphinx.ext.autodoc", "catalogue"]
 
-myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
+myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 4
 
 autodoc_typehints = "signature"
+autodoc_typehints_format = "short"
+python_use_unqualified_type_names = True
+python_display_short_literal_types = True
+python_maximum_signature_line_length = 88
 autodoc_member_order = "bysource"
-autodoc_type_aliases = {"ArrayLike": "ArrayLike", "NDArray": "NDArray"}
+autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "NDArray", "Progress", "Where", "Tell")}
 nitpicky = True  # a link that leads nowhere is a warning
 nitpick_ignore_regex = [("py:.*", ".*")]  # but not a type of numpy or click in a signature
 

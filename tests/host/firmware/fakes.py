@@ -17,7 +17,26 @@ for name in firmware0.bin firmware1.bin firmware.dfu firmware.hex firmware.elf; 
 """
 GCC = '#!/bin/sh\ncase "$1" in -dump*) echo 13.2.1;; *) exit ${NO_NEWLIB:-0};; esac\n'
 TOOL = '#!/bin/sh\necho "${0##*/} $@" >> "$TOOL_LOG"\n'
-DFU = TOOL + 'case "$1" in --list) printf "$DFU_LIST";; *) exit ${DFU_FAILS:-0};; esac\n'
+CP = shutil.which("cp")
+DFU = (
+    TOOL
+    + f"""case "$1" in --list) printf "$DFU_LIST"; exit;; esac
+at=${{6%%:*}}
+case "$7" in
+-D) {CP} "$8" "$TOOL_LOG.$at";;
+-U) if [ -n "$DFU_DAMAGES" ]; then echo other > "$8"; else {CP} "$TOOL_LOG.$at" "$8"; fi;;
+esac
+exit ${{DFU_FAILS:-0}}
+"""
+)
+STLINK = (
+    TOOL
+    + f"""case "$2" in
+write) {CP} "$3" "$TOOL_LOG.$4";;
+read) {CP} "$TOOL_LOG.$4" "$3";;
+esac
+"""
+)
 ONE = "Found DFU: [0483:df11] ver=2200, devnum=9, alt=1\\nFound DFU: [0483:df11] ver=2200, devnum=9, alt=0\\n"
 BOARD_MAKE = """CMSIS_MCU = STM32F407xx
 ifeq ($(USE_MBOOT),1)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,7 +13,7 @@ from armtempo.basics.errors import LinkError
 from armtempo.deploy.firmware import flash, image
 from armtempo.link.program_version import own_crc
 
-from tests.host.firmware.fakes import DFU, MACHINE, ONE, TOOL, no_progress, outcome
+from tests.host.firmware.fakes import DFU, MACHINE, ONE, STLINK, no_progress, outcome
 
 
 @pytest.fixture
@@ -22,7 +24,7 @@ def built(tmp_path: Path) -> Path:
     made = image.Image("STM32F4DISC", MACHINE, "1.28.0", "gcc", own_crc(), pieces)
     folder.mkdir()
     for piece in pieces:
-        (folder / piece.file).touch()
+        (folder / piece.file).write_bytes(piece.file.encode())
     (folder / image.ABOUT).write_bytes(image.about(made))
     return folder
 
@@ -32,21 +34,59 @@ def test_flashing_by_usb_writes_the_vectors_last(
 ) -> None:
     tools(dfu_util=DFU)
     monkeypatch.setenv("DFU_LIST", ONE)
-    code, said = outcome("flash", built)
+    code, said = outcome("flash", "--image", built)
     assert (code, "armtempo deploy --port PORT" in said) == (0, True), said
-    assert (tmp_path / "tool.log").read_text().splitlines() == [
+    back = re.compile(r"\S+/back.bin")
+    assert back.sub("BACK", (tmp_path / "tool.log").read_text()).splitlines() == [
         "dfu-util --list",
         f"dfu-util -d 0483:df11 -a 0 -s 0x08020000 -D {built}/firmware1.bin",
-        f"dfu-util -d 0483:df11 -a 0 -s 0x08000000:leave -D {built}/firmware0.bin",
+        f"dfu-util -d 0483:df11 -a 0 -s 0x08000000 -D {built}/firmware0.bin",
+        "dfu-util -d 0483:df11 -a 0 -s 0x08020000:13 -U BACK",
+        "dfu-util -d 0483:df11 -a 0 -s 0x08000000:13 -U BACK",
+        "dfu-util -d 0483:df11 -a 0 -s 0x08000000:4:leave -U BACK",
     ]
 
 
+def test_what_is_read_back_must_be_what_was_written(
+    built: Path, tools: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tools(dfu_util=DFU)
+    monkeypatch.setenv("DFU_LIST", ONE)
+    monkeypatch.setenv("DFU_DAMAGES", "1")
+    code, said = outcome("flash", "--image", built)
+    assert code == 1
+    assert "read back at 0x08020000 is not what was written" in said
+
+
+def test_the_only_firmware_here_is_taken(
+    built: Path, tools: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tools(st_flash=STLINK)
+    monkeypatch.chdir(tmp_path)
+    assert outcome("flash")[0] == 0
+    shutil.make_archive("armtempo-firmware-STM32F4DISC", "zip", tmp_path, built.name)
+    code, said = outcome("flash")
+    assert (code, "2 firmwares are here" in said) == (2, True)
+    shutil.rmtree(built)
+    assert outcome("flash")[0] == 0  # of the zip file
+    Path("armtempo-firmware-STM32F4DISC.zip").write_bytes(b"PK cut")
+    code, said = outcome("flash")
+    assert (code, "is no whole zip file" in said) == (2, True)
+    Path("armtempo-firmware-STM32F4DISC.zip").unlink()
+    code, said = outcome("flash")
+    assert (code, "no firmware is named" in said) == (2, True)
+
+
 def test_flashing_by_st_link(built: Path, tools: Callable[..., Path], tmp_path: Path) -> None:
-    tools(st_flash=TOOL)
-    assert outcome("flash", built)[0] == 0
-    assert (tmp_path / "tool.log").read_text().splitlines() == [
+    tools(st_flash=STLINK)
+    assert outcome("flash", "--image", built)[0] == 0
+    back = re.compile(r"\S+/back.bin")
+    assert back.sub("BACK", (tmp_path / "tool.log").read_text()).splitlines() == [
         f"st-flash --connect-under-reset write {built}/firmware1.bin 0x08020000",
-        f"st-flash --connect-under-reset --reset write {built}/firmware0.bin 0x08000000",
+        f"st-flash --connect-under-reset write {built}/firmware0.bin 0x08000000",
+        "st-flash --connect-under-reset read BACK 0x08020000 13",
+        "st-flash --connect-under-reset read BACK 0x08000000 13",
+        "st-flash reset",
     ]
 
 
@@ -80,13 +120,13 @@ def board(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 def test_a_board_at_a_port_goes_into_its_bootloader(
     built: Path, tools: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    tools(dfu_util=DFU, st_flash=TOOL)
+    tools(dfu_util=DFU, st_flash=STLINK)
     monkeypatch.setenv("DFU_LIST", ONE)
-    assert outcome("flash", built, "--port", "/dev/ttyX")[0] == 0
+    assert outcome("flash", "--image", built, "--port", "/dev/ttyX")[0] == 0
     lines = (tmp_path / "tool.log").read_text().splitlines()
     assert lines[:2] == ["mpremote bootloader", "dfu-util --list"]
     (tmp_path / "tool.log").unlink()
-    assert outcome("flash", built, "--port", "/dev/ttyX", "--tool", "st-flash")[0] == 0
+    assert outcome("flash", "--image", built, "--port", "/dev/ttyX", "--tool", "st-flash")[0] == 0
     assert "mpremote" not in (tmp_path / "tool.log").read_text()
 
 
@@ -96,7 +136,7 @@ def test_another_board_than_the_firmwares_is_refused(
 ) -> None:
     tools(dfu_util=DFU)
     monkeypatch.setattr(FakeRemote, "machine", "PYBv1.1 with STM32F405RG")
-    code, said = outcome("flash", built, "--port", "/dev/ttyX")
+    code, said = outcome("flash", "--image", built, "--port", "/dev/ttyX")
     assert code == 1
     assert "is a PYBv1.1 with STM32F405RG, the firmware is for a F4DISC" in said
     assert not (tmp_path / "tool.log").exists()
@@ -123,7 +163,7 @@ def test_no_bootloader_or_more_than_one(
 ) -> None:
     tools(dfu_util=DFU)
     monkeypatch.setenv("DFU_LIST", devices)
-    code, said = outcome("flash", built)
+    code, said = outcome("flash", "--image", built)
     assert code == 1
     assert words in said
     assert "BOOT0" in said
@@ -132,7 +172,7 @@ def test_no_bootloader_or_more_than_one(
 @pytest.mark.parametrize("tool", [None, "dfu-util", "st-flash"])
 def test_missing_flash_tools_are_named(tool: str | None, built: Path, tools: Callable[..., Path]) -> None:
     tools()
-    code, said = outcome("flash", built, *(["--tool", tool] if tool else []))
+    code, said = outcome("flash", "--image", built, *(["--tool", tool] if tool else []))
     assert code == 1
     assert "not installed" in said
     assert ("apt install dfu-util" in said) == (tool != "st-flash")
@@ -145,7 +185,7 @@ def test_a_flash_tool_that_fails_says_what_to_do(
     tools(dfu_util=DFU)
     monkeypatch.setenv("DFU_LIST", ONE)
     monkeypatch.setenv("DFU_FAILS", "74")
-    code, said = outcome("flash", built)
+    code, said = outcome("flash", "--image", built)
     assert code == 1
     assert "no whole firmware now" in said
     assert "hint: flash again" in said
@@ -153,29 +193,29 @@ def test_a_flash_tool_that_fails_says_what_to_do(
 
 def test_a_virtual_board_takes_no_firmware(built: Path, tools: Callable[..., Path]) -> None:
     tools(dfu_util=DFU)
-    assert outcome("flash", built, "--port", "sim")[0] == 2
+    assert outcome("flash", "--image", built, "--port", "sim")[0] == 2
 
 
 def test_a_folder_that_is_no_firmware_is_refused(
     built: Path, tools: Callable[..., Path], tmp_path: Path
 ) -> None:
-    tools(st_flash=TOOL)
+    tools(st_flash=STLINK)
     for damage, words in (
         (lambda: (built / "firmware1.bin").unlink(), "is not whole: firmware1.bin"),
         (lambda: (built / image.ABOUT).write_text(json.dumps({"pieces": []})), "cannot be read"),
         (lambda: (built / image.ABOUT).unlink(), "holds no firmware"),
     ):
         damage()
-        code, said = outcome("flash", built)
+        code, said = outcome("flash", "--image", built)
         assert code == 2
         assert words in said
     assert not (tmp_path / "tool.log").exists()
 
 
 def test_another_version_in_a_firmware_is_told(built: Path, tools: Callable[..., Path]) -> None:
-    tools(st_flash=TOOL)
+    tools(st_flash=STLINK)
     content = json.loads((built / image.ABOUT).read_text())
     (built / image.ABOUT).write_text(json.dumps(content | {"program_crc": f"{own_crc() ^ 1:08x}"}))
-    code, said = outcome("flash", built)
+    code, said = outcome("flash", "--image", built)
     assert code == 0
     assert "another version of the program" in said

@@ -1,4 +1,4 @@
-"""A built firmware onto a board: over USB by dfu-util, or through an ST-LINK by st-flash.
+"""A firmware onto a board: over USB by dfu-util, or through an ST-LINK by st-flash; read back and compared.
 
 The pieces are written from the highest address down: the last one holds the vectors, without which a chip does not
 start. A board whose flashing was cut off stays in its bootloader, or gets there by its BOOT0 pin, and is flashed again.
@@ -12,12 +12,13 @@ import shutil
 import subprocess
 import time
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from armtempo.basics.errors import InputError, LinkError, ToolError
 from armtempo.basics.progress import Progress
 from armtempo.deploy.changes import Tell
 from armtempo.deploy.firmware import image
-from armtempo.deploy.firmware.image import Image, Piece
+from armtempo.deploy.firmware.image import Image
 from armtempo.deploy.install import end_program
 from armtempo.deploy.remote import Remote
 from armtempo.link.program_version import own_crc
@@ -39,13 +40,18 @@ _BY_HAND = (
 )
 
 
-def flash(folder: Path, port: str | None, tool: str | None, tell: Tell, progress: Progress) -> None:
-    """Put the firmware of a folder that ``build`` made on a board.
+def flash(given: Path, port: str | None, tool: str | None, tell: Tell, progress: Progress) -> None:
+    """Put a firmware on a board: the folder that ``build`` made, or the zip file of a release.
 
     ``port``: where the board answers now; None: it is in its bootloader, or an ST-LINK is connected. ``tool``: one
     of TOOLS; None: the first that is installed. Raises InputError where the folder holds no firmware, LinkError
     where the board is moving or another one than the firmware is for, ToolError where a tool is missing or fails.
     """
+    with image.unpacked(given) as folder:
+        _flash(folder, port, tool, tell, progress)
+
+
+def _flash(folder: Path, port: str | None, tool: str | None, tell: Tell, progress: Progress) -> None:
     firmware = image.read(folder)
     chosen = _choose(tool)
     if firmware.program_crc != own_crc():
@@ -57,10 +63,29 @@ def flash(folder: Path, port: str | None, tool: str | None, tell: Tell, progress
     elif chosen == DFU:
         _wait_for_bootloader(0.0)
     pieces = sorted(firmware.pieces, key=lambda piece: -piece.address)
+    steps = 2 * len(pieces) + 1
     for number, piece in enumerate(pieces):
-        progress(number, len(pieces))
-        _run(_command(chosen, folder, piece, piece is pieces[-1]))
-    progress(len(pieces), len(pieces))
+        progress(number, steps)
+        _run(_write(chosen, folder / piece.file, piece.address))
+    for number, piece in enumerate(pieces, len(pieces)):
+        progress(number, steps)
+        _compare(chosen, folder / piece.file, piece.address)
+    _start(chosen, pieces[-1].address)
+    progress(steps, steps)
+
+
+def _compare(tool: str, file: Path, address: int) -> None:
+    """Read a piece back; ToolError if the chip has something else."""
+    wanted = file.read_bytes()
+    with TemporaryDirectory(prefix="armtempo-flash-") as name:
+        back = Path(name) / "back.bin"
+        _run(_read(tool, back, address, len(wanted)))
+        found = back.read_bytes()[: len(wanted)] if back.exists() else b""
+    if found != wanted:
+        raise ToolError(
+            f"what was read back at {address:#010x} is not what was written",
+            f"flash again, with a shorter cable if it comes again; {_BY_HAND}",
+        )
 
 
 def _choose(tool: str | None) -> str:
@@ -107,12 +132,38 @@ def _bootloaders() -> int:
     return len(re.findall(rf"^Found DFU: \[{_CHIP}\].*alt=0", done.stdout, re.MULTILINE))
 
 
-def _command(tool: str, folder: Path, piece: Piece, last: bool) -> list[str]:
-    """Write one piece; behind the last one the board starts."""
-    file, address = str(folder / piece.file), f"{piece.address:#010x}"
+def _write(tool: str, file: Path, address: int) -> list[str]:
+    """The command that writes a piece."""
     if tool == STLINK:
-        return [STLINK, "--connect-under-reset", *(["--reset"] if last else []), "write", file, address]
-    return [DFU, "-d", _CHIP, "-a", "0", "-s", address + (":leave" if last else ""), "-D", file]
+        return [STLINK, "--connect-under-reset", "write", str(file), f"{address:#010x}"]
+    return [DFU, "-d", _CHIP, "-a", "0", "-s", f"{address:#010x}", "-D", str(file)]
+
+
+def _read(tool: str, file: Path, address: int, size: int) -> list[str]:
+    """The command that reads a piece back."""
+    if tool == STLINK:
+        return [STLINK, "--connect-under-reset", "read", str(file), f"{address:#010x}", str(size)]
+    return [DFU, "-d", _CHIP, "-a", "0", "-s", f"{address:#010x}:{size}", "-U", str(file)]
+
+
+def _start(tool: str, vectors: int) -> None:
+    """Let the board start. dfu-util cannot tell whether it did: the chip leaves USB while it is asked."""
+    if tool == STLINK:
+        _run([STLINK, "reset"])
+        return
+    with TemporaryDirectory(prefix="armtempo-flash-") as name:
+        command = [
+            DFU,
+            "-d",
+            _CHIP,
+            "-a",
+            "0",
+            "-s",
+            f"{vectors:#010x}:4:leave",
+            "-U",
+            str(Path(name) / "back.bin"),
+        ]
+        subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False)
 
 
 def _run(command: list[str]) -> None:

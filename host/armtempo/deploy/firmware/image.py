@@ -1,10 +1,14 @@
-"""A built firmware as a folder: the pieces of the flash, and what they are."""
+"""A built firmware: the pieces of the flash and what they are, in a folder or in the zip file of a release."""
 
 from __future__ import annotations
 
 import json
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from armtempo.basics.errors import InputError
@@ -37,6 +41,39 @@ def about(image: Image) -> bytes:
     content = asdict(image) | {"program_crc": f"{image.program_crc:08x}"}
     content["pieces"] = [{"file": piece.file, "address": f"{piece.address:#010x}"} for piece in image.pieces]
     return f"{json.dumps(content, indent=1)}\n".encode()
+
+
+def find(here: Path) -> Path:
+    """The only firmware in a folder, built or downloaded; InputError if there is none, or more than one."""
+    found = [path.parent for path in here.glob(f"*/{ABOUT}")] + [*here.glob("armtempo-firmware-*.zip")]
+    if len(found) == 1:
+        return found[0]
+    get = "download armtempo-firmware-BOARD.zip of a release, or build one with 'armtempo firmware'"
+    if not found:
+        raise InputError(
+            "no firmware is named, and none is here", f"{get}; then: armtempo flash --image FILE"
+        )
+    raise InputError(
+        f"{len(found)} firmwares are here: {', '.join(map(str, sorted(found)))}", "name one with --image"
+    )
+
+
+@contextmanager
+def unpacked(path: Path) -> Iterator[Path]:
+    """The folder of a firmware; for a zip file one that goes with the context. InputError if it is no zip file."""
+    if path.is_dir():
+        yield path
+        return
+    with TemporaryDirectory(prefix="armtempo-firmware-") as name:
+        try:
+            with zipfile.ZipFile(path) as archive:
+                archive.extractall(name)
+        except FileNotFoundError:
+            raise InputError(f"{path}: no such file or folder", "check the path") from None
+        except (OSError, zipfile.BadZipFile) as error:
+            raise InputError(f"{path} is no whole zip file: {error}", "download it again") from None
+        inner = [about.parent for about in Path(name).rglob(ABOUT)]
+        yield inner[0] if inner else Path(name)
 
 
 def read(folder: Path) -> Image:

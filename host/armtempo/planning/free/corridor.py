@@ -8,12 +8,15 @@ from __future__ import annotations
 import numpy as np
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.progress import alive
 from armtempo.planning.free.tool import Tool
 from armtempo.splines import bernstein
 
 SHARP = 1e-3
 """How far, relative, a bound on the tool's deviation may lie above what is reached."""
-_DEPTH = 20
+_ROUNDING_MM = 1e-9
+_MOST_PIECES = 50_000
+"""No more pieces are looked at at once: some 100 MB, and a second."""
 
 
 def joint_deviation_deg(path: Array, through: Array) -> float:
@@ -22,25 +25,32 @@ def joint_deviation_deg(path: Array, through: Array) -> float:
 
 
 def tool_deviation_mm(path: Array, through: Array, tool: Tool) -> float:
-    """Upper bound, sharp to SHARP, of the distance between the tools at the same u.
+    """Upper bound of the distance between the tools at the same u, sharp to SHARP unless that needs too many pieces.
 
-    ``path`` and ``through``: Bernstein coefficients (S, 6, J) in degrees. In the middle of a piece the distance is
-    computed; away from it, it grows no faster than ``_growth`` says. Pieces that may hold the largest are halved.
+    ``path`` and ``through``: Bernstein coefficients (S, 6, J) in degrees. At the ends and in the middle of a piece the
+    distance is computed; between, it grows no faster than ``_growth`` says, and is above the chords between them by no
+    more than ``_bulge``. Pieces that may hold the largest are halved.
     """
     best = 0.0
-    for _ in range(_DEPTH):
-        ends = np.concatenate([path, path[:, ::-1]])[:, 0], np.concatenate([through, through[:, ::-1]])[:, 0]
-        middle = _middle(path), _middle(through)
-        first, second = (tool.at(angles).position_mm for angles in middle)
-        distance = np.linalg.norm(first - second, axis=1)
-        outer = np.linalg.norm(tool.at(ends[0]).position_mm - tool.at(ends[1]).position_mm, axis=1)
-        best = max(best, float(distance.max()), float(outer.max()))
-        most = distance + 0.5 * _growth(path @ tool.turns.T, through @ tool.turns.T, tool.reach_mm)
-        open_ = most > best * (1.0 + SHARP) + 1e-9
+    while True:
+        alive()
+        places = np.stack([path[:, 0], _middle(path), path[:, -1]], axis=1)
+        others = np.stack([through[:, 0], _middle(through), through[:, -1]], axis=1)
+        shape = len(path), 3, 3
+        away = tool.positions_mm(places.reshape(-1, path.shape[2])).reshape(shape)
+        away -= tool.positions_mm(others.reshape(-1, path.shape[2])).reshape(shape)
+        distance = np.linalg.norm(away, axis=2)
+        best = max(best, float(distance.max()))
+        turned, beside = path @ tool.turns.T, through @ tool.turns.T
+        grown = distance[:, 1] + 0.5 * _growth(turned, beside, tool.reach_mm)
+        bulged = distance.max(axis=1) + _bulge(turned, tool.reach_mm) + _bulge(beside, tool.reach_mm)
+        most = np.minimum(grown, bulged)
+        open_ = most > best * (1.0 + SHARP) + _ROUNDING_MM
         if not open_.any():
-            return best * (1.0 + SHARP) + 1e-9
+            return best * (1.0 + SHARP) + _ROUNDING_MM
+        if 2 * np.count_nonzero(open_) > _MOST_PIECES:
+            return float(most.max())
         path, through = _halved(path[open_]), _halved(through[open_])
-    return float(most.max())
 
 
 def _middle(pieces: Array) -> Array:
@@ -68,3 +78,16 @@ def _growth(path: Array, through: Array, reach_mm: Array) -> Array:
     speed = np.abs(np.diff(np.radians(through), axis=1)).max(axis=1) * degree
     outer = np.minimum(reach_mm[:, None], reach_mm[None, :])
     return np.asarray(drift @ reach_mm + np.einsum("nk,kj,nj->n", away, outer, speed))
+
+
+def _bulge(curve: Array, reach_mm: Array) -> Array:
+    """How far the tool is from the chords between ends and middle of a piece at most, in mm: (N,).
+
+    ``curve``: turns of rows, (N, 6, R) in degrees. A second derivative of d over a chord of length h: d h^2 / 8.
+    """
+    degree = curve.shape[1] - 1
+    angles = np.radians(curve)
+    speed = np.abs(np.diff(angles, axis=1)).max(axis=1) * degree
+    bend = np.abs(np.diff(angles, 2, axis=1)).max(axis=1) * degree * (degree - 1)
+    outer = np.minimum(reach_mm[:, None], reach_mm[None, :])
+    return np.asarray((bend @ reach_mm + np.einsum("nk,kj,nj->n", speed, outer, speed)) / 32.0)

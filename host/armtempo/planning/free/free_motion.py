@@ -264,7 +264,7 @@ class Improver:
     def _solve(self, motion: FreeMotion, points: Points, first: bool) -> FreeMotion:
         unit_s = motion.total_s / self.layout.segments
         limits = self.demand.limits * unit_s ** np.arange(1, 4) / self._size[:, None]
-        blocks: list[Block] = [LimitRows(self.variables, points, limits, None), self.angle_rows()]
+        blocks: list[Block] = [LimitRows(self.variables, points, limits), self.angle_rows()]
         if self._targets is not None and self.demand.tool is not None:
             blocks.append(ToolRows(self.variables, self.demand.tool, self._targets, self._size))
         smoothing = self._smoothing() * (1.0 if first else _SMOOTHED)

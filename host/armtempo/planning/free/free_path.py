@@ -10,7 +10,7 @@ import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import PlanError
-from armtempo.basics.progress import Progress
+from armtempo.basics.progress import Progress, alive, stage
 from armtempo.planning import rest_to_rest
 from armtempo.planning.free import angle_bounds, corridor, free_start, layout
 from armtempo.planning.free.free_motion import Demand, FreeMotion, Improver, through
@@ -29,6 +29,8 @@ _SPREAD = 0.5
 """Random starts share time out by factors of this standard deviation of their logarithm."""
 _INSIDE = 0.998
 """A corridor of the tool is kept by so much of it at points, so that it holds between them."""
+_DRAWN = 8
+"""A path is drawn towards the spline so often until its corridor is proven."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +43,9 @@ class Effort:
     """Segments that the record can hold."""
     starts: int
     rng: np.random.Generator
+    along_s: Array | None = None
+    """Differences of a time axis of the spline through the via points, as many for each of its segments: the one start
+    in a corridor that has it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,11 +68,13 @@ def shortest(demand: Demand, effort: Effort, progress: Progress) -> Shortest:
         looser = Improver(_tightened(demand), exact.motion.layout).improved(exact.motion, _ROUNDS)
         return replace(exact, motion=_within_corridor(demand, looser))
     even = effort.pieces is not None or _in_corridor(demand)
-    whole = effort.starts + _ROUNDS
+    ways = _starts(_tightened(demand), effort, even)
+    whole = len(ways) + _ROUNDS
     best: FreeMotion | None = None
     times: list[float] = []
     problem: PlanError | None = None
-    for number, start in enumerate(_starts(_tightened(demand), effort, even)):
+    for number, start in enumerate(ways):
+        stage(f"start {number + 1} of {len(ways)}")
         try:
             motion = start()
             found = Improver(_tightened(demand), motion.layout).improved(motion, 1)
@@ -79,6 +86,7 @@ def shortest(demand: Demand, effort: Effort, progress: Progress) -> Shortest:
         progress(number + 1, whole)
     if best is None:
         raise problem or PlanError("a free path needs at least one start", "set starts to 1 or more")
+    stage("improving the best")
     final = _finished(demand, best, effort, even)
     progress(whole, whole)
     return Shortest(final, np.array(times))
@@ -92,6 +100,8 @@ def automatic_pieces(stretches: int, most: int) -> int:
 def _starts(demand: Demand, effort: Effort, even: bool) -> list[Callable[[], FreeMotion]]:
     """Ways to make a motion to start from."""
     stretches = len(demand.via_deg) - 1
+    if effort.along_s is not None:
+        return [partial(free_start.on_time_axis, demand, effort.along_s)]
     pieces = min(_COARSE_PIECES, max(effort.most // stretches, LEAST_PIECES))
     if even:
         pieces = effort.pieces or automatic_pieces(stretches, effort.most)
@@ -148,13 +158,19 @@ def _within_corridor(demand: Demand, motion: FreeMotion) -> FreeMotion:
     if not np.isfinite(demand.corridor_mm) or demand.tool is None:
         return motion
     middle = bspline.refined(bspline.fit(demand.via_deg, DEGREE), int(motion.layout.pieces[0]), DEGREE)
-    reached = tool_deviation_mm(demand, motion)
-    while reached > demand.corridor_mm:
+    stage("proving the corridor")
+    for _ in range(_DRAWN):
+        alive()
+        reached = tool_deviation_mm(demand, motion)
+        if reached <= demand.corridor_mm:
+            return motion
         part = _INSIDE * demand.corridor_mm / reached
         points = middle + part * (motion.angle_points_deg - middle)
         motion = replace(motion, angle_points_deg=points).stretched(demand.limits)
-        reached = tool_deviation_mm(demand, motion)
-    return motion
+    raise PlanError(
+        f"no path was proven to stay within corridor_mm = {demand.corridor_mm:g}",
+        "widen the corridor, or set it to 0 for the spline itself",
+    )
 
 
 def tool_deviation_mm(demand: Demand, motion: FreeMotion) -> float:

@@ -9,23 +9,26 @@ from armtempo_shared import motion as record
 from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.errors import InputError
+from armtempo.basics.errors import InputError, PlanError
 from armtempo.basics.progress import Progress, part
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.model.parts import Limits
 from armtempo.model.plan import Search
 from armtempo.model.tool_pose import Pose
-from armtempo.planning import checks, lower_bounds
+from armtempo.planning import checks, lower_bounds, through_plan
+from armtempo.planning.fixed_path import FixedPath
 from armtempo.planning.free import corridor, free_path
 from armtempo.planning.free.angle_bounds import of_path
 from armtempo.planning.free.free_motion import Demand, FreeMotion, Tolerance, through
 from armtempo.planning.free.free_path import Effort, Shortest
 from armtempo.planning.free.layout import DEGREE, LEAST_PIECES, uniform
 from armtempo.planning.free.tool import Tool
+from armtempo.planning.lower_bounds import Floor
 from armtempo.planning.planned import Planned
 from armtempo.planning.time_parameterization import MIN_DURATION_S
 from armtempo.planning.variables import time_points
-from armtempo.splines import extremes
+from armtempo.splines import bspline, extremes, time_axis
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
 _BEYOND = 2.0
@@ -34,6 +37,8 @@ _WORTH_USING = 1e-3
 """A tolerance of less than so many mm or degrees is not made use of."""
 _ROUNDED = 1.001
 """Time is stretched by no more than this for what rounding does."""
+_START_GAP = 1e-3
+"""How near to the best one the time axis comes that a path in a corridor starts with."""
 _WIDER = 0.5 * checks.TOLERANCE
 """Ranges are widened by so much of themselves, so that a via point at their end is inside."""
 
@@ -44,6 +49,10 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
     Raises InputError for a job that the board cannot hold, PlanError where no path stays within the ranges.
     """
     most = _most_segments(arm, job, len(via_deg))
+    spline = None
+    if _in_corridor(job) and not job.stops:
+        spline = _on_spline(arm, job, via_deg, part(progress, 0, 2) or progress)
+        progress = part(progress, 1, 2) or progress
     moving = [int(joint) for joint in np.flatnonzero(np.ptp(via_deg, axis=0) > checks.TOLERANCE)]
     groups = [moving] if job.timing == "shared" else [[joint] for joint in moving]
     found = []
@@ -53,7 +62,16 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
         if pieces is None and len(groups) > 1:
             pieces = free_path.automatic_pieces(len(via_deg) - 1, most)
         effort = Effort(pieces, most, job.starts, np.random.default_rng([job.seed, joints[0]]))
-        found.append(free_path.shortest(demand, effort, part(progress, number, len(groups)) or progress))
+        if spline is not None:
+            pieces = pieces or free_path.automatic_pieces(len(via_deg) - 1, most)
+            effort = replace(effort, along_s=_axis_s(demand, spline, pieces))
+        try:
+            found.append(free_path.shortest(demand, effort, part(progress, number, len(groups)) or progress))
+        except PlanError:
+            if spline is None:
+                raise
+    if spline is not None and (not found or found[0].motion.total_s >= spline.trajectory.duration_s):
+        return spline
     trajectory = _kept(arm, _trajectory(job, via_deg, groups, found))
     points = np.stack([joint.angle_points_deg for joint in trajectory.joints], axis=1)
     checks.check_ranges(arm, points, DEGREE)
@@ -61,6 +79,35 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
         _search(arm, job, via_deg, joints, one) for joints, one in zip(groups, found, strict=True)
     )
     return Planned(trajectory, searches, _notes(arm, job, via_deg, groups, found))
+
+
+def _in_corridor(job: Job) -> bool:
+    return job.corridor_deg is not None or job.corridor_mm is not None
+
+
+def _on_spline(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned | None:
+    """The plan on the spline through the via points, inside any corridor; None where it leaves a joint's range."""
+    on_it = replace(job, path="through", corridor_deg=None, corridor_mm=None, refine="auto")
+    try:
+        planned = through_plan.motion(arm, on_it, via_deg, progress)
+    except PlanError:
+        return None
+    searches = (
+        replace(search, floor_s=floor.time_s, floor_kind=floor.kind)
+        for search in planned.searches
+        for floor in (_floor(arm, job, via_deg, list(search.joints)),)
+    )
+    note = "no faster path was found in the corridor than the spline through the via points itself"
+    return replace(planned, searches=tuple(searches), notes=(*planned.notes, note))
+
+
+def _axis_s(demand: Demand, spline: Planned, pieces: int) -> Array:
+    """Differences of the best time axis that has so many segments for each stretch of the spline."""
+    joint = spline.trajectory.joints[0]
+    start = time_axis.cut(np.diff(joint.time_points_s), joint.refine, pieces, DEGREE)
+    limits = [Limits(*values) for values in demand.limits]
+    path = FixedPath(bspline.fit(demand.via_deg, DEGREE), DEGREE, limits, pieces)
+    return path.optimum(start, _START_GAP).differences_s
 
 
 def _most_segments(arm: Arm, job: Job, vias: int) -> int:
@@ -160,9 +207,7 @@ def _spline(motion: FreeMotion, angle_points_deg: Array) -> JointSpline:
 
 
 def _search(arm: Arm, job: Job, via_deg: Array, joints: list[int], found: Shortest) -> Search:
-    limits = [arm.driven[joint].limits for joint in joints]
-    demand = _demand(arm, job, via_deg, joints)
-    floor = lower_bounds.of_vias(demand.via_deg, limits, demand.stops, demand.tolerances)
+    floor = _floor(arm, job, via_deg, joints)
     return Search(
         joints=tuple(joints),
         intervals_s=found.motion.differences_s,
@@ -175,6 +220,12 @@ def _search(arm: Arm, job: Job, via_deg: Array, joints: list[int], found: Shorte
         floor_s=floor.time_s,
         floor_kind=floor.kind,
     )
+
+
+def _floor(arm: Arm, job: Job, via_deg: Array, joints: list[int]) -> Floor:
+    limits = [arm.driven[joint].limits for joint in joints]
+    demand = _demand(arm, job, via_deg, joints)
+    return lower_bounds.of_vias(demand.via_deg, limits, demand.stops, demand.tolerances)
 
 
 def _notes(

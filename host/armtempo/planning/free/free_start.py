@@ -28,6 +28,13 @@ def along_spline(demand: Demand, pieces: int, times_s: Array) -> FreeMotion:
     return _met(demand, layout, points, _differences(layout, times_s / pieces), smooth=False)
 
 
+def on_time_axis(demand: Demand, differences_s: Array) -> FreeMotion:
+    """The same on a time axis (S + 4,) that has as many segments for each stretch."""
+    stretches = len(demand.via_deg) - 1
+    pieces = (len(differences_s) - DEGREE + 1) // stretches
+    return replace(along_spline(demand, pieces, np.ones(stretches)), differences_s=differences_s)
+
+
 def smooth(demand: Demand, layout: Layout, times_s: Array) -> FreeMotion:
     """The path with the least third differences of its control points, for times (n,) between the via points."""
     rough = np.empty((layout.segments + DEGREE, demand.via_deg.shape[1]))

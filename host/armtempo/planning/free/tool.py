@@ -46,9 +46,7 @@ class Tool:
 
     def at(self, angles_deg: Array) -> ToolState:
         """For angles (P, J) of the moving joints."""
-        driven = np.tile(self._posture_deg, (len(angles_deg), 1))
-        driven[:, self._moving] = angles_deg
-        chained = array_frames(self._geometry, np.radians(chain.all_angles_deg(self._arm, driven)))
+        chained = self._frames(angles_deg)
         *rotation, position = (np.stack(part, axis=-1) for part in chained[-1])
         axes, slopes = [], []
         for row in self._rows:
@@ -62,6 +60,15 @@ class Tool:
             np.einsum(by_joint, np.array(slopes), self.turns),
             np.einsum(by_joint, np.array(axes), self.turns),
         )
+
+    def positions_mm(self, angles_deg: Array) -> Array:
+        """Only where it is, (P, 3), for angles (P, J)."""
+        return np.stack(self._frames(angles_deg)[-1].origin, axis=-1)
+
+    def _frames(self, angles_deg: Array) -> list[Frame[Array]]:
+        driven = np.tile(self._posture_deg, (len(angles_deg), 1))
+        driven[:, self._moving] = angles_deg
+        return array_frames(self._geometry, np.radians(chain.all_angles_deg(self._arm, driven)))
 
     def miss(self, angles_deg: Array, target: Pose) -> Miss:
         """How far the tool is from a pose, for angles (J,)."""

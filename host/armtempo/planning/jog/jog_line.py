@@ -34,6 +34,7 @@ _TRIED = (WHOLE, (APPROACH,), (PITCH,), (YAW,), (ROLL,), ())
 _PARALLEL = 0.99
 _HALVINGS = 8
 _STEPS_TO_JUDGE = 3
+_SMALL_RAD = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,10 +95,34 @@ class ToolLine:
             if self._turns(fixed) and self._begins(fixed):
                 return fixed
         what = f"turn the tool about {self.axis}" if self.about else f"move the tool along {self.axis}"
+        if self._is_singular:
+            raise InputError(
+                f"the arm cannot {what} from here: the posture is singular, stretched or folded",
+                "bend it first: jog a single joint a few degrees",
+            )
         raise InputError(
             f"the arm cannot {what} from here",
             "a joint is at the end of its range, or the arm has too few joints: jog single joints",
         )
+
+    @cached_property
+    def _is_singular(self) -> bool:
+        """Whether the tool can move in fewer directions than from postures nearby."""
+        moving = list(self.arm.driven_indices)
+
+        def directions(angles: Array) -> int:
+            pose = forward(self._solver.geometry, angles)
+            columns = []
+            for joint in moving:
+                turned = angles.copy()
+                turned[joint] += _SMALL_RAD
+                change = (forward(self._solver.geometry, turned) - pose) / _SMALL_RAD
+                columns.append(np.append(change[:3, 3] / self.reach_mm, change[:3, :3] if self.about else ()))
+            return int(np.linalg.matrix_rank(np.array(columns), tol=1e-3))
+
+        nearby = self._start.copy()
+        nearby[moving] += np.radians(5.0) * np.arange(1, len(moving) + 1)
+        return directions(self._start) < directions(nearby)
 
     def _turns(self, fixed: tuple[str, ...]) -> bool:
         """Whether a turn about the axis is one at all, of what is kept of the orientation."""

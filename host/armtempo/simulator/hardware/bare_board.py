@@ -19,7 +19,7 @@ from firmware.usb_serial import SilentPort
 
 DEFAULTS = {
     "flash": ".",
-    "flash_blocks": 190,
+    "flash_blocks": None,
     "program": [],
     "speed": 0,
     "edge_log": None,

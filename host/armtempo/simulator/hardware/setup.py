@@ -37,7 +37,8 @@ def power_up(options, cause):
     machine_state.port = usb_serial.USB_VCP()
     cut_at = options["power_cut_at"] if first else 0  # the power fails once
     damage = options["damage"] if first else machine_state.flash.damage
-    root, blocks, programs = options["flash"], options["flash_blocks"], options["program"]
+    root, programs = options["flash"], options["program"]
+    blocks = options["flash_blocks"] or flash.BLOCKS
     machine_state.flash = flash.FlashFolder(root, blocks, programs, _stall, cut_at, damage)
     injected_faults.Faults(board, options["faults"])
     return mode

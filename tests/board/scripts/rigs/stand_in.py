@@ -97,6 +97,8 @@ def install():
     ends = Module()
     ends.duration_ticks = lambda motion: 84000
     ends.start_offset = lambda motion, joint, position: 7 - position
+    ends.at_start = lambda motion, joint: 7 * 64
+    ends.at_end = lambda motion, joint: 8 * 64
     checks = Module()
     checks.check_splines = lambda motion, engine, limits: engine.check_splines()
     ahead = Module()

@@ -1,15 +1,13 @@
-"""Sequences whose next motion is prepared while one moves: the pins do what they do without that, whatever comes.
+"""Sequences whose next motion is prepared while one moves: the pins do what they do without that.
 
-Random ones of the motions in the flash, which lead from each of some postures to each other: rows, pulses to the tick,
-and what a stop, a fault or a change of speed leaves. Arguments: see ``whole_board.arguments``.
+Random ones of the motions in the flash, which lead from each of some postures to each other: rows, and pulses to the
+tick. What comes between is in soak.py. Arguments: see ``whole_board.arguments``.
 """
 
 import cases
 import machine_state
 import whole_board
-from armtempo_board.hardware import isr
 from armtempo_shared import sequence, wire
-from armtempo_shared.messages import RESUME
 from chip.flash import real_open
 from chip.processor import TICKS_PER_MS
 from firmware.external_interrupts import set_level
@@ -151,19 +149,10 @@ def ended(world, ms=60_000):
     while True:
         fields, _ = yield from world.ask("sequence")
         if sequence.ENDINGS[fields[0]] != "running":
-            assert generators() == world.generators, "what the joints had before is theirs again"
+            assert whole_board.generators() == world.generators, "what the joints had before is theirs again"
             return (sequence.ENDINGS[fields[0]],) + tuple(fields[1:])
         assert machine_state.board.now < end, "it does not end"
         yield from world.wait(50)
-
-
-def generators():
-    """Step generators of the joints, and the queues that the interrupt reads."""
-    from armtempo_board.app import program
-
-    engine = program.app.controller.engine
-    queues = [joint.ring.state[isr.QUEUE_AT : isr.QUEUE_AT + 2] for joint in engine.drives]
-    return [id(joint.generator) for joint in engine.drives] + [list(words) for words in queues]
 
 
 def ready(world):
@@ -178,7 +167,7 @@ def begin(world, watch, crc):
     """Start it from home."""
     yield from world.home(HOME)
     watch.begin()
-    world.generators = generators()
+    world.generators = whole_board.generators()
     yield from world.ask("start", (0, crc), "seq")
 
 
@@ -230,85 +219,6 @@ THERE_AND_BACK = [
     (sequence.MOVE, LEGS[2, 0], 0, 0, 5),
     (sequence.END, 0, 1, 0, 6),
 ]
-
-
-def case_whatever_ends_it_at_any_moment(world):
-    """A stop, one that freezes, an E-stop, a loop that is away too long: at any moment of the work, and between.
-
-    What the board says of its position is what the pins did, and nothing moves behind the end.
-    """
-    watch = yield from ready(world)
-    crc = store(THERE_AND_BACK)
-    numbers = whole_board.Numbers(SEED + 1)
-    seen = {}
-    for number in range(max(60 // FEWER, 4)):
-        yield from begin(world, watch, crc)
-        before = world.steps()
-        yield from world.until(lambda: watch.leads)
-        yield from world.wait(numbers.randrange(0, 2500))
-        what = ("stop", "freeze", "estop", "lost")[number % 4]
-        if what in ("stop", "freeze"):
-            yield from world.ask("stop", (int(what == "freeze"),))
-        elif what == "estop":
-            set_level(ESTOP, PRESSED)
-            yield from world.wait(5)
-            set_level(ESTOP, 1 - PRESSED)
-        else:
-            machine_state.board.lost_ticks = 2000 * TICKS_PER_MS
-            yield from world.wait(2000)
-            if not (yield from world.status())["fault"]:  # it stood between two
-                yield from world.ask("stop", (0,))
-        end = yield from ended(world)
-        status = yield from world.status()
-        fault = {"estop": "estop", "lost": "underrun"}.get(what, "")
-        assert end[0] == ("fault" if status["fault"] else "stopped"), (number, what, end, status)
-        assert status["fault"] in (fault, ""), (number, what, status)
-        assert status["fault"] == fault or what == "lost", (number, what, status)
-        made = [now - at for now, at in zip(world.steps(), before)]
-        if status["known"] == 7:
-            assert status["steps"] == [home + steps for home, steps in zip(HOME, made)], (
-                number,
-                what,
-                status,
-                made,
-            )
-        yield from world.wait(100)
-        assert [now - at for now, at in zip(world.steps(), before)] == made, (number, what)
-        if status["fault"]:
-            yield from world.ask("clear")
-        seen[what, status["fault"]] = seen.get((what, status["fault"]), 0) + 1
-    return seen
-
-
-def case_speed_changes_at_any_moment(world):
-    """Each motion is stepped whole, at the speed that holds when it begins; pauses too."""
-    watch = yield from ready(world)
-    crc = store(THERE_AND_BACK[1:5] * 3)
-    plain, _, _ = yield from whole(world, watch, crc)
-    numbers = whole_board.Numbers(SEED + 2)
-    prepared = 0
-    for _ in range(max(8 // FEWER, 1)):
-        yield from begin(world, watch, crc)
-        paused = False
-        while True:
-            yield from world.wait(numbers.randrange(1, 300))
-            fields, _ = yield from world.ask("sequence")
-            if sequence.ENDINGS[fields[0]] != "running":
-                break
-            rate = numbers.randrange(300, 1000) if numbers.randrange(0, 3) else 0
-            kind, _, _ = yield from world.answer("speed", (RESUME if paused else rate,))
-            paused = kind == "ok" and not paused and not rate
-        assert sequence.ENDINGS[fields[0]] == "finished", fields
-        status = yield from world.status()
-        assert status["steps"] == HOME, status
-        motions = watch.motions()
-        assert len(motions) == len(plain)
-        for one, other in zip(motions, plain):
-            for edges, others in zip(one, other):
-                assert [edge[1:] for edge in edges] == [edge[1:] for edge in others]
-        prepared += watch.prepared()
-    assert prepared
-    return prepared
 
 
 def case_motion_away(world):

@@ -245,10 +245,26 @@ def arguments():
     ``FEWER``: by which the moments that a case tries are divided. Gives the flashes, the packages' folders, the
     steps, how many ticks the motion ``go`` in the flashes lasts, and the divisor.
     """
-    flashes, program, home = sys.argv[1:4]
+    flashes, program, home = places()
     ticks = int(read(flashes + "/ticks"))
     fewer = int(sys.argv[4]) if sys.argv[4:] and sys.argv[4].isdigit() else 1
-    return flashes, program.split(":"), [int(steps) for steps in home.split(",")], ticks, fewer
+    return flashes, program, home, ticks, fewer
+
+
+def places():
+    """The first arguments: a folder of flashes or a flash, the packages' folders, the steps at home."""
+    flashes, program, home = sys.argv[1:4]
+    return flashes, program.split(":"), [int(steps) for steps in home.split(",")]
+
+
+def generators():
+    """Step generators of the joints, and the queues that the interrupt reads; from within a story."""
+    from armtempo_board.app import program
+    from armtempo_board.hardware import isr
+
+    engine = program.app.controller.engine
+    queues = [joint.ring.state[isr.QUEUE_AT : isr.QUEUE_AT + 2] for joint in engine.drives]
+    return [id(joint.generator) for joint in engine.drives] + [list(words) for words in queues]
 
 
 def to_int(data):

@@ -14,11 +14,15 @@ import os
 from chip.reset import Reset
 
 BLOCK = 512
+BLOCKS = 190
+"""Of an STM32F4DISC's 224 blocks (112 KB) those that FAT12 has for files and folders; it takes 34 itself: one for the
+boot sector, one for the table, 32 for the root folder."""
 _WRITE_MS = 1
 _CLOSE_MS = 60
 _FORMAT_MS = 2000
 _POWER_ON = 1
 _DIRECTORY = 0x4000
+_ENTRY = 32  # bytes in a folder for a short name, and for each 13 letters of one that is not short
 _EPERM, _ENOENT, _EIO, _EEXIST, _EISDIR, _EINVAL, _ENOSPC = 1, 2, 5, 17, 21, 22, 28
 NO_FILE_SYSTEM, UNREADABLE = "no file system", "unreadable"
 """Kinds of damage: the firmware finds no file system; it mounts one in which nothing can be read or written."""
@@ -89,14 +93,16 @@ class FlashFolder:
         raise Reset(_POWER_ON)
 
     def blocks(self, path):
-        """Blocks that a file or folder takes."""
-        if is_folder(path):
-            return 1 + sum([self.blocks(path + "/" + name) for name in os.listdir(path)])
-        return -(-os.stat(path)[6] // BLOCK)
+        """Blocks that a file takes, or a folder with all that is in it."""
+        if not is_folder(path):
+            return -(-os.stat(path)[6] // BLOCK)
+        names = os.listdir(path)
+        own = 0 if path == self.root else 2 * _ENTRY + sum([_entry_bytes(name) for name in names])
+        return -(-own // BLOCK) + sum([self.blocks(path + "/" + name) for name in names])
 
     def free_blocks(self):
         """Blocks that are free."""
-        return max(0, self.size + 1 - self.blocks(self.root))
+        return max(0, self.size - self.blocks(self.root))
 
     def mount(self, point):
         """Mount the flash there."""
@@ -211,6 +217,14 @@ class Written:
 
 
 real_open = open
+
+
+def _entry_bytes(name):
+    """What a name takes in a folder."""
+    base, _, extension = name.partition(".")
+    fits = len(base) <= 8 and len(extension) <= 3 and "." not in extension
+    one_case = all([part in (part.lower(), part.upper()) for part in (base, extension)])
+    return _ENTRY * (1 if fits and one_case else 1 + -(-len(name) // 13))
 
 
 def is_folder(path):

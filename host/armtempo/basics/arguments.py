@@ -1,0 +1,163 @@
+"""Arguments of public calls, checked against their annotations: one InputError that says what to give instead."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import math
+import reprlib
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache, wraps
+from numbers import Integral, Real
+from types import UnionType
+from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from armtempo.basics.errors import InputError
+
+T = TypeVar("T")
+
+_SIMPLE = {
+    str: "a text",
+    int: "a whole number",
+    float: "a finite number",
+    bool: "True or False",
+    type(None): "None",
+}
+
+
+def checked(target: T) -> T:
+    """A function whose arguments are checked by its annotations, or a class whose public methods and calls are.
+
+    ``ArrayLike`` and ``Array`` take finite numbers only.
+    """
+    if not isinstance(target, type):
+        return _wrapped(target)  # type: ignore[arg-type, return-value]
+    for name, entry in [*vars(target).items()]:
+        if isinstance(entry, classmethod) and not name.startswith("_"):
+            setattr(target, name, classmethod(_wrapped(entry.__func__, target.__name__)))
+        elif inspect.isfunction(entry) and (name == "__call__" or not name.startswith("_")):
+            setattr(target, name, _wrapped(entry, target.__name__))
+    return target
+
+
+def checked_fields(target: type[T]) -> type[T]:
+    """A data class whose fields are checked when an object is made."""
+    target.__init__ = _wrapped(target.__init__, target.__name__)  # type: ignore[method-assign]
+    return target
+
+
+def _wrapped(function: Callable[..., Any], owner: str = "") -> Callable[..., Any]:
+    name = owner if function.__name__ == "__init__" else f"{owner}.{function.__name__}".lstrip(".")
+
+    @wraps(function)
+    def call(*arguments: Any, **named: Any) -> Any:
+        signature, kinds = _annotated(function)
+        for argument, value in signature.bind(*arguments, **named).arguments.items():
+            several = signature.parameters[argument].kind is inspect.Parameter.VAR_POSITIONAL
+            for one in value if several else (value,):
+                if not fits(one, kinds.get(argument, Any)):
+                    raise InputError(
+                        f"{name}: {argument} is {reprlib.repr(one)}", f"give {words(kinds[argument])}"
+                    )
+        return function(*arguments, **named)
+
+    return call
+
+
+@cache
+def _annotated(function: Callable[..., Any]) -> tuple[inspect.Signature, dict[str, Any]]:
+    """Signature and types of a function, with ``Numbers`` for arrays."""
+    arrays: dict[str, Any] = {"ArrayLike": Numbers, "Array": Numbers, "Where": Any}
+    return inspect.signature(function), get_type_hints(function, localns=arrays)
+
+
+class Numbers:
+    """The type of finite numbers in any arrangement."""
+
+
+def fits(value: object, kind: Any) -> bool:
+    """Whether a value is of a type, as an annotation says it."""
+    origin = get_origin(kind) or kind
+    if kind in _PLAIN:
+        return _PLAIN[kind](value)
+    if origin in (Union, UnionType):
+        return any(fits(value, one) for one in get_args(kind))
+    if isinstance(kind, dataclasses.InitVar):
+        return fits(value, kind.type)
+    if origin is Callable:
+        return callable(value)
+    if origin in (tuple, Sequence):
+        return _entries_fit(value, origin, get_args(kind))
+    if origin is Mapping:
+        return isinstance(value, Mapping) and all(fits(entry, get_args(kind)[1]) for entry in value.values())
+    return isinstance(value, origin)
+
+
+def _is_whole(value: object) -> bool:
+    return isinstance(value, Integral) and not isinstance(value, bool)
+
+
+def _is_number(value: object) -> bool:
+    if type(value) is float:
+        return math.isfinite(value)
+    try:
+        return isinstance(value, Real) and not isinstance(value, bool) and abs(float(value)) < float("inf")
+    except OverflowError:
+        return False
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str) and (value.isprintable() or not value)
+
+
+def _are_numbers(value: object) -> bool:
+    try:
+        array = np.asarray(value)
+        return array.dtype.kind in "iuf" and bool(np.all(np.isfinite(array)))
+    except (ValueError, TypeError, OverflowError):
+        return False
+
+
+_PLAIN: dict[Any, Callable[[object], bool]] = {
+    Any: lambda _: True,
+    Numbers: _are_numbers,
+    None: lambda value: value is None,
+    type(None): lambda value: value is None,
+    bool: lambda value: type(value).__name__ in ("bool", "bool_"),
+    int: _is_whole,
+    float: _is_number,
+    str: _is_text,
+}
+
+
+def _entries_fit(value: object, origin: Any, kinds: Sequence[Any]) -> bool:
+    entries = value.tolist() if isinstance(value, np.ndarray) else value
+    if not isinstance(entries, list | tuple):
+        return False
+    if origin is tuple and kinds[-1] is not Ellipsis:
+        return len(entries) == len(kinds) and all(map(fits, entries, kinds))
+    return all(fits(entry, kinds[0]) for entry in entries)
+
+
+def words(kind: Any) -> str:
+    """A type in words."""
+    origin, inner = get_origin(kind) or kind, get_args(kind)
+    if kind in _SIMPLE:
+        return _SIMPLE[kind]
+    if kind is Numbers:
+        return "finite numbers"
+    if origin in (Union, UnionType):
+        return " or ".join(dict.fromkeys(words(one) for one in inner))
+    if isinstance(kind, dataclasses.InitVar):
+        return words(kind.type)
+    if origin is Callable:
+        return "a function"
+    if origin is tuple and inner[-1] is not Ellipsis:
+        return f"({', '.join(words(one) for one in inner)})"
+    if origin in (tuple, Sequence):
+        return f"a list, each entry {words(inner[0])}"
+    if origin is Mapping:
+        return f"a dictionary, each value {words(inner[1])}"
+    return "a path" if origin.__name__ == "Path" else f"an object of type {origin.__name__}"

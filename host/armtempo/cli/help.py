@@ -1,0 +1,48 @@
+"""``armtempo help``: a page of the documentation, in the terminal."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+
+import click
+
+TOPICS = {
+    "first-hour": "host",
+    "first-hour-board": "host",
+    "day": "host",
+    "files": "host",
+    "arms": "host",
+    "kinematics": "host",
+    "planning": "host",
+    "sequences": "host",
+    "sharing": "host",
+    "virtual-board": "host",
+    "recovery": "host",
+    "hardware": "board",
+    "firmware": "board",
+}
+"""Pages and the part of the project whose ``docs`` folder has them; a wheel has them in ``data/pages``."""
+
+
+@click.command()
+@click.argument("topic", metavar="[TOPIC]", required=False, type=click.Choice([*TOPICS]))
+def command(topic: str | None) -> None:
+    """Show a page of the documentation, or list them.
+
+    TOPIC: a name of the list.
+    """
+    if topic is None:
+        for name in TOPICS:
+            title = page(name).partition("\n")[0].lstrip("# ")
+            click.echo(f"{name:18}{title}")
+        return
+    click.echo_via_pager(page(topic))
+
+
+def page(topic: str) -> str:
+    """The text of a page: of the wheel, or of the checkout."""
+    package = Path(str(files("armtempo")))
+    shipped = package / "data" / "pages" / f"{topic}.md"
+    found = shipped if shipped.exists() else package.parents[1] / TOPICS[topic] / "docs" / f"{topic}.md"
+    return found.read_text(encoding="utf-8")

@@ -1,0 +1,77 @@
+"""Figures that look as if they were in another unit: metres for millimetres, radians for degrees."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from armtempo.basics.arrays import Array
+from armtempo.diagnosis.finding import Finding, warning
+from armtempo.model.arm import Arm
+from armtempo.model.parts import Joint
+
+_SHORT_MM, _TINY_MM = 2.0, 0.02
+"""A length between these may be one in metres: 2 m is a large robot's, 20 mm a small offset."""
+_NARROW_DEG = (0.1, 2 * math.pi)
+"""A range, and an end of one, that may be in radians."""
+_NEAR_RAD = 0.002
+_TWISTS = [math.pi * part / 12 for part in range(1, 25)]
+
+
+def findings(arm: Arm) -> list[Finding]:
+    """Lengths that may be in metres, angles that may be in radians."""
+    return [*_lengths(arm), *_twists(arm), *_ranges(arm)]
+
+
+def position_finding(name: str, position_mm: Array, reach_mm: float) -> Finding | None:
+    """A warning where a via point lies at the base, but would lie in reach if it were in metres."""
+    distance = math.dist(position_mm, (0.0, 0.0, 0.0))
+    if not 0.0 < distance < min(_SHORT_MM, 0.01 * reach_mm):
+        return None
+    return warning(
+        "job",
+        f"{name}: its position is {distance:.3g} mm from the origin of the base: is it in metres?",
+        f"give it in mm: [{', '.join(f'{1000 * value:g}' for value in position_mm)}]",
+    )
+
+
+def _lengths(arm: Arm) -> Iterator[Finding]:
+    lengths = [abs(value) for joint in arm.joints for value in (joint.d_mm, joint.a_mm)]
+    for joint in arm.joints:
+        for key, value in (("d_mm", joint.d_mm), ("a_mm", joint.a_mm)):
+            if _TINY_MM <= abs(value) < _SHORT_MM and 1000 * abs(value) <= 2 * max(
+                1000 * _SHORT_MM, *lengths
+            ):
+                yield warning(
+                    joint.name,
+                    f"{key} = {value:g}: is it in metres?",
+                    f"if so, write {key} = {1000 * value:g}",
+                )
+
+
+def _twists(arm: Arm) -> Iterator[Finding]:
+    for joint in arm.joints:
+        for key, value in (("alpha_deg", joint.alpha_deg), ("theta_offset_deg", joint.theta_offset_deg)):
+            found = [angle for angle in _TWISTS if abs(abs(value) - angle) < _NEAR_RAD]
+            if found and value != round(value):
+                right = math.copysign(math.degrees(found[0]), value)
+                yield warning(
+                    joint.name, f"{key} = {value:g}: is it in radians?", f"if so, write {key} = {right:g}"
+                )
+
+
+def _ranges(arm: Arm) -> Iterator[Finding]:
+    for joint in arm.joints:
+        low, high = joint.range_deg
+        least, most = _NARROW_DEG
+        if high - low > least and max(abs(low), abs(high)) <= most + _NEAR_RAD and _is_fraction(joint):
+            right = f"[{math.degrees(low):.4g}, {math.degrees(high):.4g}]"
+            yield warning(
+                joint.name,
+                f"range_deg = [{low:g}, {high:g}]: is it in radians?",
+                f"if so, write range_deg = {right}, and its limits in degrees too",
+            )
+
+
+def _is_fraction(joint: Joint) -> bool:
+    return any(round(value, 1) != value for value in joint.range_deg)

@@ -1,0 +1,276 @@
+"""What ``armtempo new`` asks: each question with its explanation, an example, and what its answer must be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS, MAX_STEP_RATE
+
+from armtempo.formats.plain_text import visible
+from armtempo.model import shipped
+from armtempo.model.parts_file import MAX_ANGLE_DEG, MAX_LENGTH_MM
+from armtempo.new_arm.joint_entry import INTEGERS, JointEntry
+
+STANDARD, MODIFIED = "standard", "modified"
+CONVENTIONS = """\
+    standard (Denavit-Hartenberg)           modified (Craig)
+
+    axis i           axis i+1               axis i-1         axis i
+      |                |                      |                |
+      |     link i     |                      |    link i-1    |
+      o================o--> x i               o================o--> x i
+      ^                ^                      ^                ^
+    d, theta: here   frame i                a, alpha: here   frame i
+                     a, alpha: here                          d, theta: here
+
+    row i: turn theta, go d along axis i;   row i: go a, turn alpha from axis i-1;
+           go a, turn alpha to axis i+1            turn theta, go d along axis i
+"""
+"""Where the frame of a row stands, and which axis its four figures belong to."""
+
+Answers = dict[str, str]
+"""What was answered, by the question's key, in the order of the questions."""
+Reader = Callable[[str], object]
+
+
+class WrongAnswerError(ValueError):
+    """What is wrong with an answer, and an example of a right one."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """One question; ``read`` gives the answer's value or raises WrongAnswerError."""
+
+    key: str
+    text: str
+    default: str
+    explanation: str
+    read: Reader
+
+
+def following(answers: Mapping[str, str]) -> Question | None:
+    """The question that comes after these answers; None where all is answered."""
+    for question in _all(answers):
+        if question.key not in answers:
+            return question
+    return None
+
+
+def joints(answers: Mapping[str, str]) -> list[JointEntry]:
+    """The joints that were described, base first."""
+    found = []
+    for number in range(1, int(answers["count"]) + 1):
+        of_joint = {
+            key.removeprefix(f"{number}."): text
+            for key, text in answers.items()
+            if key.startswith(f"{number}.")
+        }
+        name = of_joint.pop("name")
+        has_linkage = of_joint.pop("parallel_linkage", "") in _YES
+        values = {key: int(text) if key in INTEGERS else float(text) for key, text in of_joint.items()}
+        found.append(JointEntry(name, **values, parallel_linkage=has_linkage))  # type: ignore[arg-type]
+    return found
+
+
+def _all(answers: Mapping[str, str]) -> list[Question]:
+    """The questions as far as the answers determine them."""
+    ships = [*shipped.files(), "own"]
+    found = [
+        Question(
+            *("arm", f"which arm ({', '.join(ships)})", "own"),
+            "An arm that ships is a beginning, to be changed to your motors and wiring; 'own' asks for each joint.",
+            _one_of(ships),
+        )
+    ]
+    if answers.get("arm") == "own":
+        found += _own(answers)
+    if answers.get("arm") != "own" or ("count" in answers and f"{answers['count']}.speed_deg_s" in answers):
+        found.append(
+            Question(
+                *("port", "port of the board", "sim:board"),
+                "'armtempo ports' lists the boards that are connected; sim:board is a virtual one, whose flash is the "
+                "folder 'board'.",
+                _text,
+            )
+        )
+    return found
+
+
+def _own(answers: Mapping[str, str]) -> list[Question]:
+    found = [
+        Question(
+            *("count", "how many joints", "3"),
+            f"Those that a motor turns, 1 to {MAX_JOINTS}; a gripper is an output, not a joint.",
+            _whole(1, MAX_JOINTS),
+        ),
+        Question(
+            *("convention", f"convention of the rows ({STANDARD}, {MODIFIED})", STANDARD),
+            f"How the table that you have was written:\n\n{CONVENTIONS}",
+            _one_of([STANDARD, MODIFIED]),
+        ),
+    ]
+    if "count" in answers and "convention" in answers:
+        for number in range(1, int(answers["count"]) + 1):
+            found += _joint(number, answers)
+            if f"{number}.speed_deg_s" not in answers:
+                break
+    return found
+
+
+def _joint(number: int, answers: Mapping[str, str]) -> list[Question]:
+    joint = f"joint {number} of {answers['count']}"
+    before = answers["convention"] == MODIFIED
+    names = [answers[f"{other}.name"] for other in range(1, number)]
+    link = "the axis before to this one" if before else "this axis to the next one"
+    length, angle = _number(-MAX_LENGTH_MM, MAX_LENGTH_MM, "120.5"), _number(-360, 360, "-90")
+
+    def ask(key: str, text: str, explanation: str, read: Reader, default: str = "") -> Question:
+        shown = default or str(getattr(JointEntry(f"joint {number}"), key))
+        return Question(f"{number}.{key}", f"{joint}: {text}", shown, explanation, read)
+
+    found = [
+        ask("name", "name", "Any words; reports and messages use them.", _new_name(names)),
+        ask("d_mm", "d, mm", "Along this joint's axis, from one common normal to the next.", length),
+        ask("a_mm", "a, mm", f"Length of the common normal from {link}.", length),
+        ask(
+            "alpha_deg",
+            "alpha, degrees",
+            f"Turn about the common normal from {link}.",
+            _number(-180, 180, "-90"),
+        ),
+        ask(
+            "theta_offset_deg",
+            "theta where the joint stands at 0, degrees",
+            "Added to the joint's angle.",
+            angle,
+        ),
+    ]
+    if number > 1:
+        text = "does a parallelogram turn it, with the motor one link further down (yes, no)"
+        explanation = (
+            "A parallel linkage, as of palletisers and the EEZYbotARM: the joint's angle is then counted from the link "
+            "before the previous one, and stays when the previous joint turns."
+        )
+        found.append(ask("parallel_linkage", text, explanation, _one_of([*_YES, *_NO]), "no"))
+    turns = _number(-MAX_ANGLE_DEG, MAX_ANGLE_DEG, "-90")
+    low = answers.get(f"{number}.low_deg", "-90")
+    found += [
+        ask("low_deg", "lowest angle, degrees", "Where the joint may turn to at most, its lower end.", turns),
+        ask(
+            *("high_deg", "highest angle, degrees", "The upper end of its range."),
+            _above(float(low)),
+            str(max(90.0, float(low) + 90.0)),
+        ),
+        ask(
+            "steps_per_rev",
+            "full steps for a turn of the motor",
+            "200 for 1.8 degrees a step.",
+            _whole(4, 10_000),
+        ),
+        ask(
+            "microsteps",
+            "microsteps of the driver",
+            "As its switches or the firmware set them.",
+            _whole(1, 256),
+        ),
+        ask(
+            *(
+                "gear_ratio",
+                "motor turns for a turn of the joint",
+                "Of gear and belt together; 1 without any.",
+            ),
+            _number(0.1, 10_000, "4.5"),
+        ),
+    ]
+    if number <= MAX_ENCODERS:
+        text = "encoder counts for a turn of the joint, all edges (0: none)"
+        found.append(ask("encoder_counts", text, "Four times the lines of its disc.", _counts))
+    return [*found, *_speed(number, answers, joint)]
+
+
+def _speed(number: int, answers: Mapping[str, str], joint: str) -> list[Question]:
+    """How fast; asked once steps and gear are known."""
+    keys = ("steps_per_rev", "microsteps", "gear_ratio")
+    if not all(f"{number}.{key}" in answers for key in keys):
+        return []
+    steps, micro, gear = (answers[f"{number}.{key}"] for key in keys)
+    entry = JointEntry("", steps_per_rev=int(steps), microsteps=int(micro), gear_ratio=float(gear))
+    most = entry.most_speed_deg_s(int(answers["count"]))
+    fastest = MAX_STEP_RATE / entry.steps_per_deg
+    return [
+        Question(
+            f"{number}.speed_deg_s",
+            f"{joint}: speed limit, degrees/s ({entry.steps_per_deg:.5g} steps/deg; {most:.4g} is easy for the motor)",
+            f"{min(60.0, float(f'{0.9 * most:.2g}')):g}",
+            "Acceleration and jerk begin at 1 and 4 times of it; change all three in the file.",
+            _number(0.001, fastest, "30"),
+        )
+    ]
+
+
+_YES, _NO = ("yes", "y"), ("no", "n")
+
+
+def _text(text: str) -> str:
+    if not text or visible(text) != text:
+        raise WrongAnswerError("it is empty or has control characters")
+    return text
+
+
+def _new_name(names: list[str]) -> Reader:
+    def read(text: str) -> str:
+        if text in names:
+            raise WrongAnswerError(f"another joint has this name; for example {text} 2")
+        return _text(text)
+
+    return read
+
+
+def _one_of(choices: list[str]) -> Reader:
+    def read(text: str) -> str:
+        if text not in choices:
+            raise WrongAnswerError(f"it must be one of {', '.join(choices)}")
+        return text
+
+    return read
+
+
+def _number(least: float, most: float, example: str) -> Reader:
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            raise WrongAnswerError(f"{text!r} is no number; write it as {example}") from None
+        if not least <= value <= most:
+            raise WrongAnswerError(f"it must be from {least:g} to {most:g}, such as {example}")
+        return value
+
+    return read
+
+
+def _whole(least: int, most: int) -> Reader:
+    def read(text: str) -> int:
+        if not text.isdecimal() or not least <= int(text) <= most:
+            raise WrongAnswerError(
+                f"it must be a whole number from {least} to {most}, such as {max(least, 3)}"
+            )
+        return int(text)
+
+    return read
+
+
+def _counts(text: str) -> int:
+    return 0 if text == "0" else int(str(_whole(4, 10_000_000)(text)))
+
+
+def _above(low: float) -> Reader:
+    def read(text: str) -> float:
+        value = float(str(_number(-MAX_ANGLE_DEG, MAX_ANGLE_DEG, "90")(text)))
+        if value <= low:
+            raise WrongAnswerError(
+                f"it must be above the lowest angle, {low:g}, such as {low + 90:g}; '<' goes back to that"
+            )
+        return value
+
+    return read

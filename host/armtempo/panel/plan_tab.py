@@ -1,0 +1,210 @@
+"""Planning: a table of via points, options, the plan with its curves, played on the model before the board gets it."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from nicegui import run, ui
+
+from armtempo import pipeline
+from armtempo.basics.errors import ArmtempoError, InputError
+from armtempo.kinematics.chain import chains_mm, tool_path_mm
+from armtempo.model.job import PATHS, Job
+from armtempo.panel import arm_scene, words
+from armtempo.panel.charts import CurveChart
+
+if TYPE_CHECKING:
+    from armtempo.model.plan import Plan
+    from armtempo.panel.panel_page import PanelPage
+
+_POINTS = 200
+_PLAY_S = 0.05
+
+
+class PlanTab:
+    """The tab of one page; its plan is the panel's, so that every page can run it."""
+
+    def __init__(self, page: PanelPage) -> None:
+        self._page = page
+        self._operator = page.operator
+        self._rows: list[list[float]] = [list(row) for row in _rows_of(page)]
+        self._cancelled = False
+        self._played: Plan | None = None
+        self._table()
+        with ui.row().classes("items-center gap-2"):
+            ui.button(words.NEW_VIA, on_click=self._add_via).props("outline no-caps")
+            ui.button(words.FROM_ARM, on_click=self._take_posture).props("outline no-caps")
+            ui.button(words.PASTE, on_click=self._paste).props("outline no-caps")
+            ui.button(words.SAVE, on_click=self._save).props("outline no-caps")
+        with ui.row().classes("items-center gap-2"):
+            self._path = ui.select(words.PATHS, value=page.operator.desk.job.path, label=words.PATH).classes(
+                "min-w-[14rem]"
+            )
+            self._go = ui.button(words.PLAN, on_click=self._plan)
+            self._stop = ui.button(words.CANCEL, on_click=self._cancel).props("flat")
+            self._stop.set_visibility(False)
+        self._bar = ui.linear_progress(0.0, show_value=False).classes("w-full")
+        self._bar.set_visibility(False)
+        self._result = ui.label("")
+        self._slider = ui.slider(min=0, max=1000, value=0, on_change=self._show_time).props("label")
+        with ui.row():
+            ui.button(words.PLAY, icon="play_arrow", on_click=self._play).props("outline no-caps")
+        self._charts = [
+            CurveChart(page.operator.arm, title, order)
+            for order, title in enumerate((words.ANGLE, words.SPEED, words.ACCELERATION, words.JERK))
+        ]
+        page.listeners.append(self._look)
+
+    # the table
+
+    @ui.refreshable_method
+    def _table(self) -> None:
+        joints = self._operator.arm.driven
+        with ui.grid(columns=f"auto repeat({len(joints)}, minmax(4.5rem, 7rem)) auto").classes(
+            "gap-1 items-center"
+        ):
+            ui.label("")
+            for joint in joints:
+                ui.label(joint.name).classes("text-caption ellipsis")
+            ui.label("")
+            for number, row in enumerate(self._rows):
+                ui.label(f"P{number}")
+                for index, joint in enumerate(joints):
+                    low, high = joint.range_deg
+                    box = ui.number(value=row[index], min=low, max=high, step=1, format="%.3f").props(
+                        "dense outlined"
+                    )
+                    box.on_value_change(
+                        lambda event, number=number, index=index: self._edit(number, index, event.value)
+                    )
+                ui.button(icon="delete", on_click=lambda number=number: self._delete(number)).props(
+                    f'flat dense aria-label="{words.DELETE} P{number}"'
+                )
+
+    def _edit(self, number: int, index: int, value: float | None) -> None:
+        if value is not None and math.isfinite(value):
+            self._rows[number][index] = float(value)
+            self._draw_vias()
+
+    def _add_via(self) -> None:
+        self._rows.append(list(self._rows[-1]) if self._rows else list(self._operator.arm.home_deg))
+        self._changed()
+
+    def _take_posture(self) -> None:
+        self._rows.append([round(float(angle), 4) for angle in self._operator.angles_deg])
+        self._changed()
+
+    def _delete(self, number: int) -> None:
+        del self._rows[number]
+        self._changed()
+
+    async def _paste(self) -> None:
+        with ui.dialog() as asked, ui.card():
+            text = ui.textarea(words.PASTE_HINT).classes("min-w-[24rem]")
+            with ui.row():
+                ui.button(words.PASTE, on_click=lambda: asked.submit(text.value))
+                ui.button(words.CANCEL, on_click=lambda: asked.submit(None)).props("flat")
+        given = await asked
+        if given:
+            self._page.attempt(lambda: self._take_rows(given))
+
+    def _take_rows(self, text: str) -> None:
+        count, rows = len(self._operator.arm.driven), []
+        for number, line in enumerate(filter(str.strip, text.splitlines()), 1):
+            try:
+                row = [float(part) for part in line.replace(";", " ").replace(",", " ").split()]
+            except ValueError:
+                raise InputError(
+                    f"line {number}: {line!r} is no row of angles", "give numbers only"
+                ) from None
+            if len(row) != count:
+                raise InputError(f"line {number} has {len(row)} angles", f"the arm drives {count} joints")
+            rows.append(row)
+        self._rows = rows
+        self._changed()
+
+    def _changed(self) -> None:
+        self._table.refresh()
+        self._draw_vias()
+
+    def _draw_vias(self) -> None:
+        tools = chains_mm(self._operator.arm, np.array(self._rows))[:, -1] if self._rows else np.empty((0, 3))
+        self._page.scene.dots("via", tools.tolist(), arm_scene.VIA)
+
+    # the plan
+
+    def _job(self) -> Job:
+        return self._operator.desk.job_with(
+            self._rows, self._path.value if self._path.value in PATHS else PATHS[0]
+        )
+
+    async def _plan(self) -> None:
+        self._cancelled = False
+        self._bar.set_visibility(True)
+        self._stop.set_visibility(True)
+        self._go.set_enabled(False)
+        try:
+            job = self._job()
+            self._operator.desk.plan = await run.io_bound(
+                pipeline.plan, self._operator.arm, job, self._progress
+            )
+        except ArmtempoError as error:
+            ui.notify(str(error), type="negative", multi_line=True, timeout=8000)
+        except asyncio.CancelledError:
+            pass
+        finally:
+            self._bar.set_visibility(False)
+            self._stop.set_visibility(False)
+            self._go.set_enabled(True)
+
+    def _progress(self, done: float, whole: float) -> None:
+        if self._cancelled:
+            raise InputError(words.CANCELLED, words.PLAN_AGAIN)
+        self._bar.value = done / whole if whole else 0.0
+
+    def _cancel(self) -> None:
+        self._cancelled = True
+
+    def _save(self) -> None:
+        self._page.attempt(lambda: ui.notify(words.SAVED.format(path=self._operator.desk.save(self._job()))))
+
+    def _look(self) -> None:
+        """Show a plan that is new, whichever page made it."""
+        plan = self._operator.desk.plan
+        if plan is None or plan is self._played:
+            return
+        self._played = plan
+        floor = max(search.floor_s for search in plan.searches)
+        self._result.set_text(words.MOTION_TIME.format(total=plan.total_s, floor=floor))
+        times = np.linspace(0.0, plan.total_s, _POINTS)
+        self._page.scene.draw("path", tool_path_mm(plan.arm, plan.trajectory, times), arm_scene.PATH)
+        for order, chart in enumerate(self._charts):
+            chart.show(times, plan.trajectory(times, order))
+
+    def _show_time(self) -> None:
+        if (plan := self._played) is not None:
+            angles = plan.trajectory(plan.total_s * self._slider.value / 1000)
+            self._page.show_ghost(angles)
+
+    async def _play(self) -> None:
+        plan = self._played
+        if plan is None:
+            ui.notify(words.NO_PLAN)
+            return
+        for time_s in np.arange(0.0, plan.total_s, _PLAY_S):
+            self._slider.set_value(round(1000 * float(time_s) / plan.total_s))
+            await asyncio.sleep(_PLAY_S)
+        self._slider.set_value(1000)
+
+
+def _rows_of(page: PanelPage) -> list[list[float]]:
+    """The via points of the project's job, as angles."""
+    return page.operator.desk.rows()
+
+
+def build(page: PanelPage) -> None:
+    """The tab."""
+    PlanTab(page)

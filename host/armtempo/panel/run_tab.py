@@ -1,0 +1,117 @@
+"""Running: the plan on the board, live curves, past runs with their reports."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from nicegui import ui
+
+from armtempo import pipeline
+from armtempo.panel import words
+from armtempo.panel.charts import CurveChart
+
+if TYPE_CHECKING:
+    from armtempo.panel.panel_page import PanelPage
+
+REPORT_PAGE = "report.html"
+_MOST_RUNS = 30
+
+
+class RunTab:
+    """The tab of one page."""
+
+    def __init__(self, page: PanelPage) -> None:
+        self._page = page
+        self._operator = page.operator
+        self._shown = (-1, 0)
+        self._busy = ""
+        with ui.row().classes("items-center gap-2"):
+            page.control(ui.button(words.TO_START, on_click=self._to_start))
+            page.control(ui.button(words.RUN, icon="play_arrow", on_click=self._run))
+            self._repeat = ui.number(words.REPEAT, value=1, min=1, max=10_000, precision=0).props(
+                "dense outlined"
+            )
+        self._angles = CurveChart(self._operator.arm, words.ANGLE, 0)
+        self._errors = CurveChart(self._operator.arm, words.ERROR, 0)
+        ui.label(words.PAST_RUNS).classes("text-subtitle2")
+        self._past()
+        page.listeners.append(self._look)
+
+    def _to_start(self) -> None:
+        plan = self._operator.desk.plan
+        if plan is None:
+            ui.notify(words.NO_PLAN)
+            return
+        operator = self._operator
+        self._page.do(words.TO_START, lambda: operator.board.goto(plan, progress=operator.part))
+
+    def _run(self) -> None:
+        plan = self._operator.desk.plan
+        if plan is None:
+            ui.notify(words.NO_PLAN)
+            return
+        operator, times = self._operator, int(self._repeat.value or 1)
+
+        def run() -> None:
+            operator.board.upload(plan, replace=True)
+            found = operator.board.run(plan, times, operator.runs, operator.part)
+            found.report()
+
+        self._page.do(words.RUN, run)
+
+    def _look(self) -> None:
+        if self._busy and not self._operator.busy:  # a run has ended, and has its report
+            self._past.refresh()
+        self._busy = self._operator.busy
+        curves = self._operator.curves
+        state = (curves.run, len(curves.time_s))
+        if state == self._shown or len(curves.time_s) < 2:
+            return
+        self._shown = state
+        times, commanded = np.array(curves.time_s), np.array(curves.commanded_deg)
+        self._angles.show(times, commanded)
+        measured = np.array(curves.angle_deg, dtype=float)
+        self._errors.show(times, np.nan_to_num(measured - commanded))
+
+    @ui.refreshable_method
+    def _past(self) -> None:
+        folders = past_runs(self._operator.runs)
+        chosen: list[Path] = []
+        for folder in folders[:_MOST_RUNS]:
+            with ui.row().classes("items-center gap-2"):
+                ui.checkbox(
+                    folder.name, on_change=lambda event, folder=folder: _choose(chosen, folder, event.value)
+                )
+                if (folder / REPORT_PAGE).is_file():
+                    ui.link(words.REPORT, f"/runs/{folder.name}/{REPORT_PAGE}", new_tab=True)
+        if len(folders) > 1:
+            ui.button(words.COMPARE, on_click=lambda: self._compare(chosen)).props("outline no-caps")
+
+    def _compare(self, folders: list[Path]) -> None:
+        def compare() -> None:
+            page = pipeline.compare(folders)
+            ui.navigate.to(f"/runs/{page.relative_to(self._operator.runs)}", new_tab=True)
+
+        self._page.attempt(compare)
+
+
+def _choose(chosen: list[Path], folder: Path, wanted: bool) -> None:
+    if wanted:
+        chosen.append(folder)
+    elif folder in chosen:
+        chosen.remove(folder)
+
+
+def past_runs(folder: Path) -> list[Path]:
+    """The run folders in ``folder``, the newest first."""
+    if not folder.is_dir():
+        return []
+    found = [path.parent for path in folder.glob("*/run.json")]
+    return sorted(found, key=lambda path: path.stat().st_mtime, reverse=True)
+
+
+def build(page: PanelPage) -> None:
+    """The tab."""
+    RunTab(page)

@@ -1,0 +1,101 @@
+"""The panel served: pages, run folders to read, and a message to all pages ten times a second."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import socket
+from contextlib import suppress
+from typing import Any
+
+import uvicorn
+from fastapi import FastAPI
+from nicegui import Client, app, ui
+from starlette.responses import FileResponse, PlainTextResponse
+
+from armtempo.basics.errors import InputError
+from armtempo.panel import layout, words
+from armtempo.panel.access import Access
+from armtempo.panel.arm_scene import ArmShape
+from armtempo.panel.held_jog import ButtonHold
+from armtempo.panel.operator import Operator
+
+_SUFFIXES = (".html", ".svg", ".png", ".csv", ".json")
+
+
+class Panel:
+    """The panel of one board; ``serve`` runs until it is told to end."""
+
+    def __init__(self, operator: Operator) -> None:
+        self._operator = operator
+        self._shape = ArmShape(operator.arm)
+        self._hold = ButtonHold(operator)
+        self._api = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+        self._api.get("/runs/{name}/{file}")(self._run_file)
+        ui.page("/")(self._page)
+        app.on_startup(self._tell)
+        ui.run_with(self._api, title=words.TITLE, dark=None, reconnect_timeout=2.0)
+
+    def serve(self, listening: socket.socket, token: str) -> None:
+        """Answer on a socket that is bound; a client needs the ``token``, unless that is ""."""
+        host = str(listening.getsockname()[0])
+        hosts = _names(host) if token else {"127.0.0.1", "localhost", "::1"}
+        guarded = Access(self._api, hosts, token)
+        config = uvicorn.Config(
+            guarded, log_level="warning", ws_max_size=1_000_000, timeout_graceful_shutdown=1
+        )
+        uvicorn.Server(config).run(sockets=[listening])
+
+    def _page(self) -> None:
+        client = ui.context.client
+        if not self._operator.holder:
+            self._operator.take_control(client.id)
+        layout.build(self._operator, self._hold, self._shape)
+        client.on_disconnect(lambda: self._gone(client.id))
+
+    def _gone(self, client: str) -> None:
+        """A page was closed, or its connection broke: what it holds is released."""
+        self._hold.release(client)
+        self._operator.release(client)
+
+    async def _tell(self) -> None:
+        asyncio.create_task(self._tell_all())  # noqa: RUF006  it lives as long as the server
+
+    async def _tell_all(self) -> None:
+        """Compute a message once, and send it to every page."""
+        while True:
+            await asyncio.sleep(layout.TELL_S)
+            if not any(client.has_socket_connection for client in Client.instances.values()):
+                continue
+            told = layout.message(self._operator, self._shape)
+            code = f"armtempo.hear({json.dumps(told)})"
+            for client in list(Client.instances.values()):
+                if client.has_socket_connection:
+                    client.run_javascript(code)
+
+    async def _run_file(self, name: str, file: str) -> Any:
+        """A file of a run folder, to read; nothing else of the disk."""
+        runs = self._operator.runs.resolve()
+        path = (runs / name / file).resolve()
+        if path.suffix not in _SUFFIXES or not path.is_relative_to(runs) or not path.is_file():
+            return PlainTextResponse("no such file", 404)
+        return FileResponse(path)
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """A socket bound to an address; ``port`` 0: one that is free. InputError if it cannot be had."""
+    try:
+        return socket.create_server((host, port), reuse_port=False)
+    except OSError as error:
+        raise InputError(
+            f"{host}:{port}: {error.strerror or error}", "choose another --web-port, or --host"
+        ) from None
+
+
+def _names(host: str) -> set[str]:
+    """Names by which this machine may be called."""
+    name = socket.gethostname()
+    found = {host, name, name.split(".")[0], f"{name.split('.')[0]}.local", "127.0.0.1", "localhost"}
+    with suppress(OSError):
+        found |= {str(entry[4][0]) for entry in socket.getaddrinfo(name, None)}
+    return found

@@ -1,0 +1,226 @@
+"""The panel without a browser: who may ask, one command at a time, one client in control, the job's file."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from armtempo.basics.errors import InputError, LinkError
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
+from armtempo.panel.access import COOKIE, MOST_BYTES, Access
+from armtempo.panel.desk import Desk
+from armtempo.panel.held_jog import ALIVE_S, ButtonHold, JogButton
+from armtempo.panel.operator import Operator
+
+ARM = Arm.paper()
+ME, OTHER = "me", "other"
+
+
+async def _inner(scope: Any, receive: Any, send: Any) -> None:
+    await send({"type": "http.response.start", "status": 200, "headers": []})
+    await send({"type": "http.response.body", "body": b"here"})
+
+
+def answer(access: Access, kind: str = "http", query: str = "", **headers: str) -> list[dict[str, Any]]:
+    """What is sent for a request."""
+    sent: list[dict[str, Any]] = []
+    given = [(name.replace("_", "-").encode(), value.encode()) for name, value in headers.items()]
+    scope = {
+        "type": kind,
+        "path": "/",
+        "query_string": query.encode(),
+        "headers": given,
+        "client": ("1.2.3.4", 5),
+    }
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    asyncio.run(access(scope, lambda: None, send))  # type: ignore[arg-type, return-value]
+    return sent
+
+
+@pytest.mark.parametrize(
+    ("query", "headers", "allowed"),
+    [
+        ("", {"host": "127.0.0.1:8088"}, True),
+        ("", {"host": "127.0.0.1:8088", "origin": "http://127.0.0.1:8088"}, True),
+        ("", {"host": "127.0.0.1:8088", "origin": "http://evil.example"}, False),
+        ("", {"host": "evil.example:8088"}, False),
+        ("", {}, False),
+        ("", {"host": "127.0.0.1", "content_length": str(MOST_BYTES + 1)}, False),
+        ("", {"host": "127.0.0.1", "content_length": "many"}, False),
+    ],
+)
+def test_who_may_ask_on_the_loopback_address(query: str, headers: dict[str, str], allowed: bool) -> None:
+    access = Access(_inner, {"127.0.0.1"}, "")
+    assert (answer(access, query=query, **headers)[0].get("status") == 200) == allowed
+    if not allowed:
+        assert answer(access, "websocket", query, **headers)[0]["type"] == "websocket.close"
+
+
+@pytest.mark.parametrize(
+    ("query", "cookie", "allowed"),
+    [
+        ("token=secret", "", True),
+        ("", f"{COOKIE}=secret", True),
+        ("", "", False),
+        ("token=Secret", "", False),
+        ("token=", f"{COOKIE}=", False),
+        ("", "a=b; =; \x7f", False),
+        ("token=%C3%A9", "", False),
+    ],
+)
+def test_other_machines_need_the_token(query: str, cookie: str, allowed: bool) -> None:
+    sent = answer(Access(_inner, {"arm.local"}, "secret"), query=query, host="arm.local:8088", cookie=cookie)
+    assert (sent[0].get("status") == 200) == allowed
+    kept = any(b"HttpOnly" in value for name, value in sent[0]["headers"] if name == b"set-cookie")
+    assert kept == (query == "token=secret")
+
+
+class Session:
+    """A session of nobody's."""
+
+    def __init__(self) -> None:
+        self.listeners: list[Callable[[Any], None]] = []
+
+    def in_a_hurry(self, timeout_s: float) -> Any:
+        raise LinkError("nothing answers")
+
+
+class Jog:
+    """A held jog that lasts until it is no longer held."""
+
+    def __init__(self) -> None:
+        self.held = 0
+        self.angles_deg = ARM.home_deg
+        self.ended = threading.Event()
+
+    def __enter__(self) -> Jog:
+        return self
+
+    def hold(self, seconds: float) -> bool:
+        self.held += 1
+        time.sleep(seconds / 10)
+        return True
+
+    def __exit__(self, *_: object) -> None:
+        self.ended.set()
+
+
+class Board:
+    """A board that only jogs."""
+
+    def __init__(self) -> None:
+        self.client = type("Client", (), {"session": Session()})()
+        self.jog = Jog()
+        self.stops: list[tuple[bool, str]] = []
+
+    def held_jog(self, *_: object) -> Jog:
+        return self.jog
+
+    def request_stop(self, now: bool, by: str) -> bool:
+        self.stops.append((now, by))
+        return True
+
+
+@pytest.fixture
+def operator(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Operator]:
+    monkeypatch.setattr("armtempo.panel.operator.LOOK_S", 1000.0)  # it is never asked for its state
+    made = Operator(Board(), ARM, Desk(ARM, tmp_path, None), tmp_path / "runs")  # type: ignore[arg-type]
+    made.take_control(ME)
+    yield made
+    made.close()
+
+
+def wait(condition: Callable[[], bool]) -> None:
+    """Until it holds."""
+    limit_s = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < limit_s
+        time.sleep(0.005)
+
+
+def test_one_command_at_a_time_of_who_has_control(operator: Operator) -> None:
+    go = threading.Event()
+    operator.do("wait", ME, go.wait)
+    with pytest.raises(InputError, match="wait is under way"):
+        operator.do("more", ME, go.wait)
+    with pytest.raises(InputError, match="Another page has control"):
+        operator.do("more", OTHER, go.wait)
+    go.set()
+    wait(lambda: not operator.busy)
+    operator.release(ME)
+    with pytest.raises(InputError, match="Take control"):
+        operator.do("more", ME, go.wait)
+
+
+def test_an_error_of_a_command_is_logged_and_ends_nothing(operator: Operator) -> None:
+    def fail() -> None:
+        raise LinkError("the arm is elsewhere", "bring it there")
+
+    operator.do("run", ME, fail)
+    wait(lambda: not operator.busy)
+    assert "bring it there" in operator.log[-1]
+    operator.do("again", ME, lambda: None)
+
+
+def test_stop_twice_freezes(operator: Operator) -> None:
+    operator.stop()
+    operator.stop()
+    assert [now for now, _ in operator.board.stops] == [False, True]  # type: ignore[attr-defined, comparison-overlap]
+
+
+@pytest.mark.parametrize("how", ["released", "silent", "other in control"])
+def test_a_jog_ends_with_its_button(operator: Operator, how: str) -> None:
+    hold, jog = ButtonHold(operator), operator.board.jog  # type: ignore[attr-defined]
+    hold.press(ME, JogButton(joint=1), 0.25)
+    wait(lambda: jog.held > 2)
+    begin_s = time.monotonic()
+    if how == "released":
+        hold.release(ME)
+    elif how == "other in control":
+        operator.take_control(OTHER)
+    while not jog.ended.is_set() and how != "silent":
+        hold.alive(ME)
+        time.sleep(0.01)
+    wait(jog.ended.is_set)
+    assert how != "silent" or time.monotonic() - begin_s > ALIVE_S / 2
+
+
+def test_saving_keeps_the_comments_of_the_job_file(tmp_path: Path) -> None:
+    file = tmp_path / "job.toml"
+    file.write_text(
+        '# my job\nname = "feed"  # its name\nseed = 7\nvia_deg = [[0, -60, 40], [20, -75, 50]]\n'
+    )
+    desk = Desk(ARM, tmp_path, file)
+    rows = [[0.0, -60.0, 40.0], [10.5, -70.0, 45.0], [20.0, -75.0, 50.0]]
+    desk.save(desk.job_with(rows, "free"))
+    text = file.read_text()
+    assert "# my job" in text
+    assert "# its name" in text
+    again = Job.load(file, ARM)
+    assert [list(row) for row in again.via] == rows  # type: ignore[arg-type]
+    assert (again.path, again.seed, again.name) == ("free", 7, "feed")
+
+
+def test_nothing_is_written_outside_of_the_folder(tmp_path: Path) -> None:
+    (tmp_path / "other").mkdir()
+    file = tmp_path / "job.toml"
+    file.write_text(text := 'name = "feed"\nvia_deg = [[0, -60, 40], [20, -75, 50]]\n')
+    desk = Desk(ARM, tmp_path / "other", file)
+    with pytest.raises(InputError, match="outside of the project folder"):
+        desk.save(desk.job_with(desk.rows(), "through"))
+    assert file.read_text() == text
+
+
+@pytest.mark.parametrize("rows", [[], [[0.0, -60.0, 40.0]], [[0.0, -60.0, 40.0], [999.0, 0.0, 0.0]]])
+def test_rows_that_are_no_motion_are_refused(tmp_path: Path, rows: list[list[float]]) -> None:
+    with pytest.raises(InputError):
+        Desk(ARM, tmp_path, None).job_with(rows, "through")

@@ -1,0 +1,211 @@
+"""Every public call with wrong types and values: an error of armtempo's that says what to do, and no other."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any, cast
+
+import armtempo
+import numpy as np
+import pytest
+
+ARM = armtempo.Arm.paper()
+JOB = armtempo.Job("small", via_deg=[(0, -60, 40), (5, -58, 41)], population=4, iterations=1, refine=1)
+NOWHERE = "/no/such/port"
+WRONG = (
+    *(object(), b"x", 1 + 2j, {1}, lambda *_: 0),
+    *(None, True, 0, 3, -1, 10**30, 0.5, -2.5, math.nan, math.inf),
+    *("", "x", "no such", "two\nlines", "\0", "\ud800", Path("/no/such/file.json"), "missing.json"),
+    *(
+        [],
+        [[]],
+        [1.0, 2.0],
+        [1, "x"],
+        [[1, 2, 3], [4]],
+        np.zeros((2, 2)),
+        np.array(["x"]),
+        {},
+        {"x": object()},
+    ),
+)
+GIVEN_BY_US = {"Board", "BoardState", "Plan", "Run", "SequencePlan", "SequenceRun", "SharedBoard", "Stopped"}
+GIVEN_BY_US |= {"StopRequest", "Trajectory", "Watcher", "Result", "VirtualBoard"}
+"""Classes that a user makes no objects of, or without arguments."""
+USERS_OWN = {"minimise.function", "minimise.rng", "launch.options"}
+"""What these raise or start is the user's affair."""
+NO_CALLS = {"BoardState.of_json", "Job.of_table", "Arm.of_table", "StopRequest.ask", "StopRequest.check"}
+NO_CALLS |= {f"Watcher.{name}" for name in ("begin", "sample", "end")}
+
+
+class Gone:
+    """Stands for a board or program that is no longer there."""
+
+    def __getattr__(self, name: str) -> Any:
+        if name in ("info", "rate"):
+            raise armtempo.LinkError("gone", "start it")
+        return self
+
+    def __call__(self, *_: object, **__: object) -> Any:
+        raise armtempo.LinkError("gone", "start it")
+
+
+@pytest.fixture(scope="module")
+def plan() -> armtempo.Plan:
+    """A small one."""
+    return armtempo.plan(ARM, JOB)
+
+
+@pytest.fixture(scope="module")
+def objects(plan: armtempo.Plan) -> dict[str, Any]:
+    """One of each class that has methods."""
+    board = armtempo.Board(cast(Any, Gone()), NOWHERE)
+    board.arm = ARM
+    sequence = armtempo.Sequence("s", (armtempo.Goto("home"), armtempo.Wait(1.0)))
+    return {
+        "Arm": ARM,
+        "Job": JOB,
+        "Board": board,
+        "SharedBoard": armtempo.SharedBoard(cast(Any, Gone())),
+        "Plan": plan,
+        "Pose": armtempo.Pose.of_angles([300, 0, 300], {}),
+        "Spline": armtempo.Spline.through([0, 1, 2]),
+        "Trajectory": plan.trajectory,
+        "Sequence": sequence,
+        "SequencePlan": armtempo.plan_sequence(ARM, sequence),
+        "Output": armtempo.Output("gripper", "switch", "PE9", 0.0),
+    }
+
+
+def good(plan: armtempo.Plan) -> dict[str, Any]:
+    """A value that fits, by the name of a parameter."""
+    limits = armtempo.Limits(10, 10, 10)
+    motor = armtempo.Motor(1, 200, 16, 10)
+    return {
+        "arm": ARM,
+        "job": JOB,
+        "sequence": armtempo.Sequence("s", (armtempo.Wait(1.0),)),
+        "plan": plan,
+        "name": "x",
+        "old": "x",
+        "new": "y",
+        "path": "/no/such/file",
+        "port": NOWHERE,
+        "folders": [NOWHERE],
+        "angles_deg": [0, -60, 40],
+        "pose": np.eye(4),
+        "points": [0, 1, 2],
+        "control_points": [0] * 8,
+        "motion": plan,
+        "where": [0, -60, 40],
+        "fraction": 0.5,
+        "joints": (),
+        "u": 0.5,
+        "time_s": 0.5,
+        "position": [1, 2, 3],
+        "direction": [0, 0, 1],
+        "matrix": np.eye(4).tolist(),
+        "algorithm": "acs",
+        "steps": (armtempo.Wait(1.0),),
+        "wait_s": 1.0,
+        "output": "x",
+        "to": 1.0,
+        "input": "x",
+        "counter": "x",
+        "limits": limits,
+        "motor": motor,
+        "channel": 1,
+        "steps_per_rev": 200,
+        "microsteps": 16,
+        "raw": 0,
+        "gear_ratio": 10.0,
+        "counts_per_rev": 4000,
+        "range_deg": (-10, 10),
+        "speed_deg_s": 1.0,
+        "target": "home",
+        "acceleration_deg_s2": 1.0,
+        "jerk_deg_s3": 1.0,
+        "d_mm": 0,
+        "a_mm": 0,
+        "alpha_deg": 0,
+        "via": 1,
+        "theta_offset_deg": 0,
+        "kind": "switch",
+        "pin": "PE9",
+        "safe": 0.0,
+        "value": 0,
+        "number": 0,
+        "row": 0,
+        "function": lambda x: (x**2).sum(1),
+        "bounds": [(0, 1)],
+        "rng": np.random.default_rng(1),
+        "posture": None,
+        "options": None,
+        "at_s": 1.0,
+        "start_deg": None,
+    }
+
+
+def public() -> Iterator[tuple[str, str]]:
+    """Class or module, and name, of every public call."""
+    for name in armtempo.__all__:
+        value = getattr(armtempo, name)
+        if isinstance(value, ModuleType):
+            yield from ((name, inner) for inner in value.__all__ if inner not in GIVEN_BY_US)
+        elif inspect.isclass(value) and not issubclass(value, Exception):
+            if name not in GIVEN_BY_US:
+                yield "", name
+            for inner, member in inspect.getmembers(value, inspect.isroutine):
+                if (inner == "__call__" or inner[0] != "_") and f"{name}.{inner}" not in NO_CALLS:
+                    assert member
+                    yield name, inner
+        elif inspect.isroutine(value):
+            yield "", name
+
+
+def called(where: str, name: str, objects: dict[str, Any]) -> Callable[..., Any] | None:
+    """What to call; None for what is no call, or cannot be one without a recorded run."""
+    owner = getattr(armtempo, where) if where else armtempo
+    if inspect.isclass(owner) and not inspect.ismethod(getattr(owner, name)):
+        owner = objects.get(where)
+    found = getattr(owner, name, None)
+    return found if inspect.isroutine(found) or inspect.isclass(found) else None
+
+
+def refusal(call: Callable[..., Any], values: dict[str, Any], several: bool) -> armtempo.ArmtempoError | None:
+    """The error that a call ends with; None without one."""
+    try:
+        call(*values.values()) if several else call(**values)
+    except armtempo.ArmtempoError as error:
+        return error
+    return None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("where", "name"), [*public()])
+def test_wrong_types_and_values_are_refused_in_words(
+    where: str, name: str, objects: dict[str, Any], plan: armtempo.Plan, tmp_path: Path, monkeypatch: Any
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    call = called(where, name, objects)
+    if call is None:
+        return
+    parameters = inspect.signature(call).parameters.values()
+    needed = {
+        one.name for one in parameters if one.default is one.empty and one.kind is not one.VAR_POSITIONAL
+    }
+    values = {key: value for key, value in good(plan).items() if key in needed}
+    assert needed <= values.keys(), f"no value is known for {needed - values.keys()}"
+    for parameter in parameters:
+        if f"{name}.{parameter.name}" in USERS_OWN:
+            continue
+        for number, wrong in enumerate(WRONG):
+            said = refusal(
+                call, {**values, parameter.name: wrong}, parameter.kind is parameter.VAR_POSITIONAL
+            )
+            shown = f"{name}({parameter.name}={wrong!r})"
+            assert said is None or (said.problem and said.hint), f"{shown}: {said}"
+            assert number or said or parameter.annotation in ("Any", "object"), f"{shown} is taken"
