@@ -33,9 +33,9 @@ def main(board: str, micropython: Path) -> None:
 
 
 def pack(folder: Path, archive: Path) -> None:
-    """The files of a folder with one date, so that the same files make the same archive."""
+    """The files of a folder with one date, so that the same sources make the same archive; an ELF file holds paths."""
     with ZipFile(archive, "w", ZIP_DEFLATED) as made:
-        for path in sorted(folder.iterdir()):
+        for path in sorted(each for each in folder.iterdir() if each.suffix != ".elf"):
             made.writestr(ZipInfo(f"{folder.name}/{path.name}", DATE), path.read_bytes())
 
 

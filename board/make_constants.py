@@ -20,11 +20,13 @@ _ARITHMETIC = (ast.BinOp, ast.UnaryOp, ast.Constant, ast.operator, ast.unaryop)
 def constants(path: Path) -> dict[str, str]:
     """By name, without the underscore of private ones: the text of a number."""
     text, found = path.read_text(encoding="utf-8"), {}
+    lines = text.splitlines()
     for node in ast.parse(text).body:
         if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
             value = node.value.args[0] if isinstance(node.value, ast.Call) and node.value.args else node.value
             if all(isinstance(part, _ARITHMETIC) for part in ast.walk(value)):
-                found[node.targets[0].id.lstrip("_")] = ast.get_source_segment(text, value) or ""
+                line = lines[value.lineno - 1].encode()  # offsets are in bytes
+                found[node.targets[0].id.lstrip("_")] = line[value.col_offset : value.end_col_offset].decode()
     return found
 
 

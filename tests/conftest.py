@@ -32,13 +32,7 @@ def own_settings() -> Iterator[None]:
     shutil.rmtree(folder, ignore_errors=True)
 
 
-SLOW = ["micropython-arm", "[cpython-engine", "anywhere]"]
-"""What in a test's name says that it takes long: the emulator, the engine on CPython, cases of many moments."""
-if "micropython" in interpreters.AVAILABLE:
-    SLOW.append("[cpython-app")  # the same cases as on MicroPython, which starts in less time
-
-
-@pytest.fixture(params=interpreters.AVAILABLE)
+@pytest.fixture(params=interpreters.EACH)
 def interpreter(request: pytest.FixtureRequest) -> str:
     """Each interpreter that is here, by name; for ``interpreters.run``."""
     return str(request.param)
@@ -50,10 +44,9 @@ def pytest_xdist_auto_num_workers() -> int:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Several workers begin with what takes long, so that they end together; ``make quick`` leaves it out."""
+    """All of ``system/`` is slow. Several workers begin with what takes long, so that they end together."""
     for item in items:
-        in_system = item.path.is_relative_to(interpreters.ROOT / "tests" / "system")
-        if in_system or any(word in item.nodeid for word in SLOW):
+        if item.path.is_relative_to(interpreters.ROOT / "tests" / "system"):
             item.add_marker(pytest.mark.slow)
     if hasattr(config, "workerinput"):  # of pytest-xdist
         items.sort(key=lambda item: item.get_closest_marker("slow") is None)

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parent.parent
 VIRTUAL = ROOT / "host" / "armtempo" / "simulator"
 _CACHE = ROOT / ".cache" / "micropython"
@@ -17,6 +19,8 @@ _STARTERS = {
 }
 AVAILABLE = [name for name, starter in _STARTERS.items() if starter.exists()]
 MISSING = [name for name in _STARTERS if name not in AVAILABLE]
+EACH = [pytest.param(name, marks=[pytest.mark.slow] * (name == "micropython-arm")) for name in AVAILABLE]
+"""For a test of each interpreter; the emulator takes long."""
 _BOARD_PATH = [ROOT / "shared", ROOT / "board", VIRTUAL / "hardware"]
 _RIGS = [ROOT / "tests" / folder for folder in ("rigs", "board/scripts/rigs", "system/scripts/rigs")]
 

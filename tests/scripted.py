@@ -1,17 +1,23 @@
-"""Scripts of cases for several interpreters as tests: one test for each case, each in an interpreter of its own."""
+"""Scripts of cases for several interpreters as tests: one test for each case, each in an interpreter of its own.
+
+A comment behind ``def case_…():`` says where a case runs: ``slow``, ``slow on CPython``, ``not emulated``, ``not on
+CPython``. A line ``# all cases: …`` says it of a whole script, and ``emulated`` or ``on CPython`` makes an exception.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+
+import pytest
 
 from tests import interpreters
 
 HEAP = {"cpython": "", "micropython": "16M", "micropython-arm": "6M"}
-
-
+NOT_ON = {"micropython-arm": "not emulated", "cpython": "not on CPython"}
 EMULATED = "micropython-arm"
 
 
@@ -35,17 +41,47 @@ class Case:
         assert [line.split()[0] for line in output.splitlines() if line.startswith("case_")] == named, output
 
 
-def names(script: Path) -> list[str]:
-    """The cases that a script defines."""
-    found = re.findall(r"^def (case_\w+)", script.read_text(), re.MULTILINE)
+@cache
+def tags(script: Path) -> dict[str, set[str]]:
+    """The cases that a script defines, with what comments say of each."""
+    text = script.read_text()
+    common = _words(re.search(r"^# all cases: (.*)$", text, re.MULTILINE))
+    found = {}
+    for match in re.finditer(r"^def (case_\w+)\(.*\):(?:  # (.*))?$", text, re.MULTILINE):
+        assert match[1] not in found, f"{match[1]} of {script} is defined twice"
+        own = _words(match, 2)
+        found[match[1]] = {word for word in common if word.removeprefix("not ") not in own} | own
     assert found, f"{script} has no cases"
-    assert len(found) == len(set(found)), f"a case of {script} is defined twice"
     return found
 
 
+def _words(match: re.Match[str] | None, group: int = 1) -> set[str]:
+    return set(match[group].split(", ")) if match and match[group] else set()
+
+
 def cases(*scripts: Path, on: Iterable[str] = interpreters.AVAILABLE) -> list[Case]:
-    """All cases of some scripts on some interpreters, for ``pytest.mark.parametrize`` with ``ids=str``."""
-    return [Case(name, script, case) for name in on for script in scripts for case in names(script)]
+    """The cases of some scripts on some interpreters, those that are to run there."""
+    return [
+        Case(name, script, case)
+        for name in on
+        for script in scripts
+        for case, said in tags(script).items()
+        if NOT_ON.get(name) not in said
+    ]
+
+
+def each(found: Iterable[Case]) -> pytest.MarkDecorator:
+    """A test for each case, as its argument ``case``; in the emulator and where a comment says so it is slow."""
+    return pytest.mark.parametrize(
+        "case",
+        [pytest.param(case, id=str(case), marks=[pytest.mark.slow] * _is_slow(case)) for case in found],
+    )
+
+
+def _is_slow(case: Case) -> bool:
+    said = set().union(*(tags(case.script)[name] for name in case.name.split()))
+    on_cpython = case.interpreter == "cpython" and "slow on CPython" in said
+    return case.interpreter == EMULATED or "slow" in said or on_cpython
 
 
 def together(found: Iterable[Case]) -> list[Case]:

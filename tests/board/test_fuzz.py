@@ -14,7 +14,7 @@ SEED = 20261121
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", interpreters.AVAILABLE)
+@pytest.mark.parametrize("name", interpreters.EACH)
 def test_no_exception_no_wrong_check_no_motion(name: str) -> None:
     """The script asserts all three (and names the seed in its arguments); every handler is reached."""
     given, acted, bad, reached = interpreters.run(name, SCRIPT, str(FRAMES[name]), str(SEED)).split()

@@ -7,7 +7,7 @@ from array import array
 
 import pytest
 
-from tests import interpreters
+from tests import interpreters, slack
 from tests.benchmark import freeze
 from tests.board.emulated import Machine, ring_state
 
@@ -76,11 +76,11 @@ def test_turning_and_stopping(machine: Machine, joints: int) -> None:
     idle, turn = SERVE[joints]
     block, timer2, port = _block(joints), _words(18), _words(10)
     timer2[AT["CNT"]] = 100
-    assert _cost(machine, "serve_compare", block, timer2, port) <= idle
+    slack.hold("no turn", _cost(machine, "serve_compare", block, timer2, port), idle)
     block[AT["BLOCK_HEAD"] + AT["DIR_BIT"]] = 128
     block[AT["BLOCK_HEAD"] + AT["TURN_TIMES"]] = 100
     block[AT["BLOCK_HEAD"] + AT["TURNS_IN"]] = 1
-    assert _cost(machine, "serve_compare", block, timer2, port) <= turn
+    slack.hold("turn", _cost(machine, "serve_compare", block, timer2, port), turn)
     assert port[AT["BSRR"]] == 128
 
 
@@ -88,7 +88,7 @@ def test_turning_and_stopping(machine: Machine, joints: int) -> None:
 def test_a_sample(machine: Machine, joints: int) -> None:
     """Without encoders: these come by way of objects."""
     raw = _words(AT["RAW_ROOM"] * AT["RAW_WORDS"])
-    assert _cost(machine, "take_sample", raw, _block(joints), _words(60), 0) <= TAKE[joints]
+    slack.hold("a sample", _cost(machine, "take_sample", raw, _block(joints), _words(60), 0), TAKE[joints])
 
 
 @pytest.mark.parametrize("joints", sorted(REFILL))
@@ -97,9 +97,11 @@ def test_looking_after_the_rings(machine: Machine, joints: int) -> None:
     full, to_refill = REFILL[joints]
     dma, timer = _words(60), _words(18)
     dma[0] = RING
-    assert _cost(machine, "rings_to_refill", _block(joints, RING - 8), dma, timer) <= full
+    slack.hold(
+        "rings that are full", _cost(machine, "rings_to_refill", _block(joints, RING - 8), dma, timer), full
+    )
     assert machine.run("rings_to_refill", _block(joints, RING - 8), dma, timer) == 0
-    assert _cost(machine, "rings_to_refill", _block(joints), dma, timer) <= to_refill
+    slack.hold("rings to refill", _cost(machine, "rings_to_refill", _block(joints), dma, timer), to_refill)
     assert machine.run("rings_to_refill", _block(joints), dma, timer) == (1 << joints) - 1
 
 
@@ -112,14 +114,16 @@ def test_writing_to_a_ring(machine: Machine, entries: int) -> None:
     for name, value in values.items():
         queue[QUEUE[name]] = value
     state = ring_state(AT, entries, ring, queue)
-    assert _cost(machine, "emit", 1, state, timer, beside=(ring, queue)) <= EMIT[entries]
+    slack.hold(
+        f"{entries} entries", _cost(machine, "emit", 1, state, timer, beside=(ring, queue)), EMIT[entries]
+    )
     assert queue[QUEUE["HEAD"]] == entries
     assert state[AT["WRITTEN"]] == entries
 
 
 def test_the_freeze_is_the_one_that_was_counted_on_the_firmware() -> None:
     """Else count it there anew: python -m tests.benchmark.freeze."""
-    assert freeze.alone() == freeze.stored()["alone"]
+    slack.hold("the freeze by itself", freeze.alone(), freeze.stored()["alone"])
 
 
 def test_outputs_stand_still_within_500_instructions() -> None:
@@ -134,4 +138,8 @@ def test_outputs_stand_still_within_500_instructions() -> None:
 def test_arming_a_channel(machine: Machine) -> None:
     ring = _words(RING + 1)
     ring[0] = 5000
-    assert _cost(machine, "arm_channel", _block(1), _words(18), ring, AT["BLOCK_HEAD"]) <= ARM_CHANNEL
+    slack.hold(
+        "arming a channel",
+        _cost(machine, "arm_channel", _block(1), _words(18), ring, AT["BLOCK_HEAD"]),
+        ARM_CHANNEL,
+    )

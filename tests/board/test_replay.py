@@ -15,7 +15,7 @@ from tests import interpreters
 SCRIPT = Path(__file__).parent / "scripts" / "probes" / "replay.py"
 
 
-@pytest.mark.parametrize("name", interpreters.AVAILABLE)
+@pytest.mark.parametrize("name", interpreters.EACH)
 def test_replay_from_the_repl(name: str, tmp_path: Path) -> None:
     """The first call takes the posture for the start and moves; the second finds the arm elsewhere."""
     paper_arm = Arm.paper()

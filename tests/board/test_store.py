@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
-
 from tests import scripted
 
 SCRIPT = Path(__file__).parent / "scripts" / "cases" / "store_cuts.py"
 
 
-@pytest.mark.parametrize("case", scripted.cases(SCRIPT), ids=str)
+@scripted.each(scripted.cases(SCRIPT))
 def test_old_or_new_after_a_failure_at_every_change(case: scripted.Case) -> None:
     case.run(heap="")

@@ -338,6 +338,7 @@ def test_a_position_in_metres_is_suspected(tmp_path: Path) -> None:
     assert any(finding.next_step == "give it in mm: [300, 100, 200]" for finding in found)
 
 
+@pytest.mark.slow
 def test_words_that_users_read_name_no_file_of_the_checkout() -> None:
     """A wheel has no folder ``host/docs``: messages name a topic of ``armtempo help``."""
     package = Path(str(files("armtempo")))

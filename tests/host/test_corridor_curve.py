@@ -50,6 +50,7 @@ def test_with_a_stop_narrow_corridors_hold_no_motion() -> None:
     assert 2 <= len(widths) < 9
 
 
+@pytest.mark.slow
 def test_the_curve_names_both_its_ends() -> None:
     points = [CorridorTime(0.0, 4.0), CorridorTime(1.0, 3.0), CorridorTime(2.0, 2.8), CorridorTime(None, 2.5)]
     axes = corridor_plot.figure(points, "deg", "bend").axes[0]

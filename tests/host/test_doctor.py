@@ -107,7 +107,7 @@ def test_the_command_examines_a_virtual_board(tmp_path: Path, monkeypatch: pytes
     done = CliRunner().invoke(main, ["doctor", "--arm", "paper", "--port", f"sim:{tmp_path / 'b'}", "--json"])
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout)
-    assert {item["what"] for item in found["machine"]} == {"armtempo", "Python", "system"}
+    assert {item["what"] for item in found["machine"]} == {"armtempo", "Python", "flash tool", "system"}
     assert "(virtual)" in found["board"][0]["found"]
     assert "as installed here" in found["board"][1]["found"]
 

@@ -68,9 +68,9 @@ def test_an_encoder_on_the_motor_counts_faster() -> None:
 
 def test_a_ratio_that_a_word_cannot_hold_is_refused() -> None:
     joint = ARM.joints[0]
-    assert joint.encoder
-    for counts, fits in ((2**31 - 1, True), (2**31 + 1, False)):
-        fine = replace(joint, encoder=replace(joint.encoder, counts_per_rev=counts))
+    assert joint.motor
+    for gear, fits in ((5.01, True), (5.000000001, False)):
+        fine = replace(joint, motor=replace(joint.motor, gear_ratio=gear))
         arm = replace(ARM, joints=(fine, *ARM.joints[1:]))
         if fits:
             encode.arm_record(arm)

@@ -29,6 +29,7 @@ def has_hint(message: ErrorMessage) -> bool:
     return bool(hint) and not hint.endswith(".") and (hint.startswith("{") or " " in hint or ":" in hint)
 
 
+@pytest.mark.slow
 @sources.TOGETHER
 def test_every_error_of_the_host_says_what_to_do_next() -> None:
     lacking = [

@@ -107,6 +107,7 @@ def test_a_table_that_will_not_do_is_refused_with_its_line(tmp_path: Path, text:
         via_table.via_from_csv(table, ARM)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tolerance", [1.0, 0.1, 0.01])
 def test_an_exported_motion_comes_back_thinned_to_the_tolerance(tmp_path: Path, tolerance: float) -> None:
     plan = shipped_plan()

@@ -243,7 +243,7 @@ def test_a_seed_repeats_and_starts_are_reported() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"path": "short"}, "'through', 'free'"),
+        ({"path": "short"}, "'through' or 'free'"),
         ({"path": "through", "corridor_deg": 1.0}, 'add path = "free"'),
         ({"corridor_deg": 1.0, "corridor_mm": 1.0}, "not both"),
         ({"corridor_deg": -1.0}, "0 or more"),

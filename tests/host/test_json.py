@@ -22,6 +22,7 @@ NO_REPORT = {
     "completion": "prints a script",
     "help": "prints a page",
     "virtual-board": "prints its port, and stays",
+    "panel": "prints its address, and stays",
 }
 JOB = """
 name = "short"
@@ -165,6 +166,6 @@ def test_the_program_on_a_board(project: Path, monkeypatch: pytest.MonkeyPatch) 
 
 @pytest.mark.slow
 def test_firmware(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("armtempo.deploy.firmware.flash.flash", lambda *_: None)
-    assert said("flash", "folder", "--port", "x") == {"folder": "folder", "port": "x"}
+    monkeypatch.setattr("armtempo.deploy.firmware.write.flash", lambda *_: None)
+    assert said("flash", "--image", "folder", "--port", "x") == {"image": "folder", "port": "x"}
     assert Path(said("firmware", "--program", "program")["manifest"]).exists()

@@ -68,6 +68,7 @@ def test_every_arm_finds_the_posture_that_made_the_pose(arm: Arm, fixed: tuple[s
         assert found.chosen.miss.rotation_deg < 1e-7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["paper", "abb_irb_140"])
 def test_all_solutions_of_the_closed_form_are_found(name: str) -> None:
     rng = np.random.default_rng(32)

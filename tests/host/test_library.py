@@ -106,6 +106,7 @@ def test_public_functions_are_typed() -> None:
         assert all(one.annotation is not inspect.Parameter.empty for one in signature.parameters.values())
 
 
+@pytest.mark.slow
 def test_the_errors_are_the_tree_that_is_drawn() -> None:
     for found in pkgutil.walk_packages(armtempo.__path__, "armtempo."):
         if "simulator." not in found.name and not found.name.endswith(("__main__", "firmware.manifest")):
@@ -287,7 +288,7 @@ def test_a_stop_that_is_asked_for_ends_a_run_early(
     stop = armtempo.StopRequest()
 
     class Impatient(armtempo.Watcher):
-        def sample(self, sample: Sample, duration_s: float) -> None:
+        def on_sample(self, sample: Sample, duration_s: float) -> None:
             stop.wanted = True
 
     with armtempo.connect("sim", arm) as board:

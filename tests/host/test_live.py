@@ -39,7 +39,7 @@ def test_angles_and_errors_stand_beside_the_bar(monkeypatch: pytest.MonkeyPatch)
     with Live(window=False) as live:
         live.begin(encoded_motion.of_plan(shipped_plan()), FOLDER)
         monkeypatch.setattr(live, "_progress", lambda *shown: notes.append(shown))
-        live.sample(sample(3.0, 0.9), 6.8)
+        live.on_sample(sample(3.0, 0.9), 6.8)
         monkeypatch.undo()
     time_s, whole_s, note = notes[0]
     assert (time_s, whole_s) == (3.0, 6.8)
@@ -54,7 +54,7 @@ def test_without_a_display_the_run_goes_on(capsys: pytest.CaptureFixture[str]) -
     mpl.use("agg")
     with Live(window=True) as live:
         live.begin(encoded_motion.of_plan(shipped_plan()), FOLDER)
-        live.sample(sample(1.0, 0.0), 6.8)
+        live.on_sample(sample(1.0, 0.0), 6.8)
     assert "no live plot: there is no display" in capsys.readouterr().err
 
 

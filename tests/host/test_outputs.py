@@ -195,7 +195,7 @@ def test_pins_that_cannot_be_had(tmp_path: Path, tables: str, words: list[str]) 
     for word in words:
         assert word in caught.value.problem, caught.value.problem
         assert word in f"{errors[0].where}: {errors[0].what}"
-    assert "hardware.md" in caught.value.hint
+    assert "help hardware" in caught.value.hint
 
 
 @pytest.mark.parametrize(

@@ -28,6 +28,7 @@ def test_a_column_is_aligned_as_a_whole() -> None:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turn_deg", [0.0, 37.0, 90.0, 160.0, 250.0])
 def test_labels_of_the_arms_figure_are_inside_of_it(turn_deg: float) -> None:
     plan = shipped_plan()

@@ -9,7 +9,7 @@ import pytest
 from armtempo.paper import motions, postures, printed, searches
 from armtempo.paper.claims import BETTER, DIFFERS, SAME, compared
 
-pytestmark = pytest.mark.xdist_group("paper")  # what they share is made once
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("paper")]  # what they share is made once
 
 
 @pytest.fixture(scope="module")
@@ -18,7 +18,6 @@ def made() -> motions.Plans:
     return motions.plans()
 
 
-@pytest.mark.slow
 def test_table_2_comes_out_but_for_its_misprint(made: motions.Plans) -> None:
     found = postures.claims(made.arm)
     assert [claim.verdict for claim in found] == [SAME] * 3 + [DIFFERS] + [SAME] * 4
@@ -88,7 +87,6 @@ def test_searches_get_the_paper_s_problem(made: motions.Plans) -> None:
     assert fitness.penalised(np.array([printed.INTERVALS_S[0]]))[0] == pytest.approx(6.033, abs=0.02)
 
 
-@pytest.mark.slow
 def test_searches_on_all_cores(made: motions.Plans, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(searches, "QUICK_POPULATIONS", (4,))
     monkeypatch.setattr(searches, "QUICK_SEEDS", 1)

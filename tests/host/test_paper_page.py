@@ -19,7 +19,7 @@ from armtempo.robot.stop_request import StopRequest
 from tests import browser
 from tests.host import made_runs
 
-pytestmark = pytest.mark.xdist_group("paper")  # what they share is made once
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("paper")]  # what they share is made once
 
 FIGURES = 7
 """4 to 7 and 10 to 12."""
@@ -47,7 +47,6 @@ def searched() -> list[searches.Row]:
     return searches.rows((("acs", n, seed), np.full(6, 6.0)) for n in (10, 50) for seed in (1, 2))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("quintic", "cubic", "verdict"), [(0.02, 0.2, SAME), (0.2, 0.02, DIFFERS)])
 def test_fig_12_is_judged_by_how_rough_the_ends_are(
     quintic: float, cubic: float, verdict: str, tmp_path: Path
@@ -58,7 +57,6 @@ def test_fig_12_is_judged_by_how_rough_the_ends_are(
     assert all("times" in claim.found for claim in ends)
 
 
-@pytest.mark.slow
 def test_a_limit_that_is_exceeded_shows(tmp_path: Path) -> None:
     runs = series(tmp_path, {QUINTIC: 0.02, CUBIC: 0.02, UNOPTIMISED: 0.02})
     found = runs[0].found
@@ -86,7 +84,6 @@ def page(made: motions.Plans, tmp_path_factory: pytest.TempPathFactory) -> tuple
     return the_page(made, tmp_path_factory.mktemp("runs"))
 
 
-@pytest.mark.slow
 def test_the_page_is_whole(page: tuple[str, list[Claim]]) -> None:
     text, claims = page
     for claim in claims:
@@ -97,7 +94,6 @@ def test_the_page_is_whole(page: tuple[str, list[Claim]]) -> None:
     assert 'replays of each motion</td><td data-column="value">2<' in text
 
 
-@pytest.mark.slow
 def test_the_page_in_a_browser(page: tuple[str, list[Claim]], tmp_path: Path) -> None:
     browser.needed()
     file = tmp_path / "paper.html"
@@ -135,7 +131,6 @@ def test_an_interrupt_ends_all(made: motions.Plans, tmp_path: Path, monkeypatch:
         experiment.run(made, tmp_path, True, None)
 
 
-@pytest.mark.slow
 def test_the_three_motions_are_the_paper_s(
     made: motions.Plans, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

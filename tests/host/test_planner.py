@@ -157,6 +157,7 @@ def test_progress_grows_to_the_whole(refine: int, polish: bool) -> None:
     assert seen[-1] == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "changes",
     [{}, {"path": "free", "refine": 4, "starts": 1}, {"path": "free", "corridor_mm": 0.01, "refine": 4}],

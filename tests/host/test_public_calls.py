@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any, cast
@@ -12,6 +13,7 @@ from typing import Any, cast
 import armtempo
 import numpy as np
 import pytest
+from armtempo.records import encoded_motion
 
 ARM = armtempo.Arm.paper()
 JOB = armtempo.Job("small", via_deg=[(0, -60, 40), (5, -58, 41)], population=4, iterations=1, refine=1)
@@ -38,7 +40,7 @@ GIVEN_BY_US |= {"StopRequest", "Trajectory", "Watcher", "Result", "VirtualBoard"
 USERS_OWN = {"minimise.function", "minimise.rng", "launch.options"}
 """What these raise or start is the user's affair."""
 NO_CALLS = {"BoardState.of_json", "Job.of_table", "Arm.of_table", "StopRequest.ask", "StopRequest.check"}
-NO_CALLS |= {f"Watcher.{name}" for name in ("begin", "sample", "end")}
+NO_CALLS |= {f"Watcher.{name}" for name in ("begin", "on_sample", "end")}
 
 
 class Gone:
@@ -80,9 +82,11 @@ def objects(plan: armtempo.Plan) -> dict[str, Any]:
     }
 
 
+@cache
 def good(plan: armtempo.Plan) -> dict[str, Any]:
     """A value that fits, by the name of a parameter."""
     limits = armtempo.Limits(10, 10, 10)
+    encoded = encoded_motion.of_plan(plan)  # once: to find its brake time takes a while
     motor = armtempo.Motor(1, 200, 16, 10)
     return {
         "arm": ARM,
@@ -99,12 +103,13 @@ def good(plan: armtempo.Plan) -> dict[str, Any]:
         "pose": np.eye(4),
         "points": [0, 1, 2],
         "control_points": [0] * 8,
-        "motion": plan,
+        "motion": encoded,
         "where": [0, -60, 40],
         "fraction": 0.5,
         "joints": (),
         "u": 0.5,
         "time_s": 0.5,
+        "poses": [np.eye(4)],
         "position": [1, 2, 3],
         "direction": [0, 0, 1],
         "matrix": np.eye(4).tolist(),
@@ -185,11 +190,13 @@ def refusal(call: Callable[..., Any], values: dict[str, Any], several: bool) -> 
 
 
 @pytest.mark.slow
+@pytest.mark.xdist_group("public calls")
 @pytest.mark.parametrize(("where", "name"), [*public()])
 def test_wrong_types_and_values_are_refused_in_words(
     where: str, name: str, objects: dict[str, Any], plan: armtempo.Plan, tmp_path: Path, monkeypatch: Any
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))  # no other program's board is found
     call = called(where, name, objects)
     if call is None:
         return

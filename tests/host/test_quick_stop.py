@@ -144,7 +144,7 @@ def test_a_program_that_hangs_is_left_to_the_command(monkeypatch: pytest.MonkeyP
         monkeypatch.setattr(quick_stop, "_HELLO_S", 0.05)
         quick_stop.send(["--port", PORT])
         assert quick_stop.take_answer(PORT, False) is None
-        assert ownership(deaf) is Ownership.HANGS  # known by now: it is not waited for again
+        assert ownership(deaf) is Ownership.HUNG  # known by now: it is not waited for again
     deaf.remove()
 
 

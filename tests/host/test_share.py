@@ -27,7 +27,7 @@ from armtempo.ports.claim import PortClaim
 from armtempo.ports.lines import LineReader, Message
 from armtempo.ports.requests import REQUESTS, Field, check
 from armtempo.ports.server import Server
-from armtempo.robot import sharing
+from armtempo.robot import stored_motion
 from armtempo.robot.shared_board import SharedBoard
 from armtempo.robot.sharing import Sharing
 from armtempo_shared import wire
@@ -112,15 +112,15 @@ def test_a_token_is_asked_for_where_there_are_no_modes(monkeypatch: pytest.Monke
 
 
 def test_lives_hangs_died(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert ownership(server.claim) is Ownership.LIVES
+    assert ownership(server.claim) is Ownership.ALIVE
     server.close()
-    assert ownership(server.claim) is Ownership.DIED
-    monkeypatch.setattr(caller, "HANGS_S", 0.1)
+    assert ownership(server.claim) is Ownership.DEAD
+    monkeypatch.setattr(caller, "HUNG_S", 0.1)
     deaf = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     with deaf:
         deaf.bind(server.claim.address)
         deaf.listen()
-        assert ownership(server.claim) is Ownership.HANGS
+        assert ownership(server.claim) is Ownership.HUNG
         with pytest.raises(NoAnswerError, match="does not answer"):
             Caller(server.claim)
     Path(server.claim.address).unlink()
@@ -128,11 +128,11 @@ def test_lives_hangs_died(server: Server, monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_that_a_program_hangs_is_remembered_for_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
     gone = claim.new("/dev/p", "/dev/p", "/dev/p")
-    assert ownership(gone) is Ownership.DIED
+    assert ownership(gone) is Ownership.DEAD
     caller.remember_hanging(gone.number)
-    assert ownership(gone) is Ownership.HANGS  # it was not asked
+    assert ownership(gone) is Ownership.HUNG  # it was not asked
     monkeypatch.setattr(caller, "_REMEMBERED_S", 0.0)
-    assert ownership(gone) is Ownership.DIED
+    assert ownership(gone) is Ownership.DEAD
 
 
 def test_who_lost_the_port_uses_it_no_more(server: Server) -> None:
@@ -208,7 +208,8 @@ class Owner:
     """What ``Sharing`` needs of a client; keeps what the board would have been told."""
 
     def __init__(self) -> None:
-        self.session = SimpleNamespace(transport=SimpleNamespace(name="/dev/p"), in_a_hurry=self._turn)
+        transport = SimpleNamespace(name="/dev/p")
+        self.session = SimpleNamespace(transport=transport, in_a_hurry=self._turn, listeners=[])
         self.told: list[tuple[object, ...]] = []
         self.rate = 1000
 
@@ -237,7 +238,7 @@ class Owner:
 def owner(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Owner, PortClaim]]:
     """A program that has a port, with a board that does as it is told."""
     client, failed = Owner(), []
-    monkeypatch.setattr(sharing, "send_stop", lambda client, now: client.stop(now) is None)
+    monkeypatch.setattr(stored_motion, "send_stop", lambda client, now: client.stop(now) is None)
     monkeypatch.setattr(threading, "excepthook", failed.append)
     shared = Sharing(cast(Any, client), cast(Any, lambda: SimpleNamespace(to_json=dict)), [], lambda: None)
     shared.open("/dev/p")

@@ -112,7 +112,7 @@ def test_record_crc_names_a_record() -> None:
     assert wire.crc32(record) == 0x2144DF1C  # the same for all records: no name
 
 
-@pytest.mark.parametrize("name", interpreters.AVAILABLE)
+@pytest.mark.parametrize("name", interpreters.EACH)
 def test_the_board_finds_the_same_frames(name: str, tmp_path: Path) -> None:
     """Host's and board's parser over the same broken stream."""
     seed = 5

@@ -48,7 +48,7 @@ def plan_file(job: str, folder: Path) -> Path:
     arm = Arm.paper()
     plan = planner.plan(arm, replace(Job.paper(arm), **JOBS[job]))
     path = folder / f"{job}.json"
-    refined(plan) if job == "refined" else plan.save(path)
+    (refined(plan) if job == "refined" else plan).save(path)
     return path
 
 

@@ -1,21 +1,29 @@
 """Every example of README and host/docs does what it says: Python blocks, and commands on a virtual board.
 
 The commands of host/docs/recovery.md are tried by ``test_recovery``, each on a board that has the trouble.
+The board's bootloader is a stand-in that puts the program where a firmware has it.
 """
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import shutil
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from zipfile import ZipFile
 
 import pytest
+from armtempo.deploy.firmware import frozen, image
+from armtempo.link.program_version import own_crc
 from armtempo.model import shipped
 from armtempo.simulator import LaunchOptions, launch
+from armtempo.simulator.launch_options import DEFAULT_MACHINE
 
 from tests import interpreters
+from tests.host.firmware import fakes
 from tests.interpreters import ROOT
 from tests.system import commandline
 from tests.system.boards import small_plan
@@ -23,6 +31,8 @@ from tests.system.conftest import FASTEST
 
 PAGES = (ROOT / "README.md", *sorted((ROOT / "host" / "docs").glob("*.md")))
 PORT = "/dev/ttyACM0"
+SOURCES_BLOCKS = 1200
+"""A flash that has room for a firmware's program too."""
 COMMANDS = ("README.md", "cli.md")
 ONCE = ((r"repeat=\d+", "repeat=1"), (r"--repeat \d+", "--repeat 1"))
 """Repetitions take time and show nothing new here."""
@@ -74,12 +84,38 @@ def started(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture
-def port(tmp_path: Path) -> Iterator[str]:
-    """A board with MicroPython alone on it, where the examples say PORT."""
-    options = LaunchOptions(tmp_path / "flash", deployed=True, interpreter=interpreters.starter(FASTEST))
+@contextmanager
+def board(folder: Path, firmware: bool) -> Iterator[str]:
+    """A board with MicroPython alone on it, where the examples say PORT; the program in a firmware takes more room."""
+    options = LaunchOptions(
+        folder / "flash",
+        deployed=True,
+        interpreter=interpreters.starter(FASTEST),
+        flash_blocks=SOURCES_BLOCKS if firmware else None,
+    )
     with launch(options) as board:
         yield board.port
+
+
+def bootloader(folder: Path) -> dict[str, str]:
+    """A release's firmware in the folder, and what stands for dfu-util; the chip starts with the program in it."""
+    pieces = (image.Piece("firmware0.bin", 0x08000000), image.Piece("firmware1.bin", 0x08020000))
+    made = image.Image("STM32F4DISC", DEFAULT_MACHINE, "1.28.0", "gcc", own_crc(), pieces)
+    with ZipFile(folder / "armtempo-firmware-STM32F4DISC.zip", "w") as archive:
+        for piece in pieces:
+            archive.writestr(f"firmware/{piece.file}", piece.file)
+        archive.writestr(f"firmware/{image.ABOUT}", image.about(made))
+    frozen.write(folder / "program")
+    tools = folder / "bin"
+    tools.mkdir()
+    (tools / "dfu-util").write_text(fakes.DFU)
+    (tools / "dfu-util").chmod(0o755)
+    return {
+        "PATH": f"{tools}{os.pathsep}{os.environ['PATH']}",
+        "TOOL_LOG": str(folder / "tool.log"),
+        "DFU_LIST": fakes.ONE,
+        "DFU_STARTS": f"cp -r {folder}/program/. {folder}/flash",
+    }
 
 
 @pytest.mark.parametrize(("name", "code"), python_blocks(), ids=[name for name, _ in python_blocks()])
@@ -91,24 +127,26 @@ def test_python_example(name: str, code: str, started: Path, monkeypatch: pytest
 @pytest.mark.parametrize(
     ("page", "block"), BLOCKS, ids=[f"{page}-{number}" for number, (page, _) in enumerate(BLOCKS)]
 )
-def test_commands(page: str, block: list[list[str]], port: str, started: Path, tmp_path: Path) -> None:
+def test_commands(page: str, block: list[list[str]], started: Path, tmp_path: Path) -> None:
     for name in ("my_arm.toml", "my_job.toml"):
         (tmp_path / name).write_text((started / name).read_text())
     shutil.copytree(started / "runs" / "feed-001", tmp_path / "runs" / "feed-001")  # the demo's
-    environment, folder = {}, tmp_path
-    for words in block:
-        if words[0] == "cd":
-            folder /= words[1]
-            continue
-        if words[1] == "flash":  # tried on stand-ins for a board's boot loader
-            continue
-        if words[0] == "export":
-            name, value = words[1].split("=")
-            environment[name] = value.replace(PORT, port)
-            continue
-        arguments = [port if word == PORT else word for word in words[1:]]
-        done = commandline.run(*arguments, folder=folder, **environment)
-        assert done.exit_code == 0, f"{' '.join(words)}: {done.output}{done.errors}"
+    flashes = any(words[1] == "flash" for words in block)
+    environment, folder = bootloader(tmp_path) if flashes else {}, tmp_path
+    with board(tmp_path, flashes) as port:
+        for words in block:
+            if words[0] == "cd":
+                folder /= words[1]
+                continue
+            if words[0] == "export":
+                name, value = words[1].split("=")
+                environment[name] = value.replace(PORT, port)
+                continue
+            arguments = [port if word == PORT else word for word in words[1:]]
+            done = commandline.run(*arguments, folder=folder, **environment)
+            assert done.exit_code == 0, f"{' '.join(words)}: {done.output}{done.errors}"
+            if words[1] == "deploy":
+                assert ("part of the board's firmware" in done.output + done.errors) == flashes
 
 
 def test_the_examples_were_found() -> None:

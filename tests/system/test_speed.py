@@ -62,7 +62,7 @@ class Changing(Watcher):
         self._board = board
         self.pause_s: list[float] = []
 
-    def sample(self, sample: Sample, duration_s: float) -> None:
+    def on_sample(self, sample: Sample, duration_s: float) -> None:
         at = {3: 0.0, 40: -1.0, 70: 1.0}.get(sample.index)
         if at == 0.0:
             self._board.pause()

@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pytest
 from armtempo.link import open_board
 from armtempo.link.board_messages import Sample
 from armtempo.model.arm import Arm
@@ -27,7 +26,7 @@ FINE_COUNTS = 400_000
 """Counts per revolution of an encoder that shows what the paper's cannot."""
 
 
-@pytest.mark.parametrize("case", scripted.cases(SCRIPT), ids=str)
+@scripted.each(scripted.cases(SCRIPT))
 def test_motor(case: scripted.Case) -> None:
     case.run()
 

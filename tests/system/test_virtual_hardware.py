@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
-
 from tests import scripted
 
 CASES = Path(__file__).parent / "scripts" / "cases"
 SCRIPTS = tuple(CASES / f"virtual_{name}.py" for name in ("hardware", "time", "flash"))
 
 
-@pytest.mark.parametrize("case", [case for script in SCRIPTS for case in scripted.cases(script)], ids=str)
+@scripted.each([case for script in SCRIPTS for case in scripted.cases(script)])
 def test_case(case: scripted.Case, tmp_path: Path) -> None:
     (tmp_path / "flash").mkdir()
     case.run(str(tmp_path), heap="")

@@ -26,42 +26,23 @@ HOME_STEPS = [round(angle * joint.steps_per_deg) for angle, joint in zip(HOME_DE
 AWAY_DEG = ([3.0, 2.0, -2.0], [-1.0, 1.0, 2.0])
 FEWER = {"micropython": 6, "cpython": 10, "micropython-arm": 12}
 """What the moments are divided by; each interpreter has others."""
-CHOSEN = {
-    ("micropython-arm", "standalone"): {
-        "case_button_starts_the_default_and_a_host_fetches_its_samples",
-    },
-    ("micropython-arm", "prompt"): {"case_boot_leaves_a_serial_port_only"},
-    ("micropython-arm", "faults"): {"case_interrupt_dies"},
-    ("micropython-arm", "sequences"): {"case_the_pins_do_the_same"},
-    ("cpython", "standalone"): {
-        "case_button_starts_the_default_and_a_host_fetches_its_samples",
-        "case_a_run_by_button_needs_no_host",
-    },
-    ("cpython", "prompt"): {"case_replay_typed_at_the_prompt"},
-    ("cpython", "sequences"): {"case_the_pins_do_the_same"},
-    ("cpython", "faults"): {"case_host_disappears_and_the_arm_stops", "case_stop", "case_broken_trajectory"},
-}
-"""The emulated interpreter is slow, and CPython never runs on a board: what they are to run."""
-INSIDE = {
-    "case_a_failing_start_is_a_fault_not_the_end",
-    "case_ctrl_c_stops_a_replay_wherever_it_comes",
-    "case_exception_anywhere",
-    *(name for name in scripted.names(CASES / "sequences.py") if name != "case_compiled_files_refuse_it"),
-}
-"""They reach into the program by the names in its sources, or need what compiled files are without."""
-ON_SOURCES = INSIDE.union(*(cases for (name, _), cases in CHOSEN.items() if name == "cpython"))
-"""What MicroPython runs with the sources themselves; with what is made of them, compact and deployed, it runs all."""
 QUICKEST = "micropython" if "micropython" in interpreters.AVAILABLE else "cpython"
 
 
-def chosen(*names: str) -> list[scripted.Case]:
-    """The cases that these interpreters are to run."""
-    found = scripted.cases(*SCRIPTS, on=names)
-    for (interpreter, script), cases in CHOSEN.items():
-        assert cases <= set(scripted.names(CASES / f"{script}.py")), (interpreter, script)
-    return [
-        case for case in found if case.name in CHOSEN.get((case.interpreter, case.script.stem), {case.name})
-    ]
+def is_for(case: scripted.Case, tag: str) -> bool:
+    """Whether a comment says so of the case."""
+    return tag in scripted.tags(case.script)[case.name]
+
+
+ALL = scripted.cases(*SCRIPTS)
+ON_SOURCES = [
+    case
+    for case in ALL
+    if case.interpreter != "micropython" or is_for(case, "not compiled") or not is_for(case, "not on CPython")
+]
+"""What MicroPython runs with the sources themselves: what reaches into the program by the names in them or needs what
+compiled files are without, and what CPython runs too; with what is deployed, compact, it runs all others."""
+COMPACT = [case for case in ALL if case.interpreter == QUICKEST and not is_for(case, "not compiled")]
 
 
 @pytest.fixture(scope="session")
@@ -122,21 +103,13 @@ def play(case: scripted.Case, flashes: Path, tmp_path: Path, program: str = PROG
     case.run(str(copied), program, home, str(FEWER[case.interpreter]))
 
 
-@pytest.mark.parametrize(
-    "case",
-    [
-        case
-        for case in chosen(*interpreters.AVAILABLE)
-        if case.interpreter != "micropython" or case.name in ON_SOURCES
-    ],
-    ids=str,
-)
+@scripted.each(ON_SOURCES)
 def test_case(case: scripted.Case, flashes: Path, tmp_path: Path) -> None:
     play(case, flashes, tmp_path)
 
 
 @pytest.mark.xdist_group("compact program")  # which takes seconds to make
-@pytest.mark.parametrize("case", [case for case in chosen(QUICKEST) if case.name not in INSIDE], ids=str)
+@scripted.each(COMPACT)
 def test_case_with_the_compact_program(
     case: scripted.Case, flashes: Path, compact: str, tmp_path: Path
 ) -> None:

@@ -38,10 +38,10 @@ _BESIDE_BYTES = const(16_500)
 class AheadSequencer(Sequencer):
     """See ``Sequencer`` for its arguments."""
 
-    _ahead: "NextMotion | None" = None  # None: the heap has no room
+    _prepared: "NextMotion | None" = None  # None: the heap has no room
     _is_full = False  # it had, and has none any more
     _work: "Iterator[None] | None" = None  # what is left to do for the next motion
-    _coming = _moved = _NONE  # the motion that is prepared, and the one that was begun last
+    _prepared_index = _running_index = _NONE  # the motion that is prepared, and the one that was begun last
     _at_rate = 0  # it is prepared for
 
     def begin(self) -> None:
@@ -56,26 +56,26 @@ class AheadSequencer(Sequencer):
             return
         try:
             ends = array("i", [MOST_STEPS] * (self._record.motions * joints))
-            self._ahead = NextMotion(controller.engine)
+            self._prepared = NextMotion(controller.engine)
             self._ends = ends  # where each motion was seen to end, steps; MOST_STEPS: not yet
         except MemoryError:  # it is not in one piece
-            self._ahead = None
+            self._prepared = None
 
     def prepare(self) -> None:
         """Called while a motion moves: go on with the next one, as far as there is time."""
-        self._keep_up()
-        if self._work and self._ahead and not self.stopping and self._ahead.has_time():
-            self._piece()
+        self._replan_if_rate_changed()
+        if self._work and self._prepared and not self.stopping and self._prepared.has_time():
+            self._do_slice()
             self._controller.engine.refill()
 
     def go_on(self) -> None:
         """See ``Sequencer``; in a wait there is time, too."""
         super().go_on()
-        self._keep_up()
+        self._replan_if_rate_changed()
         if self._work and not self._controller.engine.moving:
-            self._piece()
+            self._do_slice()
 
-    def _piece(self) -> None:
+    def _do_slice(self) -> None:
         """A piece of the work. What is refused is given up, and looked at again between the motions."""
         work: "Any" = self._work
         try:
@@ -88,33 +88,33 @@ class AheadSequencer(Sequencer):
             self._drop()
             self._is_full = True
 
-    def _keep_up(self, number: int = _NONE) -> None:
+    def _replan_if_rate_changed(self, number: int = _NONE) -> None:
         """The rate may have been changed; ``number`` as in ``_plan``."""
-        if self._moved != _NONE and self._at_rate != self._rate:
+        if self._running_index != _NONE and self._at_rate != self._rate:
             self._plan(number)
 
     def _plan(self, number: int = _NONE) -> None:
         """Prepare the motion ``number``; _NONE: the one that comes next from here."""
         place = Place()
         place.copy(self._place)  # now: the work may begin when it has gone on
-        self._coming = _NONE
+        self._prepared_index = _NONE
         self._at_rate = self._rate
-        self._work = self._pieces(place, number) if self._ahead and not self._is_full else None
+        self._work = self._pieces(place, number) if self._prepared and not self._is_full else None
 
     def _drop(self) -> None:
         """What was prepared is not meant any more."""
         self._work = None
-        self._coming = _NONE
-        if self._ahead:
-            self._ahead.close()
+        self._prepared_index = _NONE
+        if self._prepared:
+            self._prepared.close()
 
     def _pieces(self, place: Place, number: int) -> "Iterator[None]":
         """See ``NextMotion.pieces``; the others as in ``_plan``."""
         if number == _NONE:
             number = yield from self._search(place)
-        if number != _NONE and self._ahead:
-            yield from self._ahead.pieces(self._rate, lambda: self._open(number), self._stands_at)
-            self._coming = number
+        if number != _NONE and self._prepared:
+            yield from self._prepared.pieces(self._rate, lambda: self._open(number), self._stands_at)
+            self._prepared_index = number
 
     def _search(self, place: Place) -> "Generator[None, None, int]":
         """The motion that comes next, without anything being done on the way; _NONE: none, or too far away."""
@@ -139,19 +139,19 @@ class AheadSequencer(Sequencer):
         engine = self._controller.engine
         if not engine.moving:
             return int(engine.commanded(joint))
-        end = self._ends[self._moved * self._controller.joints + joint]
+        end = self._ends[self._running_index * self._controller.joints + joint]
         return endpoints.start_offset(motion, joint, 0) if end == MOST_STEPS else end
 
     def _move(self, number: int) -> None:
         """Begin a motion: the one that is prepared, where that is what is wanted."""
         self._note_end()
-        self._keep_up(number)
+        self._replan_if_rate_changed(number)
         while self._work:  # nothing moves now
-            self._piece()
-        self._moved = number
-        if self._ahead and self._coming == number and self._ahead.starts_from_here():
-            motion = self._ahead.motion
-            self._controller.engine.load(motion, self._rate, self._ahead)
+            self._do_slice()
+        self._running_index = number
+        if self._prepared and self._prepared_index == number and self._prepared.starts_from_here():
+            motion = self._prepared.motion
+            self._controller.engine.load(motion, self._rate, self._prepared)
             self._controller.start_loaded(motion, 0)
             self._drop()
         else:
@@ -161,14 +161,14 @@ class AheadSequencer(Sequencer):
 
     def _note_end(self) -> None:
         """Where the motion before ended: a posture between two steps leads to either."""
-        if self._moved != _NONE and self._ahead:
+        if self._running_index != _NONE and self._prepared:
             joints = self._controller.joints
             for joint in range(joints):
-                self._ends[self._moved * joints + joint] = self._controller.engine.commanded(joint)
+                self._ends[self._running_index * joints + joint] = self._controller.engine.commanded(joint)
 
     def _end(self, ending: int, code: int = 0) -> None:
         self._drop()
-        if self._ahead:
-            self._ahead.give_back()
-            self._ahead = None
+        if self._prepared:
+            self._prepared.give_back()
+            self._prepared = None
         super()._end(ending, code)

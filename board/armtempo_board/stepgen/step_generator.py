@@ -3,6 +3,21 @@
 A monotone subinterval's first step is solved by itself, the others as two cubics at a time between solved nodes, as
 long as the error bound allows it. Its last step is held back until it is known not to be followed by an opposite one.
 What steps come is found in the motion's own time, so it is the same however slowly that runs (time_law.py).
+
+What is solved but not in the queue is ``_pending``: NOTHING, the LAST step of the subinterval before, the FIRST of this
+one, or BOTH::
+
+              a subinterval begins           a subinterval begins
+      NOTHING ───────────────────▶ FIRST    LAST ───────────────▶ BOTH
+       ▲ ▲ ▲ │                      │ │     ▲ ▲ │                  │ │
+       │ │ │ └─ its last step is slow ──────┘ │ │                  │ └─ LAST is queued ─▶ FIRST
+       │ │ └───── is queued ────────┘ └───────┘ │                  │
+       │ │                  is slow, and alone  │                  │
+       │ └─ is queued: what follows is far away ┘                  │
+       └─── neither comes: they are opposite and within the gap ───┘
+
+A first step that others follow in the direction of those before is queued as its subinterval begins. ``follow`` takes
+steps back out of the queue, to LAST or FIRST.
 """
 
 from micropython import const
@@ -65,10 +80,16 @@ _STOPPED = const(2)
 # as in isr.py: word of a ring's state
 _ROOM = const(8)
 
+# of ``_pending``
+_NOTHING = const(0)
+_LAST = const(1)
+_FIRST = const(2)
+_BOTH = const(3)
 _THIS_RING = const(1)  # bit of the first one at hand
-_CLEARED = (_STEPS, _LATEST_KITICKS, _REACHED, _LAST_STEP, _MODE, _HELD_BACK, _HALTED)
+_CLEARED = (_STEPS, _REACHED, _LAST_STEP, _MODE, _HELD_BACK, _HALTED)
 _FIRST_CUBIC_STEPS = const(16)  # tried first in a motion
 _LAW_WORDS = const(18)  # as in time_law.py
+_BEFORE = const(-1)  # in Ki ticks: before a motion
 _FAR = const(1 << 16)  # in 4096 ticks: longer than any subinterval and gap, and a small integer in ticks
 
 
@@ -88,18 +109,18 @@ class StepGenerator:
         self._law_words = memory.take_for_processor(_LAW_WORDS)
         self.queue = memory.take_for_processor(step_queue.QUEUE_SIZE)
         self._law: "Any" = None  # JointLaw, while a motion is loaded
-        self.direction = self._heading = 1
+        self.direction = 1
         self.at_turn = False
         self.ended = True
         self.halted = self._is_last_law = False
         # every attribute from the start, so that none is added while a motion runs
-        self._held = False  # the last step of a subinterval is held back
-        self._first_waits = False  # the subinterval's first step is solved, but not in the queue,
-        self._first_comes = False  # and by the law it comes
-        self._first_ticks = 0  # its time in the motion's own
-        self._held_queued = False  # the last step in the queue was held back before
-        self._held_high = self._held_ticks = 0  # its time in the motion's own
-        self._interval_in = 0
+        self._pending = _NOTHING
+        self._first_direction = 1  # of FIRST,
+        self._first_ticks = 0  # its time in the motion's own,
+        self._first_comes = False  # and whether by the law it comes
+        self._last_high = self._last_ticks = 0  # the time of LAST in the motion's own
+        self._last_is_queued = False  # nothing was queued since LAST was
+        self._interval_in = 0  # IN of the queue as the subinterval began
         self._found = _NOT_YET  # what is known of the next subinterval
 
     def load(
@@ -130,12 +151,14 @@ class StepGenerator:
         queue[_CUBIC_STEPS] = _FIRST_CUBIC_STEPS
         for word in _CLEARED:
             queue[word] = 0
+        queue[_LATEST_KITICKS] = _BEFORE
         queue[_INTERVAL_HIGH] = _BIAS
         self._gap_ticks = gap_ticks
         self._position = position_steps + _BIAS
         self.direction = 1
         self.at_turn = self.ended = self.halted = self._is_last_law = False
-        self._held = self._first_waits = self._held_queued = False
+        self._pending = _NOTHING
+        self._last_is_queued = False
         self._found = _NOT_YET
 
     def seek(self) -> bool:
@@ -144,7 +167,9 @@ class StepGenerator:
             return False
         if self.at_turn:
             self.turn()
-        self.prepare(0)
+        self.prepare(
+            _BEFORE
+        )  # a step that comes at 0 is the last one, too: a law that begins there takes it back
         return True
 
     def close(self) -> None:
@@ -162,7 +187,7 @@ class StepGenerator:
         for _ in range(_PARTS_PER_CALL):
             if not has_room(queue, until_kiticks) or self.at_turn or self.halted or self.ended:
                 return False
-            if self._first_waits:
+            if self._pending & _FIRST:
                 self._queue_first()
             elif queue[_REACHED] < queue[_LAST_STEP]:
                 result = self._law.queue_steps(self._solver, queue, self._law_words)
@@ -216,23 +241,22 @@ class StepGenerator:
         start_kiticks = _kiticks(self._law_words[_REAL_START_HIGH], 0)
         reached = queue[_REACHED]
         if queue[_LATEST_KITICKS] >= start_kiticks and self.waits():
-            self.ended = False  # the last step may be among them
-            if self._held_queued:
+            if self._last_is_queued:
                 step_queue.withdraw(queue, queue[_IN] - 1 & 0xFFFF, start_kiticks)
-                self._held = True
+                self._pending |= _LAST
             else:
                 reached -= step_queue.withdraw(queue, self._interval_in, start_kiticks)
-                if self._held:
-                    self._held = False
+                if self._pending == _LAST:
+                    self._pending = _NOTHING
                     reached -= 1
         if reached < 0:
             reached = 0
-            self._first_waits = True
-            self._heading = self.direction  # it was in the queue, or held back behind what was
+            self._pending = _FIRST
+            self._first_direction = self.direction  # it was in the queue, or is LAST behind what was
         queue[_REACHED] = reached
         # what was written last may have followed the law before, so no cubic begins there
         queue[_SINGLE_STEPS] = max(queue[_SINGLE_STEPS], 1)
-        if self._first_waits or reached < queue[_LAST_STEP]:
+        if self._pending & _FIRST or reached < queue[_LAST_STEP]:
             self._solve(reached)
         self.halted = False
         self.finish(is_last)
@@ -252,9 +276,9 @@ class StepGenerator:
             return self.subintervals.end_steps()
         queue = self.queue
         left = self.direction * (queue[_LAST_STEP] - queue[_REACHED])
-        if self._first_waits:
-            left = self._heading * (queue[_LAST_STEP] + 1)
-        if self._held:
+        if self._pending & _FIRST:
+            left = self._first_direction * (queue[_LAST_STEP] + 1)
+        if self._pending & _LAST:
             left += self.direction
         return self._position - _BIAS - left
 
@@ -263,38 +287,37 @@ class StepGenerator:
         time = step_queue.next_kiticks(self.queue)
         if time != -1:
             return time
-        if self._held:
-            return _kiticks(self._held_high, self._held_ticks)
-        if self._first_waits:
+        if self._pending & _LAST:
+            return _kiticks(self._last_high, self._last_ticks)
+        if self._pending:
             return _kiticks(self.queue[_INTERVAL_HIGH], self._ticks())
         has_more = self.queue[_REACHED] < self.queue[_LAST_STEP]
         return _kiticks(self.queue[_INTERVAL_HIGH] if has_more else self.subintervals.time[_HIGH], 0)
 
     def _next_interval(self) -> None:
         found = self._found or self.subintervals.search(self._position)
-        if self._held or self.queue[_MODE] & _BY_LAW:
+        if self._pending or self.queue[_MODE] & _BY_LAW:
             self._found = found
             if self._waits_for(found):
                 return
         if found == _END:
-            self._found = found  # nothing is looked for behind it
             self.ended = True
         elif found:
             self._found = _NOT_YET
             self._begin_interval(found)
 
     def _waits_for(self, found: int) -> bool:
-        """Whether something else is done, as a step is held back or by the law the motion's time stands still."""
+        """Whether something else is done, as LAST is pending or by the law the motion's time stands still."""
         now = self.subintervals
         if found == _END or (self.queue[_MODE] & _BY_LAW and self._law.is_past(now.time[_HIGH])):
-            if self._held:
-                self._queue_held()
+            if self._pending:
+                self._queue_last()
             elif found == _END:
                 return False
             else:
                 self._halt()
-        elif self._held and self._since_held(now.time[_HIGH], now.time[_LOW] >> 16) > self._gap_ticks:
-            self._queue_held()
+        elif self._pending and self._since_last(now.time[_HIGH], now.time[_LOW] >> 16) > self._gap_ticks:
+            self._queue_last()
         else:
             return False
         return True
@@ -307,15 +330,15 @@ class StepGenerator:
         if by_law:
             queue[_INTERVAL_HIGH] = self._law.count_from(now.time[_HIGH])
         self._interval_in = queue[_IN]
-        direction = 0 if self._held else self.direction
+        direction = 0 if self._pending else self.direction
         at_start = found == _FOUND_AT_START
         steps = self._law.begin(self._solver, queue, now.arrays, self._position, at_start, direction)
         self._position += steps >> 1
         if steps & 1:
-            self._held_queued = False
+            self._last_is_queued = False
             return
-        self._heading = 1 if steps > 0 else -1
-        self._first_waits = True
+        self._first_direction = 1 if steps > 0 else -1
+        self._pending |= _FIRST
         if by_law:
             self._solve(0)
         else:
@@ -336,23 +359,23 @@ class StepGenerator:
             self._first_comes = comes
 
     def _queue_first(self) -> None:
-        """The first step of a subinterval, against the one that was held back before it."""
-        if self._held:
-            is_opposite = self._heading != self.direction
-            if is_opposite and self._since_held(self._high(), self._first_ticks) <= self._gap_ticks:
-                self._held = self._first_waits = False  # neither comes
+        """FIRST, where LAST is pending too against that."""
+        is_opposite = self._first_direction != self.direction
+        if self._pending == _BOTH:
+            if is_opposite and self._since_last(self._high(), self._first_ticks) <= self._gap_ticks:
+                self._pending = _NOTHING  # neither comes
             else:
-                self._queue_held()
+                self._queue_last()
         elif not self._first_comes:
             self._halt()
-        elif self._heading != self.direction:
+        elif is_opposite:
             self.at_turn = True
         else:
-            self._first_waits = False
+            self._pending = _NOTHING
             if self.queue[_LAST_STEP] == 0 and self._is_slow():
                 self._hold_back()
             else:
-                self._held_queued = False
+                self._last_is_queued = False
                 put_single(self.queue, self.queue[_INTERVAL_HIGH], self._ticks())
 
     def _end_interval(self) -> None:
@@ -374,10 +397,10 @@ class StepGenerator:
         self.finish(self._is_last_law)
 
     def _hold_back(self) -> None:
-        """Hold back the step at the first node."""
-        self._held = True
-        self._held_high = self._high()
-        self._held_ticks = self._first_ticks
+        """The step at the first node is LAST."""
+        self._pending = _LAST
+        self._last_high = self._high()
+        self._last_ticks = self._first_ticks
 
     def _is_slow(self) -> bool:
         """Whether the step at the first node may be followed by an opposite one within the gap.
@@ -388,9 +411,9 @@ class StepGenerator:
         ticks = self._solver[_FIRST_NODE + _NODE_MANTISSA] >> self._solver[_FIRST_NODE + _NODE_EXPONENT]
         return self.queue[_MODE] >= _AT_START or ticks > self.queue[_SLOW_TICKS]
 
-    def _queue_held(self) -> None:
-        """Queue the step that was held back, if by the law it comes."""
-        high, ticks = self._held_high, self._held_ticks
+    def _queue_last(self) -> None:
+        """Queue LAST, if by the law it comes."""
+        high, ticks = self._last_high, self._last_ticks
         if self.queue[_MODE] & _BY_LAW:
             solver, law = self._solver, self._law
             before = self._law_words[_MOTION_HIGH]
@@ -402,17 +425,17 @@ class StepGenerator:
             if not comes:
                 self._halt()
                 return
-        self._held = False
-        self._held_queued = True
+        self._pending &= _FIRST
+        self._last_is_queued = True
         put_single(self.queue, high, ticks)
         self._interval_in = self.queue[_IN]
 
-    def _since_held(self, high: int, ticks: int) -> int:
-        """Ticks of the motion's time from the step held back to another; any large number where it is far."""
-        high -= self._held_high
+    def _since_last(self, high: int, ticks: int) -> int:
+        """Ticks of the motion's time from LAST to another step; any large number where it is far."""
+        high -= self._last_high
         if high > _FAR:
             high = _FAR
-        return (high << 12) + ticks - self._held_ticks
+        return (high << 12) + ticks - self._last_ticks
 
     def _high(self) -> int:
         """What the motion's times of the subinterval count from."""

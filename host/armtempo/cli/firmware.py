@@ -9,7 +9,6 @@ import click
 
 from armtempo.basics.errors import InputError
 from armtempo.cli import options, results
-from armtempo.cli.flash import put_on_board
 from armtempo.cli.progress import ProgressBar
 
 if TYPE_CHECKING:
@@ -36,34 +35,22 @@ if TYPE_CHECKING:
     help="Where the firmware goes, a new folder; without it firmware-NAME here.",
 )
 @click.option(
-    "--flash",
-    "flash_too",
-    is_flag=True,
-    help="Then put it on the board of --port, as 'armtempo flash' does.",
-)
-@click.option(
     "--program",
     type=click.Path(file_okay=False, path_type=Path),
     metavar="FOLDER",
     help="Instead write FOLDER with the program and a manifest.py, for a build of your own.",
 )
-@options.flash_port
-@options.flash_tool
 @options.as_json
 def command(
     board: str | None,
     micropython: Path | None,
     out: Path | None,
-    flash_too: bool,
     program: Path | None,
-    port: str | None,
-    tool: str | None,
     as_json: bool,
 ) -> None:
     """Build a MicroPython firmware with the board program in it.
 
-    There it takes a third of the heap that it takes as files. Needs make, gcc and arm-none-eabi-gcc; what is
-    missing is named with the command that brings it.
+    Needs make, gcc and arm-none-eabi-gcc; what is missing is named with the command that brings it.
     """
     from armtempo.deploy.firmware import frozen
 
@@ -90,12 +77,9 @@ def command(
     )
     if changes.lacks_pins(made.machine):
         click.echo(f"it cannot drive an arm: {changes.NO_PINS}; {changes.MORE_PINS}", err=True)
-    if flash_too:
-        put_on_board(folder, port, tool, as_json)
-    else:
-        say(f"onto the board: armtempo flash --image {folder} --port PORT; then armtempo deploy --port PORT")
+    say(f"onto the board: armtempo flash --image {folder}, then armtempo deploy")
     if as_json:
-        results.show_json({"folder": str(folder), **_values(made), "flashed": flash_too})
+        results.show_json({"folder": str(folder), **_values(made)})
 
 
 def _values(made: Image) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""``armtempo flash``: put a built firmware on a board."""
+"""``armtempo flash``: put a firmware with the board program on a board."""
 
 from __future__ import annotations
 
@@ -19,30 +19,27 @@ from armtempo.project.settings import PORT, ProjectSettings
     metavar="FILE",
     help="The zip file of a release, or a folder that 'armtempo firmware' made. Without it the only one here.",
 )
-@options.flash_port
-@options.flash_tool
+@click.option("--port", metavar="PORT", help="Where the board answers now, if it runs MicroPython.")
+@click.option(
+    "--tool",
+    type=click.Choice(["dfu-util", "st-flash"]),
+    help="What flashes: over USB, or through an ST-LINK; without it the one that is installed.",
+)
 @options.as_json
 def command(given: Path | None, port: str | None, tool: str | None, as_json: bool) -> None:
     """Put MicroPython with the board program in it on a board; 'armtempo deploy' comes next.
 
-    The board of --port is put in its bootloader first, which is refused while it moves; without --port one that
-    is there already, or has an ST-LINK, is flashed. What was written is read back and compared. Files in its flash
-    are kept.
+    A board that runs MicroPython is put in its bootloader first, which is refused while it moves; a board that
+    is there already, or has an ST-LINK, needs no port. What was written is read back and compared. Files in the
+    board's flash are kept.
     """
     from armtempo.deploy.firmware import image
+    from armtempo.deploy.firmware.write import flash
 
     chosen = given or image.find(Path())
-    found = put_on_board(chosen, port, tool, as_json)
-    if as_json:
-        results.show_json({"image": str(chosen), "port": found})
-
-
-def put_on_board(given: Path, port: str | None, tool: str | None, as_json: bool = False) -> str | None:
-    """Put a firmware on the board, and say what comes next; gives the board's port, if it had one."""
-    from armtempo.deploy.firmware.flash import flash
-
     found = ProjectSettings().get(PORT, port).value or None
     with ProgressBar("flashing") as progress:
-        flash(given, found, tool, results.teller(as_json), progress)
-    results.teller(as_json)(f"flashed; the start files are next: armtempo deploy --port {found or 'PORT'}")
-    return found
+        flash(chosen, found, tool, results.teller(as_json), progress)
+    results.show(
+        as_json, {"image": str(chosen), "port": found}, ["flashed; the start files are next: armtempo deploy"]
+    )

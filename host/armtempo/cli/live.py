@@ -41,7 +41,7 @@ class Live(Watcher):
         self._plot = self._open() if self._window else None
         self._say(f"{motion.name}: {motion.trajectory.duration_s:.3f} s, into {folder.path}{self._where}")
 
-    def sample(self, sample: Sample, duration_s: float) -> None:
+    def on_sample(self, sample: Sample, duration_s: float) -> None:
         """Show one sample."""
         time_s = sample.path_ticks / TICK_HZ  # the motion's own time
         angles = self._angles_deg(sample)

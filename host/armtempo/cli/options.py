@@ -97,18 +97,6 @@ speed = click.option(
 )
 as_json = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 
-flash_port = click.option(
-    "--port",
-    metavar="PORT",
-    help=f"Where the board answers now. {_ELSE.format('PORT')}, else the board is in its bootloader, or an ST-LINK "
-    "is connected.",
-)
-flash_tool = click.option(
-    "--tool",
-    type=click.Choice(["dfu-util", "st-flash"]),
-    help="What flashes: over USB, or through an ST-LINK; without it the one that is installed.",
-)
-
 
 def force(what: str) -> Callable[[FC], FC]:
     """The option --force, which replaces ``what``."""

@@ -26,5 +26,7 @@ def command(as_json: bool) -> None:
         mark = "a MicroPython board" if port.board else ""
         click.echo(f"{port.device:<{width}}{port.description:<31} {mark}".rstrip())
     if not found:
-        click.echo("no serial ports here; connect a board by its USB socket")
+        click.echo(
+            "no serial ports here; connect a board by its USB socket; one without MicroPython: armtempo flash"
+        )
     click.echo(f"{SIM:<{width}}a virtual board, started for one command")

@@ -43,7 +43,8 @@ def command(runs: tuple[Path, ...], out: Path | None, force: bool, as_json: bool
             )
         sequence = is_sequence_run(runs[0])
         page = pipeline.report(SequenceRun.load(runs[0]) if sequence else Run.load(runs[0]))
-        results.show(as_json, {"runs": [_values(runs[0], page)], "comparison": None}, [f"wrote {page}"])
+        values = {"runs": [_values(runs[0], page)], "comparison": None} if as_json else None
+        results.show(as_json, values, [f"wrote {page}"])
         return
     if out is not None:
         check_replaceable(out, "", force or _is_comparison(out), "a page that compares runs is replaced")
@@ -54,8 +55,12 @@ def command(runs: tuple[Path, ...], out: Path | None, force: bool, as_json: bool
         except RunFolderError as error:
             messages.show(error)
     compared = pipeline.compare(runs, out)
-    values = {"runs": [_values(run, page) for run, page in pages.items()], "comparison": str(compared)}
-    results.show(as_json, values, [f"wrote {page}" for page in (*pages.values(), compared)])
+    found = [_values(run, page) for run, page in pages.items()] if as_json else []
+    results.show(
+        as_json,
+        {"runs": found, "comparison": str(compared)},
+        [f"wrote {page}" for page in (*pages.values(), compared)],
+    )
 
 
 def _values(run: Path, page: Path) -> dict[str, Any]:

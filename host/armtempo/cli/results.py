@@ -12,6 +12,7 @@ from typing import Any
 import click
 
 from armtempo.cli import chosen
+from armtempo.cli.messages import DOCUMENT
 
 
 def show(as_json: bool, values: Any, lines: Iterable[str]) -> None:
@@ -27,6 +28,7 @@ def show_json(values: Any) -> None:
     """Print one document, on one line."""
     import json
 
+    click.get_current_context().meta[DOCUMENT] = True
     click.echo(json.dumps(values, allow_nan=False))
 
 

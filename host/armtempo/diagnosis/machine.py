@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import platform
 import re
+import shutil
 import sys
 from importlib.metadata import PackageNotFoundError, requires, version
 
@@ -13,6 +14,7 @@ from armtempo.diagnosis.item import Condition, Item
 from armtempo.ports.listing import Port, find_ports
 
 LEAST_PYTHON = (3, 11)
+_NO_PORT = "connect a board by its USB socket, or use --port sim; a board without MicroPython: armtempo flash"
 _GROUP = "sudo usermod -a -G dialout $USER, then log in again"
 
 
@@ -31,8 +33,16 @@ def examine_machine() -> list[Item]:
             Condition.GOOD if fits else Condition.WRONG,
             "" if fits else f"install Python {least} or newer",
         ),
+        _flash_tool(),
         Item("system", f"{platform.system()} {platform.release()}, {platform.machine()}"),
     ]
+
+
+def _flash_tool() -> Item:
+    found = shutil.which("dfu-util") or shutil.which("st-flash")
+    if found:
+        return Item("flash tool", found)
+    return Item("flash tool", "not installed", Condition.NOTE, "for 'armtempo flash': install dfu-util")
 
 
 def packages() -> list[Item]:
@@ -62,9 +72,7 @@ def _package(name: str, extra: str) -> Item:
 def ports() -> list[Item]:
     """The serial ports, each with whether it can be opened by this user."""
     found = [_port(port) for port in find_ports()]
-    return found or [
-        Item("ports", "none", Condition.NOTE, "connect a board by its USB socket, or use --port sim")
-    ]
+    return found or [Item("ports", "none", Condition.NOTE, _NO_PORT)]
 
 
 def _port(port: Port) -> Item:

@@ -28,6 +28,8 @@ class Link(NamedTuple):
 STILL_DEG = 0.01
 """A joint without a motor whose range is no wider than this never turns."""
 
+_CLOSED_FORM = 6
+
 
 @dataclass(frozen=True)
 class Geometry:
@@ -81,12 +83,12 @@ class Geometry:
 
     @cached_property
     def core(self) -> slice:
-        """The joints between the rows that never turn at the base and at the tool."""
+        """The joints between the rows that never turn at the base and at the tool; at least six."""
         still = {index for index, _ in self.still}
         first, end = 0, self.joints
-        while first in still:
+        while end - first > _CLOSED_FORM and first in still:
             first += 1
-        while end - 1 in still and end > first:
+        while end - first > _CLOSED_FORM and end - 1 in still:
             end -= 1
         return slice(first, end)
 

@@ -96,12 +96,12 @@ def _check_owner(port: str, tell: Callable[[str], object]) -> PortClaim | None:
     if claim is None:
         return None
     state = ownership(claim)
-    if state is Ownership.LIVES:
+    if state is Ownership.ALIVE:
         raise PortInUseError(
             f"port {port} is in use by {claim.who}",
             "wait for its end, or end it with 'armtempo stop'; 'armtempo status' and 'watch' look on meanwhile",
         )
-    if state is Ownership.DIED:
+    if state is Ownership.DEAD:
         tell(f"{claim.who} has ended without giving up {port}; what it had started may still move")
         claim.remove()
         return None

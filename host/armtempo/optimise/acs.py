@@ -97,7 +97,7 @@ PARAMETERS: dict[str, Parameter] = {
     "b": Number(0.5, -5.0, 5.0, "of Eq. (25)"),
     "pa": Number(0.25, 0.001, 1.0, "part of the nests, or chance of a variable, to be abandoned"),
     "beta": BETA,
-    "variant": OneOf("differences", tuple(VARIANTS), "see [acs.md](acs.md)"),
+    "variant": OneOf("differences", tuple(VARIANTS), "see [adaptive cuckoo search](acs.md)"),
 }
 
 

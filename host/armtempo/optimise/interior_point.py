@@ -101,7 +101,7 @@ _TO_BOUNDARY = 0.99
 _KEEP = 1e-3
 """Least part of an inequality that a step leaves."""
 _ARMIJO = 1e-4
-_CLOSE, _DONE = 5.0, 0.1
+_NEAR_CENTRE, _DONE = 5.0, 0.1
 """The barrier falls, and the method ends, where Newton's decrement is below this many barriers times the root of
 their number."""
 _SPREAD = 1e4
@@ -109,7 +109,7 @@ _SPREAD = 1e4
 _LEAST_STEP = 1e-10
 _BENT = 0.5
 """Steps that must be shorter than this are tried along the curve of the inequalities too."""
-_FAR = -0.5
+_MOST_VIOLATED = -0.5
 """How far beyond the inequalities their curve is still measured."""
 
 
@@ -154,7 +154,7 @@ class _Solver:
             size = self.barrier * np.sqrt(self.count)
             if self.barrier <= self.last and (step.length == 0.0 or step.decrement < _DONE * size):
                 return self._solution(number, True)
-            if step.length == 0.0 or step.decrement < _CLOSE * size or self.whole:
+            if step.length == 0.0 or step.decrement < _NEAR_CENTRE * size or self.whole:
                 lower = min(self.barrier * _SHRINK, self.barrier**_SUPERLINEAR)
                 self.barrier = max(self.last, lower)
         return self._solution(self.settings.iterations, False)
@@ -173,7 +173,7 @@ class _Solver:
             except np.linalg.LinAlgError:
                 continue
             step = factor.solve(gradient, self.program.equalities.residual(self.x))
-            found = self._along(at, factor, gradient, step)
+            found = self._line_search(at, factor, gradient, step)
             if found.length > 0.0:
                 self.exact = self.settings.curvature and (found.length >= _BENT or not exact)
                 self._move(found, at.forward(step))
@@ -181,7 +181,7 @@ class _Solver:
         self.exact = self.settings.curvature
         return _Step(0.0, self.x, self.g)
 
-    def _along(self, at: Linearised, factor: Factorised, gradient: Array, step: Array) -> _Step:
+    def _line_search(self, at: Linearised, factor: Factorised, gradient: Array, step: Array) -> _Step:
         """The better of a straight and, where that is short, a bent step."""
         slope = float(
             np.sum(gradient * step)
@@ -193,29 +193,29 @@ class _Solver:
         straight = self._search(step, np.zeros_like(step), slope, most)
         if straight.length >= _BENT:
             return straight
-        bend = self._bend(step, change)
-        if bend is None:
+        correction = self._second_order_correction(step, change)
+        if correction is None:
             return straight
-        weighted = at.backward(self.multipliers / self.g * bend)
+        weighted = at.backward(self.multipliers / self.g * correction)
         other = factor.solve(gradient + weighted, self.program.equalities.residual(self.x))
         bent = self._search(step, other - step, slope, 1.0)
         return bent if bent.length > straight.length else straight
 
-    def _bend(self, step: Array, change: Array) -> Array | None:
+    def _second_order_correction(self, step: Array, change: Array) -> Array | None:
         """What the inequalities have left of their linear change by a whole step: (M,)."""
         length = 1.0
         while length > _KEEP:
             g = self.program.inequalities(self.x + length * step)
-            if np.all(g > _FAR):
+            if np.all(g > _MOST_VIOLATED):
                 return np.asarray((g - self.g - length * change) / length**2)
             length *= 0.5
         return None
 
-    def _search(self, step: Array, bend: Array, slope: float, length: float) -> _Step:
-        """Backtracking on the barrier function along x + s step + s^2 bend, from s = ``length``."""
+    def _search(self, step: Array, correction: Array, slope: float, length: float) -> _Step:
+        """Backtracking on the barrier function along x + s step + s^2 correction, from s = ``length``."""
         start = self._merit(self.x, self.g)
         while length > _LEAST_STEP:
-            x = self.x + length * step + length**2 * bend
+            x = self.x + length * step + length**2 * correction
             g = self.program.inequalities(x)
             if np.all(g > _KEEP * self.g):
                 allowed = start + _ARMIJO * length * slope + 1e-14 * abs(start)

@@ -31,8 +31,8 @@ from armtempo.planning.dual_kkt import DualKkt
 from armtempo.planning.variables import Index
 from armtempo.splines import bspline
 
-SHARE = 3.0 / 4.0 ** (1.0 / 3.0)
-"""Of the minimum of w x^(-1/2) + c x."""
+MINIMUM_FACTOR = 3.0 / 4.0 ** (1.0 / 3.0)
+"""The minimum of w x^(-1/2) + c x over x > 0 is this times w^(2/3) c^(1/3)."""
 _SCHEDULE = Schedule(first_barrier=100.0, last_barrier=1e-4, curvature=False)
 _NODES = 4
 """Gauss points in a cell."""
@@ -170,7 +170,7 @@ class _Dual:
     def objective(self, x: Array) -> float:
         w, c = self._forms(x)
         # Not by @, for which BLAS starts threads from 10 000 elements on.
-        least = SHARE * np.sum(self._weights * np.cbrt(w) ** 2 * np.cbrt(c))
+        least = MINIMUM_FACTOR * np.sum(self._weights * np.cbrt(w) ** 2 * np.cbrt(c))
         return float(np.sum(self._cost * x) - least)
 
     def inequalities(self, x: Array) -> Array:
@@ -188,7 +188,7 @@ class _Linearised:
     def __init__(self, dual: _Dual, w: Array, c: Array) -> None:
         self._dual = dual
         with np.errstate(all="ignore"):
-            least = SHARE * dual._weights * np.cbrt(w) ** 2 * np.cbrt(c)
+            least = MINIMUM_FACTOR * dual._weights * np.cbrt(w) ** 2 * np.cbrt(c)
             by_w, by_c = 2.0 / 3.0 * least / w, 1.0 / 3.0 * least / c
         self.gradient = dual._cost - dual.kkt.backward(np.stack([by_w, by_c], axis=1))
         bend = 2.0 / 9.0 * least

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
-from armtempo.planning.dual_bound import SHARE, Cells, Multipliers
+from armtempo.planning.dual_bound import MINIMUM_FACTOR, Cells, Multipliers
 from armtempo.splines import bernstein, bspline
 
 _HALVINGS = 4
@@ -90,7 +90,7 @@ def _lowered_chord(form: Array) -> tuple[Array, Array]:
 
 def _least(w: Array, c: Array) -> Array:
     """The minimum over x for w and c of 0 or more."""
-    return np.asarray(SHARE * np.cbrt(w) ** 2 * np.cbrt(c))
+    return np.asarray(MINIMUM_FACTOR * np.cbrt(w) ** 2 * np.cbrt(c))
 
 
 def _highest_x(cells: Cells) -> Array:

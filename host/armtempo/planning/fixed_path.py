@@ -24,9 +24,9 @@ _ROUNDS = 12
 _PARTS, _LEAST_PARTS, _POINTS = 64, 4, 2000
 """Points of a path segment, shared by its time segments, but at least so many in each of those; fewer where there
 would be more than _POINTS."""
-_WATCHED = 0.95
+_PEAK_THRESHOLD = 0.95
 """Peaks from this part of a limit on become points."""
-_FINER = 4
+_PEAK_GRID_FACTOR = 4
 """Peaks are looked for on a grid so many times finer."""
 _AWAY = 1.003
 """Time is stretched by this before each solve, so that it starts within the limits."""
@@ -108,7 +108,7 @@ class FixedPath:
                 best = here * stretch
             if bound and self.duration_s(best) <= bound * (1.0 + gap):
                 break
-            points += collocation.peaks(curve, _FINER * parts, _WATCHED)
+            points += collocation.peaks(curve, _PEAK_GRID_FACTOR * parts, _PEAK_THRESHOLD)
             here = here * stretch
             settings = Schedule(_AGAIN, min(_AGAIN, 0.3 * gap))
         return Optimum(best, self.duration_s(best), min(bound, self.duration_s(best)))

@@ -16,7 +16,7 @@ from armtempo.planning import limit_ratios
 from armtempo.planning.collocation import Points
 from armtempo.planning.variables import Index, MotionVariables, derivative_matrix, time_basis
 
-_WATCHED = 0.8
+_PEAK_THRESHOLD = 0.8
 """Rows are watched where their ratio could come to this part of the limit."""
 
 
@@ -115,7 +115,7 @@ def _reachable(angle: Array, time: Array, limits: Array) -> list[Array]:
         with np.errstate(divide="ignore", invalid="ignore"):
             part = np.nan_to_num(effect / effect[largest][:, None])
         centre = ratios[kind] - part * ratios[kind][largest][:, None]
-        found.append(np.stack([centre, -centre]) + np.abs(part) > _WATCHED)
+        found.append(np.stack([centre, -centre]) + np.abs(part) > _PEAK_THRESHOLD)
     return found
 
 

@@ -26,7 +26,7 @@ MIN_DURATION_S = 0.01
 _POLISHED_GAP = 1e-8
 _REFINED_GAP = 1e-4
 """How near to its local optimum an axis should come."""
-_FINER = 8
+_REFINE_FACTOR = 8
 _PAYS = 1e-3
 """With ``refine = "auto"`` each axis gets so many times more segments while that saves this part of its time."""
 
@@ -97,7 +97,7 @@ def _levels(job: Job, most: int) -> list[int]:
         return [job.refine] if job.refine > 1 else []
     levels, refine = [], 1
     while refine < most:
-        refine = min(refine * _FINER, most)
+        refine = min(refine * _REFINE_FACTOR, most)
         levels.append(refine)
     return levels
 

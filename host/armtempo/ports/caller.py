@@ -15,7 +15,7 @@ from armtempo.ports import claim as claims
 from armtempo.ports.claim import VERSION, PortClaim
 from armtempo.ports.lines import LineReader, Message, to_line
 
-HANGS_S = 2.0
+HUNG_S = 2.0
 """A program that has not answered ``hello`` for so long counts as hanging."""
 _REMEMBERED_S = 5.0
 """That it hangs is not tried again for so long."""
@@ -27,23 +27,23 @@ _hung: dict[str, float] = {}
 class Ownership(Enum):
     """What became of a program that has claimed a port."""
 
-    LIVES = "lives"
-    HANGS = "hangs"
+    ALIVE = "alive"
+    HUNG = "hung"
     """It is there, and does not answer."""
-    DIED = "died"
+    DEAD = "dead"
 
 
 def ownership(claim: PortClaim) -> Ownership:
     """Whether the program that has claimed a port answers, hangs or is gone."""
     if time.monotonic() < _hung.get(claim.number, 0.0) + _REMEMBERED_S:
-        return Ownership.HANGS
+        return Ownership.HUNG
     try:
         Caller(claim).close()
-        return Ownership.LIVES
+        return Ownership.ALIVE
     except NoAnswerError:
-        return Ownership.HANGS
+        return Ownership.HUNG
     except LinkError:
-        return Ownership.DIED
+        return Ownership.DEAD
 
 
 def remember_hanging(number: str) -> None:
@@ -64,7 +64,7 @@ class Caller:
         self._socket = _connect(claim)
         self._reader = LineReader(self._socket)
         try:
-            self.ask("hello", HANGS_S, version=VERSION, token=claim.token)
+            self.ask("hello", HUNG_S, version=VERSION, token=claim.token)
         except BaseException as error:
             if isinstance(error, NoAnswerError):
                 remember_hanging(claim.number)
@@ -91,7 +91,7 @@ class Caller:
 
     def subscribe(self, *topics: str) -> None:
         """Choose what ``messages`` gives: some of ``server.TOPICS``."""
-        self.ask("subscribe", HANGS_S, topics=list(topics))
+        self.ask("subscribe", HUNG_S, topics=list(topics))
 
     def messages(self, timeout_s: float | None = None) -> Iterator[Message]:
         """What was subscribed to, as it comes, until the other program gives up the port.
@@ -124,7 +124,7 @@ class Caller:
 
     def _send(self, line: bytes) -> None:
         try:
-            self._socket.settimeout(HANGS_S)
+            self._socket.settimeout(HUNG_S)
             self._socket.sendall(line)
         except TimeoutError:
             raise NoAnswerError(
@@ -159,7 +159,7 @@ def _connect(claim: PortClaim) -> socket.socket:
         else (socket.AF_INET, ("127.0.0.1", int(claim.address)))
     )
     found = socket.socket(kind, socket.SOCK_STREAM)
-    found.settimeout(HANGS_S)
+    found.settimeout(HUNG_S)
     try:
         found.connect(address)
     except (TimeoutError, BlockingIOError):

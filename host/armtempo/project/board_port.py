@@ -35,7 +35,7 @@ def choose(given: str | None = None, others: bool = False) -> Setting:
 
 
 def _open_ports() -> list[str]:
-    lives = [one for one in claim.claims() if ownership(one) is not Ownership.DIED]
+    lives = [one for one in claim.claims() if ownership(one) is not Ownership.DEAD]
     return sorted({one.port for one in lives})
 
 

@@ -30,7 +30,7 @@ class Watcher:
     def begin(self, motion: EncodedMotion, folder: RunFolder) -> None:
         """The run folder is there, and the arm where the motion begins."""
 
-    def sample(self, sample: Sample, duration_s: float) -> None:
+    def on_sample(self, sample: Sample, duration_s: float) -> None:
         """One sample of a motion that lasts ``duration_s``."""
 
     def end(self, repetition: Repetition) -> None:
@@ -50,12 +50,12 @@ class ProgressWatcher(Watcher):
         """See Watcher."""
         self._inner.begin(motion, folder)
 
-    def sample(self, sample: Sample, duration_s: float) -> None:
+    def on_sample(self, sample: Sample, duration_s: float) -> None:
         """See Watcher."""
         if self._progress is not None:
             before_s = self._ended * duration_s
             self._progress(before_s + sample.path_ticks / TICK_HZ, self._repetitions * duration_s)
-        self._inner.sample(sample, duration_s)
+        self._inner.on_sample(sample, duration_s)
 
     def end(self, repetition: Repetition) -> None:
         """See Watcher."""
@@ -115,7 +115,7 @@ def _recorded(
 
         def take(sample: Sample, duration_s: float) -> None:
             file.append(sample)
-            watcher.sample(sample, duration_s)
+            watcher.on_sample(sample, duration_s)
 
         end = replay(client, motion.key, stop, take)
         state = FAULT if end.fault else INTERRUPTED if stop.wanted else COMPLETE

@@ -20,12 +20,14 @@ TOOL = '#!/bin/sh\necho "${0##*/} $@" >> "$TOOL_LOG"\n'
 CP = shutil.which("cp")
 DFU = (
     TOOL
-    + f"""case "$1" in --list) printf "$DFU_LIST"; exit;; esac
+    + f"""case "$1" in --list) printf "$DFU_LIST"; echo "$DFU_SAYS" >&2; exit;; esac
+printf 'Erase\t[   ] 100%%  0 bytes\rDownload\t[   ]  50%%  5 bytes\r'
 at=${{6%%:*}}
 case "$7" in
 -D) {CP} "$8" "$TOOL_LOG.$at";;
 -U) if [ -n "$DFU_DAMAGES" ]; then echo other > "$8"; else {CP} "$TOOL_LOG.$at" "$8"; fi;;
 esac
+case "$6" in *leave) $DFU_STARTS;; esac
 exit ${{DFU_FAILS:-0}}
 """
 )
@@ -37,7 +39,25 @@ read) {CP} "$TOOL_LOG.$4" "$3";;
 esac
 """
 )
-ONE = "Found DFU: [0483:df11] ver=2200, devnum=9, alt=1\\nFound DFU: [0483:df11] ver=2200, devnum=9, alt=0\\n"
+ST_INFO = """#!/bin/sh
+echo 'Found 1 stlink programmers
+  version:    V2J37S26
+  flash:      1048576 (pagesize: 16384)
+  sram:       196608
+  '"${ST_CHIP-chipid:     0x413}"
+"""
+
+
+def dfu_list(sectors: str) -> str:
+    """What dfu-util lists of one chip in its bootloader, whose flash has these sectors."""
+    device = 'Found DFU: [0483:df11] ver=2200, devnum=9, cfg=1, intf=0, path="1-1"'
+    return (
+        f'{device}, alt=1, name="@Option Bytes  /0x1FFFC000/01*016 e", serial="3"\\n'
+        f'{device}, alt=0, name="@Internal Flash  /0x08000000/{sectors}", serial="3"\\n'
+    )
+
+
+ONE = dfu_list("04*016Kg,01*064Kg,07*128Kg")
 BOARD_MAKE = """CMSIS_MCU = STM32F407xx
 ifeq ($(USE_MBOOT),1)
 TEXT0_ADDR = 0x08020000

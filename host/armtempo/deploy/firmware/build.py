@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import subprocess
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -16,9 +15,6 @@ from armtempo.deploy.firmware import checkout, frozen, image, toolchain
 from armtempo.deploy.firmware.checkout import BoardDefinition, Checkout
 from armtempo.link.program_version import own_crc
 
-_SAID_LINES = 12
-"""Of a build that fails, the last ones are shown."""
-_SAID_COLUMNS = 200
 _FILES = 330
 """That a build compiles, about; for its progress."""
 _WHOLE = ("firmware.dfu", "firmware.hex", "firmware.elf")
@@ -69,48 +65,33 @@ def _make(found: Checkout, definition: BoardDefinition, progress: Progress) -> P
     frozen.write(program, definition.manifest)
     common = [f"-j{os.cpu_count() or 1}"]
     if not toolchain.has_mpy_cross(found.folder):
-        _run(["make", "-C", str(found.folder / "mpy-cross"), *common], lambda: None)
+        _run(["make", "-C", str(found.folder / "mpy-cross"), *common], lambda line: None)
     count = 0
 
-    def step() -> None:
+    def step(line: str) -> None:
         nonlocal count
         count = min(count + 1, _FILES - 1)
         progress(count, _FILES)
 
-    board = f"BOARD_DIR={definition.folder}"
+    settings = {
+        "BOARD_DIR": definition.folder,
+        "BUILD": built,
+        "FROZEN_MANIFEST": program / frozen.MANIFEST,
+        "SOURCE_DATE_EPOCH": checkout.date(found),
+    }
     _run(
-        [
-            "make",
-            "-C",
-            str(found.port),
-            *common,
-            board,
-            f"BUILD={built}",
-            f"FROZEN_MANIFEST={program / frozen.MANIFEST}",
-        ],
+        ["make", "-C", str(found.port), *common, *(f"{name}={value}" for name, value in settings.items())],
         step,
     )
     progress(_FILES, _FILES)
     return built
 
 
-def _run(command: list[str], step: Callable[[], None]) -> None:
-    """Run make, with a step for each line that it prints; ToolError with its last lines where it fails."""
-    said: list[str] = []
-    with subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-    ) as process:
-        assert process.stdout is not None
-        try:
-            for line in process.stdout:
-                said = [*said[1 - _SAID_LINES :], line.rstrip()[:_SAID_COLUMNS]]
-                step()
-        except BaseException:
-            process.terminate()
-            raise
-    if process.returncode:
+def _run(command: list[str], step: Callable[[str], None]) -> None:
+    """Run make; ToolError with its last lines where it fails."""
+    if said := toolchain.run(command, step):
         raise ToolError(
-            "MicroPython's build failed:\n  " + "\n  ".join(said),
+            f"MicroPython's build failed:\n  {said}",
             f"see the whole of it with {' '.join(command)}; with another version of MicroPython or of the compiler "
             f"than {checkout.RELEASE} and gcc 12 to 14, try those",
         )

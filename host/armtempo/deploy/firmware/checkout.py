@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -82,6 +83,17 @@ def look(folder: Path) -> Checkout:
             f"{found.folder}: MicroPython's build takes no path with a space", "move the checkout"
         )
     return found
+
+
+def date(checkout: Checkout) -> int:
+    """Of the last commit, in seconds since 1970; 0 without git. In a firmware it stands for the day of the build, so
+    that the same sources make the same firmware.
+    """
+    try:
+        command = ["git", "-C", str(checkout.folder), "log", "-1", "--format=%ct"]
+        return int(subprocess.run(command, capture_output=True, check=True).stdout)
+    except (OSError, ValueError, subprocess.CalledProcessError):
+        return 0
 
 
 def board(checkout: Checkout, name: str) -> BoardDefinition:

@@ -1,9 +1,10 @@
-"""The programs that build a firmware: whether they are there."""
+"""The programs that build a firmware and write it: whether they are there, and running them."""
 
 from __future__ import annotations
 
 import shutil
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 from armtempo.basics.errors import ToolError
@@ -15,6 +16,26 @@ INSTALL = (
 )
 _TRIAL = "#include <math.h>\n#include <string.h>\n"
 """Headers of newlib, which some systems package apart from the compiler."""
+_SAID_LINES = 12
+"""Of a program that fails, the last ones are shown."""
+_SAID_COLUMNS = 200
+
+
+def run(command: list[str], heard: Callable[[str], None]) -> str:
+    """Run a program, ``heard`` with each line that it prints; the last lines where it fails, else ""."""
+    said: list[str] = []
+    with subprocess.Popen(
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    ) as process:
+        assert process.stdout is not None
+        try:
+            for line in process.stdout:
+                said = [*said[1 - _SAID_LINES :], line.rstrip()[:_SAID_COLUMNS]]
+                heard(line)
+        except BaseException:
+            process.terminate()
+            raise
+    return ("\n  ".join(said) or f"code {process.returncode}") if process.returncode else ""
 
 
 def check(with_mpy_cross: bool) -> None:

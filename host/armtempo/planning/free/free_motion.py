@@ -30,8 +30,8 @@ _PARTS = 4
 """Points in a segment at which limits are watched, besides the peaks found."""
 _CORRIDOR_PARTS = 4
 """Points in a segment at which the tool's corridor is watched."""
-_FINER = 4
-_WATCHED = 0.95
+_PEAK_GRID_FACTOR = 4
+_PEAK_THRESHOLD = 0.95
 _AWAY = 1.01
 """Time is stretched by this before each solve, so that it starts within the limits."""
 _SMOOTHING, _SMOOTHED = 0.075, 0.1
@@ -243,7 +243,7 @@ class Improver:
             here = self._solve(here, points, first=number == 0)
             curve = here.curve(self.demand.limits)
             stretch = curve.stretch()
-            points += collocation.peaks(curve, _FINER * _PARTS, _WATCHED)
+            points += collocation.peaks(curve, _PEAK_GRID_FACTOR * _PARTS, _PEAK_THRESHOLD)
             here = here.slower(stretch)
             best = min(best, here, key=lambda candidate: candidate.total_s)
             if stretch < 1.0 + _NEAR:

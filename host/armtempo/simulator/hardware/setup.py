@@ -86,4 +86,4 @@ def _arm_record():
 
 def _stall(ms):
     """The processor stands still so long; the timers do not."""
-    machine_state.board.stand_still(ms * TICKS_PER_MS)
+    machine_state.board.stall(ms * TICKS_PER_MS)

@@ -1,5 +1,7 @@
 """Commands to the program above the engine: which are carried out, which refused, which are a repetition."""
 
+# all cases: slow on CPython
+
 import cases
 import stand_in
 from app_rig import ROOT, App, connected, start, state

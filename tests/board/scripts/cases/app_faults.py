@@ -1,5 +1,7 @@
 """Faults and exceptions: what moves is frozen, the host is told, and nothing starts before it is cleared."""
 
+# all cases: slow on CPython
+
 import cases
 
 from app_rig import connected, ends_of, start, state  # isort: skip  it puts the stand-ins into place

@@ -1,5 +1,7 @@
 """Held motions, which brake in silence; drivers off and on."""
 
+# all cases: slow on CPython
+
 import sys
 
 import cases

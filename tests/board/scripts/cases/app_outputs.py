@@ -1,5 +1,7 @@
 """Outputs and inputs of an arm: set while it moves, safe at a fault, at an exception and at the end, debounced."""
 
+# all cases: slow on CPython, not emulated
+
 import cases
 import stand_in
 

@@ -1,5 +1,7 @@
 """How the program is left for MicroPython's prompt: by command or Ctrl-C, not by noise, not while moving."""
 
+# all cases: slow on CPython, not emulated
+
 import sys
 
 import cases

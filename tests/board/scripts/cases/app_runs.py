@@ -1,5 +1,7 @@
 """A motion under way: stopping it, its samples, and hosts that stall, change or are gone."""
 
+# all cases: slow on CPython
+
 import gc
 
 import cases

@@ -1,5 +1,7 @@
 """Sequences before they run: stored whole, refused before anything moves."""
 
+# all cases: slow on CPython, not emulated
+
 import gc
 from binascii import crc32
 

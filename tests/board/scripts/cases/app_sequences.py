@@ -1,5 +1,7 @@
 """Sequences that run: step by step, ended by whatever can end one."""
 
+# all cases: slow on CPython
+
 import cases
 import stand_in
 from app_rig import connected, flash, start, state
@@ -105,14 +107,14 @@ def case_counters_count_until_it_begins_anew():
     assert counters_of(host) == {"trays": 0, "parts": 1}
 
 
-def case_without_counters_there_are_none():
+def case_without_counters_there_are_none():  # not emulated
     _, host = ready([(WAIT, 0, 0, 1)])
     assert host.ask("counter", (0,))[:2] == ("error", "unknown_command")
     begin(host)
     assert counters_of(host) == {}
 
 
-def case_each_row_is_told_when_it_begins():
+def case_each_row_is_told_when_it_begins():  # not emulated
     _, host = ready(COUNTING, counters=("trays", "parts"))
     host.turn()
     host.events = []
@@ -128,7 +130,7 @@ def case_each_row_is_told_when_it_begins():
     assert not any(value for _, row, value in rows if row in (0, 2, 3))
 
 
-def case_a_motions_row_is_told_with_its_run():
+def case_a_motions_row_is_told_with_its_run():  # not emulated
     app, host = ready([(MOVE, "there", 0, 0), (WAIT, 0, 0, 10), (MOVE, "back", 0, 0)])
     host.turn()
     host.events = []
@@ -261,7 +263,7 @@ def case_a_motion_that_is_unfit_is_refused_before_anything_moves():
     assert runs(app) == 0 and app.controller.outputs.log == [] and state(host) == "idle"
 
 
-def case_a_record_that_is_another_now_is_refused_though_it_was_checked():
+def case_a_record_that_is_another_now_is_refused_though_it_was_checked():  # not emulated
     app, host = ready([(REPEAT, 0, 0, 2), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 1, 0)])
     begin(host)
     app.controller.engine.has_time = False
@@ -327,7 +329,7 @@ def case_an_input_that_never_comes_stops_it():
     assert state(host) == "idle" and app.controller.outputs.log == []
 
 
-def case_an_input_that_never_comes_is_a_fault():
+def case_an_input_that_never_comes_is_a_fault():  # not emulated
     app, host = _waited_in_vain(sequence.FAULT_THEN)
     assert stands(host) == ("fault", codes.INPUT_TIMEOUT, 1, 0, 0)
     assert state(host) == "fault" and app.controller.outputs.log == []
@@ -336,12 +338,12 @@ def case_an_input_that_never_comes_is_a_fault():
     assert begin(host)[0] == "ok"
 
 
-def case_an_input_that_never_comes_is_passed_over():
+def case_an_input_that_never_comes_is_passed_over():  # not emulated
     app, host = _waited_in_vain(sequence.NEXT_THEN)
     assert stands(host)[0] == "finished" and app.controller.outputs.log == [(0, 1)]
 
 
-def case_a_fault_ends_it_and_says_where():
+def case_a_fault_ends_it_and_says_where():  # not emulated
     app, host = ready([(MOVE, "there", 0, 0), (OUTPUT, 0, 1, 0), (MOVE, "back", 0, 0)])
     begin(host)
     engine = app.controller.engine
@@ -352,7 +354,7 @@ def case_a_fault_ends_it_and_says_where():
     assert app.controller.outputs.log == [] and state(host) == "fault"
 
 
-def case_a_fault_in_a_wait_ends_it():
+def case_a_fault_in_a_wait_ends_it():  # not emulated
     app, host = ready([(WAIT, 0, 0, 100000), (OUTPUT, 0, 1, 0)])
     begin(host)
     app.controller.engine.fault = codes.ESTOP
@@ -360,7 +362,7 @@ def case_a_fault_in_a_wait_ends_it():
     assert app.controller.outputs.log == []
 
 
-def case_a_mistake_of_the_program_ends_it():
+def case_a_mistake_of_the_program_ends_it():  # not emulated
     app, host = ready([(WAIT, 0, 0, 100000), (OUTPUT, 0, 1, 0)])
     begin(host)
     app.controller.engine.explode = ValueError("x")
@@ -368,7 +370,7 @@ def case_a_mistake_of_the_program_ends_it():
     assert app.controller.outputs.log == []
 
 
-def case_what_cannot_go_on_is_named():
+def case_what_cannot_go_on_is_named():  # not emulated
     app, host = ready([(MOVE, "there", 0, 0), (MOVE, "back", 0, 0)])
     begin(host)
     app.controller.engine.refusal = (codes.TOO_FAST, 1, 5)
@@ -377,7 +379,7 @@ def case_what_cannot_go_on_is_named():
     assert state(host) == "idle"
 
 
-def case_nothing_else_is_taken_meanwhile():
+def case_nothing_else_is_taken_meanwhile():  # not emulated
     _, host = ready([(WAIT, 0, 0, 100000)])
     begin(host)
     for name, values, tail in (
@@ -393,12 +395,12 @@ def case_nothing_else_is_taken_meanwhile():
     assert stands(host)[0] == "running"
 
 
-def case_before_any_the_command_is_unknown():
+def case_before_any_the_command_is_unknown():  # not emulated
     _, host = connected()
     assert host.ask("sequence")[:2] == ("error", "unknown_command")
 
 
-def case_while_a_motion_runs_the_last_one_is_told():
+def case_while_a_motion_runs_the_last_one_is_told():  # not emulated
     _, host = ready([(WAIT, 0, 0, 10)])
     begin(host)
     host.turn(20)
@@ -406,7 +408,7 @@ def case_while_a_motion_runs_the_last_one_is_told():
     assert stands(host) == ("finished", 0, 1, 0, 0)
 
 
-def case_hosts_come_and_go():
+def case_hosts_come_and_go():  # not emulated
     app, host = ready([(REPEAT, 0, 0, 5), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 1, 0)])
     begin(host)
     for cycle in range(5):
@@ -457,7 +459,7 @@ def case_speed_between_motions_is_that_of_the_next():
     assert app.controller.engine.rates.wanted == 200
 
 
-def case_the_button_starts_it_as_the_default():
+def case_the_button_starts_it_as_the_default():  # not emulated
     app, host = ready([(MOVE, "there", 0, 0), (MOVE, "back", 0, 0)])
     assert host.ask("set_default", (), "seq")[0] == "ok"
     app.controller.begin(app.controller.store().default(), 0)

@@ -1,5 +1,7 @@
 """Starts with records in the flash that cannot be used: the program starts, names them, and all else works."""
 
+# all cases: slow on CPython, not emulated
+
 import struct
 import sys
 

@@ -1,5 +1,7 @@
 """Motions in the program's store: how they come in, under which names, and what is refused."""
 
+# all cases: slow on CPython
+
 import os
 
 import cases

@@ -1,5 +1,7 @@
 """Braking a real motion at many moments: every joint comes to rest at the same point of the path."""
 
+# all cases: slow on CPython
+
 import random
 
 import cases
@@ -16,7 +18,7 @@ def joints():
     return rows
 
 
-def case_whole_motion():
+def case_whole_motion():  # not emulated
     """Without braking it ends at the last points."""
     rig = Rig(joints(), planned=False)
     begin(rig)
@@ -33,7 +35,7 @@ def begin(rig, ramps=RAMPS):
     rig.engine.start()
 
 
-def case_anywhere():
+def case_anywhere():  # slow
     """The stop is on the path, the samples go on to it, and nothing comes after it."""
     random.seed(SEED)
     for number in range(15 // FEWER):
@@ -58,7 +60,7 @@ def case_anywhere():
         assert rig.samples[-1][4:7] == rig.commanded()
 
 
-def case_too_late():
+def case_too_late():  # not emulated
     """Asked for when the motion is nearly over, it ends as planned."""
     rig = Rig(joints(), planned=False)
     begin(rig)
@@ -70,7 +72,7 @@ def case_too_late():
     assert [abs(a - b) <= 0.5 for a, b in zip(rig.commanded(), path(10.0))] == [True] * 3
 
 
-def case_never_longer_than_the_motion():
+def case_never_longer_than_the_motion():  # not emulated
     """Where braking would take longer than the rest of the motion, it ends as planned; earlier, it is braked."""
     for asked in (TICK_HZ // 2, TICK_HZ - TICK_HZ // 5):
         rig = Rig(joints(), planned=False)
@@ -88,7 +90,7 @@ def case_never_longer_than_the_motion():
         assert rig.engine.rates.duration_ticks <= end
 
 
-def case_not_planned_for():
+def case_not_planned_for():  # not emulated
     """A motion without a braking time is frozen."""
     rig = Rig(joints(), planned=False)
     begin(rig, motion.NO_RAMPS)

@@ -1,5 +1,7 @@
 """Whatever stops a motion, at whatever moment: no wrong pulse; the position is exact or declared unknown."""
 
+# all cases: slow on CPython
+
 import random
 
 import cases
@@ -51,7 +53,7 @@ def again(rig):
     assert rig.commanded() == [a + steps.total() for a, steps in zip(before, MOTION.joints)]
 
 
-def case_freeze_anywhere():
+def case_freeze_anywhere():  # slow
     """``freeze`` called at many moments."""
     random.seed(SEED)
     for number in range(30 // FEWER):
@@ -66,7 +68,7 @@ def case_freeze_anywhere():
             again(rig)
 
 
-def case_estop_anywhere():
+def case_estop_anywhere():  # not emulated, slow
     """The E-stop's edge at exact ticks: just before, on and after edges, in pulses and between them."""
     random.seed(SEED)
     moments = [
@@ -98,7 +100,7 @@ def press():
     external_interrupts.set_level("E15", 0)
 
 
-def case_estop_at_rest():
+def case_estop_at_rest():  # not emulated
     """Pressed while nothing moves, or before the program ran."""
     rig = Rig(arm(1), flags=armrecord.FLAG_ESTOP_FITTED | armrecord.FLAG_ESTOP_ACTIVE_HIGH)
     rig.turn()
@@ -134,7 +136,7 @@ class Tapped:
         return MOTION.duration
 
 
-def case_estop_while_loading():
+def case_estop_while_loading():  # not emulated
     """A tap on the E-stop after the engine has looked at it, but before the start: nothing moves, and it is told."""
     for motion in (MOTION, Tapped()):
         rig = Rig(arm(3), flags=armrecord.FLAG_ESTOP_FITTED)
@@ -149,7 +151,7 @@ def case_estop_while_loading():
         assert (rig.engine.fault, rig.engine.known) == (codes.ESTOP, 7)
 
 
-def case_estop_behind_a_limit_switch():
+def case_estop_behind_a_limit_switch():  # not emulated
     """It releases the drivers whatever came before, so the position is unknown."""
     rig = Rig(
         [row(channel=0, limit_low=0, limit_active_high=1)],
@@ -178,7 +180,7 @@ def case_limit_switch_just_before_another_fault():
     stopped_one(rig, codes.LIMIT_SWITCH)
 
 
-def case_underrun_anywhere():
+def case_underrun_anywhere():  # not emulated, slow
     """The main loop stalls at many moments, for long enough and for not quite long enough."""
     random.seed(SEED)
     dry = 0
@@ -198,7 +200,7 @@ def case_underrun_anywhere():
     assert 0 < dry < 18 // FEWER, dry
 
 
-def case_written_too_late():
+def case_written_too_late():  # not emulated
     """The interrupt takes so long that the last edge has passed when new ones are written."""
     motion = Motion(LONG.duration, LONG.joints[0], Steps(), Steps())
     for moment in (-500_000, 9_000_000):
@@ -215,7 +217,7 @@ def with_slow_emit(motion, moment):
     def slow_emit(rings, *arguments):
         for rig in slow:
             if rings & 1:
-                rig.board.stand_still(84 * 30_000)
+                rig.board.stall(84 * 30_000)
         return emit(rings, *arguments)
 
     ring_feeder.emit = slow_emit
@@ -232,7 +234,7 @@ def with_slow_emit(motion, moment):
     assert rig.engine.known == 7
 
 
-def case_interrupt_gone():
+def case_interrupt_gone():  # not emulated
     """TIM6 asks no more: the rings run dry, nothing wrong is stepped, and the fault says so."""
     for moment in (-500_000, 300_000, 9_000_000):
         rig = Rig(arm(3))
@@ -249,7 +251,7 @@ def case_interrupt_gone():
         assert rig.engine.known == 7
 
 
-def case_long_stall():
+def case_long_stall():  # not emulated
     """The main loop is away for nearly half the counter's range: the outputs stay where they stalled, 50 ms on."""
     rig = Rig(arm(3))
     rig.start(LONG)
@@ -262,7 +264,7 @@ def case_long_stall():
     stopped(rig, codes.UNDERRUN, rig.engine.fault_joint)
 
 
-def case_limit_switches():
+def case_limit_switches():  # not emulated
     """A switch stops a joint that moves towards it, not one that moves away; and ends a homing run."""
     joints = arm(3)
     joints[1] = row(channel=1, dir_inverted=1, limit_low=0, limit_high=2, limit_active_high=1)
@@ -306,7 +308,7 @@ def case_home_switches():
             assert rig.commanded() == [steps.total() for steps in MOTION.joints]
 
 
-def case_limit_tripped_before():
+def case_limit_tripped_before():  # not emulated
     """A joint that turns towards a switch that is tripped already is stopped by the main loop."""
     joints = [row(channel=0, limit_high=1)]
     rig = Rig(joints)
@@ -322,7 +324,7 @@ def stopped_one(rig, code):
     assert rig.commanded() == rig.stepped()
 
 
-def case_following():
+def case_following():  # not emulated
     """A blocked motor and a slipping coupling are noticed, and the joint's position is unknown."""
     for harm in ("block", "slip"):
         rig = Rig(arm(3))
@@ -342,7 +344,7 @@ def case_following():
         assert rig.engine.known == 7
 
 
-def case_start_failed():
+def case_start_failed():  # not emulated
     """The second counter does not follow the first."""
     rig = Rig(arm(3))
     rig.board.timers[2].follower = None
@@ -354,7 +356,7 @@ def case_start_failed():
     assert rig.stepped() == [0, 0, 0]  # the counter that runs makes no steps
 
 
-def case_refusals():
+def case_refusals():  # not emulated
     """What a motion is refused for."""
     rig = Rig(arm(2))
     motion = Motion(TICK_HZ, Steps((1000, 400, 2000, 1)), Steps())
@@ -371,7 +373,7 @@ def case_refusals():
     assert rig.engine.fault == 0
 
 
-def case_enable():
+def case_enable():  # not emulated
     """Drivers are off until the first motion is loaded, then on, then off when the engine is closed."""
     for flags, on in ((0, 0), (armrecord.FLAG_ENABLE_HIGH, 1)):
         rig = Rig(arm(1), flags=flags)
@@ -383,7 +385,7 @@ def case_enable():
         assert line.level == 1 - on
 
 
-def case_close_and_anew():
+def case_close_and_anew():  # not emulated
     """Another engine takes the hardware over, inputs and all."""
     flags = armrecord.FLAG_ESTOP_FITTED
     first = Rig(arm(2), flags=flags)

@@ -5,6 +5,8 @@ motion's own time. What is expected are the steps of the same motion without a c
 many motions are tried.
 """
 
+# all cases: slow on CPython
+
 import random
 import struct
 import sys
@@ -153,7 +155,7 @@ def change(rig):
     rig.run_to(rig.board.now - rig.zero() + random.randrange(TICK_HZ // 3))
 
 
-def case_whole_path():
+def case_whole_path():  # slow
     """Whatever the speed, the whole path is stepped."""
     random.seed(SEED)
     for number in range(MOTIONS):
@@ -207,7 +209,7 @@ def some_place():
     return [random.randrange(-200, 200) + random.choice((-0.45, 0.1, 0.45)) for _ in range(3)]
 
 
-def case_prepared():
+def case_prepared():  # not emulated, slow
     """Motions prepared while others move, at every speed: on the pins each ends where its record does."""
     random.seed(SEED + 1)
     rig = Rig(joints(), planned=False)
@@ -240,19 +242,28 @@ def case_prepared():
 
 
 def case_step_at_the_start():
-    """A joint that begins just beyond the middle between two steps: its only step comes, at every speed."""
-    for segments in range(1, 5):
-        points = [[0.505] * (segments + 5), [0.0] * (segments + 5), [0.0] * (segments + 5)]
-        motion = record(some_ramps(), points, [(number - 2) / 20 for number in range(segments + 5)])
-        for rate in (1000, 700):
-            rig, recorders = begin(motion, rate)
-            rig.run_to(TICK_HZ)
-            assert not rig.engine.moving and rig.engine.fault == 0
-            assert rig.commanded() == [1, 0, 0], (segments, rate, rig.commanded())
-            assert [len(recorder.steps) for recorder in recorders] == [1, 0, 0]
+    """A joint that begins just beyond the middle between two steps: a step comes at once, whatever follows it."""
+    for segments in (1, 2, 4, 8):
+        for start, way in ((0.505, 0.0), (0.505, 5.0), (0.505, -3.0), (-0.505, 1.2)):
+            points = [start] * 5 + [start + way * (part + 1) / segments for part in range(segments)]
+            at_rest = [0.0] * len(points)
+            times = [(number - 2) / 20 for number in range(len(points))]
+            motion = record(some_ramps(), [points, at_rest, at_rest], times)
+            found = []
+            for rate in (1000, 700):
+                rig, recorders = begin(motion, rate)
+                rig.run_to(TICK_HZ)
+                assert not rig.engine.moving and rig.engine.fault == 0, (segments, start, way, rate)
+                found.append([direction for _, direction in recorders[0].steps])
+            assert found[0] == found[1] and found[0][0] == (1 if start > 0 else -1), (
+                segments,
+                start,
+                way,
+                found,
+            )
 
 
-def case_stops():
+def case_stops():  # not emulated
     """A stop, whatever the speed is and is becoming, ends on the path."""
     random.seed(SEED)
     for number in range(max(MOTIONS // 2, 1)):
@@ -281,7 +292,7 @@ def case_stops():
         check_samples(rig)
 
 
-def case_wrong_steps():
+def case_wrong_steps():  # slow
     """A step that is not in the record is found out however the motion ends, and makes its joint unknown."""
     for rates in ((), (700,), (0, RESUME), (BRAKE,), (500, BRAKE), (0, BRAKE)):
         for wrong in (0, 1):
@@ -298,7 +309,7 @@ def case_wrong_steps():
             assert rig.engine.clear() and rig.engine.fault == 0
 
 
-def case_long_pause():
+def case_long_pause():  # not emulated
     """A pause longer than the counter's round, then on; and one that is too long ends the run."""
     motion = record()
     plain, recorders = begin(motion)
@@ -322,7 +333,7 @@ def case_long_pause():
     assert check_steps(rig, recorders, expected) == [len(steps) for steps in expected]
 
 
-def case_refused():
+def case_refused():  # not emulated
     """What cannot change its speed says so, and goes on."""
     rig, _ = begin(record(NO_RAMPS))
     for rate in (0, 500, RESUME):

@@ -1,5 +1,7 @@
 """Pulses on the pins are those that were computed: to the tick, none lost, none added."""
 
+# all cases: slow on CPython
+
 from array import array
 
 import cases
@@ -45,7 +47,7 @@ def case_a_sample_has_times_beyond_32_bits():
             assert (sample[low] & 0xFFFFFFFF) + (sample[high] << 32) == ticks, ticks
 
 
-def case_three_joints():
+def case_three_joints():  # not emulated
     """Fast, turning, slow; twice, from where the first time ended."""
     motion = Motion(
         TICK_HZ + 12345,
@@ -81,7 +83,7 @@ def case_six_joints():
     check_samples(rig, motion)
 
 
-def case_long_rest():
+def case_long_rest():  # not emulated
     """Joints idle for longer than half the counter, for longer than all of it, and to the very end."""
     second = TICK_HZ
     motion = Motion(
@@ -110,7 +112,7 @@ def case_across_the_wrap():
     check(rig, motion)
 
 
-def case_many_turns():
+def case_many_turns():  # not emulated
     """To and fro, every other time with the shortest gap, more turns waiting than the queue holds."""
     gap = 2 * 8400 + 2 * 420 + 168
     blocks = []
@@ -139,7 +141,7 @@ def case_steps_to_the_end():
         check_samples(rig, motion)
 
 
-def case_loaded_in_vain():
+def case_loaded_in_vain():  # not emulated
     """A motion that was loaded and never started leaves nothing behind."""
     rig = Rig(arm(2))
     rig.engine.load(Motion(100_000, Steps((5000, 400, 20, -1)), Steps((900, 300, 50, 1))))

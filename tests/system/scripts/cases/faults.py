@@ -4,6 +4,8 @@ Every case provokes one kind of fault at many moments; its name is printed with 
 Positions are compared with the pulses that were counted on the pins. Arguments: see ``whole_board.arguments``.
 """
 
+# all cases: not emulated, not on CPython
+
 import struct
 from binascii import crc32
 
@@ -127,7 +129,7 @@ def case_host_disappears_and_the_motion_goes_on(world):
     return trial.seen
 
 
-def case_host_disappears_and_the_arm_stops(world):
+def case_host_disappears_and_the_arm_stops(world):  # on CPython
     """As this arm's record says: it brakes along the path; not before, and not while the host asks."""
     trial = Trial(world, record=whole_board.read(FLASHES + "/stop/armtempo/go.atm"))
     timeout = world.arm[0]["link_timeout_ms"] * TICKS_PER_MS
@@ -147,7 +149,7 @@ def case_host_disappears_and_the_arm_stops(world):
     return trial.seen
 
 
-def case_stop(world):
+def case_stop(world):  # on CPython
     """The host's stop before time 0, anywhere, again while it brakes, and at the very end."""
     trial = Trial(world)
     yield from world.hello()
@@ -169,7 +171,7 @@ REFUSALS = (
 )  # fmt: skip
 
 
-def case_broken_trajectory(world):
+def case_broken_trajectory(world):  # on CPython
     """Bytes of the file in the flash changed, cut off, added; or changed with a checksum that fits."""
     trial = Trial(world)
     yield from world.hello()
@@ -251,7 +253,7 @@ def case_interrupt_delayed(world):
         for late_us in (40, 90, 130, 400, 3000):
             trial.what = "turn at %d, %d us late" % (turn, late_us)
             at = turn - zero - 84 * 5
-            yield from trial.begin(at, lambda late_us=late_us: machine_state.board.stand_still(84 * late_us))
+            yield from trial.begin(at, lambda late_us=late_us: machine_state.board.stall(84 * late_us))
             status = yield from trial.end("internal", "")
             assert late_us >= 90 or not status["fault"], trial.what
             assert late_us <= 110 or (status["fault"] and status["known"] == 0), trial.what
@@ -274,7 +276,7 @@ class Turns:
         self.ticks.extend([origin + time for time in times])
 
 
-def case_interrupt_dies(world):
+def case_interrupt_dies(world):  # emulated
     """An exception in the compare interrupt: MicroPython never calls it again."""
     trial = Trial(world)
     yield from world.hello()
@@ -292,7 +294,7 @@ COUNTING = ("JointDrive._count_from", "Ring.stop", "JointDrive.position")
 """Functions between whose calls a joint's count is not what it should be."""
 
 
-def case_exception_anywhere(world):
+def case_exception_anywhere(world):  # not compiled
     """Each function that the loop calls while it moves raises once, before or behind its work."""
     yield from world.hello()
     trial = Trial(world)

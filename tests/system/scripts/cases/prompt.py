@@ -3,6 +3,8 @@
 Every case asserts, and its name is printed when it holds. Arguments: see ``whole_board.arguments``.
 """
 
+# all cases: not emulated, not on CPython
+
 import cases
 import machine_state
 import whole_board
@@ -50,7 +52,7 @@ def alive(world, ms):
     assert machine_state.board is board
 
 
-def case_boot_leaves_a_serial_port_only(world):
+def case_boot_leaves_a_serial_port_only(world):  # emulated
     yield from world.hello()
     assert machine_state.settings["usb_mode"] == "VCP"
     assert machine_state.settings["reset_cause"] == 1
@@ -150,7 +152,7 @@ def case_the_program_goes_on_where_it_was_left(world):
     yield from alive(world, 2 * BITE_MS)
 
 
-def case_replay_typed_at_the_prompt(world):
+def case_replay_typed_at_the_prompt(world):  # on CPython
     """From the posture that the arm has; again; and what it says of names and faults."""
     yield from prompt(world)
     before = world.steps()
@@ -165,7 +167,7 @@ def case_replay_typed_at_the_prompt(world):
     yield from alive(world, 2 * BITE_MS)
 
 
-def case_ctrl_c_stops_a_replay_wherever_it_comes(world):
+def case_ctrl_c_stops_a_replay_wherever_it_comes(world):  # not compiled
     """Once: it brakes along the path; twice: it freezes. The steps are those on the pins, and the prompt is back."""
     numbers = whole_board.Numbers(SEED)
     yield from world.hello()

@@ -4,6 +4,8 @@ Random ones of the motions in the flash, which lead from each of some postures t
 tick. What comes between is in soak.py. Arguments: see ``whole_board.arguments``.
 """
 
+# all cases: not emulated, not on CPython, not compiled
+
 import cases
 import machine_state
 import whole_board
@@ -190,7 +192,7 @@ def whole(world, watch, crc):
     return watch.motions(), said(world), counted
 
 
-def case_the_pins_do_the_same(world):
+def case_the_pins_do_the_same(world):  # emulated, on CPython
     """With and without a motion that is prepared; nested repeats, waits and counters between."""
     watch = yield from ready(world)
     numbers = whole_board.Numbers(SEED)
@@ -238,7 +240,7 @@ def case_motion_away(world):
     return end
 
 
-def case_compiled_files_refuse_it(world):
+def case_compiled_files_refuse_it(world):  # compiled
     """They are without what runs one; a motion runs."""
     watch = yield from ready(world)
     crc = store(THERE_AND_BACK)

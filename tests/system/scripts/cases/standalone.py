@@ -3,6 +3,8 @@
 Every case asserts, and its name is printed when it holds. Arguments: see ``whole_board.arguments``.
 """
 
+# all cases: not emulated, not on CPython
+
 import sys
 
 import cases
@@ -67,7 +69,7 @@ def notices(world):
     return words
 
 
-def case_button_starts_the_default_and_a_host_fetches_its_samples(world):
+def case_button_starts_the_default_and_a_host_fetches_its_samples(world):  # emulated, on CPython
     assert world.led() == "unhomed"
     yield from ready(world)
     yield from tap(world)
@@ -228,7 +230,7 @@ def upload(world, name, data):
     yield from world.ask("put_commit", (wire.record_crc(data),))
 
 
-def case_a_run_by_button_needs_no_host(world):
+def case_a_run_by_button_needs_no_host(world):  # on CPython
     """Although this arm record says that a host that falls silent stops a motion."""
     yield from world.hello()
     assert world.arm[0]["flags"] & armrecord.FLAG_STOP_ON_LINK_LOSS
@@ -248,7 +250,7 @@ def case_level_present_at_power_up(world):
     yield from moves_when_pressed_anew(world)
 
 
-def case_a_failing_start_is_a_fault_not_the_end(world):
+def case_a_failing_start_is_a_fault_not_the_end(world):  # not compiled
     """The button's start raises something unforeseen: the program goes on and says so."""
     yield from ready(world)
     sys.modules["armtempo_board.app.controller"].Controller.store = None

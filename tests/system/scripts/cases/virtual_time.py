@@ -81,9 +81,9 @@ def case_each_call_of_the_serial_port_takes_its_time():
     board = bare_board.start()
     port = pyb.USB_VCP()
     for call in (port.isconnected, port.any, lambda: port.recv(1, timeout=0), lambda: port.send(b"")):
-        before = board.now + board.owed
+        before = board.now + board.unspent_ticks
         call()
-        assert board.now + board.owed - before == CALL_TICKS
+        assert board.now + board.unspent_ticks - before == CALL_TICKS
 
 
 class Looked(usb_serial.SilentPort):

@@ -13,7 +13,7 @@ TICKS_PER_MS = 84_000
 TICKS_PER_US = 84
 CALL_TICKS = 84
 """A simulated function or register access: 1 us, about 130 instructions of the interpreter."""
-_MOST_OWED = 40 * CALL_TICKS
+_MOST_UNSPENT_TICKS = 40 * CALL_TICKS
 INTERRUPT_TICKS = 160
 """From an event to the first line of its callback: 1.9 us (an empty callback's instructions)."""
 CALLBACK_TICKS = 250
@@ -51,7 +51,7 @@ class Chip:
         self.serving = False
         self.woken = False
         self.next_happening = 0
-        self.happenings = []
+        self.events = []
         self.callbacks = {}
         self.scheduled = []
         self.interrupted = False
@@ -59,7 +59,7 @@ class Chip:
         self.extints = {}
         self.observers = []
         self.follow = None
-        self.owed = 0
+        self.unspent_ticks = 0
         self.lost_ticks = 0
         self.crash = False
         self.watchdog_ticks = 0
@@ -114,20 +114,20 @@ class Chip:
 
     def at(self, tick, action):
         """Call ``action()`` when time comes to ``tick``."""
-        self.happenings.append((tick, action))
-        self.happenings.sort(key=lambda happening: happening[0])
+        self.events.append((tick, action))
+        self.events.sort(key=lambda event: event[0])
         self._find_happening()
 
     def _find_happening(self):
-        due = self.happenings[0][0] if self.happenings else NEVER
+        due = self.events[0][0] if self.events else NEVER
         for timer in self.counting:
             due = min(due, timer.next_interrupt())
         self.next_happening = due
 
     def call(self):
         """The program made a cheap call. The time of several is kept and spent together."""
-        self.owed += CALL_TICKS
-        if self.owed > _MOST_OWED:
+        self.unspent_ticks += CALL_TICKS
+        if self.unspent_ticks > _MOST_UNSPENT_TICKS:
             self.spend(0)
 
     def wrote(self):
@@ -137,8 +137,8 @@ class Chip:
 
     def spend(self, ticks):
         """The program takes so long."""
-        ticks += self.owed
-        self.owed = 0
+        ticks += self.unspent_ticks
+        self.unspent_ticks = 0
         self.run_until(self.now + ticks)
 
     def run_until(self, target, wake=False):
@@ -162,14 +162,14 @@ class Chip:
         self._serve()
         while self.next_happening <= target and not (wake and self.woken):
             self._run(max(self.next_happening, self.now))
-            while self.happenings and self.happenings[0][0] <= self.now:
-                self.happenings.pop(0)[1]()
+            while self.events and self.events[0][0] <= self.now:
+                self.events.pop(0)[1]()
             self._find_happening()
             self._serve()
         if target > self.now and not (wake and self.woken):
             self._run(target)
 
-    def stand_still(self, ticks):
+    def stall(self, ticks):
         """The processor cannot do anything for so long, not even serve interrupts."""
         self.sync()
         self._run(self.now + ticks)

@@ -38,7 +38,7 @@ def choose_mode(board, held_ms):
     for _ in range(6):
         _show(board, 0, 50)
         _show(board, mode, 50)
-    board.stand_still(400 * TICKS_PER_MS)
+    board.stall(400 * TICKS_PER_MS)
     _show(board, 0, 0)
     return mode
 
@@ -47,7 +47,7 @@ def _held(board, mode, release):
     """Show a mode; whether the button is still held at the end."""
     _show(board, mode, 0)
     for _ in range(_LOOKS):
-        board.stand_still(_LOOK_MS * TICKS_PER_MS)
+        board.stall(_LOOK_MS * TICKS_PER_MS)
         if board.now >= release:
             external_interrupts.set_level(_BUTTON, None)
             return False
@@ -58,7 +58,7 @@ def _show(board, mode, ms):
     """Green, orange and blue are the bits of the mode."""
     for bit, name in enumerate((_GREEN, _ORANGE, _BLUE)):
         Pin(name, Pin.OUT_PP).value(mode >> bit & 1)
-    board.stand_still(ms * TICKS_PER_MS)
+    board.stall(ms * TICKS_PER_MS)
 
 
 def flash_error(times):
@@ -67,7 +67,7 @@ def flash_error(times):
         for red in (1, 0):
             Pin(_RED, Pin.OUT_PP).value(red)
             Pin(_GREEN, Pin.OUT_PP).value(1 - red)
-            machine_state.board.stand_still(250 * TICKS_PER_MS)
+            machine_state.board.stall(250 * TICKS_PER_MS)
     Pin(_GREEN, Pin.OUT_PP).value(0)
 
 
