@@ -1,6 +1,6 @@
 """Make the firmware of one board for a release: ``python .ci/make_firmware.py BOARD CHECKOUT``.
 
-CHECKOUT: a checkout of MicroPython; where there is none, the release that armtempo is built with is fetched, with the
+CHECKOUT: a checkout of MicroPython; if there is none, the release that armtempo is built with is fetched, with the
 submodules of the board. The firmware goes to ``armtempo-firmware-BOARD.zip`` here, its sha256 beside it.
 """
 

@@ -28,7 +28,7 @@ def keep_code(keeps: bool) -> None:
 
 
 def collect_often(parts: int = OFTEN) -> None:
-    """Collect the heap whenever one of so many parts of it was given out, which keeps large blocks free; 0: when full.
+    """Collect the heap whenever 1/``parts`` of it was allocated, which keeps large blocks free; 0: when full.
 
     That is for a motion that runs: what MicroPython allocates for a call is freed at its end, but counts.
     Collections would come every few turns of the loop, and take longer than the rings last.

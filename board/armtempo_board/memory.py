@@ -33,7 +33,7 @@ class Memory:
         self._used = 0
 
     def take_for_processor(self, words: int) -> "memoryview[int]":
-        """As ``take``, of the memory that the processor alone reaches while it has so many.
+        """As ``take``, of the memory that the processor alone reaches while it has that many.
 
         On MicroPython it is no memoryview, which there is of the heap's words only: it has neither length nor slices.
         """
@@ -47,7 +47,7 @@ class Memory:
         return part  # type: ignore[no-any-return]
 
     def take(self, words: int) -> "memoryview[int]":
-        """A part of so many words, signed, all 0, from the first block that has them; MemoryError where none has."""
+        """A part of that many words, signed, all 0, from the first block that has them; MemoryError where none has."""
         for number, block in enumerate(self._blocks):
             begin = self._taken[number]
             end = begin + words
@@ -60,7 +60,7 @@ class Memory:
 
 
 def bytes_behind(part: "Any", first: int, words: int) -> bytearray:
-    """The bytes of a part of so many words, from the word ``first`` on."""
+    """The bytes of a part of that many words, from the word ``first`` on."""
     return uctypes.bytearray_at(uctypes.addressof(part) + 4 * first, 4 * (words - first))
 
 

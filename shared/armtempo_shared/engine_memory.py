@@ -67,12 +67,12 @@ def output_bytes(outputs: int, inputs: int) -> int:
 
 
 def blocks(room_words: int) -> "list[int]":
-    """The blocks, in words, of a memory of so many words."""
+    """The blocks, in words, of a memory of that many words."""
     return [min(_BLOCK_WORDS, room_words - begin) for begin in range(0, room_words, _BLOCK_WORDS)]
 
 
 def lasting_ms(rates: "list[int]", room_words: int) -> int:
-    """How long the rings can last in a room of so many words, one of LASTING_MS; 0 where the engine does not fit."""
+    """How long the rings can last in a room of that many words, one of LASTING_MS; 0 where the engine does not fit."""
     for lasts_ms in LASTING_MS:
         if _find_place(rates, room_words, lasts_ms):
             return lasts_ms

@@ -92,7 +92,7 @@ _ROWS = (
     (
         "leg_missing",
         "the board does not have a motion that the sequence runs, or another one under its name",
-        "upload the sequence again, which brings its motions",
+        "upload the sequence again, which uploads its motions too",
     ),
     (
         "leg_elsewhere",
@@ -182,7 +182,7 @@ COMMANDS: "dict[str, str]" = {
     "`arm_problem`: code of "
     "what is wrong with the stored arm record, 0 where it is in force or there is none; `arm_value`: its value; the "
     "tail is the unique id in hex and the firmware.",
-    "status": "What the board is doing. `known`: bit a joint, its position is known. `run`: number of the "
+    "status": "What the board is doing. `known`: one bit per joint, its position is known. `run`: number of the "
     "current or last run since the start. `ticks`: motion clock. `path`: the motion's own time, which is behind the "
     "clock where the speed was below 100 %. `fault_joint`: also the joint whose switch ended the last homing motion. "
     "`rate`: the speed that is wanted, in thousandths, 0 in a pause; while nothing moves that of the next start. "

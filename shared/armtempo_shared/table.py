@@ -6,7 +6,7 @@ that the board can parse it and free the memory again.
 A row: kind (C command, A the answer to it; O and P the same of commands that a board only knows where its arm has
 outputs or inputs, S and T of that which it knows when a sequence was started; E event, R reply), name, number in hex,
 fields as ``name:type`` in the letters of ``struct``, little endian without padding, then ``text`` (UTF-8) or ``bytes``
-where the rest of the payload is such a tail. A line that begins with a blank goes on with the row.
+where the rest of the payload is such a tail. A line that begins with a blank continues with the row.
 """
 
 from struct import calcsize
@@ -84,7 +84,7 @@ def rows(kind: str) -> "list[tuple[str, int, str, list[str], str]]":
 
 
 def offset(kind: str, name: str, field: str) -> int:
-    """Bytes of the payload of a message before one of its fields; KeyError where there is none."""
+    """Bytes of the payload of a message before one of its fields; KeyError if there is none."""
     for found, _, layout, fields, _ in rows(kind):
         if found == name and field in fields:
             return calcsize(layout[: 1 + fields.index(field)])

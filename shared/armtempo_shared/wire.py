@@ -4,7 +4,7 @@ A frame::
 
     0xA5 | length N (H) | sequence (B) | message id (B) | payload, N bytes | crc32 over length..payload (I)
 
-little endian. A frame whose checksum fails is ignored and the search for 0xA5 goes on at the next byte. The host
+little endian. A frame whose checksum fails is ignored and the search for 0xA5 continues at the next byte. The host
 sends commands; the board answers each with ``ok`` or ``error`` carrying the command's sequence number. A repeated
 command is answered again from memory but not executed again. The board sends events by itself, under their own
 sequence numbers.
@@ -65,7 +65,7 @@ def encode(entry: "Any", values: "Any" = (), tail: "bytes | str" = b"") -> bytes
 
 
 def decode(entry: "Any", payload: bytes) -> "tuple[tuple[Any, ...], Any]":
-    """(tuple of field values, tail) of a payload; WireError where it does not fit."""
+    """(tuple of field values, tail) of a payload; WireError if it does not fit."""
     _, _, fields, _, kind = entry
     size = struct.calcsize(fields)
     if len(payload) < size or (not kind and len(payload) != size):

@@ -233,7 +233,9 @@ def test_boards(tmp_path: Path) -> None:
         wired_arms.load(tmp_path, PUMP.replace("PD0", "PB9"), board="VCC_GND_F407VE")
     with pytest.raises(InputError, match="PA6 is taken on the VCC_GND_F407ZG by the flash chip"):
         wired_arms.load(tmp_path, PUMP.replace("PD0", "PA6"), board="VCC_GND_F407ZG")
-    with pytest.raises(InputError, match=r"PYBV11 has not the pins that the engine takes: PE12 \(ENABLE"):
+    with pytest.raises(
+        InputError, match=r"PYBV11 does not have the pins that the engine takes: PE12 \(ENABLE"
+    ):
         wired_arms.load(tmp_path, board="PYBV11")
     with pytest.raises(InputError, match="board = 'PYBV10' is not allowed"):
         wired_arms.load(tmp_path, board="PYBV10")

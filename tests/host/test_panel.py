@@ -16,7 +16,8 @@ from armtempo.model.job import Job
 from armtempo.panel.access import COOKIE, MOST_BYTES, Access
 from armtempo.panel.desk import Desk
 from armtempo.panel.held_jog import ALIVE_S, ButtonHold, JogButton
-from armtempo.panel.operator import Operator
+from armtempo.panel.operator import Needs, Operator
+from armtempo.panel.sequence_desk import SequenceDesk
 
 ARM = Arm.paper()
 ME, OTHER = "me", "other"
@@ -122,6 +123,12 @@ class Board:
         self.jog = Jog()
         self.stops: list[tuple[bool, str]] = []
 
+    def configure(self, arm: Arm) -> None:
+        """It has this arm."""
+
+    def close(self) -> None:
+        """Nothing is open."""
+
     def held_jog(self, *_: object) -> Jog:
         return self.jog
 
@@ -133,7 +140,8 @@ class Board:
 @pytest.fixture
 def operator(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Operator]:
     monkeypatch.setattr("armtempo.panel.operator.LOOK_S", 1000.0)  # it is never asked for its state
-    made = Operator(Board(), ARM, Desk(ARM, tmp_path, None), tmp_path / "runs")  # type: ignore[arg-type]
+    board = Board()
+    made = Operator(lambda sink: board, "sim", Desk(ARM, tmp_path, None), tmp_path / "runs")  # type: ignore[arg-type, return-value]
     made.take_control(ME)
     yield made
     made.close()
@@ -224,3 +232,91 @@ def test_nothing_is_written_outside_of_the_folder(tmp_path: Path) -> None:
 def test_rows_that_are_no_motion_are_refused(tmp_path: Path, rows: list[list[float]]) -> None:
     with pytest.raises(InputError):
         Desk(ARM, tmp_path, None).job_with(rows, "through")
+
+
+SEQUENCE = """# all day
+name = "day"  # its name
+
+[[step]]
+repeat = 2  # twice
+
+# the tray
+[[step]]
+goto = [10, -60, 40]
+
+[[step]]
+wait_s = 0.5  # it settles
+
+[[step]]
+end = "repeat"
+"""
+
+
+@pytest.fixture
+def steps(tmp_path: Path) -> SequenceDesk:
+    (tmp_path / "day.toml").write_text(SEQUENCE)
+    (tmp_path / "job.toml").write_text('name = "feed"\nvia_deg = [[0, -60, 40], [20, -75, 50]]\n')
+    (tmp_path / "damaged.toml").write_text("[[step")
+    desk = SequenceDesk(ARM, tmp_path)
+    assert desk.files() == ["day.toml"]
+    desk.open("day.toml")
+    return desk
+
+
+def test_steps_are_edited_and_comments_stay(steps: SequenceDesk) -> None:
+    steps.set(0, "repeat", "for ever")
+    steps.set(1, "goto", "[12.5, -60, 40]")
+    steps.move(2, -1)
+    steps.move(0, -1)  # it is the first
+    steps.add(1)
+    steps.set_kind(1, "wait_s")
+    steps.set(1, "wait_s", "0.25")
+    file = steps.save()
+    text = file.read_text()
+    for comment in ("# all day", "# its name", "# twice", "# the tray", "# it settles"):
+        assert comment in text
+    steps.open("day.toml")
+    assert steps.steps == [
+        {"repeat": "for ever"},
+        {"wait_s": "0.25"},
+        {"wait_s": "0.5"},
+        {"goto": "[12.5, -60, 40]"},
+        {"end": "repeat"},
+    ]
+    steps.delete(0)
+    steps.delete(3)
+    assert len(steps.sequence().steps) == 3
+
+
+def test_steps_that_are_no_sequence_are_not_saved(steps: SequenceDesk) -> None:
+    steps.delete(3)
+    with pytest.raises(InputError, match="repeat has no end"):
+        steps.save()
+    assert steps.file is not None
+    assert steps.file.read_text() == SEQUENCE
+    with pytest.raises(InputError, match="no such sequence"):
+        steps.open("../day.toml")
+
+
+def test_a_board_that_does_not_answer_can_be_deployed_to_and_nothing_else(tmp_path: Path) -> None:
+    board = Board()
+    answers = [LinkError("the board runs another program"), board]
+
+    def connect(sink: object) -> Board:
+        answer = answers.pop(0)
+        if isinstance(answer, LinkError):
+            raise answer
+        return answer
+
+    made = Operator(connect, "port", Desk(ARM, tmp_path, None), tmp_path)  # type: ignore[arg-type]
+    made.take_control(ME)
+    assert "another program" in made.why_not(ME)
+    assert "another program" in made.why_not(ME, Needs.BOARD)
+    with pytest.raises(LinkError, match="another program"):
+        made.board.list()
+    deployed = threading.Event()
+    made.do("deploy", ME, lambda: made.without_board(deployed.set), Needs.IDLE)
+    wait(lambda: not made.busy)
+    assert deployed.is_set()
+    assert made.board is board  # type: ignore[comparison-overlap]
+    made.close()

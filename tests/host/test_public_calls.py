@@ -39,7 +39,8 @@ GIVEN_BY_US |= {"StopRequest", "Trajectory", "Watcher", "Result", "VirtualBoard"
 """Classes that a user makes no objects of, or without arguments."""
 USERS_OWN = {"minimise.function", "minimise.rng", "launch.options"}
 """What these raise or start is the user's affair."""
-NO_CALLS = {"BoardState.of_json", "Job.of_table", "Arm.of_table", "StopRequest.ask", "StopRequest.check"}
+NO_CALLS = {"BoardState.of_json", "StopRequest.ask", "StopRequest.check"}
+NO_CALLS |= {"Arm.of_table", "Job.of_table", "Sequence.of_table"}
 NO_CALLS |= {f"Watcher.{name}" for name in ("begin", "on_sample", "end")}
 
 

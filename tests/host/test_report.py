@@ -208,7 +208,7 @@ def test_of_a_folder_without_an_arm_the_limits_are_not_known(tmp_path: Path) -> 
     assert "arm.json: cannot be read" in found.complaints[0]
     (path / "arm.json").unlink()
     text = words(run_report.write(path))
-    assert "does not say which arm it was, so the motion is not held against limits" in text
+    assert "does not say which arm it was, so the motion is not checked against limits" in text
     assert evaluate(path).complaints == ()
 
 

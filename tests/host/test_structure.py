@@ -34,6 +34,7 @@ ORDER = (
     "deploy",  # the board program onto a board
     "runs",  # run folders and what the samples say
     "report",  # pages, plots, tables
+    "selftest",  # a board measures itself
     "robot",  # a board in use: home, go, run, stop
     "pipeline",  # plan, load, run, report
     "paper",  # its tables and figures, repeated

@@ -212,13 +212,13 @@ class Terminal:
 def test_keys_move_the_arm_in_steps_and_while_held(tmp_path: Path) -> None:
     with homed() as port:
         screen = Terminal("jog", "--arm", "paper", "--port", port, folder=tmp_path)
-        screen.wait_for("joint 1, step 1°, 25 % | 0.00 -60.00 39.99 °")
+        screen.wait_for("joint 1, step 1°, 25 % | 0.00 -60.00 39.99°")
         screen.press("2")
         screen.wait_for("joint 2, step 1°")
         screen.press("\x1b[C")
-        screen.wait_for("| 0.00 -59.00 39.99 °")
+        screen.wait_for("| 0.00 -59.00 39.99°")
         screen.press("s+")
-        screen.wait_for("step 10°, 25 % | 0.00 -48.99 39.99 °")
+        screen.wait_for("step 10°, 25 % | 0.00 -48.99 39.99°")
         screen.press("z")
         screen.wait_for("tool along z, step 10 mm")
         screen.press("k")

@@ -50,7 +50,7 @@ def test_files(bare: VirtualBoard, tmp_path: Path) -> None:
 
 
 def test_a_full_flash_is_said(bare: VirtualBoard, tmp_path: Path) -> None:
-    (bare.flash_dir / "there").write_bytes(bytes(95_000))
+    (bare.flash_dir / "there").write_bytes(bytes(160_000))
     (tmp_path / "big").write_bytes(bytes(5_000))
     assert "No space left" in mpremote(bare, "cp", str(tmp_path / "big"), ":big", code=1)
 

@@ -145,7 +145,7 @@ def _drop_engine(board: "ArmState") -> None:
 
 
 def drop_outputs(board: "ArmState") -> None:
-    """Safe values, then let go of pins and timers."""
+    """Safe values, then release pins and timers."""
     outputs = board.outputs
     outputs.safe()
     for held in outputs.held:

@@ -119,11 +119,11 @@ class ArmState:
         return self.engine is not None and (self.engine.moving or self.sequence is not None)
 
     def known(self) -> int:
-        """Bit a joint: its position is known."""
+        """One bit per joint: its position is known."""
         return self.engine.known if self.engine else 0
 
     def everyone(self) -> int:
-        """Bit a joint, all set."""
+        """One bit per joint, all set."""
         return (1 << self.joints) - 1
 
     def fault(self) -> int:

@@ -46,7 +46,7 @@ class Controller(ArmState):
         self._can_brake = False  # the motion can come to rest along its path
         self._next_rate = _PERMILLE  # of the next run that a host starts
         self._by_host = False  # the run was started by a command
-        self._held = 0  # the run goes on only while the host says hold,
+        self._held = 0  # the run continues only while the host says hold,
         self._hold_ms: "Any" = 0  # which it did then
         self._assumed = 0  # joints whose position a homing motion took for granted
 
@@ -253,7 +253,7 @@ class Controller(ArmState):
             self.engine.brake()
 
     def change_speed(self, rate: int) -> None:
-        """What moves goes on at ``rate`` thousandths (0: pause, RESUME: as before), or a host's next run begins so."""
+        """Change the rate of what moves, or of a host's next run: thousandths; 0: pause, RESUME: as before."""
         if self.moving():
             (self.sequence or self.engine).change_rate(rate)
         elif rate in (0, RESUME):

@@ -65,7 +65,7 @@ def _build(port: "pyb.USB_VCP", root: str) -> App:
 
 
 def run(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
-    """Turn the loop until a host asks for the REPL. Whatever ends it, nothing goes on moving then."""
+    """Turn the loop until a host asks for the REPL. Whatever ends it, nothing keeps moving then."""
     try:
         while True:
             app.turn()

@@ -46,9 +46,9 @@ def workspace() -> "Workspace":
 
 
 def share(workspace: "Workspace", outputs: int, inputs: int) -> None:
-    """Where memory is short, leave heap for so many outputs and inputs, out of the engine's, which nobody uses now.
+    """Where memory is short, leave heap for that many outputs and inputs, out of the engine's, which nobody uses now.
 
-    What the heap has not in one piece any more, the engine goes without, until the program starts again.
+    What the heap no longer has in one piece, the engine goes without, until the program starts again.
     """
     words = workspace.words
     if workspace.is_short:

@@ -34,7 +34,7 @@ def checked(board: "ArmState", motion: "MotionFile", crc: "int | None") -> "Moti
 
 
 def assume(board: "ArmState", motion: "MotionFile", unknown: int) -> int:
-    """Declare that the joints stand where a homing motion begins; those that are not known to (bit a joint).
+    """Declare that the joints stand where a homing motion begins; those that are not known to (one bit per joint).
 
     ``unknown``: joints of unknown position.
     """

@@ -25,7 +25,7 @@ class SampleBuffer:
         self.configure(0)
 
     def configure(self, joints: int) -> None:
-        """Samples of so many joints from now on."""
+        """Samples of that many joints from now on."""
         self.size = self.flags_at + 1 + _BYTES_PER_JOINT * joints
         self._joints = joints
         self._capacity = len(self._buffer) // self.size

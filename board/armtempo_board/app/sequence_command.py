@@ -1,4 +1,4 @@
-"""What is told of the sequence, for a board on which one has been started: asked for, and row by row; it allocates
+"""What is reported of the sequence, for a board on which one has been started: asked for, and row by row; it allocates
 nothing.
 """
 
@@ -40,7 +40,7 @@ class SequenceCommand:
         self._name = name
         self._counters = counters
         self._counts = array("i", [0] * len(counters))
-        self._sent = 0  # rows that the host was told of
+        self._sent = 0  # rows that were reported to the host
         for event, number, layout, _, _ in rows("E"):
             if event == "row":
                 self._number = number

@@ -17,7 +17,7 @@ _PROBED = (0, 1, 2, 4, 8, 16, 32, 64, 128, 256, 512, PROCESSOR_WORDS - 1)  # wor
 
 
 def find() -> int:
-    """Its address, ready to be used; 0 where it does not keep what is written to it.
+    """Its address, ready to be used; 0 if it does not keep what is written to it.
 
     A chip without it is not asked: there the access itself would fail.
     """

@@ -77,7 +77,7 @@ MODE_SHIFT = const(5)  # with the mode's place there
 ON_PORT_B = const(6)  # its STEP pin; else on port A
 PIN_BIT = const(7)
 TURN_TIMES = const(8)  # when the queued turns are due
-TURN_ROOM = const(8)  # so many
+TURN_ROOM = const(8)  # this many
 RING = const(16)  # the state of its ring
 JOINT_WORDS = const(29)
 # words of a line behind six joints: of an external interrupt, 8 to 15, or of the program itself
@@ -121,7 +121,7 @@ _LOW_BITS = const(0x3FFFFFFF)
 SPARE_ENTRIES = const(8)  # of a ring, that are not overwritten: those matched last, and the far-away entry
 _GUARD_TICKS = const(32768)  # 390 us: entries are only added behind a rising edge that is further away,
 _FAR_AHEAD_TICKS = const(3145728)  # but not 37 ms away,
-_MOST_ENTRIES = const(512)  # and so many at most, which takes less than the 390 us
+_MOST_ENTRIES = const(512)  # and at most this many, which takes less than the 390 us
 # modes of an output (RM0090 18.4.7), by what is subtracted from all three bits set
 _MODE_BITS = const(7)
 _TO_TOGGLE = const(4)  # 3: toggle on match
@@ -193,7 +193,7 @@ def matches(state: ptr32, dma: ptr32) -> int:
 
 @micropython.viper
 def rings_to_refill(block: ptr32, dma: ptr32, timer: ptr32) -> int:
-    """Bit a joint: three eighths of its ring are free, so up to ROOM entries are to be added. -1: no ring is fed.
+    """One bit per joint: three eighths of its ring are free, so up to ROOM entries are to be added. -1: no ring is fed.
 
     130 instructions and 79 a joint, 126 where entries are to be added.
     """

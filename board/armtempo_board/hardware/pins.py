@@ -35,7 +35,7 @@ LEDS = ("D12", "D13", "D14", "D15")  # green, orange, red, blue
 
 
 def name(number: int) -> str:
-    """A pin by its number in the arm record, 16 times its port and the number in it; "" where there is none."""
+    """A pin by its number in the arm record, 16 times its port and the number in it; "" if there is none."""
     port = number >> _PORT_SHIFT
     return _PORTS[port] + str(number & _LINE_MASK) if port < len(_PORTS) else ""
 

@@ -34,7 +34,7 @@ class Sampler:
         self._hook = self._interrupt  # bound once: making a bound method allocates
 
     def configure(self, joints: int, counters: "tuple[int, ...]") -> None:
-        """For an arm of so many joints; ``counters``: addresses of the encoder timers in use."""
+        """For an arm of that many joints; ``counters``: addresses of the encoder timers in use."""
         for word in range(isr.BLOCK_WORDS):
             self.block[word] = 0
         self.block[isr.JOINTS] = joints

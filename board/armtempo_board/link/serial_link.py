@@ -1,7 +1,7 @@
 """The board's end of the serial link: commands in, replies and events out. It never waits and never allocates.
 
 Where a host stops reading, ``out`` fills up. Then the reply waits in ``reply``, events wait where they come from,
-and the main loop goes on.
+and the main loop continues.
 """
 
 import time
@@ -65,7 +65,7 @@ class SerialLink:
         self._reply_waits = True
 
     def room(self, size: int) -> bool:
-        """Whether an event with so many bytes of payload fits into ``out`` now; replies go first."""
+        """Whether an event with that many bytes of payload fits into ``out`` now; replies go first."""
         self._queue_reply()
         return not self._reply_waits and self._fits(size + OVERHEAD)
 

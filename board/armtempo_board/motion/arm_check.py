@@ -1,4 +1,4 @@
-"""Is an arm record fit to be taken? Judged before the one that is in force is let go."""
+"""Is an arm record fit to be taken? Judged before the one that is in force is released."""
 
 from armtempo_shared import armrecord, codes, engine_memory
 from armtempo_shared.limits import MAX_ENCODERS
@@ -20,7 +20,7 @@ def checked(data: bytes, room_words: int, most_joints: int) -> "Record":
     """(head, joints, crc32, outputs, inputs) of an arm record, as ``armrecord`` unpacks them.
 
     ``room_words``, ``most_joints``: what an engine can have. Refused: BAD_RECORD where it is damaged, of another
-    version, or names what the board has not; PIN_TAKEN where an output, input or polled switch has what is taken;
+    version, or names what the board does not have; PIN_TAKEN where an output, input or polled switch has what is taken;
     NO_ROOM with the bytes needed.
     """
     try:

@@ -59,7 +59,7 @@ class Engine(EngineParts):
     def __init__(self, head: "dict[str, int]", joints: "list[dict[str, int]]", workspace: Workspace) -> None:
         super().__init__(head, joints, workspace)
         self._watched_joint = self._background_task = 0
-        self._homing = 0  # bit a joint that moves in a homing motion
+        self._homing = 0  # one bit per joint that moves in a homing motion
         self._in_service = False  # service() or refill() is at work, or has not come to its end
         self.judged = False  # the next motion is one that was checked before, and nothing has changed since
 
@@ -69,7 +69,7 @@ class Engine(EngineParts):
         """Check a motion and fill the rings; Refused where something is wrong.
 
         ``rate``, in thousandths: how fast the motion's own time is to run. ``ready``: the ``NextMotion`` that has it
-        loaded already. ``homing``: bit a joint that moves in a homing motion; a switch of these ends it without a
+        loaded already. ``homing``: one bit per joint that moves in a homing motion; a switch of these ends it without a
         fault, and ``fault_joint`` says whose.
         """
         if self.moving:

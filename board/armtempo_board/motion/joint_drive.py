@@ -26,7 +26,7 @@ LOOKAHEAD_KITICKS = const(4096)
 
 _GUARD_KITICKS = const(16)  # 195 us: a turn of DIR is queued only behind an edge that is further away
 _OVERDUE_KITICKS = const(-164)  # 2 ms ago: the interrupt that fills the rings comes no more
-_REFILL_KITICKS = const(512)  # 6 ms between two looks at a queue that is full or goes on far enough, at most
+_REFILL_KITICKS = const(512)  # at most 6 ms between two looks at a queue that is full or long enough
 _NEVER_KITICKS = const(1 << 29)
 _NOT_FED = const(-(1 << 22))  # as in ring.py
 _LATEST_KITICKS = const(22)  # of the queue, as in step_queue.py
@@ -98,7 +98,7 @@ class JointDrive:
         self._next_refill_kiticks = -LOOKAHEAD_KITICKS  # nothing is to be done before
 
     def position(self, matches: int) -> int:
-        """Commanded steps after so many matches of the ring; call it in the order of the matches."""
+        """Commanded steps after that many matches of the ring; call it in the order of the matches."""
         steps = (matches + 1) >> 1
         while self._turns_out != self._turns_in:
             turned = self._turn_steps[self._turns_out & (_TURNS - 1)]
@@ -133,7 +133,7 @@ class JointDrive:
             return self._restart(now_kiticks) if self._sampler.quiet() else 0
         if generator.at_turn and not generator.waits() and ahead_kiticks > _GUARD_KITICKS and self._turn():
             self.can_queue_more = True
-        elif not can_queue_more:  # the queue is full, or goes on far enough
+        elif not can_queue_more:  # the queue is full, or long enough
             wait_kiticks = generator.queue[_LATEST_KITICKS] - now_kiticks >> 3
             if wait_kiticks > _REFILL_KITICKS:
                 wait_kiticks = _REFILL_KITICKS

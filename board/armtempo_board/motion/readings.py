@@ -102,7 +102,7 @@ class Readings:
         self._has_ended = True
 
     def next(self, buffer: "array[int]") -> bool:
-        """Copy the oldest sample to ``buffer`` and forget it; False where there is none."""
+        """Copy the oldest sample to ``buffer`` and forget it; False if there is none."""
         if self._in == self._out:
             return False
         at = (self._out & (_CAPACITY - 1)) * self._size

@@ -19,7 +19,7 @@ def check_start(
 ) -> int:
     """Duration of the motion, in ticks, or Refused.
 
-    ``limits`` as the engine has them, None for a motion whose splines were checked before; ``known``: bit a joint.
+    ``limits`` as the engine has them, None if its splines were checked before; ``known``: one bit per joint.
     """
     if limits is not None:
         check_splines(motion, joints, limits)

@@ -26,7 +26,7 @@ class Workspace:
 
         self.joints = joints
         self.words = words  # as many as can be; ``memory`` has less while outputs and inputs need heap
-        self.is_short = words < LARGEST_WORDS  # the heap has not enough for every arm
+        self.is_short = words < LARGEST_WORDS  # the heap does not have enough for every arm
         self._own = None if address else Memory([PROCESSOR_WORDS]).take(PROCESSOR_WORDS)
         self._address = address or uctypes.addressof(self._own)
         self.make_memory(words)
@@ -34,7 +34,7 @@ class Workspace:
         self.feeder = RingFeeder(self.sampler.block)
 
     def make_memory(self, words: int) -> None:
-        """Blocks of so many words; MemoryError where the heap has none such."""
+        """Blocks of that many words; MemoryError if the heap has no such block."""
         from armtempo_shared.engine_memory import PROCESSOR_WORDS, blocks  # here, so that it can be forgotten
 
         self.memory = Memory([])  # what was there goes first

@@ -2,7 +2,7 @@
 
 A number of the motion record, V = high * 2**28 + low with 0 <= low < 2**28, is kept as ``high + BIAS`` and ``low``.
 Both are positive and below 2**30, so they mean the same in the 31-bit integers of the chip, in the 32-bit and 64-bit
-words of compiled code, and on CPython. Every operation here is a weighted mean, which leaves the bias as it is. Of an
+words of compiled code, and on CPython. Every operation here is a weighted mean, which leaves the bias unchanged. Of an
 angle, ``high`` counts whole steps; of a time, 4096 ticks.
 
 A piece is array('i') of 12: six high words, then six low words. Cubic pieces are raised to degree 5 when they are

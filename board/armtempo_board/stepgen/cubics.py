@@ -63,7 +63,7 @@ _LONGEST_GROUP = const(4)
 def cubics_fit(steps: int, solver: ptr32, queue: ptr32) -> int:
     """Above 0 where two cubics of ``steps`` each, from FIRST_NODE over MIDDLE_NODE to END_NODE, keep the error bound.
 
-    Then the next ones may have so many eighths of these steps, as the error grows with their fourth power.
+    Then the next ones may have that many eighths of these steps, as the error grows with their fourth power.
 
     The Hermite cubic through the first and the end node misses the middle one by D in time and by E / (4 steps) in
     slope. Its fourth derivative alone makes each of the two D / 16 wrong at most, its fifth E / 26. D / 16 + E / 16 <=
@@ -161,7 +161,7 @@ def put_cubics(steps: int, node: ptr32, queue: ptr32, held_back: int) -> object:
     N**3: T ticks over N steps, with slopes s_a, s_b at the two nodes.
     Its differences are taken over groups of G steps. Within a group time grows evenly where that is true within 3/32
     tick (second derivative times G**2 / 8) for eight steps or more; else as a square, if that is true within 1/16 tick
-    (third derivative times G**3 / 125) for so many, and its rounding of G**2 / 16 units of time within another 1/16.
+    (third derivative times G**3 / 125) for that many, and its rounding of G**2 / 16 units of time within another 1/16.
     What the third and the second difference lose by rounding goes into those below them, so that the cubic it leaves
     vanishes at both ends and in the middle, the square at both ends: at most 0.004 M**3 and 0.06 M**2 units, for M
     groups.

@@ -153,7 +153,7 @@ def solve(solver: ptr32, high: int, length: int) -> object:
             target = 0
         if target > solver[RANGE]:
             target = solver[RANGE]
-        # Newton: w += residual / rate, from the step solved last; first with the rate half way if it goes on changing
+        # Newton: w += residual / rate, from the step solved last; first with the rate half way if it continues changing
         w = solver[_LAST_W]
         rate = solver[_LAST_RATE]
         residual = target - solver[_LAST_ANGLE]

@@ -173,12 +173,12 @@ class StepGenerator:
         return True
 
     def close(self) -> None:
-        """The motion is read no further; what only a motion needs is let go."""
+        """The motion is read no further; what only a motion needs is released."""
         self.subintervals.close()
         self._law = None
 
     def prepare(self, until_kiticks: int) -> bool:
-        """Put the next steps into the queue, unless it is full or goes on beyond a time already.
+        """Put the next steps into the queue, unless it is full or continues beyond a time already.
 
         What comes after that time is not written to the ring, and waits. True where it could go on: each call takes a
         limited time. At a turn it ends.
@@ -230,7 +230,7 @@ class StepGenerator:
         """Take the motion's time by a law from the real time on at which its ramp begins (time_law.py).
 
         Nothing may be written meanwhile. That time must not lie before any ``until_kiticks`` that ``prepare`` was
-        given. Only what was put into the queue last goes on beyond that: steps of one subinterval, or one that was held
+        given. Only what was put into the queue last lies beyond that: steps of one subinterval, or one that was held
         back. The ramp of the law before must lie behind what was written. ``is_last``: where the motion's time stands
         still behind the ramp, it is the end.
         """
@@ -406,7 +406,7 @@ class StepGenerator:
         """Whether the step at the first node may be followed by an opposite one within the gap.
 
         Acceleration near standstill is at most 0.16 steps / gap**2 (see motion_check.py), so a joint that takes less
-        than 12 gaps for a step is not back within a gap; held against 4 of them.
+        than 12 gaps for a step is not back within a gap; checked against 4 of them.
         """
         ticks = self._solver[_FIRST_NODE + _NODE_MANTISSA] >> self._solver[_FIRST_NODE + _NODE_EXPONENT]
         return self.queue[_MODE] >= _AT_START or ticks > self.queue[_SLOW_TICKS]

@@ -96,13 +96,13 @@ _LONG_KITICKS = const(1 << 19)  # longer than any cubic
 def emit(now: int, ring: ptr32, timer: ptr32) -> int:
     """Write edges of queued items to rings: of each joint up to UNTIL_KITICKS, and as many as its ROOM says.
 
-    ``now``: bit a joint; ``ring``: the state of the first joint's ring in the block of isr.py, behind which the others'
-    stand. Returns a bit for each joint whose last edge had passed by ``timer`` before all was written.
+    ``now``: one bit per joint; ``ring``: the state of the first joint's ring in the block of isr.py, followed by the
+    others'. Returns a bit for each joint whose last edge had passed by ``timer`` before all was written.
 
     An interrupt calls it (its cost: docs/hardware.md), once for all joints, as a call costs as much as ten steps or
     more. The compiler keeps the first two arguments in registers: ``now`` becomes the running time, and ``ring`` moves.
 
-    The program itself puts entry 0 of a ring into the compare register. So the stream begins with entry 1 and goes on
+    The program itself puts entry 0 of a ring into the compare register. So the stream begins with entry 1 and continues
     to one word behind the ring: entry 0 is repeated there. Behind the last entry stands one that is far away.
     """
     wanted = now

@@ -58,7 +58,7 @@ class PlanError(ArmtempoError):
 
 
 class MissingPackageError(ArmtempoError):
-    """``what`` needs an optional ``package`` that is not installed; ``extra`` is armtempo's extra that brings it."""
+    """``what`` needs an optional ``package`` that is not installed; ``extra`` is armtempo's extra that installs it."""
 
     def __init__(self, what: str, package: str, extra: str) -> None:
         super().__init__(

@@ -7,7 +7,7 @@ import sys
 
 
 def command(package: str, extra: str) -> str:
-    """The command that adds ``package``, or armtempo's ``extra`` that brings it, to this installation."""
+    """The command that adds ``package``, or armtempo's ``extra`` that installs it, to this installation."""
     if os.path.exists(os.path.join(sys.prefix, "pipx_metadata.json")):
         return f"pipx inject armtempo {package}"
     if os.path.exists(os.path.join(sys.prefix, "uv-receipt.toml")):
@@ -16,7 +16,7 @@ def command(package: str, extra: str) -> str:
 
 
 def upgrade(package: str) -> str:
-    """The command that brings a package of this installation up to date."""
+    """The command that updates a package of this installation."""
     if os.path.exists(os.path.join(sys.prefix, "pipx_metadata.json")):
         return f"pipx inject --force armtempo {package}"
     if os.path.exists(os.path.join(sys.prefix, "uv-receipt.toml")):

@@ -72,7 +72,7 @@ def stage(name: str) -> None:
 
 
 def alive() -> None:
-    """Work goes on: the progress is called again with what it was last called with, so that it may end the work."""
+    """Work continues: the progress is called again with what it was last called with, so that it may end the work."""
     if (current := _watched.get()) is not None:
         current.alive()
 

@@ -41,7 +41,7 @@ GROUPS = {
         "panel",
     ),
     "Board": (
-        *("ports", "deploy", "undeploy", "firmware", "flash", "configure"),
+        *("ports", "deploy", "undeploy", "firmware", "flash", "selftest", "configure"),
         *("upload", "list", "show", "remove", "rename"),
         *("virtual-board", "monitor", "config", "doctor", "help"),
     ),

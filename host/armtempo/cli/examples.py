@@ -39,6 +39,7 @@ EXAMPLES = {
     "undeploy": ("undeploy",),
     "firmware": ("firmware --board STM32F4DISC --micropython ~/micropython",),
     "flash": ("flash", "flash --image armtempo-firmware-STM32F4DISC.zip --port /dev/ttyACM0"),
+    "selftest": ("selftest --port /dev/ttyACM0", "selftest --json > selftest.json"),
     "configure": ("configure --arm my_arm.toml",),
     "upload": ("upload first.json", "upload first.json --name pick --default"),
     "list": ("list",),

@@ -59,9 +59,13 @@ def command(
         if is_sim(name):  # in real time, as a board is
             wanted = LaunchOptions(sim_flash(name), virtual_time=False, arm=arm)
             name = stack.enter_context(launch(wanted)).port
-        board = stack.enter_context(chosen.board(name, None, arm))
-        board.configure(arm)
-        operator = Operator(board, arm, Desk(arm, Path(), job), chosen.runs(None))
+
+        operator = Operator(
+            lambda sink: chosen.board(name, None, arm, sink=sink),
+            name,
+            Desk(arm, Path(), job),
+            chosen.runs(None),
+        )
         stack.callback(operator.close)
         address = f"http://{host}:{listening.getsockname()[1]}/" + (f"?token={token}" if token else "")
         click.echo(address)

@@ -66,7 +66,7 @@ def check_suitable(found: Survey) -> None:
 
 
 def lacks_pins(machine: str) -> bool:
-    """Whether a board, by what its firmware says that it runs on, has not all pins that the program uses."""
+    """Whether a board, by what its firmware says that it runs on, does not have all pins that the program uses."""
     return _64_PINS.search(machine) is not None
 
 

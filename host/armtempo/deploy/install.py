@@ -228,7 +228,7 @@ def _await_port(port: str) -> None:
 
 
 def _confirm(port: str) -> Hello:
-    """Wait until the board has started the program: its answer; LinkError where it does not."""
+    """Wait until the board has started the program: its answer; LinkError if it does not."""
     begin = time.monotonic()
     while True:
         try:

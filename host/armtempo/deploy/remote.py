@@ -43,7 +43,7 @@ class Survey:
     firmware_crc: int | None
     """Hash of a program that is built into the firmware; None without one."""
     files: dict[str, tuple[int, str]]
-    """Size and sha256, in hex, of each of our files, and of boot.py and main.py whoever they belong to."""
+    """Size and sha256, in hex, of each of our files, and of boot.py and main.py whichever program they belong to."""
 
     @property
     def release(self) -> str:

@@ -27,7 +27,7 @@ def check(arm_file: Path, job_file: Path | None = None) -> tuple[Arm | None, lis
         return arm, found
     if any(finding.level is Level.ERROR for finding in found):
         return arm, [*found, note("job", "not looked at", "correct the arm first")]
-    from armtempo.diagnosis import job  # here, because it brings the whole planner
+    from armtempo.diagnosis import job  # here, because it imports the whole planner
 
     return arm, _sorted([*found, *job.findings(arm, job_file)])
 
@@ -49,7 +49,7 @@ def check_arm(arm: Arm) -> list[Finding]:
 
 def _postures(arm: Arm) -> list[Finding]:
     """Tool poses of the arm's named postures that it cannot take."""
-    from armtempo.planning import via_points  # here, because it brings the inverse kinematics
+    from armtempo.planning import via_points  # here, because it imports the inverse kinematics
 
     try:
         via_points.check_postures(arm)

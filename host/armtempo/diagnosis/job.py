@@ -28,7 +28,7 @@ def findings(arm: Arm, path: Path) -> list[Finding]:
     except ArmtempoError as refused:
         text = "correct that; the rest of the job was not looked at"
         return [*suspected, error("job", str(refused), text)]
-    told = [note("job", text, "change the pose, or take it as it is") for text in notes]
+    told = [note("job", text, "change the pose, or accept it") for text in notes]
     return [*suspected, *told, *_steps(arm, via_deg)]
 
 

@@ -29,7 +29,7 @@ class Functions(NamedTuple, Generic[T]):
     sqrt: Callable[[T], T]
     arctan2: Callable[[T, T], T]
     wrapped: Callable[[T], T]
-    """Brings angles into [-pi, pi]."""
+    """Maps angles into [-pi, pi]."""
 
 
 FLOATS: Functions[float] = Functions(math.sqrt, math.atan2, lambda angle: math.remainder(angle, math.tau))

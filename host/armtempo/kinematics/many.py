@@ -32,7 +32,7 @@ class ManySolutions:
     usable: NDArray[np.bool_]
     """(N, 8): within reach and all ranges, and not equal to an earlier one."""
     nearest_deg: Array
-    """(N, joints): the usable one nearest to that posture; NaN where there is none."""
+    """(N, joints): the usable one nearest to that posture; NaN if there is none."""
 
 
 @checked

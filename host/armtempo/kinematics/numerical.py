@@ -19,7 +19,7 @@ from armtempo.model.tool_pose import Pose
 
 LEAST_STARTS, MOST_STARTS = 40, 240
 STARTS_PER_SOLUTION = 12
-"""The search goes on until it has started this often for each solution that it found, and once more."""
+"""The search continues until it has started this often for each solution that it found, and once more."""
 
 SAME_RAD = 1e-4
 """Postures with all joints this near to each other, whole turns aside, are one."""
@@ -211,4 +211,4 @@ def _next_step(answer: NumericalSolutions) -> str:
 
 
 FITTING = {4: "position and pitch", 5: "position and approach, or position, roll and pitch"}
-"""Poses that ask for as many numbers as so many joints can give."""
+"""Poses that ask for as many numbers as the joints can give."""

@@ -1,4 +1,4 @@
-"""What the closed form answers: angles of the eight solutions, what became of each, and what is singular."""
+"""What the closed form answers: angles of the eight solutions, the outcome of each, and what is singular."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from armtempo.basics.arrays import Array
 
 OK, TOO_FAR, TOO_NEAR, IN_OFFSET, DUPLICATE = range(5)
-"""What became of a solution: there, or Eq. (3) violated at the outer or inner border, or the wrist centre
+"""The outcome of a solution: there, or Eq. (3) violated at the outer or inner border, or the wrist centre
 nearer to axis 1 than the shoulder offset, or equal to an earlier solution."""
 
 ON_AXIS_1, ELBOW_STRETCHED, WRIST_STRAIGHT = 1, 2, 4

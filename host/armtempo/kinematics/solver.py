@@ -13,13 +13,13 @@ from functools import cached_property
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
-from armtempo.kinematics.choice import Choice, choose
+from armtempo.kinematics.choice import Candidate, Choice, choose
 from armtempo.kinematics.constraint import Constraint, Miss
 from armtempo.kinematics.descent import descend
 from armtempo.kinematics.forward import forward, frames
 from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.inverse import inverse_of_pose
-from armtempo.kinematics.numerical import MovingArm, NumericalSolutions, search, why_not
+from armtempo.kinematics.numerical import MovingArm, NumericalSolution, NumericalSolutions, search, why_not
 from armtempo.kinematics.ranges import Ranges
 from armtempo.kinematics.rejection import out_of_range, table
 from armtempo.kinematics.shape import refusals
@@ -76,6 +76,15 @@ class Answer:
     def success(self) -> bool:
         """Whether a posture can be used."""
         return not self.reason
+
+    @property
+    def usable_deg(self) -> list[tuple[float, ...]]:
+        """Every posture that can be used, (joints,) each, the nearest to the previous one first."""
+        found: list[Candidate | NumericalSolution] = []
+        found += self.choice.candidates if self.choice else ()
+        found += self.search.solutions if self.search else ()
+        usable = sorted((one for one in found if not one.rejections), key=lambda one: one.distance_rad)
+        return [tuple(map(math.degrees, one.angles_rad)) for one in usable]
 
     @property
     def angles_deg(self) -> tuple[float, ...]:

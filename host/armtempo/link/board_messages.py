@@ -210,7 +210,7 @@ def ending_name(number: int) -> str:
 
 
 def positions(tail: bytes) -> Positions:
-    """The tail of status, sample, done and fault: two int32 a joint; WireError where it does not fit."""
+    """The tail of status, sample, done and fault: two int32 a joint; WireError if it does not fit."""
     if len(tail) % 8:
         raise wire.WireError("length")
     values = struct.unpack(f"<{len(tail) // 4}i", tail)
@@ -233,7 +233,7 @@ def event(number: int, payload: bytes) -> Event:
 
 
 def decode(entry: tuple[Any, ...], payload: bytes) -> tuple[tuple[Any, ...], Any]:
-    """Values and tail of a payload, control characters spelt out; WireError where it does not fit."""
+    """Values and tail of a payload, control characters spelt out; WireError if it does not fit."""
     values, tail = wire.decode(entry, payload)
     return values, visible(tail) if isinstance(tail, str) else tail
 

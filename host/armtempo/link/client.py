@@ -225,7 +225,7 @@ class Client:
             return found
 
     def home(self, steps: Sequence[int | None]) -> None:
-        """Declare the positions of the joints, in steps; None leaves a joint as it is."""
+        """Declare the positions of the joints, in steps; None leaves a joint unchanged."""
         mask = sum(1 << joint for joint, value in enumerate(steps) if value is not None)
         tail = b"".join((value or 0).to_bytes(4, "little", signed=True) for value in steps)
         self.session.command("home", (mask,), tail)

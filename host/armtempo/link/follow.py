@@ -93,7 +93,7 @@ class Follower:
         """The samples in order, until the run has ended and each has arrived or is lost.
 
         ``between`` is called between two messages; it may tell the board to stop. Raises LinkError where
-        the connection breaks; a later call goes on from there.
+        the connection breaks; a later call continues from there.
         """
         while self._last is None:
             between()

@@ -56,6 +56,8 @@ class Session:
     def __init__(self, transport: Transport, clock: Callable[[], float] = time.monotonic) -> None:
         self.transport = transport
         self.clock = clock
+        self.open_transport: Callable[[], Transport] = lambda: transport
+        """Opens the port that this session is on, which was closed."""
         self.reopen: Callable[[], Transport] | None = None
         self.greet: Callable[[], None] = lambda: None
         """Raises OtherBoardError where another one answers, or the same one started anew."""
@@ -120,6 +122,11 @@ class Session:
             if silent or now_s - begin_s >= answer_timeout_s:
                 raise self._no_answer(name, now_s - begin_s)
             self.repeats += 1
+
+    def open_again(self) -> None:
+        """Open the port after ``transport.close``; what had come in part is forgotten."""
+        self._parser = wire.Parser()
+        self.transport = self.open_transport()
 
     def poll(self, timeout_s: float) -> board_messages.Event | None:
         """The oldest event; waits up to ``timeout_s`` for one, or until ``wake``."""

@@ -122,7 +122,7 @@ class LogFile:
     """A sink that writes a log; used as a context. InputError where the file cannot be opened.
 
     Each line is flushed, so that a killed program leaves a readable log. Where the disk fills up the log ends
-    and the traffic goes on; InputError says so when the context is left without another error.
+    and the traffic continues; InputError says so when the context is left without another error.
     """
 
     def __init__(self, path: Path) -> None:

@@ -40,7 +40,7 @@ class Turns:
 
     @contextmanager
     def in_a_hurry(self, timeout_s: float) -> Iterator[bool]:
-        """The next turn; gives False where it does not come within ``timeout_s``."""
+        """The next turn; gives False if it does not come within ``timeout_s``."""
         self._count(1)
         try:
             mine = self._lock.acquire(timeout=timeout_s)

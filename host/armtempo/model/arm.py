@@ -164,7 +164,7 @@ class Arm:
         return tuple(joint.home_deg for joint in self.driven)
 
     def posture(self, name: str) -> ArmPosture:
-        """The posture of that name, "home" among them; InputError, naming the nearest, where there is none."""
+        """The posture of that name, "home" among them; InputError, naming the nearest, if there is none."""
         if name == named.HOME:
             return ArmPosture(name, self.home_deg)
         found = [posture for posture in self.postures if posture.name == name]

@@ -67,7 +67,7 @@ def problems(arm: PinUser) -> list[PinProblem]:
     engine = engine_pins.taken_pins(arm)
     missing = [f"{pin} ({use})" for pin, use in engine.items() if pin not in board.pins]
     if missing:
-        what = f"{board.name} has not the pins that the engine takes: {', '.join(missing)}"
+        what = f"{board.name} does not have the pins that the engine takes: {', '.join(missing)}"
         return [PinProblem("board", what, "take a board whose chip has 100 pins or more")]
     found = _pin_problems(arm, board, engine)
     named = [problem.where for problem in found]

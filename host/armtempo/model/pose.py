@@ -94,7 +94,7 @@ def _nearest_rotation(part: Array, what: str) -> Array:
     rotation: Array = left @ right
     if np.linalg.det(rotation) < 0.0:
         raise InputError(f"{what}: the 3 x 3 part is a mirror image (left-handed)", "swap or negate a column")
-    # An exact matrix stays as it is, to the last bit.
+    # An exact matrix is unchanged, to the last bit.
     return part if np.abs(rotation - part).max() < 1e-14 else rotation
 
 

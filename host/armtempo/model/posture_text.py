@@ -1,4 +1,4 @@
-"""Writing a posture into the text of an arm file: one table is added or replaced, everything else stays as it is."""
+"""Writing a posture into the text of an arm file: one table is added or replaced, everything else is unchanged."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def _changed(text: str, name: str, values: str, end: str) -> str:
 
 
 def _place(lines: list[str], name: str) -> tuple[int, int] | None:
-    """Where the table stands: the line of its header, and the line behind it; None where there is none."""
+    """Where the table stands: the line of its header, and the line behind it; None if there is none."""
     header = re.compile(rf"\s*\[\s*posture\s*\.\s*[\"']?{re.escape(name)}[\"']?\s*\]\s*(#.*)?")
     heads = [number for number, line in enumerate(lines) if header.fullmatch(line.rstrip("\r\n"))]
     for head in heads[:1]:

@@ -77,14 +77,17 @@ class Sequence:
 
         Raises InputError, naming file, step and key, for anything missing, unknown or not allowed.
         """
-        arm = Arm.of(arm)
-        top = toml_table.read(path)
+        return cls.of_table(toml_table.read(path), Arm.of(arm))
+
+    @classmethod
+    def of_table(cls, top: Table, arm: Arm) -> Sequence:
+        """The sequence of a table, whose file may be still to be written; errors as of ``load``."""
         name = name_of(top, LONGEST_NAME)
-        reader = _Reader(arm, Path(path), _postures(top, arm))
+        reader = _Reader(arm, Path(top.file), _postures(top, arm))
         start = reader.posture(top, "start") if top.has("start") else None
         steps = reader.steps(top)
         top.done()
-        return cls(name, steps, start, str(path))
+        return cls(name, steps, start, top.file)
 
 
 def arm_named(path: Path | str) -> Path | None:

@@ -14,7 +14,7 @@ from armtempo.model.posture import ArmPosture
 
 STOP, FAULT, NEXT = "stop", "fault", "next"
 ON_TIMEOUT = (STOP, FAULT, NEXT)
-"""What happens where an input does not come in time: the sequence ends in order, or by a fault, or goes on."""
+"""What happens where an input does not come in time: the sequence ends in order, or by a fault, or continues."""
 FOR_EVER = "for ever"
 MOST_S = MAX_WAIT_MS / 1000
 """Longest wait."""

@@ -56,7 +56,7 @@ def via_from_csv(
 
 
 def job_text(name: str, path: ImportedPath) -> str:
-    """A job file through these via points, everything else as it is by default.
+    """A job file through these via points, everything else by default.
 
     Of a thinned path the joints pass the via points together, as they did in the table.
     """
@@ -66,7 +66,7 @@ def job_text(name: str, path: ImportedPath) -> str:
 
 
 def _times(table: NumberTable) -> Array | None:
-    """The column ``time_s``, (n,), which must increase; None where there is none."""
+    """The column ``time_s``, (n,), which must increase; None if there is none."""
     if table.header is None or TIME_COLUMN not in table.header:
         return None
     times = np.array(table.numbers([table.header.index(TIME_COLUMN)]))[:, 0]

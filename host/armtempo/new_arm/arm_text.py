@@ -16,7 +16,7 @@ _STILL_DEG = 0.001
 
 _HEAD = """\
 # Imported from {source}, robot {robot}: from link {base} to link {tip}.
-# Held against the URDF's own forward kinematics at {postures} random postures within the ranges: worst errors
+# Checked against the URDF's own forward kinematics at {postures} random postures within the ranges: worst errors
 # {position_mm:.2g} mm and {rotation_deg:.2g} degrees. Joint angles are those of the URDF, in degrees.
 #
 # A URDF says nothing of motors, gears, encoders and wiring. Before the arm can be planned for:

@@ -40,7 +40,7 @@ class JointEntry:
         return self.steps_per_rev * self.microsteps * self.gear_ratio / 360.0
 
     def most_speed_deg_s(self, joints: int) -> float:
-        """The speed that the board's step rate, shared by so many joints, and MOTOR_RPM allow, degrees/s."""
+        """The speed that the board's step rate, shared by that many joints, and MOTOR_RPM allow, degrees/s."""
         rate = min(MAX_STEP_RATE, MAX_STEP_RATE_SUM / joints)
         return min(rate / self.steps_per_deg, MOTOR_RPM * 6.0 / self.gear_ratio)
 
@@ -82,7 +82,7 @@ def _number(number: int, key: str, value: str) -> float | int:
 
 
 def table(entry: JointEntry, channel: int, joints: int) -> str:
-    """The joint's ``[[joint]]`` table of an arm file of so many joints."""
+    """The joint's ``[[joint]]`` table of an arm file of that many joints."""
     most = entry.most_speed_deg_s(joints)
     speed = min(60.0, float(f"{0.9 * most:.2g}")) if entry.speed_deg_s is None else entry.speed_deg_s
     lines = [

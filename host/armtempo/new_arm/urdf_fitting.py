@@ -1,4 +1,4 @@
-"""The simplest rows that do what the URDF does: derived, rounded, held against its own forward kinematics."""
+"""The simplest rows that do what the URDF does: derived, rounded, checked against its own forward kinematics."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ def geometry(rows: Sequence[DhRow]) -> Geometry:
 
 
 def rounded(rows: Sequence[DhRow], decimals: int) -> list[DhRow]:
-    """The rows with so many decimals, no zero negative and no alpha of -180."""
+    """The rows with that many decimals, no zero negative and no alpha of -180."""
     table = []
     for row in rows:
         theta, d, a, alpha = (round(value, decimals) + 0.0 for value in row[1:])

@@ -116,7 +116,7 @@ _MOST_VIOLATED = -0.5
 def minimise(program: Program, x: Array, settings: Schedule | None = None) -> Minimum:
     """The local optimum near ``x``; none of the iterates breaks an inequality.
 
-    Where ``x`` itself breaks one it is given back as it is, not converged.
+    Where ``x`` itself breaks one it is returned unchanged, not converged.
     """
     return _Solver(program, x, settings or Schedule()).run()
 

@@ -8,8 +8,9 @@
     arm_scene.py   the arm in 3-D
     panel_page.py  what the tabs of a page share
     layout.py      header with stop, scene, tabs
-    move_tab.py, plan_tab.py, run_tab.py, board_tab.py
+    move_tab.py, plan_tab.py, run_tab.py, sequence_tab.py, board_tab.py
     desk.py        the job that is planned, and its file
+    sequence_desk.py  the sequence that is edited, and its file
     charts.py      curves of all joints
     words.py       every English text
     server.py      all of it served

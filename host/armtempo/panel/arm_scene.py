@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 from nicegui import ui
-from scipy.spatial.transform import Rotation
+from nicegui.elements.scene.scene_object3d import Object3D
+from nicegui.events import SceneClickEventArguments
 
 from armtempo.basics.arrays import Array
 from armtempo.kinematics.chain import all_angles_deg, outline_mm
+from armtempo.kinematics.forward import all_frames
+from armtempo.kinematics.geometry import Geometry
 from armtempo.model.arm import Arm
 
 COLOUR, GHOST, PATH, RUN, VIA = "#4477aa", "#999999", "#228833", "#ee6677", "#ccbb44"
@@ -20,7 +22,11 @@ COLOUR, GHOST, PATH, RUN, VIA = "#4477aa", "#999999", "#228833", "#ee6677", "#cc
 _THICK = 0.03
 """Radius of a link as a share of the arm's reach, for arms whose file gives none."""
 _SHORT_MM = 1e-6
+_OPPOSITE = 1e-9
 _GHOST_OPACITY = 0.25
+_VIA_NAME = "via "
+FOLLOW = "follow"
+"""The view that keeps the tool in the middle."""
 
 
 class ArmShape:
@@ -35,6 +41,22 @@ class ArmShape:
         return outline_mm(self.arm, all_angles_deg(self.arm, np.asarray(angles_deg))) / self.reach_mm
 
     @cached_property
+    def _geometry(self) -> Geometry:
+        return Geometry.of(self.arm)
+
+    def dials(self, angles_deg: Array) -> list[list[float]]:
+        """For each driven joint 10 numbers: centre, directions of its zero and of its axis, angle in rad."""
+        angles_rad = np.radians(all_angles_deg(self.arm, np.asarray(angles_deg)))
+        poses = all_frames(self._geometry, angles_rad.tolist())
+        found = []
+        for joint in self.arm.driven_indices:
+            axis, now, angle = poses[joint, :3, 2], poses[joint + 1, :3, 0], angles_rad[joint]
+            zero = now * np.cos(angle) - np.cross(axis, now) * np.sin(angle)
+            numbers = (*poses[joint, :3, 3] / self.reach_mm, *zero, *axis, angle)
+            found.append([round(float(number), 5) for number in numbers])
+        return found
+
+    @cached_property
     def pieces(self) -> list[tuple[int, float]]:
         """The point at which each link begins in the outline, and its length; none of no length."""
         points = self.outline(np.array(self.arm.home_deg))
@@ -47,13 +69,14 @@ class ArmShape:
 
     def poses(self, angles_deg: Array) -> list[list[float]]:
         """x, y, z and the quaternion x, y, z, w of each piece's middle: its y axis points along it."""
-        points = self.outline(angles_deg)
-        found = []
-        for index, _ in self.pieces:
-            begin, end = points[index], points[index + 1]
-            along = (end - begin) / np.linalg.norm(end - begin)
-            turn, _ = Rotation.align_vectors([along], [[0.0, 1.0, 0.0]])
-            found.append([*((begin + end) / 2).round(5).tolist(), *turn.as_quat().round(5).tolist()])
+        points, first = self.outline(angles_deg), [index for index, _ in self.pieces]
+        begin, end = points[first], points[np.array(first) + 1]
+        along = (end - begin) / np.linalg.norm(end - begin, axis=1, keepdims=True)
+        zero = np.zeros(len(along))
+        turns = np.column_stack((along[:, 2], zero, -along[:, 0], 1.0 + along[:, 1]))  # from y, the short way
+        turns[turns[:, 3] < _OPPOSITE] = (1.0, 0.0, 0.0, 0.0)
+        turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+        found: list[list[float]] = np.hstack(((begin + end) / 2, turns)).round(5).tolist()
         return found
 
 
@@ -62,12 +85,21 @@ class ArmScene:
 
     def __init__(self, shape: ArmShape) -> None:
         self._shape = shape
-        with ui.scene(width=800, height=500, grid=(4, 16), background_color="#ffffff").classes(
-            "w-full h-full"
+        self.picked: Callable[[int], object] = lambda number: None
+        """Called with the number of a via point that was clicked."""
+        self.dragged: Callable[[int, Array], object] = lambda number, position_mm: None
+        """Called with the number of a via point that was dragged, and where to, (3,)."""
+        with ui.scene(
+            width=800,
+            height=500,
+            grid=(4, 16),
+            background_color="#ffffff",
+            on_click=self._clicked,
+            on_drag_end=lambda event: self._moved(event.object_name, [event.x, event.y, event.z]),
         ) as self.scene:
             self._links = self._capsules(COLOUR, 1.0)
             self._ghost = self._capsules(GHOST, _GHOST_OPACITY)
-        self._lines: dict[str, list[object]] = {}
+        self._dots: list[Object3D] = []
         self.look("free")
 
     def _capsules(self, colour: str, opacity: float) -> list[str]:
@@ -83,33 +115,50 @@ class ArmScene:
 
     @property
     def parts(self) -> str:
-        """What the page's script moves: the scene, its links and its ghost, as JSON."""
-        return json.dumps({"scene": self.scene.id, "links": self._links, "ghost": self._ghost})
+        """What the page's script draws: the scene, its links and its ghost, the joints' ranges in rad, as JSON."""
+        ranges = [np.radians(joint.range_deg).round(4).tolist() for joint in self._shape.arm.driven]
+        return json.dumps(
+            {"scene": self.scene.id, "links": self._links, "ghost": self._ghost, "ranges": ranges}
+        )
 
     def look(self, view: str) -> None:
-        """Look from the side, from above, or from in front and above."""
-        eye = {"side": (0.01, -1.2, 0.2), "top": (0.01, -0.01, 1.4), "free": (0.7, -0.9, 0.6)}[view]
-        self.scene.move_camera(*eye, 0, 0, 0.1, duration=0.3)
+        """Look from the side, from above, from in front and above, or follow the tool."""
+        if view != FOLLOW:
+            eye = {"side": (0.01, -1.4, 0.25), "top": (0.01, -0.01, 1.6), "free": (0.8, -1.0, 0.7)}[view]
+            self.scene.move_camera(*eye, 0, 0, 0.15, duration=0.3)
+        ui.run_javascript(f"armtempo.follow = {json.dumps(view == FOLLOW)}")
 
     def draw(self, name: str, points_mm: Array, colour: str) -> None:
         """A line through points (N, 3), in the place of the one of that name."""
-        for old in self._lines.pop(name, []):
-            old.delete()  # type: ignore[attr-defined]
-        points = (np.asarray(points_mm) / self._shape.reach_mm).tolist()
+        points = (np.asarray(points_mm) / self._shape.reach_mm).round(4).tolist()
+        ui.run_javascript(f"armtempo.line({json.dumps(name)}, {json.dumps(points)}, {json.dumps(colour)})")
+
+    def dots(self, points_mm: Array) -> None:
+        """A ball at each via point, (N, 3), that can be clicked and dragged, in the place of those before."""
+        for old in self._dots:
+            old.delete()
         with self.scene:
-            self._lines[name] = [
-                self.scene.line(begin, end).material(colour) for begin, end in pairwise(points)
+            self._dots = [
+                self.scene.sphere(1.3 * _THICK, 16, 12)
+                .material(VIA)
+                .move(*point)
+                .with_name(f"{_VIA_NAME}{number}")
+                .draggable()
+                for number, point in enumerate((np.asarray(points_mm) / self._shape.reach_mm).tolist())
             ]
 
-    def dots(self, name: str, points_mm: Sequence[Sequence[float]], colour: str) -> None:
-        """A ball at each point, in the place of those of that name."""
-        for old in self._lines.pop(name, []):
-            old.delete()  # type: ignore[attr-defined]
-        with self.scene:
-            self._lines[name] = [
-                self.scene.sphere(1.3 * _THICK, 16, 12)
-                .material(colour)
-                .move(*(np.asarray(point) / self._shape.reach_mm).tolist())
-                .with_name(f"{name} {number}")
-                for number, point in enumerate(points_mm)
-            ]
+    def _clicked(self, event: SceneClickEventArguments) -> None:
+        for hit in event.hits:
+            if (number := _via_number(hit.object_name)) is not None:
+                self.picked(number)
+                return
+
+    def _moved(self, name: str, position: list[float]) -> None:
+        if (number := _via_number(name)) is not None:
+            self.dragged(number, np.array(position) * self._shape.reach_mm)
+
+
+def _via_number(name: str | None) -> int | None:
+    """The number in the name of a via point's ball; None for something else."""
+    number = (name or "").removeprefix(_VIA_NAME)
+    return int(number) if name != number and number.isdigit() else None

@@ -1,13 +1,20 @@
-"""The board: its state, its stored motions, the log."""
+"""The board: its state, its stored motions, its program, what goes over its port, the log."""
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Callable
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nicegui import ui
 
+from armtempo.deploy import deploy
+from armtempo.deploy.firmware import image, write
+from armtempo.link.board_messages import StoredMotion
 from armtempo.panel import words
+from armtempo.panel.operator import Needs
 
 if TYPE_CHECKING:
     from armtempo.panel.panel_page import PanelPage
@@ -34,18 +41,35 @@ class BoardTab:
 
     def __init__(self, page: PanelPage) -> None:
         self._page = page
-        self._operator = page.operator
+        self._operator = operator = page.operator
+        self._stored_of = ""
         ui.label(words.STATUS).classes("text-subtitle2")
         columns = [{"name": name, "label": "", "field": name, "align": "left"} for name in ("key", "value")]
         self._state = ui.table(columns=columns, rows=[]).props("dense flat hide-header wrap-cells")
-        with ui.row().classes("items-center gap-2"):
+        with ui.row():
             ui.label(words.STORED).classes("text-subtitle2")
-            page.control(ui.button(icon="refresh", on_click=self._read).props("flat dense"), moves=False)
-        self._stored = ui.column().classes("gap-1")
+            refresh = ui.button(icon="refresh", on_click=self._read).props("flat dense")
+            page.control(refresh.props(f'aria-label="{words.REFRESH}"'), Needs.COMMAND)
+        self._stored = ui.column()
+        ui.label(words.PROGRAM).classes("text-subtitle2")
+        with ui.row():
+            for text, sure, call in (
+                (words.DEPLOY, words.SURE_DEPLOY, self._deploy),
+                (words.FLASH, words.SURE_FLASH, self._flash),
+            ):
+                button = ui.button(text).props("outline no-caps")
+                button.on_click(lambda text=text, sure=sure, call=call: self._if_sure(text, sure, call))
+                page.control(button, Needs.IDLE)
         ui.label(words.LOG).classes("text-subtitle2")
-        self._log = ui.log(max_lines=200).classes("w-full h-48")
-        self._logged = 0
-        page.listeners.append(self._look)
+        self._log = _Lines(lambda: (operator.log, operator.lines))
+        with ui.row():
+            ui.label(words.TRAFFIC).classes("text-subtitle2")
+            ui.switch(on_change=lambda event: self._monitor(event.value)).props(
+                f'aria-label="{words.TRAFFIC}"'
+            )
+        self._traffic = _Lines(lambda: (operator.traffic, operator.messages))
+        self._traffic.log.set_visibility(False)
+        page.on_look(self._look)
 
     def _look(self) -> None:
         state = self._operator.state
@@ -58,11 +82,18 @@ class BoardTab:
             ]
             if rows != self._state.rows:
                 self._state.rows = rows
-        lines = list(self._operator.log)
-        new = self._operator.lines - self._logged
-        for line in lines[-new:] if new else ():
-            self._log.push(line)
-        self._logged = self._operator.lines
+            if self._stored_of != state.board_id and not self._operator.busy:
+                self._stored_of = state.board_id
+                self._read()
+        self._log.look()
+        if self._page.client in self._operator.monitors:
+            self._traffic.look()
+
+    def _monitor(self, wanted: bool) -> None:
+        self._traffic.log.set_visibility(wanted)
+        (self._operator.monitors.add if wanted else self._operator.monitors.discard)(self._page.client)
+
+    # stored motions
 
     def _read(self) -> None:
         def read() -> None:
@@ -70,24 +101,94 @@ class BoardTab:
             self._stored.clear()
             with self._stored:
                 for motion in motions:
-                    self._row(motion.name, motion.duration_s)
+                    self._row(motion)
 
         self._page.attempt(read)
 
-    def _row(self, name: str, duration_s: float) -> None:
-        operator = self._operator
-        with ui.row().classes("items-center gap-2"):
-            ui.label(f"{name} · {duration_s:.3f} s")
-            run = ui.button(words.RUN).props("outline dense no-caps")
-            run.on_click(
-                lambda: self._page.do(name, lambda: operator.board.run(name, 1, operator.runs, operator.part))
-            )
-            self._page.control(run)
-            remove = ui.button(words.REMOVE).props("flat dense no-caps")
-            remove.on_click(
-                lambda: self._page.do(words.REMOVE, lambda: operator.board.remove(name), moves=False)
-            )
-            self._page.control(remove, moves=False)
+    def _row(self, motion: StoredMotion) -> None:
+        operator, page, name = self._operator, self._page, motion.name
+
+        def run() -> None:
+            if motion.sequence:
+                operator.board.run_sequence(name, operator.take_sequence, out=operator.runs)
+            else:
+                operator.board.run(name, 1, operator.runs, operator.part)
+
+        with ui.row():
+            kind = words.A_SEQUENCE if motion.sequence else f"{motion.duration_s:.3f} s"
+            ui.label(f"{name} · {kind}{words.BY_BUTTON if motion.default else ''}")
+            button = ui.button(words.RUN, on_click=lambda: page.do(name, run)).props("outline dense no-caps")
+            page.control(button)
+            for text, call in (
+                (words.RENAME, lambda: self._rename(name)),
+                (words.REMOVE, lambda: self._remove(name)),
+            ):
+                button = ui.button(text, on_click=call).props("flat dense no-caps")
+                page.control(button, Needs.COMMAND)
+
+    async def _remove(self, name: str) -> None:
+        sure = words.SURE_REMOVE.format(name=name)
+        await self._if_sure(
+            words.REMOVE, sure, lambda: self._change(lambda: self._operator.board.remove(name))
+        )
+
+    async def _rename(self, name: str) -> None:
+        with ui.dialog() as asked, ui.card():
+            new = ui.input(words.NEW_NAME, value=name)
+            with ui.row():
+                ui.button(words.RENAME, on_click=lambda: asked.submit(new.value))
+                ui.button(words.CANCEL, on_click=lambda: asked.submit(None)).props("flat")
+        if wanted := await asked:
+            self._change(lambda: self._operator.board.rename(name, wanted))
+
+    def _change(self, call: Callable[[], object]) -> None:
+        self._page.at_once(call, Needs.COMMAND)
+        self._read()
+
+    # the board's program
+
+    async def _if_sure(self, text: str, sure: str, call: Callable[[], object]) -> None:
+        with ui.dialog() as asked, ui.card():
+            ui.label(sure)
+            with ui.row():
+                ui.button(text, on_click=lambda: asked.submit(True))
+                ui.button(words.CANCEL, on_click=lambda: asked.submit(False)).props("flat")
+        if await asked:
+            call()
+
+    def _deploy(self) -> None:
+        operator, port = self._operator, self._operator.port
+
+        def work() -> None:
+            operator.without_board(lambda: deploy(port, tell=operator.say, progress=operator.part))
+
+        self._page.do(words.DEPLOY, work, Needs.IDLE)
+
+    def _flash(self) -> None:
+        operator, port = self._operator, self._operator.port
+
+        def work() -> None:
+            found = image.find(Path())
+            operator.without_board(lambda: write.flash(found, port, None, operator.say, operator.part))
+
+        self._page.do(words.FLASH, work, Needs.IDLE)
+
+
+class _Lines:
+    """Lines that grow; only the new ones are sent."""
+
+    def __init__(self, source: Callable[[], tuple[deque[str], int]]) -> None:
+        self.log = ui.log(max_lines=200).classes("armtempo-chart")
+        self._source = source
+        self._shown = 0
+
+    def look(self) -> None:
+        """Show those that are new."""
+        lines, count = self._source()
+        new = min(count - self._shown, self.log.max_lines or 0)
+        for line in list(lines)[-new:] if new else ():
+            self.log.push(line)
+        self._shown = count
 
 
 def build(page: PanelPage) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from nicegui import ui
 
 from armtempo.basics.arrays import Array
@@ -10,6 +11,7 @@ from armtempo.model.arm import Arm
 COLOURS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377")
 """Paul Tol's bright scheme."""
 DASHES = ("solid", "dashed", "dotted")
+_GRID = {"lineStyle": {"color": "rgba(128, 128, 128, 0.3)"}}
 ORDER_LIMIT = {1: "speed_deg_s", 2: "acceleration_deg_s2", 3: "jerk_deg_s3"}
 
 
@@ -19,35 +21,43 @@ class CurveChart:
     def __init__(self, arm: Arm, title: str, order: int) -> None:
         self._arm, self._order = arm, order
         options = {
-            "title": {"text": title, "textStyle": {"fontSize": 13}},
+            "title": {"text": title, "left": 0, "textStyle": {"fontSize": 13}},
             "animation": False,
             "grid": {"left": 55, "right": 15, "top": 35, "bottom": 25},
             "legend": {"top": 2, "right": 5},
             "tooltip": {"trigger": "axis"},
-            "xAxis": {"type": "value", "max": "dataMax"},
-            "yAxis": {"type": "value", "scale": True},
+            "xAxis": {
+                "type": "value",
+                "max": "dataMax",
+                "axisLabel": {"showMaxLabel": False},
+                "splitLine": _GRID,
+            },
+            "yAxis": {"type": "value", "scale": True, "splitLine": _GRID},
             "series": [],
         }
-        self.chart = ui.echart(options).classes("w-full h-48")
+        self.chart = ui.echart(options, renderer="svg").classes("armtempo-chart")
 
-    def show(self, times_s: Array, values: Array) -> None:
-        """A curve for each joint: times (N,), values (N, J)."""
-        self.chart.options["series"] = [
-            {
-                "name": joint.name,
-                "type": "line",
-                "showSymbol": False,
-                "color": COLOURS[number % len(COLOURS)],
-                "lineStyle": {"type": DASHES[number // len(COLOURS)]},
-                "data": [
-                    [round(float(t), 4), round(float(v), 4)]
-                    for t, v in zip(times_s, values[:, number], strict=True)
-                ],
-                **self._limit(number),
-            }
-            for number, joint in enumerate(self._arm.driven)
-        ]
+    def show(self, times_s: Array, values: Array, reference: Array | None = None) -> None:
+        """A curve for each joint: times (N,), values (N, J); ``reference``, (N, J), is dotted."""
+        joints = range(values.shape[1])
+        series = [self._curve(number, times_s, values[:, number]) for number in joints]
+        if reference is not None:
+            series += [self._curve(number, times_s, reference[:, number], of_plan=True) for number in joints]
+        self.chart.options["series"] = series
         self.chart.update()
+
+    def _curve(self, number: int, times_s: Array, values: Array, of_plan: bool = False) -> dict[str, object]:
+        points = np.column_stack((times_s, values)).round(4).tolist()
+        curve: dict[str, object] = {
+            "name": self._arm.driven[number].name,  # one entry of the legend for both
+            "type": "line",
+            "showSymbol": False,
+            "color": COLOURS[number % len(COLOURS)],
+            "data": points,
+        }
+        if of_plan:
+            return {**curve, "lineStyle": {"type": "dotted", "width": 4, "opacity": 0.5}}
+        return {**curve, "lineStyle": {"type": DASHES[number // len(COLOURS)]}, **self._limit(number)}
 
     def _limit(self, number: int) -> dict[str, object]:
         """Lines at a joint's limit, both ways."""

@@ -10,14 +10,18 @@ import numpy as np
 from nicegui import ui
 
 from armtempo.basics.errors import InputError
+from armtempo.kinematics.chain import tool_path_mm
 from armtempo.kinematics.of_arm import forward
-from armtempo.panel import board_tab, move_tab, plan_tab, run_tab, words
+from armtempo.panel import arm_scene, board_tab, move_tab, plan_tab, run_tab, sequence_tab, words
 from armtempo.panel.arm_scene import ArmScene, ArmShape
 from armtempo.panel.held_jog import ButtonHold
 from armtempo.panel.operator import Operator
 from armtempo.panel.panel_page import LOOK_S, PanelPage
 
 TELL_S = 0.1
+_POINTS = 200
+_PRIMARY = "#2b5f8f"
+"""White on it has a contrast of 6.6 to 1, of which 4.5 is needed."""
 _SCRIPT = Path(__file__).with_name("panel.js").read_text(encoding="utf-8")
 _STYLE = Path(__file__).with_name("panel.css").read_text(encoding="utf-8")
 
@@ -29,30 +33,52 @@ def build(operator: Operator, hold: ButtonHold, shape: ArmShape) -> PanelPage:
     ui.add_css(_STYLE)
     ui.add_body_html(f"<script>{_SCRIPT}</script>")
     ui.dark_mode(None)
+    ui.colors(primary=_PRIMARY)
     _header(page)
-    with ui.element("div").classes("w-full flex flex-col lg:flex-row gap-2 no-wrap"):
-        with ui.column().classes("w-full lg:w-1/2 gap-1"):
-            with ui.element("div").classes("w-full h-[38vh] lg:h-[75vh] min-h-[240px]"):
+    with ui.element("div").classes("armtempo-page"):
+        with ui.column().classes("armtempo-half"):
+            with ui.element("div").classes("armtempo-scene"):
                 page.scene = ArmScene(shape)
-            with ui.row().classes("gap-1"):
+            with ui.row():
                 for view, text in words.VIEWS.items():
                     ui.button(text, on_click=lambda view=view: page.scene.look(view)).props("flat dense")
-        with ui.column().classes("w-full lg:w-1/2 gap-1"):
+        page.on_look(Paths(page).look)
+        with ui.column().classes("armtempo-half"):
             _tabs(page)
     _events(page)
-    page.refresh()
     ui.timer(LOOK_S, page.refresh)
     return page
 
 
+class Paths:
+    """The tool's path of the plan, and of the motion that runs or ran last, in the scene of one page."""
+
+    def __init__(self, page: PanelPage) -> None:
+        self._page = page
+        self._plan: object = None
+        self._run: object = None
+
+    def look(self) -> None:
+        """Draw what has changed."""
+        operator, scene = self._page.operator, self._page.scene
+        if (plan := operator.desk.plan) is not None and plan is not self._plan:
+            self._plan = plan
+            times = np.linspace(0.0, plan.total_s, _POINTS)
+            scene.draw("plan", tool_path_mm(plan.arm, plan.trajectory, times), arm_scene.PATH)
+        path = operator.run_path_mm
+        if path is not self._run:
+            self._run = path
+            scene.draw("run", path, arm_scene.RUN)
+
+
 def _header(page: PanelPage) -> None:
     operator = page.operator
-    with ui.header().classes("items-center gap-3 py-1 no-wrap"):
+    with ui.header().classes("items-center no-wrap"):
         stop = ui.button(words.STOP, icon="front_hand", color="negative", on_click=lambda: operator.stop())
         stop.classes("armtempo-stop").tooltip(words.STOP_HINT)
-        with ui.column().classes("gap-0 grow overflow-hidden"):
-            ui.label(f"{words.TITLE} · {operator.arm.name}").classes("text-lg leading-tight ellipsis")
-            ui.label("").classes("text-sm leading-tight ellipsis").props('id="armtempo-state" role="status"')
+        with ui.column().classes("armtempo-title"):
+            ui.label(f"{words.TITLE} · {operator.arm.name}").classes("text-subtitle1 ellipsis")
+            ui.label("").classes("ellipsis").props('id="armtempo-state" role="status"')
         take = ui.button(words.TAKE_CONTROL, on_click=lambda: operator.take_control(page.client)).props(
             "outline color=white"
         )
@@ -62,7 +88,7 @@ def _header(page: PanelPage) -> None:
         take.set_text(words.IN_CONTROL if mine else words.TAKE_CONTROL)
         take.set_enabled(not mine)
 
-    page.listeners.append(look)
+    page.on_look(look)
 
 
 def _tabs(page: PanelPage) -> None:
@@ -70,15 +96,27 @@ def _tabs(page: PanelPage) -> None:
         words.TAB_MOVE: move_tab.build,
         words.TAB_PLAN: plan_tab.build,
         words.TAB_RUN: run_tab.build,
+        words.TAB_SEQUENCE: sequence_tab.build,
         words.TAB_BOARD: board_tab.build,
     }
-    with ui.tabs().classes("w-full") as tabs:
+    with ui.tabs().classes("full-width") as tabs:
         for name in parts:
             ui.tab(name)
-    with ui.tab_panels(tabs, value=words.TAB_MOVE, animated=False, keep_alive=True).classes("w-full"):
-        for name, part in parts.items():
-            with ui.tab_panel(name).classes("p-2"):
+    with ui.tab_panels(tabs, value=words.TAB_MOVE, animated=False, keep_alive=True).classes(
+        "full-width"
+    ) as shown:
+        places = {name: ui.tab_panel(name) for name in parts}
+
+    def show(name: str) -> None:
+        """Each tab is built when it is first shown: the first view does not wait for charts and tables."""
+        page.shown = name
+        if part := parts.pop(name, None):
+            with places[name]:
                 part(page)
+        page.refresh()
+
+    shown.on_value_change(lambda event: show(event.value))
+    show(words.TAB_MOVE)
 
 
 def _events(page: PanelPage) -> None:
@@ -109,7 +147,9 @@ def message(operator: Operator, shape: ArmShape) -> dict[str, Any]:
         texts["armtempo-tool"] = f"x {x:.1f}  y {y:.1f}  z {z:.1f} mm"
     except InputError:
         pass
-    return {"links": shape.poses(np.asarray(angles)), "texts": texts}
+    target = operator.target_deg
+    ghost = None if target is None else shape.poses(target)
+    return {"links": shape.poses(angles), "dials": shape.dials(angles), "ghost": ghost, "texts": texts}
 
 
 def state_line(operator: Operator) -> str:

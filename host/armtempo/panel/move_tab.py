@@ -8,6 +8,7 @@ from nicegui import ui
 
 from armtempo.panel import words
 from armtempo.panel.held_jog import JogButton
+from armtempo.panel.operator import Needs
 
 if TYPE_CHECKING:
     from armtempo.panel.panel_page import PanelPage
@@ -38,46 +39,44 @@ def _hold_button(page: PanelPage, button: JogButton, text: str, label: str) -> N
 
 def _pair(page: PanelPage, name: str, number_id: str, made: dict[str, object]) -> None:
     """A row: minus, name and number, plus."""
-    with ui.row().classes("items-center gap-2 no-wrap"):
+    with ui.row().classes("no-wrap"):
         _hold_button(page, JogButton(**made, direction=-1), "−", f"{name} −")  # type: ignore[arg-type]
-        ui.label(name).classes("min-w-[4.5rem] text-center ellipsis")
+        ui.label(name).classes("armtempo-name ellipsis")
         _hold_button(page, JogButton(**made, direction=1), "+", f"{name} +")  # type: ignore[arg-type]
         if number_id:
             ui.label("").classes("armtempo-number").props(f'id="{number_id}"')
 
 
 def _jog(page: PanelPage) -> None:
-    with ui.row().classes("gap-8 items-start"):
-        with ui.column().classes("gap-1"):
+    with ui.row().classes("armtempo-apart"):
+        with ui.column():
             ui.label(words.JOINTS).classes("text-subtitle2")
             for number, joint in enumerate(page.operator.arm.driven, 1):
                 low, high = joint.range_deg
-                with ui.row().classes("items-center gap-2 no-wrap"):
+                with ui.row().classes("no-wrap"):
                     _pair(page, joint.name, f"armtempo-angle-{number}", {"joint": number})
-                    ui.label(f"{low:g}° … {high:g}°").classes("text-caption opacity-70")
-        with ui.column().classes("gap-1"):
+                    ui.label(f"{low:g}° … {high:g}°").classes("armtempo-note")
+        with ui.column():
             ui.label(words.TOOL).classes("text-subtitle2")
             for axis in AXES:
                 _pair(page, axis, "", {"axis": axis})
             for axis in AXES:
                 _pair(page, f"⟳ {axis}", "", {"axis": axis, "turn": True})
-            ui.label("").classes("text-sm").props('id="armtempo-tool"').style("white-space: pre")
-    ui.label(words.HOLD_HINT).classes("text-caption opacity-70")
+            ui.label("").props('id="armtempo-tool"').style("white-space: pre")
+    ui.label(words.HOLD_HINT).classes("armtempo-note")
     ui.label(words.SPEED_OF_JOG).classes("text-caption")
-    slider = ui.slider(min=1, max=100, value=page.jog_percent).props("label").classes("max-w-md")
+    slider = ui.slider(min=1, max=100, value=page.jog_percent).props("label").classes("armtempo-slider")
     slider.on_value_change(lambda event: setattr(page, "jog_percent", float(event.value)))
 
 
 def _postures(page: PanelPage) -> None:
     operator = page.operator
     names = ["home", *(posture.name for posture in operator.arm.postures)]
-    with ui.row().classes("items-center gap-2"):
+    with ui.row():
         ui.label(words.POSTURES).classes("text-subtitle2")
         for name in names:
             go = ui.button(name).props("outline no-caps")
-            go.on_click(
-                lambda name=name: page.do(name, lambda: operator.board.goto(name, progress=operator.part))
-            )
+            go.on_click(lambda name=name: page.do(name, lambda: operator.go(name)))
             page.control(go)
 
 
@@ -91,18 +90,23 @@ def _motion(page: PanelPage) -> None:
                 ui.button(words.HOME, on_click=lambda: sure.submit(True))
                 ui.button(words.CANCEL, on_click=lambda: sure.submit(False)).props("flat")
         if await sure:
-            page.do(words.HOME, lambda: operator.board.home(operator.arm), moves=False)
+            page.do(words.HOME, lambda: operator.board.home(operator.arm), Needs.COMMAND)
 
-    with ui.row().classes("items-center gap-2"):
-        page.control(ui.button(words.HOME, on_click=home).props("outline no-caps"), moves=False)
+    with ui.row():
+        page.control(ui.button(words.HOME, on_click=home).props("outline no-caps"), Needs.COMMAND)
         clear = ui.button(words.CLEAR).props("outline no-caps")
-        clear.on_click(lambda: page.do(words.CLEAR, operator.board.clear, moves=False))
-        page.control(clear, moves=False)
-        ui.button(words.PAUSE, on_click=lambda: page.attempt(operator.board.pause)).props("outline no-caps")
-        ui.button(words.RESUME, on_click=lambda: page.attempt(operator.board.resume)).props("outline no-caps")
+        clear.on_click(lambda: page.do(words.CLEAR, lambda: operator.board.clear(), Needs.COMMAND))
+        page.control(clear, Needs.COMMAND)
+        for text, call in (
+            (words.PAUSE, lambda: operator.board.pause()),
+            (words.RESUME, lambda: operator.board.resume()),
+        ):
+            button = ui.button(text, on_click=lambda call=call: page.at_once(call)).props("outline no-caps")
+            page.control(button, Needs.BOARD)
     ui.label(words.SPEED_OF_MOTION).classes("text-caption")
-    speed = ui.slider(min=1, max=100, value=100).props("label").classes("max-w-md")
-    speed.on("change", lambda event: page.attempt(lambda: operator.board.speed(float(event.args) / 100)))
+    speed = ui.slider(min=1, max=100, value=100).props("label").classes("armtempo-slider")
+    speed.on("change", lambda event: page.at_once(lambda: operator.board.speed(float(event.args) / 100)))
+    page.control(speed, Needs.BOARD)
 
 
 def _outputs(page: PanelPage) -> None:
@@ -110,18 +114,18 @@ def _outputs(page: PanelPage) -> None:
     if operator.arm.outputs:
         ui.label(words.OUTPUTS).classes("text-subtitle2")
     for output in operator.arm.outputs:
-        with ui.row().classes("items-center gap-2"):
+        with ui.row():
             ui.label(output.name)
             for state in [name for name, _ in output.states] or output.range:
                 button = ui.button(f"{state:g}" if isinstance(state, float) else state).props(
                     "outline no-caps"
                 )
                 button.on_click(
-                    lambda name=output.name, state=state: page.attempt(
+                    lambda name=output.name, state=state: page.at_once(
                         lambda: operator.board.output(name).set(state)
                     )
                 )
-                page.control(button, moves=False)
+                page.control(button, Needs.BOARD)
     if operator.arm.inputs:
         ui.label(words.INPUTS).classes("text-subtitle2")
         lamps = {one.name: ui.badge(one.name, color="grey") for one in operator.arm.inputs}
@@ -131,4 +135,4 @@ def _outputs(page: PanelPage) -> None:
                 active = operator.inputs.get(name)
                 lamp.props(f"color={'green' if active else 'grey'}")
 
-        page.listeners.append(look)
+        page.on_look(look)

@@ -4,15 +4,22 @@ window.armtempo = {
   parts: null,
   from: null,
   to: null,
-  ghost: null,
+  ghost: null, // where the plan is played
+  target: null, // where the arm goes
+  changes: 0,
   since: 0,
   heard: performance.now(),
   held: null,
+  lines: {}, // three.js objects by name
+  dials: [], // ranges of the joints
+  follow: false,
+  THREE: null,
   SMOOTH_MS: 100,
   SILENT_MS: 900,
 
   begin(parts) {
     this.parts = parts;
+    import("nicegui-scene").then((module) => (this.THREE = module.THREE));
     requestAnimationFrame(() => this.draw());
     setInterval(() => this.look(), 100);
     addEventListener("keydown", (event) => {
@@ -30,8 +37,12 @@ window.armtempo = {
   hear(message) {
     this.heard = performance.now();
     document.body.classList.remove("lost");
-    this.from = this.now();
-    this.to = message.links;
+    this.target = message.ghost;
+    if (JSON.stringify(message.dials) !== JSON.stringify(this.angles)) this.angles = message.dials;
+    if (JSON.stringify(message.links) !== JSON.stringify(this.to)) {
+      this.from = this.now();
+      this.to = message.links;
+    }
     this.since = performance.now();
     for (const [id, text] of Object.entries(message.texts || {})) {
       const element = document.getElementById(id);
@@ -42,7 +53,8 @@ window.armtempo = {
   now() {
     if (!this.to) return null;
     if (!this.from) return this.to;
-    const part = Math.min(1, (performance.now() - this.since) / this.SMOOTH_MS);
+    const part = (performance.now() - this.since) / this.SMOOTH_MS;
+    if (part >= 1) return this.to;
     return this.to.map((pose, i) => pose.map((value, k) => {
       const before = this.from[i];
       const sign = k > 2 && [3, 4, 5, 6].reduce((sum, n) => sum + before[n] * pose[n], 0) < 0 ? -1 : 1;
@@ -53,11 +65,32 @@ window.armtempo = {
   draw() {
     const scene = this.parts && getElement(this.parts.scene);
     if (scene && scene.objects) {
-      if (scene.renderer) scene.renderer.setClearColor(0x000000, 0); // as the page, light or dark
+      this.begin_scene(scene);
       this.place(scene, this.parts.links, this.now());
-      this.place(scene, this.parts.ghost, this.ghost);
+      this.place(scene, this.parts.ghost, this.ghost || this.target);
+      this.turn(scene);
     }
     requestAnimationFrame(() => this.draw());
+  },
+
+  // The scene draws 20 times a second; what has not changed is drawn once a second, which spares a tablet's battery.
+  begin_scene(scene) {
+    if (scene.renderer === this.renderer || !scene.renderer) return;
+    const renderer = (this.renderer = scene.renderer);
+    const render = renderer.render.bind(renderer);
+    let shown = "", drawn = 0;
+    renderer.setClearColor(0x000000, 0); // as the page, light or dark
+    const ground = scene.scene.children.find((child) => child.object_id === "ground");
+    if (ground) scene.scene.remove(ground);
+    renderer.render = (what, camera) => {
+      const tool = this.follow && this.now()?.at(-1);
+      if (tool) scene.controls.target.set(...tool.slice(0, 3));
+      const size = renderer.domElement.width + "x" + renderer.domElement.height;
+      const state = [size, scene.objects.size, this.changes, ...camera.matrix.elements].join();
+      if (state === shown && performance.now() - drawn < 1000) return;
+      [shown, drawn] = [state, performance.now()];
+      render(what, camera);
+    };
   },
 
   place(scene, ids, poses) {
@@ -65,9 +98,52 @@ window.armtempo = {
       const found = scene.objects.get(id);
       if (!found || !found.mesh) return;
       found.mesh.visible = Boolean(poses);
-      if (!poses) return;
+      if (!poses || poses[i] === found.placed) return;
+      found.placed = poses[i];
+      this.changes += 1;
       found.mesh.position.set(...poses[i].slice(0, 3));
       found.mesh.quaternion.set(...poses[i].slice(3)).normalize();
+    });
+  },
+
+  // a line through points, in the place of the one of that name; tried again until three.js is loaded
+  line(name, points, colour) {
+    const scene = this.parts && getElement(this.parts.scene);
+    if (!this.THREE || !scene || !scene.scene) return setTimeout(() => this.line(name, points, colour), 100);
+    if (this.lines[name]) scene.scene.remove(this.lines[name]);
+    delete this.lines[name];
+    this.changes += 1;
+    if (points.length > 1) scene.scene.add((this.lines[name] = this.polyline(points, colour)));
+  },
+
+  polyline(points, colour) {
+    const T = this.THREE;
+    const shape = new T.BufferGeometry().setFromPoints(points.map((point) => new T.Vector3(...point)));
+    return new T.Line(shape, new T.LineBasicMaterial({ color: colour }));
+  },
+
+  // an arc at each joint for its range, and a hand on it for its angle
+  turn(scene) {
+    if (!this.THREE || !this.angles || this.angles === this.turned) return;
+    this.turned = this.angles;
+    this.changes += 1;
+    const T = this.THREE, RADIUS = 0.11;
+    const vector = (numbers) => new T.Vector3(...numbers);
+    this.angles.forEach((dial, i) => {
+      if (!this.dials[i]) {
+        const [low, high] = this.parts.ranges[i];
+        const arc = Array.from({ length: 49 }, (_, k) => low + ((high - low) * k) / 48);
+        const on = (angle) => [RADIUS * Math.cos(angle), RADIUS * Math.sin(angle), 0];
+        const group = new T.Group();
+        group.add(this.polyline([[0, 0, 0], ...arc.map(on), [0, 0, 0]], "#999999"));
+        group.add(this.polyline([[0, 0, 0], [1.25 * RADIUS, 0, 0]], "#999999"));
+        scene.scene.add((this.dials[i] = group));
+      }
+      const zero = vector(dial.slice(3, 6)), axis = vector(dial.slice(6, 9));
+      const basis = new T.Matrix4().makeBasis(zero, axis.clone().cross(zero), axis);
+      this.dials[i].quaternion.setFromRotationMatrix(basis);
+      this.dials[i].position.set(...dial.slice(0, 3));
+      this.dials[i].children[1].rotation.z = dial[9];
     });
   },
 

@@ -11,13 +11,35 @@ from nicegui import ui
 from nicegui.element import Element
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.errors import ArmtempoError
+from armtempo.basics.errors import ArmtempoError, InputError
+from armtempo.panel import words
 from armtempo.panel.arm_scene import ArmScene, ArmShape
 from armtempo.panel.held_jog import ButtonHold, JogButton
-from armtempo.panel.operator import Operator
+from armtempo.panel.operator import Needs, Operator
 
 LOOK_S = 0.25
 """Interval at which a page looks at what has changed, but for what moves."""
+
+
+@dataclass
+class _Control:
+    """Something that can be pressed, and what that needs."""
+
+    element: Element
+    needs: Needs
+    reason: str = "-"
+    """Why it cannot be pressed."""
+
+    def grey(self, reason: str) -> None:
+        """Grey it, with the reason as its hint, unless that is \"\"."""
+        if reason == self.reason:
+            return
+        self.reason = reason
+        self.element.set_enabled(not reason)  # type: ignore[attr-defined]
+        for hint in self.element.default_slot.children:
+            if isinstance(hint, ui.tooltip):
+                hint.set_text(reason)
+                hint.set_visibility(bool(reason))
 
 
 @dataclass
@@ -28,25 +50,32 @@ class PanelPage:
     hold: ButtonHold
     shape: ArmShape
     client: str
-    controls: list[tuple[Element, bool]] = field(default_factory=list)
-    """What can be pressed, and whether that moves the arm."""
-    listeners: list[Callable[[], None]] = field(default_factory=list)
-    """Called every LOOK_S: each tab looks at what has changed."""
+    controls: list[_Control] = field(default_factory=list)
+    """What can be pressed."""
+    shown: str = ""
+    """The tab that is shown."""
+    listeners: list[tuple[str, Callable[[], None]]] = field(default_factory=list)
+    """Called every LOOK_S while their tab is shown; those of no tab always."""
     buttons: list[JogButton] = field(default_factory=list)
     jog_percent: float = 25.0
     scene: ArmScene = field(init=False)
-    _reasons: tuple[str, str] = ("-", "-")
 
-    def control(self, element: Element, moves: bool = True) -> Any:
+    def control(self, element: Element, needs: Needs = Needs.MOVE) -> Any:
         """An element that is greyed, with the reason as its hint, while it cannot be used."""
         with element:
-            ui.tooltip("").classes("text-sm")
-        self.controls.append((element, moves))
+            ui.tooltip("")
+        control = _Control(element, needs)
+        control.grey(self.operator.why_not(self.client, needs))
+        self.controls.append(control)
         return element
 
-    def do(self, what: str, call: Callable[[], object], moves: bool = True) -> None:
+    def on_look(self, listener: Callable[[], None]) -> None:
+        """Let what is built now, in the tab that is shown, look at what has changed."""
+        self.listeners.append((self.shown, listener))
+
+    def do(self, what: str, call: Callable[[], object], needs: Needs = Needs.MOVE) -> None:
         """Let the operator begin a command; what is refused is said."""
-        self.attempt(lambda: self.operator.do(what, self.client, call, moves))
+        self.attempt(lambda: self.operator.do(what, self.client, call, needs))
 
     def attempt(self, call: Callable[[], object]) -> None:
         """Do something at once; an error is said in the words of the library."""
@@ -55,6 +84,16 @@ class PanelPage:
         except ArmtempoError as error:
             ui.notify(str(error), type="negative", multi_line=True, timeout=8000)
 
+    def at_once(self, call: Callable[[], object], needs: Needs = Needs.BOARD) -> None:
+        """Do what is quick and needs no turn, also while something is under way."""
+
+        def checked() -> None:
+            if reason := self.operator.why_not(self.client, needs):
+                raise InputError(reason, words.WAIT)
+            call()
+
+        self.attempt(checked)
+
     def show_ghost(self, angles_deg: Array) -> None:
         """Show where the arm would be at these angles, (J,), besides where it is; on this page only."""
         poses = json.dumps(self.shape.poses(angles_deg))
@@ -62,16 +101,13 @@ class PanelPage:
 
     def refresh(self) -> None:
         """Grey what cannot be used now, with the reason."""
-        operator = self.operator
-        reasons = operator.why_not(self.client), operator.why_not(self.client, moves=False)
-        if reasons != self._reasons:
-            self._reasons = reasons
-            for element, moves in self.controls:
-                reason = reasons[0] if moves else reasons[1]
-                element.set_enabled(not reason)  # type: ignore[attr-defined]
-                for hint in element.default_slot.children:
-                    if isinstance(hint, ui.tooltip):
-                        hint.set_text(reason or element.props.get("aria-label", ""))
-                        hint.set_visibility(bool(reason))
-        for listener in self.listeners:
-            listener()
+        self.controls = [control for control in self.controls if not control.element.is_deleted]
+        reasons = {
+            needs: self.operator.why_not(self.client, needs)
+            for needs in {control.needs for control in self.controls}
+        }
+        for control in self.controls:
+            control.grey(reasons[control.needs])
+        for tab, listener in self.listeners:
+            if tab in ("", self.shown):
+                listener()

@@ -10,10 +10,12 @@ import numpy as np
 from nicegui import run, ui
 
 from armtempo import pipeline
+from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError, InputError
-from armtempo.kinematics.chain import chains_mm, tool_path_mm
+from armtempo.kinematics.chain import chains_mm
+from armtempo.kinematics.moved_tool import moved_tool_deg
 from armtempo.model.job import PATHS, Job
-from armtempo.panel import arm_scene, words
+from armtempo.panel import words
 from armtempo.panel.charts import CurveChart
 
 if TYPE_CHECKING:
@@ -30,23 +32,27 @@ class PlanTab:
     def __init__(self, page: PanelPage) -> None:
         self._page = page
         self._operator = page.operator
-        self._rows: list[list[float]] = [list(row) for row in _rows_of(page)]
+        self._rows: list[list[float]] = page.operator.desk.rows()
         self._cancelled = False
         self._played: Plan | None = None
+        page.scene.picked, page.scene.dragged = self._pick, self._drag
         self._table()
-        with ui.row().classes("items-center gap-2"):
+        ui.label(words.DRAG_HINT).classes("armtempo-note")
+        self._offered = ui.column()
+        self._draw_vias()
+        with ui.row():
             ui.button(words.NEW_VIA, on_click=self._add_via).props("outline no-caps")
             ui.button(words.FROM_ARM, on_click=self._take_posture).props("outline no-caps")
             ui.button(words.PASTE, on_click=self._paste).props("outline no-caps")
             ui.button(words.SAVE, on_click=self._save).props("outline no-caps")
-        with ui.row().classes("items-center gap-2"):
+        with ui.row():
             self._path = ui.select(words.PATHS, value=page.operator.desk.job.path, label=words.PATH).classes(
                 "min-w-[14rem]"
             )
             self._go = ui.button(words.PLAN, on_click=self._plan)
             self._stop = ui.button(words.CANCEL, on_click=self._cancel).props("flat")
             self._stop.set_visibility(False)
-        self._bar = ui.linear_progress(0.0, show_value=False).classes("w-full")
+        self._bar = ui.linear_progress(0.0, show_value=False).classes("full-width")
         self._bar.set_visibility(False)
         self._result = ui.label("")
         self._slider = ui.slider(min=0, max=1000, value=0, on_change=self._show_time).props("label")
@@ -56,7 +62,7 @@ class PlanTab:
             CurveChart(page.operator.arm, title, order)
             for order, title in enumerate((words.ANGLE, words.SPEED, words.ACCELERATION, words.JERK))
         ]
-        page.listeners.append(self._look)
+        page.on_look(self._look)
 
     # the table
 
@@ -103,7 +109,7 @@ class PlanTab:
 
     async def _paste(self) -> None:
         with ui.dialog() as asked, ui.card():
-            text = ui.textarea(words.PASTE_HINT).classes("min-w-[24rem]")
+            text = ui.textarea(words.PASTE_HINT).style("min-width: min(24rem, 80vw)")
             with ui.row():
                 ui.button(words.PASTE, on_click=lambda: asked.submit(text.value))
                 ui.button(words.CANCEL, on_click=lambda: asked.submit(None)).props("flat")
@@ -132,7 +138,44 @@ class PlanTab:
 
     def _draw_vias(self) -> None:
         tools = chains_mm(self._operator.arm, np.array(self._rows))[:, -1] if self._rows else np.empty((0, 3))
-        self._page.scene.dots("via", tools.tolist(), arm_scene.VIA)
+        self._page.scene.dots(tools)
+
+    # in 3-D
+
+    def _tool_mm(self, number: int) -> Array:
+        """Where the tool is at a via point, (3,)."""
+        place: Array = chains_mm(self._operator.arm, np.array(self._rows[number]))[-1]
+        return place
+
+    def _pick(self, number: int) -> None:
+        """Show a via point and the other postures that reach it."""
+        if number < len(self._rows):
+            self._page.attempt(lambda: self._offer(number, self._tool_mm(number)))
+
+    def _drag(self, number: int, position_mm: Array) -> None:
+        """Move a via point to where it was dragged; back if no posture reaches that."""
+        if number < len(self._rows):
+            self._page.attempt(lambda: self._offer(number, position_mm))
+            self._draw_vias()
+
+    def _offer(self, number: int, position_mm: Array) -> None:
+        """Take the posture that is nearest to the via point's, and offer the others."""
+        postures = moved_tool_deg(self._operator.arm, np.array(self._rows[number]), position_mm.tolist())
+        texts = [", ".join(f"{angle:.1f}" for angle in posture) + "°" for posture in postures]
+        self._offered.clear()
+        with self._offered:
+            ui.label(words.POSTURES_OF.format(number=number, count=len(postures)))
+            ui.radio(
+                dict(enumerate(texts)),
+                value=0,
+                on_change=lambda event: self._take(number, postures[int(event.value)]),
+            ).props("dense")
+        self._take(number, postures[0])
+
+    def _take(self, number: int, posture_deg: Array) -> None:
+        self._rows[number] = [round(float(angle), 4) for angle in posture_deg]
+        self._page.show_ghost(posture_deg)
+        self._changed()
 
     # the plan
 
@@ -180,7 +223,6 @@ class PlanTab:
         floor = max(search.floor_s for search in plan.searches)
         self._result.set_text(words.MOTION_TIME.format(total=plan.total_s, floor=floor))
         times = np.linspace(0.0, plan.total_s, _POINTS)
-        self._page.scene.draw("path", tool_path_mm(plan.arm, plan.trajectory, times), arm_scene.PATH)
         for order, chart in enumerate(self._charts):
             chart.show(times, plan.trajectory(times, order))
 
@@ -198,11 +240,6 @@ class PlanTab:
             self._slider.set_value(round(1000 * float(time_s) / plan.total_s))
             await asyncio.sleep(_PLAY_S)
         self._slider.set_value(1000)
-
-
-def _rows_of(page: PanelPage) -> list[list[float]]:
-    """The via points of the project's job, as angles."""
-    return page.operator.desk.rows()
 
 
 def build(page: PanelPage) -> None:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 REPORT_PAGE = "report.html"
 _MOST_RUNS = 30
+_MOST_POINTS = 300
 
 
 class RunTab:
@@ -26,18 +27,20 @@ class RunTab:
         self._page = page
         self._operator = page.operator
         self._shown = (-1, 0)
-        self._busy = ""
-        with ui.row().classes("items-center gap-2"):
+        self._ended = page.operator.ended
+        with ui.row():
             page.control(ui.button(words.TO_START, on_click=self._to_start))
             page.control(ui.button(words.RUN, icon="play_arrow", on_click=self._run))
             self._repeat = ui.number(words.REPEAT, value=1, min=1, max=10_000, precision=0).props(
                 "dense outlined"
             )
+        ui.label(words.DOTTED).classes("armtempo-note")
         self._angles = CurveChart(self._operator.arm, words.ANGLE, 0)
+        self._speeds = CurveChart(self._operator.arm, words.SPEED, 1)
         self._errors = CurveChart(self._operator.arm, words.ERROR, 0)
         ui.label(words.PAST_RUNS).classes("text-subtitle2")
         self._past()
-        page.listeners.append(self._look)
+        page.on_look(self._look)
 
     def _to_start(self) -> None:
         plan = self._operator.desk.plan
@@ -45,7 +48,7 @@ class RunTab:
             ui.notify(words.NO_PLAN)
             return
         operator = self._operator
-        self._page.do(words.TO_START, lambda: operator.board.goto(plan, progress=operator.part))
+        self._page.do(words.TO_START, lambda: operator.go(plan))
 
     def _run(self) -> None:
         plan = self._operator.desk.plan
@@ -53,34 +56,29 @@ class RunTab:
             ui.notify(words.NO_PLAN)
             return
         operator, times = self._operator, int(self._repeat.value or 1)
-
-        def run() -> None:
-            operator.board.upload(plan, replace=True)
-            found = operator.board.run(plan, times, operator.runs, operator.part)
-            found.report()
-
-        self._page.do(words.RUN, run)
+        self._page.do(words.RUN, lambda: operator.run(plan, times))
 
     def _look(self) -> None:
-        if self._busy and not self._operator.busy:  # a run has ended, and has its report
+        operator = self._operator
+        if self._ended != operator.ended:  # perhaps a run, which has its report then
+            self._ended = operator.ended
             self._past.refresh()
-        self._busy = self._operator.busy
-        curves = self._operator.curves
-        state = (curves.run, len(curves.time_s))
-        if state == self._shown or len(curves.time_s) < 2:
+        state = (operator.curves.run, len(operator.curves.time_s))
+        if state == self._shown or state[1] < 2:
             return
         self._shown = state
-        times, commanded = np.array(curves.time_s), np.array(curves.commanded_deg)
-        self._angles.show(times, commanded)
-        measured = np.array(curves.angle_deg, dtype=float)
-        self._errors.show(times, np.nan_to_num(measured - commanded))
+        live, plan = operator.curves.thinned(_MOST_POINTS), operator.plan_run
+        planned = [plan.trajectory(live.path_s, order) if plan else None for order in (0, 1)]
+        self._angles.show(live.time_s, live.angle_deg, planned[0])
+        self._speeds.show(live.time_s, np.gradient(live.angle_deg, live.time_s, axis=0), planned[1])
+        self._errors.show(live.time_s, live.angle_deg - live.commanded_deg)
 
     @ui.refreshable_method
     def _past(self) -> None:
         folders = past_runs(self._operator.runs)
         chosen: list[Path] = []
         for folder in folders[:_MOST_RUNS]:
-            with ui.row().classes("items-center gap-2"):
+            with ui.row():
                 ui.checkbox(
                     folder.name, on_change=lambda event, folder=folder: _choose(chosen, folder, event.value)
                 )

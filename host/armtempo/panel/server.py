@@ -11,6 +11,7 @@ from typing import Any
 import uvicorn
 from fastapi import FastAPI
 from nicegui import Client, app, ui
+from starlette.middleware.gzip import GZipMiddleware
 from starlette.responses import FileResponse, PlainTextResponse
 
 from armtempo.basics.errors import InputError
@@ -20,6 +21,8 @@ from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.held_jog import ButtonHold
 from armtempo.panel.operator import Operator
 
+_RECONNECT_S = 3.0
+"""A page whose connection breaks keeps control if it is back within this time; what it holds is released at once."""
 _SUFFIXES = (".html", ".svg", ".png", ".csv", ".json")
 
 
@@ -34,7 +37,14 @@ class Panel:
         self._api.get("/runs/{name}/{file}")(self._run_file)
         ui.page("/")(self._page)
         app.on_startup(self._tell)
-        ui.run_with(self._api, title=words.TITLE, dark=None, reconnect_timeout=2.0)
+        ui.run_with(
+            self._api,
+            title=words.TITLE,
+            dark=None,
+            reconnect_timeout=_RECONNECT_S,
+            tailwind=False,
+            gzip_middleware_factory=lambda inner: GZipMiddleware(inner, compresslevel=1),
+        )
 
     def serve(self, listening: socket.socket, token: str) -> None:
         """Answer on a socket that is bound; a client needs the ``token``, unless that is ""."""
@@ -51,12 +61,13 @@ class Panel:
         if not self._operator.holder:
             self._operator.take_control(client.id)
         layout.build(self._operator, self._hold, self._shape)
-        client.on_disconnect(lambda: self._gone(client.id))
+        client.on_disconnect(lambda: self._hold.release(client.id))
+        client.on_delete(lambda: self._gone(client.id))
 
     def _gone(self, client: str) -> None:
-        """A page was closed, or its connection broke: what it holds is released."""
-        self._hold.release(client)
+        """A page was closed, or its connection did not come back: another one may take control."""
         self._operator.release(client)
+        self._operator.monitors.discard(client)
 
     async def _tell(self) -> None:
         asyncio.create_task(self._tell_all())  # noqa: RUF006  it lives as long as the server

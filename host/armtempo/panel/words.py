@@ -9,9 +9,10 @@ BUSY = "Wait: {what} is under way."
 FAULT = "A fault is pending ({fault}): remove its cause, then clear it."
 NOT_HOMED = "The arm's position is unknown: home it first."
 MOVING = "The arm is moving."
+NO_BOARD, NO_BOARD_HINT = "The board is not connected.", "wait until it is"
 WAIT = "try again when that is over"
 DONE = "{what}: done"
-STOPPED = "{what}: stopped {why}"
+STOPPED = "{what}: stopped: {why}"
 BRAKING = "Stop: the arm brakes along its path."
 FREEZING = "Stop pressed twice: the outputs are frozen."
 
@@ -23,8 +24,8 @@ IN_CONTROL = "In control"
 LOST = "The panel's program does not answer. Nothing can be moved from here."
 VIRTUAL = "virtual board"
 
-TAB_MOVE, TAB_PLAN, TAB_RUN, TAB_BOARD = "Move", "Plan", "Run", "Board"
-VIEWS = {"side": "Side", "top": "Top", "free": "Free"}
+TAB_MOVE, TAB_PLAN, TAB_RUN, TAB_SEQUENCE, TAB_BOARD = "Move", "Plan", "Run", "Sequence", "Board"
+VIEWS = {"side": "Side", "top": "Top", "free": "Free", "follow": "Follow"}
 
 JOINTS, TOOL, POSTURES, OUTPUTS, INPUTS = "Joints", "Tool", "Postures", "Outputs", "Inputs"
 SPEED_OF_JOG = "Speed of jogs, % of the limits"
@@ -35,7 +36,9 @@ HOME, GO, CLEAR, PAUSE, RESUME = "The arm is at home", "Go", "Clear the fault", 
 HOME_HINT = "Says that the arm is in its home posture; nothing moves."
 SURE = "Is the arm in its home posture? Its position is taken as this."
 
-JOB, NEW_VIA, FROM_ARM, DELETE = "Job", "Add a via point", "Take the arm's posture", "Delete"
+DRAG_HINT = "Drag a via point in the picture, or click it to see the other postures that reach it."
+POSTURES_OF = "P{number}: postures of the arm with the tool there, {count}; the nearest is taken"
+NEW_VIA, FROM_ARM, DELETE = "Add a via point", "Take the arm's posture", "Delete"
 PASTE, PASTE_HINT = "Paste", "Rows of angles from a spreadsheet, one row a via point"
 PLAN, CANCEL, SAVE = "Plan", "Cancel", "Save the job"
 PATH, PATHS = "Path", {"through": "spline through the via points", "free": "free between the via points"}
@@ -53,8 +56,38 @@ CANCELLED, PLAN_AGAIN = "The planning was cancelled.", "plan again when you like
 NO_PLAN = "Plan a motion first."
 
 TO_START, RUN, REPEAT = "Go to the start", "Run", "Repetitions"
-MEASURED, COMMANDED, ERROR = "measured", "commanded", "following error, deg"
+ERROR = "following error, deg"
+DOTTED = "Lines: measured, or commanded for a joint without an encoder. Dotted: planned."
 STORED, PAST_RUNS, REPORT, COMPARE = "Stored motions", "Past runs", "Report", "Compare two"
+NO_SEQUENCE = "The project folder has no sequence: a TOML file with [[step]]."
+SEQUENCE_FILE, SAVE_SEQUENCE = "Sequence", "Save the sequence"
+STEP, ADD_STEP, UP, DOWN = "step", "Add a step", "Up", "Down"
+STEP_KINDS = {
+    "goto": "go to",
+    "run": "run",
+    "output": "set output",
+    "wait_s": "wait, s",
+    "wait_input": "wait for input",
+    "count": "count",
+    "repeat": "repeat",
+    "end": "end of",
+    "call": "call",
+}
+STEP_KEYS = {
+    "to": "to",
+    "wait_s": "wait, s",
+    "active": "active",
+    "timeout_s": "time-out, s",
+    "on_timeout": "then",
+}
 STEP_NOW = "Step {step}, cycle {cycle}"
 
-STATUS, LOG, REMOVE = "Status", "Log", "Remove"
+STATUS, LOG, TRAFFIC = "Status", "Log", "Traffic"
+REFRESH, RENAME, REMOVE, NEW_NAME = "Read again", "Rename", "Remove", "New name"
+A_SEQUENCE, BY_BUTTON = "sequence", " · started by the board's button"
+SURE_REMOVE = "Remove {name} from the board?"
+PROGRAM, DEPLOY, FLASH = "Board program", "Deploy", "Flash"
+SURE_DEPLOY = "Put this version's program on the board? The arm's position is unknown afterwards."
+SURE_FLASH = (
+    "Write the firmware in the project folder to the board? The arm's position is unknown afterwards."
+)

@@ -87,7 +87,7 @@ def _total(what: str, total: float, ours: float) -> Claim:
     verdict = SAME if abs(ours - total) <= 0.0015 else BETTER if ours < total else DIFFERS
     because = {
         SAME: "",
-        BETTER: "the search goes on to a better optimum under the same limits",
+        BETTER: "the search continues to a better optimum under the same limits",
         DIFFERS: "another seed of a random search, and every limit is kept exactly, not to three digits",
     }[verdict]
     return Claim("Table 6", what, f"{total:.3f}", f"{ours:.4f}", verdict, because)

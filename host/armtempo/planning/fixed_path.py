@@ -1,4 +1,4 @@
-"""The best time axis of a path that stays as it is, with as many segments for each of the path as wanted."""
+"""The best time axis of a fixed path, with as many segments for each of the path as wanted."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from armtempo.splines import bspline, time_axis
 _ROUNDS = 12
 """Solves, each at the peaks that the one before showed between its points."""
 _PARTS, _LEAST_PARTS, _POINTS = 64, 4, 2000
-"""Points of a path segment, shared by its time segments, but at least so many in each of those; fewer where there
+"""Points of a path segment, shared by its time segments, but at least this many in each of those; fewer where there
 would be more than _POINTS."""
 _PEAK_THRESHOLD = 0.95
 """Peaks from this part of a limit on become points."""
 _PEAK_GRID_FACTOR = 4
-"""Peaks are looked for on a grid so many times finer."""
+"""Peaks are looked for on a grid this many times finer."""
 _AWAY = 1.003
 """Time is stretched by this before each solve, so that it starts within the limits."""
 _COARSE = Schedule(first_barrier=1e-2, last_barrier=1e-5)

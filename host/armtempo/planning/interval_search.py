@@ -53,7 +53,7 @@ def search(
 ) -> Found:
     """Intervals (n,) by the job's optimiser, for joints on one axis with control points (n + degree, J).
 
-    Where the result ends at bounds that follow from the job, they are widened and it goes on from anew; at
+    Where the result ends at bounds that follow from the job, they are widened and it continues from anew; at
     bounds that the job gives, that is only said. Gradients start within the bounds and may leave them.
     """
     box = bounds_s(angle_points_deg, job.degree, limits)

@@ -68,7 +68,7 @@ def _path_s(angle_points_deg: Array, degree: int, limits: Sequence[Limits], abou
 
 
 def _by_cells(points_deg: Array, degree: int, limits: Sequence[Limits], about_s: float, parts: int) -> float:
-    """By duality, with so many cells in a segment of the path."""
+    """By duality, with that many cells in a segment of the path."""
     pieces = bspline.subdivide(bspline.polynomials(points_deg, degree), parts)
     cell_s = about_s / len(pieces)
     values = np.array([limit.values for limit in limits]) * cell_s ** np.arange(1, 4)

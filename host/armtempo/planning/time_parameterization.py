@@ -28,7 +28,7 @@ _REFINED_GAP = 1e-4
 """How near to its local optimum an axis should come."""
 _REFINE_FACTOR = 8
 _PAYS = 1e-3
-"""With ``refine = "auto"`` each axis gets so many times more segments while that saves this part of its time."""
+"""With ``refine = "auto"`` each axis gets this many times more segments while that saves this part of its time."""
 
 
 @dataclass(frozen=True, eq=False)

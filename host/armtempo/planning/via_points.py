@@ -185,7 +185,7 @@ def _solve(
 def _searched(
     setup: _Setup, target: Pose, previous: Array, where: str, choice: Choice | None = None
 ) -> Array:
-    """A posture of the numerical search, (joints,) in rad; PlanError with all reasons where there is none."""
+    """A posture of the numerical search, (joints,) in rad; PlanError with all reasons if there is none."""
     answer = setup.solver.solve(target, previous.tolist(), numerically=True)
     if answer.success:
         return np.array(answer.angles_rad)

@@ -25,7 +25,7 @@ _hung: dict[str, float] = {}
 
 
 class Ownership(Enum):
-    """What became of a program that has claimed a port."""
+    """The state of a program that has claimed a port."""
 
     ALIVE = "alive"
     HUNG = "hung"

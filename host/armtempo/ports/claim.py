@@ -24,7 +24,7 @@ LOCAL_SOCKETS = os.name == "posix"
 
 
 class PortClaim(NamedTuple):
-    """One program's claim to one port. (A data class would take 10 ms to import, which a stop has not.)"""
+    """One program's claim to one port. (A data class would take 10 ms to import, too long for a stop.)"""
 
     name: str
     """The port, by a name that is the same for every program (``ports.names.same_for_all``)."""

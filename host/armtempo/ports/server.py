@@ -73,10 +73,10 @@ class Server:
         if self._taken_by is None and now_s - self._checked_s >= _CHECK_S:
             self._checked_s = now_s
             self._taken_by = self.claim.taken_by()
-        if self._taken_by is not None:  # said each time: whoever tries to open the port again minds no error
+        if self._taken_by is not None:  # reported each time, as callers may try to open the port again
             raise PortError(
                 f"{self._taken_by.who} has taken {self.claim.port} over, as this program did not answer",
-                "ask 'armtempo status' what became of the motion",
+                "ask 'armtempo status' how the motion ended",
             )
 
     def close(self) -> None:

@@ -12,7 +12,7 @@ from armtempo.project.settings import PORT, ProjectSettings, Setting, nothing_se
 ONLY_BOARD = "the only board plugged in"
 ONLY_OPEN = "the only port that an armtempo program has open"
 UNASKED = (ONLY_BOARD, ONLY_OPEN)
-"""Sources of a port that nobody has named; such a choice is said aloud."""
+"""Sources of a port that nobody has named; such a choice is printed."""
 
 
 def choose(given: str | None = None, others: bool = False) -> Setting:

@@ -79,7 +79,7 @@ def _lives(pid: int) -> bool:
 
 
 def _port_of_project() -> str:
-    """The port of the nearest ``armtempo.toml``, by its full path; "" where there is none, or it names none."""
+    """The port of the nearest ``armtempo.toml``, by its full path; "" if there is none, or it names none."""
     place = os.getcwd()
     while not os.path.isfile(os.path.join(place, _PROJECT_FILE)):
         if place == os.path.dirname(place):

@@ -45,7 +45,7 @@ class ProjectSettings:
 
     @cached_property
     def file(self) -> Path | None:
-        """The nearest ``armtempo.toml``, in the folder or above it; None where there is none."""
+        """The nearest ``armtempo.toml``, in the folder or above it; None if there is none."""
         here = self._folder.absolute()
         for place in (here, *here.parents):
             if (place / FILE).is_file():

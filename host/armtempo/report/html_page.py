@@ -15,7 +15,7 @@ GOOD, BAD, OPEN = "good", "bad", "open"
 """Kinds of text by what it says: as it should be, not so, cannot be told."""
 _MARKS = {GOOD: "✓", BAD: "✗", OPEN: "?"}
 _FEW_COLUMNS = 2
-"""A table of so many fits on a phone as it is; the rows of a wider one become blocks there."""
+"""A table of that many fits on a phone as it is; the rows of a wider one become blocks there."""
 
 
 class Page:
@@ -99,7 +99,7 @@ def escape(text: str) -> str:
 
 
 def number(value: float, form: str) -> str:
-    """A value as ``form`` has it; a dash where there is none (NaN), no sign where it rounds to 0."""
+    """A value as ``form`` has it; a dash if there is none (NaN), no sign where it rounds to 0."""
     if math.isnan(value):
         return "–"
     text = f"{value:{form}}"

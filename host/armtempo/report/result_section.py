@@ -62,7 +62,7 @@ def write(sheet: html_page.Page, found: Evaluation) -> None:
     if found.limits:
         _peaks(sheet, found)
     else:
-        sheet.note("The folder does not say which arm it was, so the motion is not held against limits.")
+        sheet.note("The folder does not say which arm it was, so the motion is not checked against limits.")
 
 
 def _measured(sheet: html_page.Page, found: Evaluation) -> None:

@@ -49,6 +49,8 @@ from armtempo.robot.start_position import StartPosition
 from armtempo.robot.stop_request import StopRequest, stoppable
 from armtempo.robot.where import Where, posture_deg
 from armtempo.runs.sequence_reader import SequenceRun
+from armtempo.selftest import selftest
+from armtempo.selftest.result import SelfTest
 
 
 @checked
@@ -285,7 +287,7 @@ class Board:
         turn: bool = False,
         speed: float = SPEED,
     ) -> HeldJog:
-        """A jog to the end of the range that goes on only while its ``hold`` is called, in a ``with`` statement.
+        """A jog to the end of the range that continues only while its ``hold`` is called, in a ``with`` statement.
 
         ``direction``: 1 or -1; ``turn``: about ``axis`` instead of along it; the rest as in ``jog``. Where the calls
         cease the board brakes; leaving the context brakes too, and waits for rest.
@@ -431,7 +433,7 @@ class Board:
     def speed(self, fraction: float) -> None:
         """Run at a fraction of the planned speed, 0.01 to 1: what this object starts from now on, and what moves.
 
-        The path stays as it is; while it moves, the speed goes over smoothly in the motion's brake time: from a
+        The path is unchanged; while it moves, the speed goes over smoothly in the motion's brake time: from a
         ``Watcher``, from another thread than the one that waits in ``run``, or for what the button started.
         Raises InputError for another fraction, BoardError where the board refuses.
         """
@@ -444,6 +446,14 @@ class Board:
     def resume(self) -> None:
         """Go on along the path at the speed before the pause; BoardError where nothing moves."""
         change_speed(self.client, RESUME)
+
+    def selftest(self, progress: Progress | None = None) -> SelfTest:
+        """The board measures itself with its drivers off; ``progress`` tells how far it is.
+
+        The board is reset at the end, so its positions are unknown. Raises LinkError where the drivers are on,
+        something moves, or the program is not a part of the board's firmware; nothing was done then.
+        """
+        return selftest.run(self.client, progress)
 
     def clear(self) -> None:
         """Clear a fault; BoardError while its cause is still there."""

@@ -31,7 +31,7 @@ def examine_board(state: BoardState | ArmtempoError) -> list[Item]:
         found.append(Item("fault", state.fault, Condition.WRONG, "remove its cause, then 'armtempo clear'"))
     if state.frames_bad or state.samples_lost:
         text = f"{state.frames_bad} damaged messages, {state.samples_lost} samples lost"
-        found.append(Item("link", text, Condition.NOTE, "another cable or USB socket, if that goes on"))
+        found.append(Item("link", text, Condition.NOTE, "another cable or USB socket, if that continues"))
     return found
 
 

@@ -23,7 +23,7 @@ SETTLES_S = 0.3
 class HandGuided:
     """An arm without its motors' current, as a context; in the end it has it again, and its position by the encoders.
 
-    Whoever begins it holds the arm: it sinks under its weight. Raises InputError for a driven joint without an
+    The caller holds the arm: it sinks under its weight. Raises InputError for a driven joint without an
     encoder, LinkError where the position is unknown before.
     """
 

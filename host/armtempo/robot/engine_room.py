@@ -14,7 +14,7 @@ from armtempo.records import encode
 
 @dataclass(frozen=True)
 class Room:
-    """Memory for engines: ``size`` bytes of heap, and heap for the objects of so many ``joints``.
+    """Memory for engines: ``size`` bytes of heap, and heap for the objects of that many ``joints``.
 
     Beside it the board has memory for step generators, the same on every chip (``engine_memory.PROCESSOR_WORDS``).
     """
@@ -44,7 +44,7 @@ class Room:
         return [f"{joints} x {rate} steps/s" for joints, rate in found if rate]
 
     def _highest_rate(self, joints: int) -> int:
-        """The highest step rate, in whole 1000 steps/s, at which so many joints fit; 0 where none do."""
+        """The highest step rate, in whole 1000 steps/s, at which that many joints fit; 0 where none do."""
         for rate in range(limits.MAX_STEP_RATE_SUM // joints // 1000, 0, -1):
             if self.holds([1000 * rate] * joints):
                 return 1000 * rate

@@ -156,7 +156,7 @@ class _GroupHoming:
         self._move(ways, FAST)
 
     def _declare(self, away_deg: dict[int, float]) -> None:
-        """The joints stand so far from their switches."""
+        """The joints stand this far from their switches."""
         steps: list[int | None] = [None] * len(self.arm.driven)
         for index, way_deg in away_deg.items():
             switch, joint = self.switches[index], self.arm.driven[index]

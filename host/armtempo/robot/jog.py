@@ -1,4 +1,4 @@
-"""Jogging: a step, or a motion that goes on only while somebody says so."""
+"""Jogging: a step, or a motion that continues only while somebody says so."""
 
 from __future__ import annotations
 
@@ -63,9 +63,9 @@ def _encoded(motion: JogMotion, arm: Arm) -> EncodedMotion:
 
 
 class HeldJog:
-    """A jog that goes on while ``hold`` is called, and no longer; a context that ends with the arm at rest.
+    """A jog that continues while ``hold`` is called, and no longer; a context that ends with the arm at rest.
 
-    Whoever calls ``hold`` is the dead man's switch: no thread does it. Where the calls cease, or nothing of them
+    The caller of ``hold`` is the dead man's switch: no thread does it. Where the calls cease, or nothing of them
     reaches the board for HOLD_TIMEOUT_MS, the board brakes by itself; ``rest_s`` says when it rests at the latest.
     """
 
@@ -73,7 +73,7 @@ class HeldJog:
         self.motion = motion
         self.arm = arm
         self.moving = False
-        """Whether it still goes on, as far as the board has said."""
+        """Whether it still continues, as far as the board has said."""
         self.fault: Fault | None = None
         """What ended it, where that was one."""
         self._client = client

@@ -25,7 +25,7 @@ _END_S = 1e-3
 
 
 class Watcher:
-    """Sees a run while it goes on; override what you want to see."""
+    """Sees a run while it runs; override what you want to see."""
 
     def begin(self, motion: EncodedMotion, folder: RunFolder) -> None:
         """The run folder is there, and the arm where the motion begins."""

@@ -21,7 +21,7 @@ from armtempo.runs import run_folder, sequence_folder
 from armtempo.runs.sequence_folder import SequenceFolder
 
 ACKNOWLEDGED = 8
-"""The board is told of samples that have arrived, so many at a time."""
+"""The board is notified of samples that have arrived, this many at a time."""
 
 
 class Recorder:

@@ -88,9 +88,9 @@ def run(
 ) -> SequenceState:
     """Start a stored sequence and follow it to its end; a stop request makes the board brake and end it.
 
-    ``recorder`` gets the board's events and the end. A board that cannot be reached goes on by itself; it is looked for
-    RECONNECT_S long. Raises BoardError where the board refuses to start or a fault ends the sequence, LinkError where
-    it cannot be reached any more.
+    ``recorder`` gets the board's events and the end. A board that cannot be reached continues by itself; the host tries
+    to reconnect for RECONNECT_S. Raises BoardError where the board refuses to start or a fault ends the sequence,
+    LinkError where it cannot be reached any more.
     """
     client.session.stopping = lambda: stop.wanted
     stop.wake = client.session.wake

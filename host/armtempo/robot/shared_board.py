@@ -72,10 +72,16 @@ class SharedBoard:
         return Levels(found["inputs"], tuple(found["outputs"]))
 
     def wait_for_rest(self) -> BoardState:
+<<<<<<< HEAD
         """The state in which the board comes to rest; LinkError where it does not in time."""
         state = self.state()
         limit_s = time.monotonic() + REST_S + state.rest_s
         while state.moving:
+=======
+        """The state in which the board comes to rest; LinkError if it does not within REST_S."""
+        limit_s = time.monotonic() + REST_S
+        while (state := self.state()).moving:
+>>>>>>> main
             if time.monotonic() > limit_s:
                 raise LinkError("the board was told to stop and does not", "switch off the motors' power")
             time.sleep(_LOOK_S)
@@ -92,7 +98,7 @@ class SharedBoard:
         return self._caller.messages(timeout_s)
 
     def close(self) -> None:
-        """Hang up; the other program goes on."""
+        """Hang up; the other program continues."""
         self._caller.close()
 
     def __enter__(self) -> Self:
@@ -112,7 +118,7 @@ def find(port: str) -> SharedBoard | None:
         return None
     try:
         return SharedBoard(Caller(found))
-    except LinkError:  # it hangs or has died: whoever opens the port says so
+    except LinkError:  # it hangs or has died: opening the port reports it
         return None
 
 

@@ -29,7 +29,7 @@ class StopRequest:
         self.by = ""
         """Who asked for it, in words; "" for a signal or this program."""
         self.wake: Callable[[], object] = lambda: None
-        """Called when the stop is asked for; ends the waiting of whoever looks at ``wanted``."""
+        """Called when the stop is asked for; wakes whatever waits for ``wanted``."""
 
     @property
     def wanted(self) -> bool:

@@ -96,7 +96,7 @@ def _follow(client: Client, follower: Follower, brake: Brake, take: Callable[[Sa
         except OtherBoardError:
             raise
         except NoAnswerError as error:  # silent, though its port is there: as if the cable were out
-            if not client.session.stopping():  # else the stop goes on, until it is given up
+            if not client.session.stopping():  # else the stop continues, until it is given up
                 if client.session.clock() - heard_s > RECONNECT_S:
                     raise
                 client.session.reconnect(error)
@@ -181,7 +181,7 @@ def request_stop(client: Client, stops: Iterable[StopRequest], now: bool, by: st
 
 
 def stop(client: Client, now: bool) -> None:
-    """Stop and wait until the arm rests; LinkError where it does not come to rest."""
+    """Stop and wait until the arm rests; LinkError if it does not come to rest."""
     request = StopRequest()
     request.wanted = True
     brake = Brake(client, request, now)

@@ -17,7 +17,7 @@ END_S = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class LegResult:
-    """A motion of the sequence: its runs that were heard of, held against its plan."""
+    """A motion of the sequence: its runs that were heard of, checked against its plan."""
 
     number: int
     """From 1."""

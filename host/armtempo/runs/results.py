@@ -1,4 +1,4 @@
-"""What became of each joint in the last repetition of a run."""
+"""The outcome for each joint in the last repetition of a run."""
 
 from __future__ import annotations
 

@@ -100,7 +100,7 @@ class SequenceRun:
 
     @property
     def rows_lost(self) -> int:
-        """How many rows the host was not told of, before the last one that it was."""
+        """How many rows were not reported to the host, before the last one that was."""
         return self.rows[-1].passed - len(self.rows) if self.rows else 0
 
     def motion_of(self, row: int) -> int:

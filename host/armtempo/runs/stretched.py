@@ -51,4 +51,4 @@ def note(repetition: RepetitionData) -> str:
     rates = 100 * np.diff(repetition.path_s)[whole] / passed_s[whole]
     low, high = round(float(rates.min()), 1), round(float(rates.max()), 1)
     speed = f"at {high:g} %" if high - low < 1.0 else f"between {low:g} and {high:g} %"
-    return f"{repetition.file}: ran {speed} {NOTE}; it is held against the plan at that speed"
+    return f"{repetition.file}: ran {speed} {NOTE}; it is checked against the plan at that speed"

@@ -1,4 +1,4 @@
-"""How a virtual board is started: what a caller may choose, and what its process is told of it."""
+"""How a virtual board is started: what a caller may choose, and what its process is told about it."""
 
 from __future__ import annotations
 

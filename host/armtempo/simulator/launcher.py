@@ -142,8 +142,8 @@ def launch(options: LaunchOptions | None = None) -> VirtualBoard:
     wanted = options or LaunchOptions()
     if os.name != "posix":
         raise LinkError(
-            "a virtual board needs pseudo terminals, which this operating system has not",
-            "run it on Linux or macOS, or in WSL; plans and boards of metal do without",
+            "a virtual board needs pseudo terminals, which this operating system does not have",
+            "run it on Linux or macOS, or in WSL; plans and real boards work without one",
         )
     folder = TemporaryFolder()
     flash = Path(wanted.flash_dir).resolve() if wanted.flash_dir else folder.path / "flash"
@@ -228,7 +228,7 @@ def _command(interpreter: Path | str | None, options: Path) -> list[str]:
 
 
 def is_micropython(interpreter: str) -> bool:
-    """Whether the interpreter is MicroPython; LinkError where it does not run."""
+    """Whether the interpreter is MicroPython; LinkError if it does not run."""
     question = "import sys; print(sys.implementation.name)"
     try:
         command = [interpreter, "-c", question]

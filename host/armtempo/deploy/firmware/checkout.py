@@ -64,7 +64,7 @@ def how_to_get(folder: Path) -> str:
 
 
 def look(folder: Path) -> Checkout:
-    """The checkout in a folder; InputError where there is none, or too old a one."""
+    """The checkout in a folder; InputError if there is none, or too old a one."""
     try:
         text = (folder / "py" / "mpconfig.h").read_text(encoding="utf-8", errors="replace")
         numbers = [re.findall(rf"define MICROPY_VERSION_{part} (\d+)", text)[0] for part in _PARTS]
@@ -97,7 +97,7 @@ def date(checkout: Checkout) -> int:
 
 
 def board(checkout: Checkout, name: str) -> BoardDefinition:
-    """A board of the port by name, or by the path of a folder that defines one; InputError where it does not suit."""
+    """A board of the port by name, or by the path of a folder that defines one; InputError if it does not suit."""
     folder = Path(name).resolve() if "/" in name else checkout.port / "boards" / name
     try:
         make = (folder / "mpconfigboard.mk").read_text(encoding="utf-8", errors="replace")
@@ -152,12 +152,12 @@ def check_submodules(checkout: Checkout, definition: BoardDefinition) -> None:
 
 
 def _setting(make: str, name: str) -> str:
-    """What a makefile sets a variable to, at last; "" where it does not."""
+    """What a makefile sets a variable to, at last; "" if it does not."""
     found = re.findall(rf"^{name} *[?:]?= *(\S+)", make, re.MULTILINE)
     return str(found[-1]) if found else ""
 
 
 def _text(header: str, name: str) -> str:
-    """A string that a header defines; "" where it does not."""
+    """A string that a header defines; "" if it does not."""
     found = re.search(rf'define +{name} +"([^"]*)"', header)
     return found[1] if found else ""

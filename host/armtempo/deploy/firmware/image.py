@@ -77,7 +77,7 @@ def unpacked(path: Path) -> Iterator[Path]:
 
 
 def read(folder: Path) -> Image:
-    """The firmware in a folder; InputError where there is none, or not a whole one."""
+    """The firmware in a folder; InputError if there is none, or not a whole one."""
     try:
         found: dict[str, Any] = json.loads((folder / ABOUT).read_text(encoding="utf-8"))
         pieces = tuple(

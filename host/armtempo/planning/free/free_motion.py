@@ -236,7 +236,7 @@ class Improver:
         self._targets = _targets(demand, layout)
 
     def improved(self, motion: FreeMotion, rounds: int) -> FreeMotion:
-        """After so many solves, each at the peaks that the one before showed; never slower than ``motion``."""
+        """After that many solves, each at the peaks that the one before showed; never slower than ``motion``."""
         points = collocation.grid(self.layout.segments, _PARTS, ends=False)
         best = here = motion.stretched(self.demand.limits)
         for number in range(rounds):

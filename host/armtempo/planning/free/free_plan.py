@@ -32,7 +32,7 @@ from armtempo.splines import bspline, extremes, time_axis
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
 _BEYOND = 2.0
-"""A free path is kept within so many times what its via points span on each side of them."""
+"""A free path is kept within this many times what its via points span on each side of them."""
 _WORTH_USING = 1e-3
 """A tolerance of less than so many mm or degrees is not made use of."""
 _ROUNDED = 1.001

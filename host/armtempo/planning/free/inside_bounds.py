@@ -15,7 +15,7 @@ _CENTRE = Schedule(first_barrier=1e3, last_barrier=1e3, iterations=30, curvature
 """Far from all bounds, however little that is like the path wanted."""
 _NEAR = Schedule(first_barrier=10.0, last_barrier=1e-10, curvature=False)
 _WIDER = 2.0
-"""Bounds are widened by so many times what the path is beyond them."""
+"""Bounds are widened by this many times what the path is beyond them."""
 _BETTER, _STEPS = 0.99, 60
 _ROOM, _MOST_ROOM = 0.25, 1e-7
 """Part of the room that the path keeps to its bounds, and the most of it, in the unit of the angles."""

@@ -23,11 +23,11 @@ from armtempo.model.tool_pose import APPROACH, PITCH, ROLL, WHOLE, YAW, Pose
 TOLERANCE_MM, TOLERANCE_DEG = 0.02, 0.02
 """A posture this near to the line is on it."""
 STEPS_OF_REACH, STEP_DEG = 250, 1.0
-"""The line is looked at in steps of the arm's reach by this, or of so many degrees."""
+"""The line is looked at in steps of the arm's reach by this, or of that many degrees."""
 MOST_GAIN = 5.0
 """Radians of a joint for a radian of the tool, or for a way of the arm's reach; beyond, a posture is singular."""
 MARGIN_STEPS = 2.0
-"""So many steps of its motor are left to the end of a joint's range."""
+"""This many steps of its motor are left to the end of a joint's range."""
 AXES = ("x", "y", "z", "tool-x", "tool-y", "tool-z")
 """Axes of the base, and of the tool as it stands at the start."""
 _TRIED = (WHOLE, (APPROACH,), (PITCH,), (YAW,), (ROLL,), ())
@@ -80,7 +80,7 @@ class ToolLine:
         return self.sign * np.asarray(self._pose[:3, :3] @ unit if self.axis.startswith("tool") else unit)
 
     def pose(self, way: float) -> Array:
-        """The tool's pose after so many mm or deg, (4, 4)."""
+        """The tool's pose after that many mm or deg, (4, 4)."""
         pose = self._pose.copy()
         if self.about:
             pose[:3, :3] = _turn(self.direction, math.radians(way)) @ pose[:3, :3]
@@ -203,7 +203,7 @@ class FollowedLine:
     angles_rad: Array
     """All joints there, (K, joints)."""
     ends: str
-    """Why the line ends before it was to, in words; "" where it does not."""
+    """Why the line ends before it was to, in words; "" if it does not."""
 
     @property
     def length(self) -> float:

@@ -29,7 +29,7 @@ RAMP = 0.5
 STRAY_MM = 0.2
 """How far the tool may leave its line."""
 LINE_PARTS = (8, 16, 32, 64)
-"""Into so many parts a line is cut, until the tool stays on it; then its ramps too, which takes longer."""
+"""Into this many parts a line is cut, until the tool stays on it; then its ramps too, which takes longer."""
 _SHORTER = 0.98
 _TRIES = 6
 _INSIDE_STEPS = 1e-6
@@ -68,7 +68,7 @@ class JogMotion:
     brakes: BrakeTimes
     """How long it takes to come to rest."""
     ends: str
-    """Why it ends before it was to, in words; "" where it does not."""
+    """Why it ends before it was to, in words; "" if it does not."""
 
     @property
     def end_deg(self) -> Array:
@@ -120,7 +120,7 @@ def plan(name: str, arm: Arm, here_deg: Sequence[float], move: JogMove, speed: f
 
 
 def number_of_joint(arm: Arm, joint: int | str) -> int:
-    """The place of a joint, from 0, by its number (from 1) or its name; InputError where there is none."""
+    """The place of a joint, from 0, by its number (from 1) or its name; InputError if there is none."""
     names = [driven.name for driven in arm.driven]
     if joint in names:
         return names.index(str(joint))

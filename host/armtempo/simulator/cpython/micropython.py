@@ -1,8 +1,8 @@
-"""Stands in for MicroPython's ``micropython`` module when the board program runs under CPython.
+"""Replaces MicroPython's ``micropython`` module when the board program runs under CPython.
 
 Pointer annotations of ``@viper`` functions, and casts such as ``ptr32(address)`` inside them, get views that
 behave like the chip's memory: 8, 16 or 32 bit wide, stores wrap, loads of ``ptr8`` and ``ptr16`` are
-unsigned, loads of ``ptr32`` signed. Everything else in a viper function is left as it is: board code keeps
+unsigned, loads of ``ptr32`` signed. Everything else in a viper function is unchanged: board code keeps
 its words within 31 bits (or lets only a store wrap).
 """
 

@@ -1,4 +1,4 @@
-"""Stands in for MicroPython's ``uctypes`` under CPython: addresses of buffers, buffers and words at addresses."""
+"""Replaces MicroPython's ``uctypes`` under CPython: addresses of buffers, buffers and words at addresses."""
 
 from __future__ import annotations
 

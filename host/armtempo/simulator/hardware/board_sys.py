@@ -40,7 +40,7 @@ class _Stdin:
     """``sys.stdin``."""
 
     def read(self, count):
-        """Wait for so many bytes."""
+        """Wait for that many bytes."""
         return _the.port.recv(count, timeout=1 << 30)
 
 

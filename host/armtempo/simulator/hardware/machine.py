@@ -20,6 +20,8 @@ class _Memory:
         machine_state.board.call()
         shift = 8 * (where & 3)
         words, at = memory.place(where)
+        if at == machine_state.board.cycles.at and words is memory.words:
+            machine_state.board.cycles.look()
         value = words[at] >> shift & self._mask
         return value - (1 << 32) if value >> 31 else value
 

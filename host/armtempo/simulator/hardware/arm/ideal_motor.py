@@ -40,7 +40,7 @@ class IdealMotor:
             self.moved = True
 
     def slip(self, counts):
-        """The encoder's coupling slips by so many counts."""
+        """The encoder's coupling slips by that many counts."""
         self._counts -= counts
         self.moved = True
 

@@ -1,18 +1,20 @@
 """The board: virtual time, interrupts, and what happens in between.
 
 Time is counted in ticks of 84 MHz since power-up and passes only in calls of simulated functions: each costs
-what its like costs on the chip, roughly. ``run_until`` brings the models to a time; interrupts are served
+what its like costs on the chip, roughly. ``run_until`` advances the models to a time; interrupts are served
 on the way, each a little late, as on the chip.
 """
 
 import sys
 
-from chip import backup_sram, dma, gpio, memory, timer_registers, timers
+from chip import backup_sram, cycle_counter, dma, gpio, memory, timer_registers, timers
 
 TICKS_PER_MS = 84_000
 TICKS_PER_US = 84
 CALL_TICKS = 84
 """A simulated function or register access: 1 us, about 130 instructions of the interpreter."""
+FLASH_ACR = 0x705
+"""What the firmware sets: 5 wait states, prefetch and both caches on (RM0090 3.9.1)."""
 _MOST_UNSPENT_TICKS = 40 * CALL_TICKS
 INTERRUPT_TICKS = 160
 """From an event to the first line of its callback: 1.9 us (an empty callback's instructions)."""
@@ -28,7 +30,7 @@ _RCC_TIMERS = {
 class Chip:
     """Everything between the program and what is connected to the pins.
 
-    ``observers`` are told of timers that start or stop and of inputs that change; ``follow()`` is called after
+    ``observers`` are notified of timers that start or stop and of inputs that change; ``follow()`` is called after
     each stretch of time.
     """
 
@@ -39,6 +41,7 @@ class Chip:
         self.dma = dma.Controller()
         self.pins = gpio.Pins()
         self.backup = backup_sram.BackupSram()
+        self.cycles = cycle_counter.CycleCounter(self)
         self.timers = {}
         for number, bits, rate in ((2, 32, 1), (5, 32, 1), (1, 16, 2), (8, 16, 2), (3, 16, 1), (4, 16, 1),
                                    (6, 16, 1), (7, 16, 1), (9, 16, 2), (10, 16, 2), (11, 16, 2),
@@ -67,6 +70,7 @@ class Chip:
         self.millisecond = None
         self.next_ms = TICKS_PER_MS
         memory.poke(memory.index("IWDG") + 2, 0xFFF)
+        memory.poke(memory.index("FLASH"), FLASH_ACR)
         for port, register, value in gpio.AT_RESET:
             memory.poke(memory.index(port) + register, value)
         self.sync(True)
@@ -86,6 +90,8 @@ class Chip:
         self._sync_pins(names)
         if "PWR" in names:
             self.backup.sync()
+        if "DWT" in names or "SCS" in names:
+            self.cycles.sync()
         if "DMA1" in names or "RCC" in names:
             rcc = memory.words[memory.index("RCC") + 12]
             self.dma.sync((rcc >> 21) & 1)
@@ -183,7 +189,7 @@ class Chip:
             self.follow()
 
     def moving(self, horizon_ticks):
-        """Whether a timer will do something within so many ticks."""
+        """Whether a timer will do something within that many ticks."""
         limit = self.now + horizon_ticks
         return any([timer.next_match() < limit for timer in self.counting])
 

@@ -178,6 +178,6 @@ class TimerUnit:
         memory.poke(self.at + SR, memory.words[self.at + SR] & ~(1 << flag))
 
     def turn(self, counts):
-        """In encoder mode: the shaft has turned by so many counts."""
+        """In encoder mode: the shaft has turned by that many counts."""
         if self.encoder and self.running:
             memory.poke(self.at + CNT, (memory.words[self.at + CNT] + counts) % self.modulus)

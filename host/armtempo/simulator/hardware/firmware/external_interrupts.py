@@ -53,7 +53,7 @@ class ExtInt:
 
 
 def set_level(name, level):
-    """Drive an input pin from outside to 0 or 1, or let go of it (None)."""
+    """Drive an input pin from outside to 0 or 1, or release it (None)."""
     line = machine_state.board.pins.line(name)
     before = line.read()
     line.external = level

@@ -87,6 +87,6 @@ class Pin:
 
 
 def _field(at, bits, number, value):
-    """Write field ``number`` of so many bits each in a register."""
+    """Write field ``number`` of that many bits each in a register."""
     mask = (1 << bits) - 1
     memory.words[at] = memory.words[at] & ~(mask << bits * number) | (value & mask) << bits * number

@@ -54,7 +54,7 @@ class SilentPort:
         return count
 
     def take(self, count):
-        """Up to so many received bytes."""
+        """Up to that many received bytes."""
         data = bytes(self.received[:count])
         self.received = self.received[count:]
         return data
@@ -138,7 +138,7 @@ class USB_VCP:
         return bool(self._line.received)
 
     def recv(self, data, timeout=5000):
-        """Receive into a buffer, or so many bytes; the time-out is per byte, in ms."""
+        """Receive into a buffer, or that many bytes; the time-out is per byte, in ms."""
         wanted = data if isinstance(data, int) else len(data)
         waited = 0
         while len(self._line.received) < wanted and waited < timeout:

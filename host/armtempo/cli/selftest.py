@@ -1,0 +1,47 @@
+"""``armtempo selftest``: the board measures itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from armtempo.cli import chosen, options, results
+from armtempo.cli.progress import ProgressBar
+
+if TYPE_CHECKING:
+    from armtempo.selftest.result import Measurement, SelfTest
+
+
+@click.command()
+@options.port
+@options.log_traffic
+@options.as_json
+def command(port: str | None, log_traffic: Path | None, as_json: bool) -> None:
+    """Let the board measure itself: clocks, flash, memory, link.
+
+    Nothing needs to be connected, and nothing moves: the drivers must be off, and stay so. The board is reset at the
+    end, so the arm's position is unknown then. Exit code 1 where anything is wrong.
+    """
+    with chosen.board(chosen.port(port), log_traffic) as board, ProgressBar("self-test") as progress:
+        found = board.selftest(progress)
+    results.show(as_json, found.to_json(), _lines(found))
+    if found.failed:
+        raise SystemExit(1)
+
+
+def _lines(found: SelfTest) -> list[str]:
+    kind = "virtual board: its figures are simulated" if found.simulated else "board"
+    lines = [f"self-test of {kind} {found.board_id}"]
+    for line in found.lines:
+        lines.extend(_words(line))
+    wrong = len(found.failed)
+    lines.append(f"{wrong} of {len(found.lines)} lines are wrong" if wrong else "nothing is wrong")
+    return lines
+
+
+def _words(line: Measurement) -> list[str]:
+    expected = f"   (expected: {line.expected})" if line.expected else ""
+    words = [f"  {line.verdict.value:<6}{line.part:<8}{line.what}: {line.measured}{expected}"]
+    return [*words, f"  {'':<14}-> {line.cure}"] if line.cure else words

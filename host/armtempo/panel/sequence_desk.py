@@ -1,0 +1,163 @@
+"""The sequence that the panel edits, step by step, and its file, in which comments are kept."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+from tomlkit.items import AoT, Table
+
+from armtempo.basics.errors import InputError
+from armtempo.formats import toml_table
+from armtempo.formats.atomic_file import replace_text
+from armtempo.model.arm import Arm
+from armtempo.model.sequence import Sequence, is_sequence
+from armtempo.model.sequence_plan import SequencePlan
+
+KINDS: dict[str, tuple[str, ...]] = {
+    "goto": (),
+    "run": (),
+    "output": ("to", "wait_s"),
+    "wait_s": (),
+    "wait_input": ("active", "timeout_s", "on_timeout"),
+    "count": (),
+    "repeat": (),
+    "end": (),
+    "call": (),
+}
+"""What a step does, and what else can be said of it."""
+_FIRST = {"goto": "home", "wait_s": "1", "repeat": "for ever", "end": "repeat"}
+
+
+class SequenceDesk:
+    """The steps of one file; ``folder``: no other is written to."""
+
+    def __init__(self, arm: Arm, folder: Path) -> None:
+        self.arm, self.folder = arm, folder
+        self.file: Path | None = None
+        self.plan: SequencePlan | None = None
+        """Of the steps as they were when it was planned."""
+        self.version = 0
+        """Grows with each change."""
+        self._content = tomlkit.document()
+
+    def files(self) -> list[str]:
+        """Names of the sequence files in the folder."""
+        found = []
+        for path in sorted(self.folder.glob("*.toml")):
+            try:
+                if is_sequence(path):
+                    found.append(path.name)
+            except InputError:
+                continue
+        return found
+
+    def open(self, name: str) -> None:
+        """Edit a file of the folder; InputError if it is none of a sequence, or its steps cannot be edited here."""
+        if name not in self.files():
+            raise InputError(f"{name}: there is no such sequence in the project folder", "choose another")
+        file = self.folder / name
+        content = tomlkit.parse(file.read_text(encoding="utf-8"))
+        if not isinstance(content["step"], AoT):
+            raise InputError(
+                f"{name}: its steps are not written as [[step]]", "write them so, or edit it as text"
+            )
+        self.file, self._content, self.plan = file, content, None
+        self.version += 1
+
+    @property
+    def steps(self) -> list[dict[str, str]]:
+        """The keys and values of each step, as text."""
+        return [{key: _text(value) for key, value in step.unwrap().items()} for step in self._tables]
+
+    @property
+    def _tables(self) -> list[Table]:
+        steps = self._content.get("step")
+        return list(steps.body) if isinstance(steps, AoT) else []
+
+    def set(self, index: int, key: str, text: str) -> None:
+        """Change what a step says under a key; "" takes the key out."""
+        table = self._tables[index]
+        if text:
+            table[key] = _value(text)
+        elif key in table:
+            del table[key]
+        self._changed()
+
+    def set_kind(self, index: int, kind: str) -> None:
+        """Let a step do something else; its comments stay."""
+        table = self._tables[index]
+        for key in list(table):
+            del table[key]
+        table[kind] = _value(_FIRST.get(kind, "name"))
+        self._changed()
+
+    def add(self, index: int) -> None:
+        """Put a step before the one of this index."""
+        table = tomlkit.table()
+        table["goto"] = "home"
+        table.add(tomlkit.nl())
+        tables = self._tables
+        self._put([*tables[:index], table, *tables[index:]])
+
+    def delete(self, index: int) -> None:
+        """Take a step out, with its comments."""
+        tables = self._tables
+        del tables[index]
+        self._put(tables)
+
+    def move(self, index: int, by: int) -> None:
+        """Move a step ``by`` places, with its comments; not beyond the first or last."""
+        tables = self._tables
+        if 0 <= index + by < len(tables):
+            tables.insert(index + by, tables.pop(index))
+            self._put(tables)
+
+    def sequence(self) -> Sequence:
+        """The steps as they are; InputError, naming step and key, if they are none."""
+        if self.file is None:
+            raise InputError("no sequence is open", "choose a file")
+        return Sequence.of_table(toml_table.parse(tomlkit.dumps(self._content), str(self.file)), self.arm)
+
+    def save(self) -> Path:
+        """Write the file; InputError, and nothing written, if the steps are no sequence."""
+        sequence = self.sequence()
+        file = Path(sequence.source)
+        replace_text(file, tomlkit.dumps(self._content))
+        return file
+
+    def _put(self, tables: list[Table]) -> None:
+        steps = tomlkit.aot()
+        for table in tables:
+            steps.append(table)
+        self._content["step"] = steps
+        self._changed()
+
+    def _changed(self) -> None:
+        self.plan = None
+        self.version += 1
+
+
+def kind_of(step: dict[str, str]) -> str:
+    """What a step does."""
+    return next((kind for kind in KINDS if kind in step), "goto")
+
+
+def _text(value: Any) -> str:
+    """A value as it is typed: a text without its quotes."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, bool):
+        return str(value).lower()
+    return str(value)
+
+
+def _value(text: str) -> Any:
+    """What was typed: a number, yes or no, or a list if it is one in TOML, else a text."""
+    try:
+        value = tomllib.loads(f"x = {text}")
+    except ValueError:
+        return text
+    return value["x"] if len(value) == 1 and isinstance(value["x"], bool | int | float | list) else text

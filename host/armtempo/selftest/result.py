@@ -1,0 +1,65 @@
+"""What a self-test found: lines of what was measured, what was expected, a verdict, and what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from armtempo.diagnosis.item import Condition
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """One thing that was measured. ``verdict`` NOTE: there is nothing to compare it with, or it was left out."""
+
+    part: str
+    what: str
+    measured: str
+    expected: str = ""
+    verdict: Condition = Condition.NOTE
+    cure: str = ""
+
+
+def judged(part: str, what: str, measured: str, expected: str, is_good: bool, cure: str) -> Measurement:
+    """A line with a verdict; ``cure`` is for one that is wrong."""
+    verdict = Condition.GOOD if is_good else Condition.WRONG
+    return Measurement(part, what, measured, expected, verdict, "" if is_good else cure)
+
+
+def left_out(part: str, reason: str, cure: str) -> Measurement:
+    """A part that was not done, and why."""
+    return Measurement(part, "left out", reason, "", Condition.NOTE, cure)
+
+
+@dataclass
+class SelfTest:
+    """The lines of one self-test of one board, and the figures behind them (``data``, by part)."""
+
+    board_id: str
+    simulated: bool
+    program_crc: int
+    lines: list[Measurement] = field(default_factory=list)
+    data: dict[str, Any] = field(default_factory=dict)
+
+    def add(self, lines: Iterable[Measurement]) -> None:
+        """More lines."""
+        self.lines.extend(lines)
+
+    @property
+    def failed(self) -> list[Measurement]:
+        """The lines that are wrong."""
+        return [line for line in self.lines if line.verdict is Condition.WRONG]
+
+    def to_json(self) -> dict[str, Any]:
+        """What ``selftest.json`` and ``--json`` have."""
+        lines = [{**asdict(line), "verdict": line.verdict.value} for line in self.lines]
+        return {
+            "selftest": 1,
+            "board_id": self.board_id,
+            "simulated": self.simulated,
+            "program_crc": self.program_crc,
+            "passed": not self.failed,
+            "lines": lines,
+            "data": self.data,
+        }

@@ -1,0 +1,201 @@
+"""The panel as its users have it: the program, on a virtual board in real time behind a cable, and a real browser."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import armtempo
+from armtempo.model import shipped
+from armtempo.robot import shared_board
+from armtempo.robot.board_state import BoardState
+from armtempo.simulator import LaunchOptions, launch
+
+from tests import browser
+from tests.system import commandline
+from tests.system.held_jogs import Cable
+from tests.system.relay import Relay
+
+ARM = armtempo.Arm.paper()
+OPTIONS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+WAIT_S = 120.0
+"""Nothing here takes longer, on however loaded a machine."""
+SMALL = {"width": 640, "height": 900}
+"""Size of a window that is drawn quickly by a processor."""
+
+
+@contextmanager
+def playwright() -> Iterator[Any]:
+    """Playwright, which a process can have once."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as play:
+        yield play
+
+
+def chromium(play: Any) -> Any:
+    """A browser, that ends with Playwright."""
+    return play.chromium.launch(executable_path=browser.BROWSER, args=OPTIONS)
+
+
+@contextmanager
+def chromium_to_kill(play: Any, folder: Path) -> Iterator[tuple[Any, subprocess.Popen[bytes]]]:
+    """A browser with its process, for a context of its own."""
+    assert browser.BROWSER
+    told = folder / "DevToolsActivePort"
+    process = subprocess.Popen(
+        [
+            browser.BROWSER,
+            *OPTIONS,
+            "--headless",
+            "--remote-debugging-port=0",
+            f"--user-data-dir={folder}",
+            "about:blank",
+        ],
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        commandline.wait_for(lambda: told.is_file() and "\n" in told.read_text(), "the browser's port")
+        yield play.chromium.connect_over_cdp(f"http://127.0.0.1:{told.read_text().split()[0]}"), process
+    finally:
+        process.kill()
+        process.wait()
+
+
+@dataclass
+class Panel:
+    """A panel that runs."""
+
+    folder: Path
+    port: str
+    cables: tuple[Cable, Cable]
+    process: subprocess.Popen[str]
+    address: str
+
+    @property
+    def running(self) -> bool:
+        """Whether its program runs."""
+        return self.process.poll() is None
+
+    def state(self) -> BoardState:
+        """What the board says: through the panel's program, or directly if that has ended."""
+        if self.running and (found := shared_board.find(self.port)):
+            with found:
+                return found.state()
+        with armtempo.connect(self.port, ARM, tell=lambda text: None) as board:
+            return board.state(ARM)
+
+    def end(self) -> None:
+        """End its program."""
+        if self.running:
+            self.process.send_signal(signal.SIGINT)
+        self.process.communicate(timeout=WAIT_S)
+
+    def cut(self, cut: bool) -> None:
+        """Cut the cable, or mend it."""
+        for cable in self.cables:
+            cable.cut = cut
+
+
+class Panels:
+    """Panels on one board, one after the other: a new one only if the last was killed."""
+
+    def __init__(self, folder: Path, port: str, cables: tuple[Cable, Cable]) -> None:
+        self._folder, self._port, self._cables = folder, port, cables
+        self._last: Panel | None = None
+
+    def __call__(self) -> Panel:
+        """One that runs."""
+        if self._last is None or not self._last.running:
+            self.close()
+            options = ("--arm", "paper", "--job", "job.toml", "--web-port", "0", "--no-show")
+            process = commandline.start("panel", *options, "--port", self._port, folder=self._folder)
+            assert process.stdout
+            address = process.stdout.readline().strip()
+            assert address.startswith("http://127.0.0.1:"), (
+                address,
+                process.stderr and process.stderr.read(),
+            )
+            self._last = Panel(self._folder, self._port, self._cables, process, address)
+        return self._last
+
+    def close(self) -> None:
+        """End the last one."""
+        if self._last is not None:
+            self._last.end()
+
+
+@contextmanager
+def panels(folder: Path) -> Iterator[Panels]:
+    """For the paper's arm and job."""
+    (folder / "job.toml").write_text(shipped.job_path().read_text(encoding="utf-8"), encoding="utf-8")
+    cables = Cable(), Cable()
+    with ExitStack() as stack:
+        virtual = stack.enter_context(launch(LaunchOptions(virtual_time=False, arm=ARM)))
+        relay = stack.enter_context(Relay(virtual.port, folder / "port", *cables))
+        made = Panels(folder, relay.port, cables)
+        stack.callback(made.close)
+        yield made
+
+
+def opened(window: Any, address: str) -> Any:
+    """The panel's page in a window (a Playwright context), in control of the board."""
+    page = window.new_page()
+    page.set_default_timeout(WAIT_S * 1000)
+    page.goto(address)
+    page.wait_for_selector("button:has-text('control')")
+    take = page.get_by_role("button", name="Take control")
+    if take.is_visible():
+        take.click()
+    page.wait_for_selector("text=In control")
+    wait_for(page, "virtual board")
+    return page
+
+
+def wait_for(page: Any, *words: str) -> None:
+    """Until the line of the state has all the words."""
+    page.wait_for_function(
+        "words => words.every(word => document.getElementById('armtempo-state').textContent.includes(word))",
+        arg=list(words),
+        polling=50,
+    )
+
+
+def home(page: Any) -> None:
+    """Say that the arm is at home."""
+    page.get_by_role("button", name="The arm is at home").click()
+    page.get_by_role("dialog").get_by_role("button", name="The arm is at home").click()
+    page.wait_for_selector('[aria-label="joint 1 +"]:not([disabled])')
+
+
+def hold(page: Any) -> None:
+    """Hold a jog button until the arm moves; again if a busy browser was silent for too long, as then it lets go."""
+    button = page.get_by_label("joint 1 +")
+    for _ in range(20):
+        button.hover()
+        page.mouse.down()
+        with suppress(Exception):  # a time-out
+            page.wait_for_function(
+                "document.getElementById('armtempo-state').textContent.includes('moving')",
+                timeout=3000,
+                polling=50,
+            )
+            return
+        page.mouse.up()
+        wait_for(page, "idle")
+    raise AssertionError("the arm does not move")
+
+
+def rest(state: Callable[[], BoardState]) -> BoardState:
+    """The state in which the board comes to rest."""
+    limit_s = time.monotonic() + WAIT_S
+    while (found := state()).moving:
+        assert time.monotonic() < limit_s, found
+        time.sleep(0.02)
+    return found
