@@ -72,16 +72,10 @@ class SharedBoard:
         return Levels(found["inputs"], tuple(found["outputs"]))
 
     def wait_for_rest(self) -> BoardState:
-<<<<<<< HEAD
-        """The state in which the board comes to rest; LinkError where it does not in time."""
+        """The state in which the board comes to rest; LinkError if it does not in time."""
         state = self.state()
         limit_s = time.monotonic() + REST_S + state.rest_s
         while state.moving:
-=======
-        """The state in which the board comes to rest; LinkError if it does not within REST_S."""
-        limit_s = time.monotonic() + REST_S
-        while (state := self.state()).moving:
->>>>>>> main
             if time.monotonic() > limit_s:
                 raise LinkError("the board was told to stop and does not", "switch off the motors' power")
             time.sleep(_LOOK_S)
