@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from armtempo.cli import COMMANDS, main
+from armtempo.cli import main
+from armtempo.cli.commands import COMMANDS
 from armtempo.kinematics.of_arm import forward
 from armtempo.link import Client, greet
 from armtempo.model import shipped

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from armtempo.cli import show
+from armtempo.cli import stored
 from armtempo.diagnosis.finding import Finding, Level
 from armtempo.formats.text_table import aligned
 from armtempo.model.plan import Plan
@@ -77,5 +77,5 @@ def test_results_and_times_of_joints_with_long_names(made: Plan) -> None:
     lines = text_summary.result_lines(results(run, made.trajectory))
     assert len({len(line) for line in lines}) == 1
     assert all(f"{joint.name} " in line for joint, line in zip(made.arm.driven, lines[2:], strict=True))
-    times = show._lines(motion, [1.0] * len(scales))[3:]
+    times = stored.motion_lines(motion, [1.0] * len(scales))[3:]
     assert len({line.index(" s, up to") for line in times}) == 1

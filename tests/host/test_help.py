@@ -11,15 +11,29 @@ from pathlib import Path
 
 import click
 import pytest
-from armtempo.cli import COMMANDS, GROUPS, examples, main
+from armtempo.cli import main
+from armtempo.cli.commands import COMMANDS, GROUPS
 from click.testing import CliRunner
 
 
-def test_every_command_is_in_one_group_and_has_its_module() -> None:
-    assert len(COMMANDS) == len(set(COMMANDS))
-    folder = Path(str(sys.modules[main.__module__].__file__)).parent
-    modules = {path.stem.rstrip("_").replace("_", "-") for path in folder.glob("*.py")}
-    assert set(COMMANDS) <= modules
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_table_says_of_a_command_what_its_docstring_says(name: str) -> None:
+    command = main.get_command(click.Context(main), name)
+    assert command is not None
+    assert command.name == name
+    assert command.help is not None
+    assert command.help.split("\n\n")[0].replace("\n", " ") == COMMANDS[name].summary
+    assert COMMANDS[name].examples
+
+
+def test_the_help_page_and_the_tab_key_import_no_command() -> None:
+    count = "len([name for name in sys.modules if name.startswith('armtempo.cli.')])"
+    code = (
+        "import sys, click; from armtempo.cli import main; "
+        f"before = {count}; context = click.Context(main); main.get_help(context); main.shell_complete(context, ''); "
+        f"print({count} - before, 'numpy' in sys.modules)"
+    )
+    assert subprocess.check_output([sys.executable, "-c", code], text=True).split() == ["0", "False"]
 
 
 def test_the_help_page_shows_the_groups_and_their_commands() -> None:
@@ -32,11 +46,7 @@ def test_the_help_page_shows_the_groups_and_their_commands() -> None:
         assert line == "COMMAND" or line in COMMANDS
 
 
-def test_every_command_has_examples() -> None:
-    assert set(examples.EXAMPLES) == set(COMMANDS)
-
-
-@pytest.mark.parametrize("line", [line for lines in examples.EXAMPLES.values() for line in lines])
+@pytest.mark.parametrize("line", [line for entry in COMMANDS.values() for line in entry.examples])
 def test_an_example_is_a_command_that_can_be_given(
     line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

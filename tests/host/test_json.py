@@ -9,7 +9,8 @@ from typing import Any
 
 import click
 import pytest
-from armtempo.cli import COMMANDS, main
+from armtempo.cli import main
+from armtempo.cli.commands import COMMANDS
 from armtempo.link.board_messages import Hello
 from armtempo.simulator import LaunchOptions, launch
 from click.testing import CliRunner

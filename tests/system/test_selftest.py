@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +15,7 @@ from armtempo import connect
 from armtempo.basics.errors import LinkError
 from armtempo.records import encode
 from armtempo.simulator import LaunchOptions, edgelog, launch
+from armtempo.simulator.launch_options import InjectedFault
 
 from tests import interpreters
 from tests.system import boards, commandline
@@ -68,7 +70,49 @@ def test_a_sound_board_passes(tmp_path: Path) -> None:
         code, found = selftest(port, tmp_path)
     assert (code, words(found, "wrong")) == (0, []), found
     assert found["simulated"]
-    assert {one["part"] for one in found["lines"]} >= {"drivers", "board", "cycles", "memory", "link"}
+    assert all(rises(tmp_path, pin) > 300 for pin in STEPS)  # pulses there were
+    parts = {one["part"] for one in found["lines"]}
+    assert parts == {"drivers", "board", "cycles", "memory", "link", "pulses", "safety"}
+    assert not is_enabled(tmp_path)
+
+
+BROKEN = (
+    (
+        (
+            InjectedFault("short", 0, 0, name="A15-A1"),
+            InjectedFault("dead_pin", 0, 0, name="B10"),
+            InjectedFault("slow_flash", 0, 0, ms=1500),
+            InjectedFault("late_interrupts", 0, 0, ms=0.05),
+        ),
+        (
+            "PA1, forward: 385 steps, those of PA15 among them",
+            "PB10, forward: 0 steps",
+            "flash: write",
+            "E-stop to frozen outputs",
+        ),
+    ),
+    (
+        (InjectedFault("dead_stream", 0, 0, joint=1),),
+        ("fault internal", "PB10, forward: 1 steps"),
+    ),
+    (
+        (InjectedFault("half_clock", 0, 0),),
+        ("a tick of TIM2: 4.000",),
+    ),
+)
+
+
+@pytest.mark.parametrize(("faults", "wrong"), BROKEN, ids=("pins", "stream", "clock"))
+def test_what_is_wrong_is_named(
+    tmp_path: Path, faults: tuple[InjectedFault, ...], wrong: tuple[str, ...]
+) -> None:
+    with board(tmp_path, faults=faults) as port:
+        code, found = selftest(port, tmp_path)
+    named = [f"{one['what']}: {one['measured']}" for one in found["lines"] if one["verdict"] == "wrong"]
+    assert code == 1
+    for words in wrong:
+        assert any(words in line for line in named), named
+    assert all(one["cure"] for one in found["lines"] if one["verdict"] == "wrong")
     assert not is_enabled(tmp_path)
 
 
@@ -81,3 +125,35 @@ def test_with_drivers_on_nothing_is_done(tmp_path: Path) -> None:
         with pytest.raises(LinkError, match="drivers are on"):
             used.selftest()
         assert (used.status().state, used.status().positions) == ("idle", steps)
+
+
+def test_no_pulses_where_enable_cannot_be_inactive(tmp_path: Path) -> None:
+    """ENABLE, active low, is shorted to ground."""
+    with board(tmp_path, faults=[InjectedFault("dead_pin", 0, 0, name=ENABLE)]) as port:
+        code, found = selftest(port, tmp_path)
+    assert (code, found["error"]) == (1, "the drivers are on (ENABLE, PE12, is active)")
+    assert not any(rises(tmp_path, pin) for pin in STEPS)
+
+
+@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGKILL], ids=("ctrl-c", "kill"))
+def test_drivers_stay_off_whatever_ends_it(tmp_path: Path, end: signal.Signals) -> None:
+    """Ended while pulses are made; after Ctrl-C the program runs again, after a kill the watchdog sees to that."""
+    edges = tmp_path / "edges"
+    with board(tmp_path) as port:
+        process = commandline.start("selftest", "--port", port, folder=tmp_path)
+        commandline.wait_for(lambda: edges.exists() and edges.stat().st_size > 3000, "the first pulses")
+        process.send_signal(end)
+        code = commandline.ended(process).exit_code
+        if end is signal.SIGINT:
+            assert code == 130
+            commandline.wait_for(lambda: _state(port) == "unhomed", "the program")
+    assert rises(tmp_path, STEPS[0]) > 0
+    assert not is_enabled(tmp_path)
+
+
+def _state(port: str) -> str:
+    try:
+        with connect(port) as used:
+            return used.status().state
+    except LinkError as error:
+        return str(error)

@@ -13,7 +13,7 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
-from armtempo.cli.interrupts import raised_by_signals
+from armtempo.cli import raised_by_signals
 
 from tests.interpreters import ROOT
 

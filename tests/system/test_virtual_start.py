@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 import serial
 from armtempo.basics.errors import LinkError
-from armtempo.cli import virtual_board
+from armtempo.cli.virtual_board import virtual_board
 from armtempo.simulator import LaunchOptions, VirtualBoard, edgelog, launch
 from armtempo.simulator.temporary_folder import PREFIX, TemporaryFolder
 
@@ -136,7 +136,7 @@ def test_nothing_is_wrong_with_a_board_unless_asked_for() -> None:
 
 
 def test_the_command_starts_the_board_that_a_script_gets() -> None:
-    (seed,) = (option for option in virtual_board.command.params if option.name == "seed")
+    (seed,) = (option for option in virtual_board.params if option.name == "seed")
     assert seed.default == LaunchOptions().seed
 
 

@@ -5,50 +5,22 @@ from __future__ import annotations
 import errno
 import io
 import os
+import signal
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
-from keyword import iskeyword
+from types import FrameType
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from armtempo.basics.errors import INTERRUPTED, ArmtempoError
 from armtempo.basics.version import installed_version
-from armtempo.cli import examples, messages
-from armtempo.cli.interrupts import raised_by_signals
+from armtempo.cli import results
+from armtempo.cli.commands import COMMANDS, GROUPS
 from armtempo.formats.spelling import did_you_mean
-
-GROUPS = {
-    "Plan": ("new", "plan", "ik", "fk", "check", "import", "export", "import-urdf"),
-    "Run": (
-        "demo",
-        "home",
-        "goto",
-        "jog",
-        "teach",
-        "run",
-        "speed",
-        "pause",
-        "resume",
-        "output",
-        "input",
-        "stop",
-        "clear",
-        "status",
-        "watch",
-        "fetch",
-        "report",
-        "panel",
-    ),
-    "Board": (
-        *("ports", "deploy", "undeploy", "firmware", "flash", "selftest", "configure"),
-        *("upload", "list", "show", "remove", "rename"),
-        *("virtual-board", "monitor", "config", "doctor", "help"),
-    ),
-    "Develop": ("paper", "completion"),
-}
-"""Commands in the order of the help page. Each is ``command`` in its module: '-' as '_', a keyword with '_' behind."""
-COMMANDS = tuple(name for names in GROUPS.values() for name in names)
 
 _EXAMPLES = """\
 Examples:
@@ -62,30 +34,42 @@ Examples:
 """
 
 
+_AGAIN_S = 0.01
+_MOST_WAITS = 300
+"""Longer than any import takes; whoever runs a command while importing is interrupted all the same."""
+
+
 class LazyGroup(click.Group):
     """A group that imports a command's module when it is asked for it."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """All names, in the order of the table."""
-        return [*COMMANDS]  # "list" may be the module of that command here
+        return [*COMMANDS]
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """The commands with what they do, group by group."""
         width = formatter.width - 6 - max(map(len, COMMANDS))
-        for title, names in GROUPS.items():
+        for title, entries in GROUPS.items():
             with formatter.section(title):
-                commands = [(name, self.get_command(ctx, name)) for name in names]
-                formatter.write_dl(
-                    [(name, command.get_short_help_str(width)) for name, command in commands if command]
-                )
+                rows = [(name, one.short_help(width)) for name, one in entries.items()]
+                formatter.write_dl(rows)
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """The commands that begin so, with what they do; then what any command completes: its options."""
+        found = [
+            CompletionItem(name, help=one.short_help())
+            for name, one in COMMANDS.items()
+            if name.startswith(incomplete)
+        ]
+        return [*found, *click.Command.shell_complete(self, ctx, incomplete)]
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
         """The command of that name."""
         if name not in COMMANDS:
             return None
-        module = import_module(f"{__name__}.{name.replace('-', '_')}{'_' * iskeyword(name)}")
-        command: click.Command = module.command
-        command.epilog = examples.of(name)
+        entry = COMMANDS[name]
+        command: click.Command = getattr(import_module(f"{__name__}.{entry.module}"), entry.function)
+        command.epilog = entry.epilog
         for parameter in command.params:
             if isinstance(parameter, click.Option) and isinstance(
                 parameter.type, click.IntRange | click.FloatRange
@@ -113,15 +97,15 @@ class LazyGroup(click.Group):
             with raised_by_signals():
                 return super().invoke(ctx)
         except ArmtempoError as error:
-            messages.show(error, as_json=as_json)
+            results.show_error(error, as_json=as_json)
             ctx.exit(error.exit_code)
         except OSError as error:
             if error.errno == errno.EPIPE:  # whoever read the output has gone: click ends quietly
                 raise
-            messages.show(_of_file(error), as_json=as_json)
+            results.show_error(_of_file(error), as_json=as_json)
             ctx.exit(1)
         except MemoryError as error:
-            messages.show(
+            results.show_error(
                 ArmtempoError(
                     f"this takes more memory than there is: {error}".rstrip(": "),
                     "close other programs, or ask for less: lower refine, a smaller population",
@@ -132,6 +116,47 @@ class LazyGroup(click.Group):
         except KeyboardInterrupt as error:
             click.echo(f"armtempo: interrupted{': ' if error.args else ''}{error}", err=True)
             ctx.exit(INTERRUPTED)
+
+
+@contextmanager
+def raised_by_signals() -> Iterator[None]:
+    """Let Ctrl-C and SIGTERM raise KeyboardInterrupt.
+
+    Ctrl-C stays ignored where it is, as in a program that a shell has put into the background.
+    """
+    ignored = signal.getsignal(signal.SIGINT) == signal.SIG_IGN
+    numbers = [signal.SIGTERM] if ignored else [signal.SIGTERM, signal.SIGINT]
+    numbers += [signal.SIGALRM] if hasattr(signal, "setitimer") else []
+    handler = _Interrupt()
+    before = {number: signal.signal(number, handler) for number in numbers}
+    try:
+        yield
+    finally:
+        waiting = hasattr(signal, "setitimer") and signal.setitimer(signal.ITIMER_REAL, 0.0)[0] > 0.0
+        for number, earlier in before.items():
+            signal.signal(number, earlier)
+        if waiting:
+            raise KeyboardInterrupt
+
+
+class _Interrupt:
+    """Raises KeyboardInterrupt; during an import, where compiled modules may swallow it, SIGALRM tries again."""
+
+    def __init__(self) -> None:
+        self._waits = 0
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        if hasattr(signal, "setitimer") and self._waits < _MOST_WAITS and _importing(frame):
+            self._waits += 1
+            signal.setitimer(signal.ITIMER_REAL, _AGAIN_S)
+        else:
+            raise KeyboardInterrupt
+
+
+def _importing(frame: FrameType | None) -> bool:
+    while frame and not frame.f_code.co_filename.startswith("<frozen importlib"):
+        frame = frame.f_back
+    return frame is not None
 
 
 def _of_file(error: OSError) -> ArmtempoError:

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, options, results
+from armtempo.diagnosis import arm_check, figures
+from armtempo.diagnosis.figures import JointFigures, table
+from armtempo.diagnosis.finding import Finding, Level
+from armtempo.model.arm import Arm
+from armtempo.project.settings import JOB, ProjectSettings
+from armtempo.report import arm_picture, drawing
 
-if TYPE_CHECKING:
-    from armtempo.diagnosis.figures import JointFigures
-    from armtempo.diagnosis.finding import Finding
-    from armtempo.model.arm import Arm
 
-
-@click.command()
+@click.command("check")
 @options.arm
 @options.job
 @click.option(
@@ -26,7 +29,7 @@ if TYPE_CHECKING:
 )
 @options.force("the picture if it is there")
 @options.as_json
-def command(
+def check(
     arm_path: Path | None, job_path: Path | None, picture: Path | None, force: bool, as_json: bool
 ) -> None:
     """Hold an arm file, and a job if named, against common sense: what looks wrong, and what to do about it.
@@ -34,15 +37,10 @@ def command(
     Steps, step rates, resolution at the tool, torque, encoders, ranges, wiring. Exit code 1 where there are
     errors; warnings and notes leave it 0.
     """
-    from armtempo.diagnosis import figures
-    from armtempo.diagnosis.arm_check import check
-    from armtempo.diagnosis.finding import Level
-    from armtempo.project.settings import JOB, ProjectSettings
-
     _check_picture(picture, force)
     path = chosen.arm_file(arm_path)
     job = ProjectSettings().get(JOB, job_path)
-    arm, found = check(path, job.path if job else None)
+    arm, found = arm_check.check(path, job.path if job else None)
     joints = figures.of(arm) if arm else ()
     (_print_json if as_json else _print_text)(path, arm, joints, found)
     if arm and picture:
@@ -53,8 +51,6 @@ def command(
 
 def _check_picture(picture: Path | None, force: bool) -> None:
     """Raise InputError where the picture cannot be written as asked."""
-    from armtempo.basics.errors import InputError
-
     if picture is None:
         return
     if picture.suffix not in (".png", ".svg"):
@@ -66,9 +62,6 @@ def _check_picture(picture: Path | None, force: bool) -> None:
 
 
 def _print_text(path: Path, arm: Arm | None, joints: tuple[JointFigures, ...], found: list[Finding]) -> None:
-    from armtempo.diagnosis.figures import table
-    from armtempo.diagnosis.finding import Level
-
     click.echo(f"arm: {arm.name if arm else '(not readable)'} ({path})")
     for line in table(joints):
         click.echo(line)
@@ -88,8 +81,6 @@ def _counted(count: int, what: str) -> str:
 
 
 def _print_json(path: Path, arm: Arm | None, joints: tuple[JointFigures, ...], found: list[Finding]) -> None:
-    from dataclasses import asdict
-
     values: dict[str, Any] = {
         "arm": arm.name if arm else None,
         "file": str(path),
@@ -100,7 +91,5 @@ def _print_json(path: Path, arm: Arm | None, joints: tuple[JointFigures, ...], f
 
 
 def _draw(arm: Arm, picture: Path) -> None:
-    from armtempo.report import arm_picture, drawing
-
     drawing.save(arm_picture.arm_picture(arm), picture)
     click.echo(f"wrote {picture}", err=True)

@@ -3,33 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
-
-from armtempo.basics.errors import InputError
-from armtempo.cli.verbosity import is_quiet
+from armtempo.basics.errors import InputError, PortGivenUpError
+from armtempo.cli.options import BoardOptions
+from armtempo.cli.results import tell
+from armtempo.formats.spelling import did_you_mean
+from armtempo.link import patiently
+from armtempo.link.traffic import Sink
+from armtempo.model import shipped
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job, is_name
+from armtempo.model.tool_pose import Pose
+from armtempo.ports.names import SIM, is_sim
+from armtempo.project import board_port
 from armtempo.project.settings import ARM, JOB, RUNS, ProjectSettings, nothing_set
+from armtempo.robot import connect, shared_board
+from armtempo.robot.board import Board
+from armtempo.robot.board_state import BoardState, record_crc
+from armtempo.robot.shared_board import SharedBoard
 
-if TYPE_CHECKING:
-    from armtempo.link.traffic import Sink
-    from armtempo.model.arm import Arm
-    from armtempo.model.job import Job
+if TYPE_CHECKING:  # what plans takes long to import, and most commands need none of it
     from armtempo.model.plan import Plan
     from armtempo.model.sequence_plan import SequencePlan
-    from armtempo.robot.board import Board
-    from armtempo.robot.board_state import BoardState
-    from armtempo.robot.shared_board import SharedBoard
-
 
 _ANEW = ", started for this command: its arm begins at home; 'armtempo virtual-board' keeps one running"
-
-
-def tell(text: str) -> None:
-    """Say something beside the command's output, unless ``armtempo --quiet``."""
-    if not is_quiet():
-        click.echo(text, err=True)
 
 
 # arm and job
@@ -43,9 +43,6 @@ def named_arm(path: Path | None, for_shape: bool = False) -> Arm | None:
     setting = ProjectSettings().get(ARM, path)
     if not setting:
         return None
-    from armtempo.model.arm import Arm
-    from armtempo.model.tool_pose import Pose
-
     arm = (Arm.shape if for_shape else Arm.load)(setting.path)
     if any(isinstance(posture.where, Pose) for posture in arm.postures):
         from armtempo.planning import via_points  # here, because most arms need no kinematics
@@ -56,8 +53,6 @@ def named_arm(path: Path | None, for_shape: bool = False) -> Arm | None:
 
 def arm_file(path: Path | None) -> Path:
     """The file of the same, or the paper's arm's, which is said aloud."""
-    from armtempo.model import shipped
-
     setting = ProjectSettings().get(ARM, path)
     if not setting:
         tell(f"no arm is named; this is for the one that ships with armtempo, {shipped.PAPER!r}")
@@ -76,8 +71,6 @@ def arm_or_paper(path: Path | None, for_shape: bool = False) -> Arm:
     """The same, for commands that move nothing: without one the paper's arm, which is said aloud."""
     found = named_arm(path, for_shape)
     if found is None:
-        from armtempo.model.arm import Arm
-
         found = Arm.paper()
         tell(f"no arm is named; this is for the one that ships with armtempo, {found.name!r}")
     return found
@@ -88,8 +81,6 @@ def load_job(path: Path | None, arm: Arm) -> Job:
     setting = ProjectSettings().get(JOB, path)
     if not setting:
         raise nothing_set(JOB, "which job?")
-    from armtempo.model.job import Job
-
     return Job.load(setting.path, arm)
 
 
@@ -111,9 +102,6 @@ def arm_and_job(arm_path: Path | None, job_path: Path | None) -> tuple[Arm, Job]
             raise nothing_set(ARM, f"job {job.value} ({job.source}) is for which arm?")
         loaded = load_arm(arm_path)
         return loaded, load_job(job_path, loaded)
-    from armtempo.model.arm import Arm
-    from armtempo.model.job import Job
-
     tell("no arm and no job are named; these are the feeding job and the arm that ship with armtempo")
     return Arm.paper(), Job.paper()
 
@@ -125,9 +113,6 @@ def arm_of_board(board: Board, named: Arm | None) -> Arm:
     """
     if named is not None:
         return named
-    from armtempo.model.arm import Arm
-    from armtempo.robot.board_state import record_crc
-
     paper = Arm.paper()
     if board.info.arm_crc == record_crc(paper):
         tell(f"arm: {paper.name}, which the board is set up for")
@@ -156,9 +141,6 @@ def is_file(what: str) -> bool:
 
     InputError, naming the nearest file, for what is no file and can be no name of a motion either.
     """
-    from armtempo.formats.spelling import did_you_mean
-    from armtempo.model.job import is_name
-
     path = Path(what)
     if path.is_file():
         return True
@@ -204,12 +186,15 @@ def port(given: str | None, others: bool = False) -> str:
 
     ``others``: one that another armtempo program has open will do too.
     """
-    from armtempo.project import board_port
-
     setting = board_port.choose(given, others)
     if setting.source in board_port.UNASKED:
         tell(f"port {setting.value}: {setting.source}")
     return setting.value
+
+
+def any_port(given: BoardOptions) -> BoardOptions:
+    """The same with the port that is meant, which another armtempo program may have open."""
+    return replace(given, port=port(given.port, others=True))
 
 
 def runs(out: Path | None) -> Path:
@@ -218,8 +203,7 @@ def runs(out: Path | None) -> Path:
 
 
 def board(
-    port: str | None,
-    log_traffic: Path | None = None,
+    given: BoardOptions,
     arm: Arm | None = None,
     any_program: bool = False,
     sink: Sink | None = None,
@@ -229,45 +213,36 @@ def board(
 
     ``wait``: a few seconds for a port that another program has, see ``connect``.
     """
-    from armtempo.robot import connect
-
     opened: Callable[..., Board] = connect.connect if wait else connect.connect_now
-    found = opened(port, arm, log_traffic=log_traffic, sink=sink, any_program=any_program, tell=tell)
+    log = given.log_traffic
+    found = opened(given.port, arm, log_traffic=log, sink=sink, any_program=any_program, tell=tell)
     if found.info.virtual:
         tell(f"port {found.port}: {virtual_words(found.port)}")
     return found
 
 
 def shared_or_own(
-    port: str,
-    log_traffic: Path | None = None,
-    arm: Arm | None = None,
-    any_program: bool = False,
-    sink: Sink | None = None,
+    given: BoardOptions, arm: Arm | None = None, any_program: bool = False, sink: Sink | None = None
 ) -> SharedBoard | Board:
-    """The board through another program that has ``port``, which is said aloud, else over the port itself.
+    """The board through another program that has its port, which is said aloud, else over the port itself.
 
-    A program that opens the port just now answers for it soon; one that ends gives it up.
+    ``given`` names a port. A program that opens it just now answers for it soon; one that ends gives it up.
     """
-    from armtempo.link import patiently
-    from armtempo.robot import shared_board
 
     def either() -> SharedBoard | Board:
-        shared = shared_board.find(port)
+        shared = shared_board.find(given.port or "")
         if shared is None:
-            return board(port, log_traffic, arm, any_program, sink, wait=False)
-        tell(f"port {port}: through {shared.program}")
+            return board(given, arm, any_program, sink, wait=False)
+        tell(f"port {given.port}: through {shared.program}")
         return shared
 
     return patiently(either)
 
 
-def board_state(port: str, log_traffic: Path | None = None) -> BoardState:
-    """What the board says, whoever has the port."""
-    from armtempo.basics.errors import PortGivenUpError
-
+def board_state(given: BoardOptions) -> BoardState:
+    """What the board says, whoever has the port, which ``given`` names."""
     while True:
-        with shared_or_own(port, log_traffic, any_program=True) as found:
+        with shared_or_own(given, any_program=True) as found:
             try:
                 return found.state()
             except PortGivenUpError:  # it is free now, or another program's
@@ -276,8 +251,6 @@ def board_state(port: str, log_traffic: Path | None = None) -> BoardState:
 
 def virtual_words(port: str) -> str:
     """What kind of virtual board is on a port."""
-    from armtempo.ports.names import SIM, is_sim
-
     if port == SIM:
         return "a virtual board, which ends with this command"
     return f"a virtual board{_ANEW}" if is_sim(port) else "a virtual board"

@@ -1,4 +1,4 @@
-"""``armtempo config``: what is set, and where it comes from."""
+"""``armtempo config`` and ``ports``: what is set and where that comes from, and where a board may be."""
 
 from __future__ import annotations
 
@@ -8,17 +8,19 @@ import click
 
 from armtempo.basics.errors import InputError
 from armtempo.cli import options, results
-from armtempo.project import settings
+from armtempo.ports.listing import find_ports
+from armtempo.ports.names import SIM
+from armtempo.project import board_port, settings
 from armtempo.project.settings import ProjectSettings, Setting
 
 
-@click.command()
+@click.command("config")
 @options.arm
 @options.port
 @options.job
 @options.out
 @options.as_json
-def command(
+def config(
     arm_path: Path | None, port: str | None, job_path: Path | None, out: Path | None, as_json: bool
 ) -> None:
     """Show what a command in this folder, with these options, takes for arm, port, job and run folder, and why.
@@ -47,10 +49,30 @@ def _unset_port(found: dict[str, Setting]) -> str:
     """What happens where no port is set."""
     if found[settings.PORT]:
         return ""
-    from armtempo.project import board_port
-
     try:
         one = board_port.choose()
     except InputError:
         return "not set, and not exactly one board is plugged in"
     return f"{one.value} ({one.source})"
+
+
+@click.command("ports")
+@options.as_json
+def ports(as_json: bool) -> None:
+    """List the serial ports, likely boards first."""
+    found = find_ports()
+    if as_json:
+        entries = [
+            {"port": port.device, "description": port.description, "board": port.board} for port in found
+        ]
+        results.show_json({"ports": entries})
+        return
+    width = max([24, *(1 + len(port.device) for port in found)])
+    for port in found:
+        mark = "a MicroPython board" if port.board else ""
+        click.echo(f"{port.device:<{width}}{port.description:<31} {mark}".rstrip())
+    if not found:
+        click.echo(
+            "no serial ports here; connect a board by its USB socket; one without MicroPython: armtempo flash"
+        )
+    click.echo(f"{SIM:<{width}}a virtual board, started for one command")

@@ -6,11 +6,18 @@ from pathlib import Path
 
 import click
 
-from armtempo.basics.errors import InputError
-from armtempo.cli import chosen, messages, options, sequences
+import armtempo
+from armtempo import pipeline
+from armtempo.basics.errors import ArmtempoError, InputError, MissingPackageError
+from armtempo.cli import chosen, options, results, sequences
+from armtempo.cli.options import BoardOptions
 from armtempo.cli.progress import ProgressBar
 from armtempo.cli.run import run_and_tell
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
+from armtempo.model.sequence import Sequence
 from armtempo.ports.names import SIM
+from armtempo.simulator import InjectedFault, LaunchOptions, launch
 
 _NEXT = """\
 report: {page}
@@ -20,7 +27,7 @@ next:   armtempo new my_arm            a folder for an own arm and job, asked fo
         armtempo --help                all commands"""
 
 
-@click.command()
+@click.command("demo")
 @options.out
 @click.option(
     "--port",
@@ -35,7 +42,7 @@ next:   armtempo new my_arm            a folder for an own arm and job, asked fo
     help="Instead: a sequence with a gripper and a part sensor, on a virtual board only.",
 )
 @options.log_traffic
-def command(out: Path | None, port: str, pick_and_place: bool, log_traffic: Path | None) -> None:
+def demo(out: Path | None, port: str, pick_and_place: bool, log_traffic: Path | None) -> None:
     """Plan, replay and report the paper's feeding motion.
 
     Without --port a virtual board replays it, faster than in real time, whatever is plugged in.
@@ -45,34 +52,24 @@ def command(out: Path | None, port: str, pick_and_place: bool, log_traffic: Path
             raise InputError(f"--port {port}: this demo is for a virtual board", "leave --port out")
         _pick_and_place()
         return
-    from armtempo import pipeline
-    from armtempo.basics.errors import ArmtempoError, MissingPackageError
-    from armtempo.model.arm import Arm
-    from armtempo.model.job import Job
-
     with ProgressBar("planning") as progress:
         plan = pipeline.plan(Arm.paper(), Job.paper(), progress)
     click.echo(f"arm: {chosen.words(plan.arm)}")
     for line in pipeline.summary(plan):
         click.echo(line)
-    with chosen.board(port, log_traffic, plan.arm) as board:
+    with chosen.board(BoardOptions(port, log_traffic), plan.arm) as board:
         run = run_and_tell(board, plan, 1, chosen.runs(out))
     try:
         page = pipeline.report(run)
         click.echo(_NEXT.format(page=page, uri=page.resolve().as_uri()))
     except MissingPackageError as error:
-        messages.show(
+        results.show_error(
             ArmtempoError(error.problem, f"{error.hint}, then: armtempo report {run.path}"), "no report"
         )
 
 
 def _pick_and_place() -> None:
     """The shipped sequence on a virtual board whose part sensor sees a part from the first motion on."""
-    import armtempo
-    from armtempo.model.arm import Arm
-    from armtempo.model.sequence import Sequence
-    from armtempo.simulator import InjectedFault, LaunchOptions, launch
-
     folder = Path(armtempo.__file__).parent / "data" / "pick_and_place"
     arm = Arm.load(folder / "arm.toml")
     with ProgressBar("planning") as progress:

@@ -1,16 +1,22 @@
-"""``armtempo deploy``: put the board program on a board."""
+"""``armtempo deploy``, ``undeploy`` and ``configure``: set a board up."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
+from armtempo import deploy as deployment
 from armtempo.cli import chosen, options, results
+from armtempo.cli.options import BoardOptions
 from armtempo.cli.progress import ProgressBar
+from armtempo.deploy import package as packages
+from armtempo.model.arm import Arm
+from armtempo.robot import engine_room
 
 
-@click.command()
+@click.command("deploy")
 @click.option("--mpy", is_flag=True, help="Compiled by mpy-cross: smaller, and quicker to start.")
 @click.option(
     "--package",
@@ -21,24 +27,20 @@ from armtempo.cli.progress import ProgressBar
 @options.arm
 @options.port
 @options.as_json
-def command(mpy: bool, package: Path | None, arm_path: Path | None, port: str | None, as_json: bool) -> None:
+def deploy(mpy: bool, package: Path | None, arm_path: Path | None, port: str | None, as_json: bool) -> None:
     """Put the board program on a board, or bring it up to date.
 
     mpremote copies what differs below /flash/lib; every file is read back. A boot.py or main.py that was
     there before is kept aside. Interrupted, do it again. At the end it says which arms fit into the memory that
     is left, and whether the arm that is named does.
     """
-    from armtempo.deploy import deploy
-    from armtempo.deploy import package as packages
-    from armtempo.robot import engine_room
-
     if package is not None:
         packages.write(package)
         results.show(as_json, {"package": str(package)}, [f"written: {package}"])
         return
     arm = chosen.named_arm(arm_path)
     with ProgressBar("copying") as progress:
-        info = deploy(chosen.port(port), mpy, results.teller(as_json), progress)
+        info = deployment.deploy(chosen.port(port), mpy, results.teller(as_json), progress)
     room = engine_room.of_board(info)
     values = {
         "board_id": info.board_id,
@@ -51,3 +53,61 @@ def command(mpy: bool, package: Path | None, arm_path: Path | None, port: str | 
     }
     of_arm = [f"{chosen.words(arm)}: {engine_room.of_arm(arm, info)}"] if arm else []
     results.show(as_json, values, ["the board runs armtempo", *room, *of_arm])
+
+
+@click.command("undeploy")
+@options.port
+@options.as_json
+def undeploy(port: str | None, as_json: bool) -> None:
+    """Take the board program off a board.
+
+    Stored motions stay; a boot.py or main.py from before comes back.
+    """
+    name = chosen.port(port)
+    deployment.undeploy(name, results.teller(as_json))
+    if as_json:
+        results.show_json({"port": name, "program": None})
+
+
+@click.command("configure")
+@options.board(options.arm)
+def configure(given: BoardOptions) -> None:
+    """Set the board up for an arm, also in the place of another one.
+
+    The position is unknown afterwards, unless only limits differ: ranges, speeds, following errors, the link
+    time-out. Motions that were stored for other figures of the arm are refused; upload them again.
+    """
+    arm = chosen.load_arm(given.arm_path)
+    with chosen.board(given, arm) as board:
+        before = board.info.arm_crc
+        board.configure(arm, replace=True)
+        found = board.state()
+        motions = len(board.list())
+        room = engine_room.of_arm(arm, board.info)
+    changed, known = found.arm_crc != before, all(joint.known for joint in found.joints)
+    values = {
+        "arm": arm.name,
+        "file": arm.source,
+        "changed": changed,
+        "position_known": known,
+        "motions_to_upload_again": motions if before and changed else 0,
+        "memory": room,
+    }
+    results.show(given.as_json, values, _configured(arm, values) if changed else [_unchanged(arm)])
+
+
+def _unchanged(arm: Arm) -> str:
+    return f"the board is set up for {chosen.words(arm)} already; nothing is changed"
+
+
+def _configured(arm: Arm, values: dict[str, Any]) -> list[str]:
+    lines = [f"the board is set up for {chosen.words(arm)}", values["memory"]]
+    if motions := values["motions_to_upload_again"]:
+        lines.append(
+            f"{motions} stored motions were made for the arm as it was; upload those that are still wanted"
+        )
+    if values["position_known"]:
+        lines.append("only limits differ from what the board had: it still knows where the arm stands")
+    else:
+        lines.append("the position is unknown: bring the arm to its home posture, then 'armtempo home'")
+    return lines

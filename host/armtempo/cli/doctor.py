@@ -4,33 +4,31 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from armtempo.basics.errors import ArmtempoError
 from armtempo.cli import chosen, options, results
-from armtempo.project import settings
+from armtempo.cli.options import BoardOptions
+from armtempo.diagnosis import arm_check, machine
+from armtempo.diagnosis.item import Condition, Item
+from armtempo.model import shipped
+from armtempo.project import board_port, settings
 from armtempo.project.settings import ProjectSettings
-
-if TYPE_CHECKING:
-    from armtempo.diagnosis.item import Item
-    from armtempo.robot.board_state import BoardState
+from armtempo.robot import board_check
+from armtempo.robot.board_state import BoardState
 
 
-@click.command()
+@click.command("doctor")
 @options.arm
 @options.port
 @options.as_json
-def command(arm_path: Path | None, port: str | None, as_json: bool) -> None:
+def doctor(arm_path: Path | None, port: str | None, as_json: bool) -> None:
     """Examine Python, packages, ports, permissions, project, arm file and board, and say what to do.
 
     Nothing is changed and nothing moves. Without a port it looks at the one board that is plugged in, if there is one.
     Exit code 1 where something is wrong.
     """
-    from armtempo.diagnosis import machine
-    from armtempo.diagnosis.item import Condition
-
     parts = {
         "machine": machine.examine_machine(),
         "packages": machine.packages(),
@@ -49,8 +47,6 @@ def command(arm_path: Path | None, port: str | None, as_json: bool) -> None:
 
 
 def _project(arm_path: Path | None, port: str | None) -> list[Item]:
-    from armtempo.diagnosis.item import Condition, Item
-
     project = ProjectSettings()
     given = {settings.ARM: arm_path, settings.PORT: port}
     try:
@@ -61,10 +57,6 @@ def _project(arm_path: Path | None, port: str | None) -> list[Item]:
 
 
 def _arm(arm_path: Path | None) -> list[Item]:
-    from armtempo.diagnosis import arm_check
-    from armtempo.diagnosis.item import Condition, Item
-    from armtempo.model import shipped
-
     try:
         setting = ProjectSettings().get(settings.ARM, arm_path)
         return arm_check.examine_arm(shipped.find(setting.value).path) if setting else []
@@ -73,16 +65,12 @@ def _arm(arm_path: Path | None) -> list[Item]:
 
 
 def _board(port: str | None, arm_path: Path | None) -> list[Item]:
-    from armtempo.diagnosis.item import Condition, Item
-    from armtempo.project import board_port
-    from armtempo.robot import board_check
-
     try:
         name = board_port.choose(port, others=True).value
     except ArmtempoError:  # none was named and none can be meant: nothing is wrong with that
         return [Item("board", "not looked at", Condition.NOTE, "give --port PORT, or --port sim")]
     try:
-        return board_check.examine_board(_named(chosen.board_state(name), arm_path))
+        return board_check.examine_board(_named(chosen.board_state(BoardOptions(name)), arm_path))
     except ArmtempoError as error:
         return board_check.examine_board(error)
 

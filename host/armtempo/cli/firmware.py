@@ -1,21 +1,22 @@
-"""``armtempo firmware``: build a MicroPython firmware with the board program in it."""
+"""``armtempo firmware`` and ``flash``: a MicroPython with the board program in it."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from armtempo.basics.errors import InputError
 from armtempo.cli import options, results
 from armtempo.cli.progress import ProgressBar
+from armtempo.deploy import changes
+from armtempo.deploy.firmware import build, checkout, frozen, image, write
+from armtempo.deploy.firmware.image import Image
+from armtempo.project.settings import PORT, ProjectSettings
 
-if TYPE_CHECKING:
-    from armtempo.deploy.firmware.image import Image
 
-
-@click.command()
+@click.command("firmware")
 @click.option(
     "--board",
     metavar="NAME",
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
     help="Instead write FOLDER with the program and a manifest.py, for a build of your own.",
 )
 @options.as_json
-def command(
+def firmware(
     board: str | None,
     micropython: Path | None,
     out: Path | None,
@@ -52,17 +53,12 @@ def command(
 
     Needs make, gcc and arm-none-eabi-gcc; what is missing is named with the command that brings it.
     """
-    from armtempo.deploy.firmware import frozen
-
     if program is not None:
         frozen.write(program)
         manifest = program.resolve() / frozen.MANIFEST
         line = f"written: {program}; for MicroPython's make: FROZEN_MANIFEST={manifest}"
         results.show(as_json, {"folder": str(program), "manifest": str(manifest)}, [line])
         return
-    from armtempo.deploy import changes
-    from armtempo.deploy.firmware import build, checkout
-
     if board is None or micropython is None:
         raise InputError(
             "--board and --micropython are needed",
@@ -83,11 +79,40 @@ def command(
 
 
 def _values(made: Image) -> dict[str, Any]:
-    from armtempo.deploy import changes
-
     return {
         "micropython": made.micropython,
         "machine": made.machine,
         "program_crc": made.program_crc,
         "can_drive_an_arm": not changes.lacks_pins(made.machine),
     }
+
+
+@click.command("flash")
+@click.option(
+    "--image",
+    "given",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="The zip file of a release, or a folder that 'armtempo firmware' made. Without it the only one here.",
+)
+@click.option("--port", metavar="PORT", help="Where the board answers now, if it runs MicroPython.")
+@click.option(
+    "--tool",
+    type=click.Choice(["dfu-util", "st-flash"]),
+    help="What flashes: over USB, or through an ST-LINK; without it the one that is installed.",
+)
+@options.as_json
+def flash(given: Path | None, port: str | None, tool: str | None, as_json: bool) -> None:
+    """Put MicroPython with the board program in it on a board; 'armtempo deploy' comes next.
+
+    A board that runs MicroPython is put in its bootloader first, which is refused while it moves; a board that
+    is there already, or has an ST-LINK, needs no port. What was written is read back and compared. Files in the
+    board's flash are kept.
+    """
+    chosen = given or image.find(Path())
+    found = ProjectSettings().get(PORT, port).value or None
+    with ProgressBar("flashing") as progress:
+        write.flash(chosen, found, tool, results.teller(as_json), progress)
+    results.show(
+        as_json, {"image": str(chosen), "port": found}, ["flashed; the start files are next: armtempo deploy"]
+    )

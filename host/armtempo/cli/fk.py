@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from armtempo.cli import chosen, options, results
+from armtempo.basics.arrays import Array
+from armtempo.cli import chosen, options, posture, results
+from armtempo.kinematics import frame_listing
+from armtempo.kinematics.chain import spread_deg
+from armtempo.kinematics.pose_file import numbers
+from armtempo.model.arm import Arm
 
-if TYPE_CHECKING:
-    from armtempo.basics.arrays import Array
-    from armtempo.model.arm import Arm
 
-
-@click.command(context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
+@click.command("fk", context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
 @click.argument("where", nargs=-1)
 @options.job
 @options.arm
 @options.altered
 @options.as_json
-def command(
+def fk(
     where: tuple[str, ...], job_path: Path | None, arm_path: Path | None, altered: bool, as_json: bool
 ) -> None:
     """Print the tool's pose and every frame for given joint angles.
@@ -29,10 +29,6 @@ def command(
     others at home; a posture of the arm file; a via point such as P0; or a trajectory file for its start. Without it,
     or for 'home', the arm's home. Hold the frames against the arm: a wrong row of its table shows at once.
     """
-    from armtempo.cli import posture
-    from armtempo.kinematics import frame_listing
-    from armtempo.kinematics.chain import spread_deg
-
     if len(where) == 1 and posture.is_via(where[0]):
         arm, job = chosen.arm_and_job(arm_path, job_path)
         angles_deg = spread_deg(arm, posture.via_deg(where[0], arm, job).tolist())
@@ -51,9 +47,6 @@ def command(
 
 def _angles(where: tuple[str, ...], arm: Arm) -> Array:
     """Angles of all joints, deg (joints,)."""
-    from armtempo.kinematics.chain import spread_deg
-    from armtempo.kinematics.pose_file import numbers
-
     if not where:
         return spread_deg(arm, arm.all_home_deg)
     return spread_deg(arm, numbers(" ".join(where), "the angles"))

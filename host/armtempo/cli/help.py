@@ -1,4 +1,4 @@
-"""``armtempo help``: a page of the documentation, in the terminal."""
+"""``armtempo help`` and ``completion``: pages of the documentation, and the Tab key."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ from importlib.resources import files
 from pathlib import Path
 
 import click
+from click.shell_completion import get_completion_class
+
+from armtempo.cli import main
 
 TOPICS = {
     "first-hour": "host",
@@ -25,9 +28,9 @@ TOPICS = {
 """Pages and the part of the project whose ``docs`` folder has them; a wheel has them in ``data/pages``."""
 
 
-@click.command()
+@click.command("help")
 @click.argument("topic", metavar="[TOPIC]", required=False, type=click.Choice([*TOPICS]))
-def command(topic: str | None) -> None:
+def show_page(topic: str | None) -> None:
     """Show a page of the documentation, or list them.
 
     TOPIC: a name of the list.
@@ -46,3 +49,21 @@ def page(topic: str) -> str:
     shipped = package / "data" / "pages" / f"{topic}.md"
     found = shipped if shipped.exists() else package.parents[1] / TOPICS[topic] / "docs" / f"{topic}.md"
     return found.read_text(encoding="utf-8")
+
+
+SHELLS = ("bash", "zsh", "fish")
+
+
+@click.command("completion")
+@click.argument("shell", type=click.Choice(SHELLS))
+def completion(shell: str) -> None:
+    """Print a script that lets SHELL complete commands and options.
+
+    \b
+    bash: armtempo completion bash >> ~/.bashrc
+    zsh:  armtempo completion zsh >> ~/.zshrc
+    fish: armtempo completion fish > ~/.config/fish/completions/armtempo.fish
+    """
+    maker = get_completion_class(shell)
+    assert maker is not None  # click brings these three
+    click.echo(maker(main, {}, "armtempo", "_ARMTEMPO_COMPLETE").source())

@@ -6,17 +6,19 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from armtempo.basics.errors import InputError, PlanError
 from armtempo.cli import chosen, options
 from armtempo.cli.results import show_json
-
-if TYPE_CHECKING:
-    from armtempo.kinematics.listing import Listing
-    from armtempo.kinematics.solver import PoseSolver
-    from armtempo.model.tool_pose import Pose
+from armtempo.kinematics import pose_file
+from armtempo.kinematics.listing import Listing, listings
+from armtempo.kinematics.pose_file import numbers
+from armtempo.kinematics.solver import PoseSolver
+from armtempo.model.pose import from_quaternion
+from armtempo.model.tool_pose import Pose
 
 Three = tuple[float, float, float]
 Four = tuple[float, float, float, float]
@@ -37,7 +39,7 @@ class _Given:
     poses: Path | None
 
 
-@click.command()
+@click.command("ik")
 @options.arm
 @click.option("--matrix", metavar="NUMBERS", help="12 or 16 numbers in quotes: its rows, lengths in mm.")
 @click.option(
@@ -84,7 +86,7 @@ class _Given:
 )
 @click.option("--numerical", is_flag=True, help="Search numerically, whatever the arm.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-def command(
+def ik(
     arm_path: Path | None,
     previous: str | None,
     numerical: bool,
@@ -99,9 +101,6 @@ def command(
     something open, and an arm outside the class of the closed form, get the solutions that a numerical search
     finds with the joints that have a motor. Exit code 1 if a pose has no solution.
     """
-    from armtempo.kinematics.listing import listings
-    from armtempo.kinematics.solver import PoseSolver
-
     wanted = [_within(pose, tolerance_mm, tolerance_deg) for pose in _poses(_Given(**given))]
     solver = PoseSolver(chosen.arm_or_paper(arm_path, for_shape=True))
     found = listings(solver, wanted, _posture(previous, solver), numerical)
@@ -118,9 +117,6 @@ def _within(pose: Pose, tolerance_mm: float | None, tolerance_deg: float | None)
 
 def _poses(given: _Given) -> list[Pose]:
     """The poses of the options; InputError where they do not make exactly one of the three forms."""
-    from armtempo.basics.errors import InputError
-    from armtempo.kinematics import pose_file
-
     if sum(form is not None for form in (given.matrix, given.position, given.poses)) != 1:
         raise InputError(
             "not one pose is asked for, or too many", "give one of --matrix, --position and --poses"
@@ -146,9 +142,6 @@ def _poses(given: _Given) -> list[Pose]:
 
 def _positioned(given: _Given, angles: dict[str, float]) -> Pose:
     """The pose of --position and what goes with it."""
-    from armtempo.model.pose import from_quaternion
-    from armtempo.model.tool_pose import Pose
-
     assert given.position is not None
     if given.quaternion is not None:
         matrix = from_quaternion(given.position, given.quaternion, "--position --quaternion")
@@ -162,9 +155,6 @@ def _positioned(given: _Given, angles: dict[str, float]) -> Pose:
 
 def _posture(previous: str | None, solver: PoseSolver) -> Sequence[float]:
     """The posture to stay near to, in rad: (joints,)."""
-    from armtempo.basics.errors import InputError
-    from armtempo.kinematics.pose_file import numbers
-
     if previous is None:
         return solver.home_rad
     angles = numbers(previous, "--previous")
@@ -200,8 +190,6 @@ def _print_json(solver: PoseSolver, found: Iterable[Listing]) -> None:
 
 def _fail(without: list[int]) -> None:
     """End with exit code 1 where poses are left without a solution."""
-    from armtempo.basics.errors import PlanError
-
     if without:
         which = ", ".join(map(str, without))
         raise PlanError(

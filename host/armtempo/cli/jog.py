@@ -4,24 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from armtempo.basics.errors import ArmtempoError, InputError
-from armtempo.cli import chosen, options, posture
-
-if TYPE_CHECKING:
-    from armtempo.cli.jog_screen import JogScreen
-    from armtempo.cli.keys import Keys
-    from armtempo.model.arm import Arm
-    from armtempo.robot.board import Board
+from armtempo.basics.errors import ArmtempoError, InputError, LinkError
+from armtempo.cli import chosen, gamepad, keys, options, posture
+from armtempo.cli.jog_screen import KEYS, SPEEDS, JogScreen
+from armtempo.cli.keys import Keys
+from armtempo.cli.options import BoardOptions
+from armtempo.model.arm import Arm
+from armtempo.ports.names import is_sim
+from armtempo.robot.board import Board
 
 _AXES = click.Choice(["x", "y", "z", "tool-x", "tool-y", "tool-z"])
 
 
-@click.command()
+@click.command("jog")
 @click.option(
     "--joint", metavar="JOINT", help="Move this joint, by its number (from 1) or name, by --by degrees."
 )
@@ -36,23 +34,15 @@ _AXES = click.Choice(["x", "y", "z", "tool-x", "tool-y", "tool-z"])
     help="Percent of the speed limits.",
 )
 @options.gamepad
-@options.arm_of_board
-@options.replace_arm
-@options.port
-@options.log_traffic
-@options.as_json
-def command(
+@options.board(options.arm_of_board, options.replace_arm)
+def jog(
     joint: str | None,
     axis: str | None,
     about: str | None,
     by: float | None,
     speed: float,
     gamepad: bool,
-    arm_path: Path | None,
-    replace_arm: bool,
-    port: str | None,
-    log_traffic: Path | None,
-    as_json: bool,
+    given: BoardOptions,
 ) -> None:
     """Jog: move a joint or the tool a little, straight, never beyond a range.
 
@@ -60,41 +50,36 @@ def command(
     it is. With one of them, and --by, it moves once. Axes are the base's, or the tool's as it stands. The arm must be
     homed. Ctrl-C brakes.
     """
-    from armtempo.cli import keys
-
-    given = [option for option in (joint, axis, about) if option is not None]
-    if len(given) > 1 or (by is None) != (not given):
+    moves = [option for option in (joint, axis, about) if option is not None]
+    if len(moves) > 1 or (by is None) != (not moves):
         raise InputError(
             "one of --joint, --axis and --about goes with --by",
             "give --joint 2 --by -5, say; or none, for the keys",
         )
-    if given and gamepad:
+    if moves and gamepad:
         raise InputError("--gamepad goes with the keys of jog", "leave out --by, or --gamepad")
-    if not given and as_json:
+    if not moves and given.as_json:
         raise InputError("the keys of jog give no JSON", "give --joint, --axis or --about, and --by")
-    if not given and not keys.is_terminal():
+    if not moves and not keys.is_terminal():
         raise InputError("the keys of jog need a terminal", "give --joint, --axis or --about, and --by")
-    arm = chosen.named_arm(arm_path)
-    with chosen.board(port, log_traffic, arm) as board:
-        prepare(board, chosen.arm_of_board(board, arm), replace_arm)
-        if not given:
+    arm = chosen.named_arm(given.arm_path)
+    with chosen.board(given, arm) as board:
+        prepare(board, chosen.arm_of_board(board, arm), given.replace_arm)
+        if not moves:
             with pressed_keys(board, gamepad) as pressed:
                 screen(board, pressed, speed).loop()
         else:
             along = by if axis else None
             board.jog(joint, None if axis else by, axis or about, along, speed / 100)
         early = board.last_jog_ends
-        if not (early and as_json):
-            posture.say_where_it_is(board, as_json)
+        if not (early and given.as_json):
+            posture.say_where_it_is(board, given.as_json)
         if early:
             raise ArmtempoError(f"the jog ended early: {early}", "jog less far, or the other way")
 
 
 def prepare(board: Board, arm: Arm, replace_arm: bool = False) -> None:
     """Set the board up; LinkError where the position is unknown. A virtual arm that has just come stands at home."""
-    from armtempo.basics.errors import LinkError
-    from armtempo.ports.names import is_sim
-
     board.configure(arm, replace=replace_arm)
     try:
         board.posture_deg()
@@ -107,8 +92,6 @@ def prepare(board: Board, arm: Arm, replace_arm: bool = False) -> None:
 @contextmanager
 def pressed_keys(board: Board, with_gamepad: bool) -> Iterator[Keys]:
     """The keys of the terminal, and of a gamepad where that is wanted."""
-    from armtempo.cli import gamepad, keys
-
     assert board.arm is not None  # it was configured
     with keys.of_terminal() as pressed:
         if not with_gamepad:
@@ -127,8 +110,6 @@ def screen(
     told: str = "",
 ) -> JogScreen:
     """The jog screen, its keys said; ``more``: the caller's, which ``told`` says."""
-    from armtempo.cli.jog_screen import KEYS, SPEEDS, JogScreen
-
     click.echo(f"{KEYS}\n{told}" if told else KEYS)
     made = JogScreen(board, pressed, more, told)
     made.choice.speed = min(range(len(SPEEDS)), key=lambda index: abs(SPEEDS[index] - speed))

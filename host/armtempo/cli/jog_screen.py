@@ -8,16 +8,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Thread
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import click
 
 from armtempo.basics.errors import ArmtempoError, BoardError, InputError, LinkError, PlanError
 from armtempo.cli.keys import END, INTERRUPT, Keys
+from armtempo.kinematics.of_arm import forward
+from armtempo.model.pose import to_rpy_deg
+from armtempo.robot.board import Board
 from armtempo.robot.stop_request import Stopped, StopRequest
-
-if TYPE_CHECKING:
-    from armtempo.robot.board import Board
 
 STEPS = (0.1, 1.0, 10.0)
 """deg or mm."""
@@ -225,9 +225,6 @@ class JogScreen:
 
     def _where(self, angles_deg: list[float]) -> list[str]:
         """Angles and tool, what is chosen first."""
-        from armtempo.kinematics.of_arm import forward
-        from armtempo.model.pose import to_rpy_deg
-
         pose = forward(self._arm, angles_deg)
         angles = " ".join(f"{angle + 0.0:.2f}" for angle in angles_deg) + "°"
         position = " ".join(f"{value + 0.0:.1f}" for value in pose[:3, 3]) + " mm"

@@ -12,7 +12,7 @@ from armtempo_shared.limits import TICK_HZ
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError
-from armtempo.cli import chosen, messages
+from armtempo.cli import results
 from armtempo.cli.progress import ProgressBar
 from armtempo.link.board_messages import Sample
 from armtempo.records.encoded_motion import EncodedMotion
@@ -26,7 +26,7 @@ class Live(Watcher):
 
     def __init__(self, window: bool, where: str = "", aside: bool = False) -> None:
         """``where``: on what the motion runs, if that needs saying; ``aside``: say it on stderr."""
-        self._say = chosen.tell if aside else click.echo
+        self._say = results.tell if aside else click.echo
         self._window = window
         self._where = f", on {where}" if where else ""
         self._plot: LivePlot | None = None
@@ -68,7 +68,7 @@ class Live(Watcher):
         try:
             return LivePlot(self._motion.trajectory, [joint.name for joint in self._motion.arm.driven])
         except ArmtempoError as error:
-            messages.show(error, "no live plot")
+            results.show_error(error, "no live plot")
             return None
 
     def _angles_deg(self, sample: Sample) -> Array:

@@ -1,22 +1,24 @@
-"""``armtempo new``: a project folder for an arm of one's own."""
+"""``armtempo new``: a project folder for an arm of one's own, asked for at the terminal or given by options."""
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from armtempo.basics.errors import InputError
 from armtempo.cli import options, results
-from armtempo.cli.interview import draft_path
+from armtempo.diagnosis import figures
+from armtempo.formats.atomic_file import replace_text
+from armtempo.new_arm import folder as project_folder
+from armtempo.new_arm import given_geometry, joint_entry, questions
+from armtempo.new_arm.given_geometry import ArmText
+from armtempo.new_arm.questions import Answers
 
-if TYPE_CHECKING:
-    from armtempo.new_arm.given_geometry import ArmText
 
-
-@click.command()
+@click.command("new")
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--like", metavar="ARM", help="Begin with an arm that ships, such as ar4.")
 @click.option(
@@ -37,7 +39,7 @@ if TYPE_CHECKING:
 @click.option("--resume", is_flag=True, help="Go on with the questions that were left by Ctrl-C.")
 @click.option("--port", default=None, help="Port of the board; 'sim:board' is a virtual one.", metavar="PORT")
 @options.as_json
-def command(
+def new(
     folder: Path,
     like: str | None,
     urdf: Path | None,
@@ -53,8 +55,6 @@ def command(
 
     Asks for what no option says, if there is somebody at the terminal to ask: '?' explains, '<' goes back.
     """
-    from armtempo.new_arm import folder as project_folder
-
     if sum(map(bool, (like, urdf, joints))) > 1:
         raise InputError("--like, --urdf and --joint exclude each other", "give one of them")
     project_folder.check_free(folder)
@@ -64,14 +64,10 @@ def command(
         if port is None:
             port = click.prompt("port of the board", default="sim:board") if asked else "sim:board"
     elif asked:
-        from armtempo.cli import interview
-
-        answers = interview.hold(folder, resume)
+        answers = hold(folder, resume)
         arm, port = _arm_of(folder.name, answers), port or answers["port"]
     else:
         raise InputError("which arm?", "give --like ARM, --urdf FILE, or a --joint for each joint")
-    from armtempo.diagnosis import figures
-
     written = project_folder.write(folder, arm, port)
     draft_path(folder).unlink(missing_ok=True)
     joint_figures = figures.of(arm.arm)
@@ -89,8 +85,6 @@ def _asked() -> bool:
 def _given_arm(
     name: str, like: str | None, urdf: Path | None, joints: tuple[str, ...], modified: bool
 ) -> ArmText:
-    from armtempo.new_arm import given_geometry, joint_entry
-
     if like:
         return given_geometry.from_shipped(like)
     if urdf:
@@ -101,9 +95,58 @@ def _given_arm(
 
 
 def _arm_of(name: str, answers: dict[str, str]) -> ArmText:
-    from armtempo.new_arm import given_geometry, questions
-
     if answers["arm"] != "own":
         return given_geometry.from_shipped(answers["arm"])
     modified = answers["convention"] == questions.MODIFIED
     return given_geometry.from_joints(name, questions.joints(answers), modified)
+
+
+def draft_path(folder: Path) -> Path:
+    """Where the answers for a project folder are kept until it is made."""
+    return folder.parent / f".{folder.name}.draft.json"
+
+
+def hold(folder: Path, resume: bool) -> Answers:
+    """Ask until all is answered. KeyboardInterrupt says how to go on, where answers were kept."""
+    draft = draft_path(folder)
+    answers = _kept(draft) if resume else {}
+    click.echo("'?' explains a question, '<' goes back to the one before; Ctrl-C keeps what was answered.")
+    try:
+        while (question := questions.following(answers)) is not None:
+            text = click.prompt(question.text, default=question.default).strip()
+            if text == "?":
+                click.echo(question.explanation)
+            elif text == "<":
+                if answers:
+                    answers.popitem()
+            else:
+                try:
+                    question.read(text)
+                except questions.WrongAnswerError as wrong:
+                    click.echo(f"  {wrong}")
+                    continue
+                answers[question.key] = text
+                draft.parent.mkdir(parents=True, exist_ok=True)
+                replace_text(draft, json.dumps(answers))
+    except (click.Abort, KeyboardInterrupt):
+        if not draft.exists():
+            raise
+        raise KeyboardInterrupt(f"the answers are kept; go on with: armtempo new {folder} --resume") from None
+    return answers
+
+
+def _kept(draft: Path) -> Answers:
+    """The answers of a draft, as far as they can be taken; InputError where there are none."""
+    try:
+        found = json.loads(draft.read_text(encoding="utf-8"))
+        given = {str(key): str(value) for key, value in found.items()}
+    except (OSError, ValueError, AttributeError):
+        raise InputError(f"{draft}: no answers are kept there", "leave out --resume") from None
+    answers: Answers = {}
+    while (question := questions.following(answers)) is not None and question.key in given:
+        try:
+            question.read(given[question.key])
+        except questions.WrongAnswerError:
+            break
+        answers[question.key] = given[question.key]
+    return answers

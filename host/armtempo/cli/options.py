@@ -1,8 +1,10 @@
-"""Options that several commands share."""
+"""Options that several commands share, and the object that the commands for a board take theirs in."""
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -101,3 +103,35 @@ as_json = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def force(what: str) -> Callable[[FC], FC]:
     """The option --force, which replaces ``what``."""
     return click.option("--force", is_flag=True, help=f"Replace {what}.")
+
+
+@dataclass(frozen=True)
+class BoardOptions:
+    """What the options of a command that speaks with a board say; those that it does not have keep the default."""
+
+    port: str | None = None
+    log_traffic: Path | None = None
+    as_json: bool = False
+    arm_path: Path | None = None
+    replace_arm: bool = False
+    altered: bool = False
+
+
+def board(*before: Callable[[Any], Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Options of a command that speaks with a board: those of ``before``, --port, --log-traffic and --json.
+
+    The command takes those of ``BoardOptions`` as one argument, ``given``. It is the decorator nearest to it.
+    """
+    names = [field.name for field in fields(BoardOptions)]
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        @functools.wraps(command)
+        def decorated(**values: Any) -> None:
+            given = BoardOptions(**{name: values.pop(name) for name in names if name in values})
+            command(given=given, **values)
+
+        for option in reversed((*before, port, log_traffic, as_json)):
+            option(decorated)
+        return decorated
+
+    return decorate

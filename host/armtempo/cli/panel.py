@@ -10,12 +10,13 @@ import click
 
 from armtempo.basics.errors import MissingPackageError
 from armtempo.cli import chosen, options
+from armtempo.cli.options import BoardOptions
 from armtempo.ports.names import is_sim, sim_flash
 
 _LOOPBACK = "127.0.0.1"
 
 
-@click.command()
+@click.command("panel")
 @options.arm_of_board
 @options.job
 @options.port
@@ -34,7 +35,7 @@ _LOOPBACK = "127.0.0.1"
     help="TCP port to listen on; 0: one that is free.",
 )
 @click.option("--show/--no-show", default=True, help="Open the page in the browser.")
-def command(
+def panel(
     arm_path: Path | None, job_path: Path | None, port: str | None, host: str, web_port: int, show: bool
 ) -> None:
     """See the arm in a browser: move it, teach it, run it, watch it.
@@ -59,9 +60,8 @@ def command(
         if is_sim(name):  # in real time, as a board is
             wanted = LaunchOptions(sim_flash(name), virtual_time=False, arm=arm)
             name = stack.enter_context(launch(wanted)).port
-
         operator = Operator(
-            lambda sink: chosen.board(name, None, arm, sink=sink),
+            lambda sink: chosen.board(BoardOptions(name), arm, sink=sink),
             name,
             Desk(arm, Path(), job),
             chosen.runs(None),

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from armtempo.cli import options, results
 from armtempo.cli.progress import ProgressBar
+from armtempo.formats.atomic_file import replace_text
+from armtempo.paper import experiment, motions, postures, searches, sheet
+from armtempo.paper.claims import Claim
 
-if TYPE_CHECKING:
-    from armtempo.paper.claims import Claim
 
-
-@click.command()
+@click.command("paper")
 @click.option("--quick", is_flag=True, help="Small populations, few seeds, two replays: under a minute.")
 @click.option(
     "--out",
@@ -26,14 +25,11 @@ if TYPE_CHECKING:
     help="Where page and run folders go.",
 )
 @options.as_json
-def command(quick: bool, out: Path, as_json: bool) -> None:
+def paper(quick: bool, out: Path, as_json: bool) -> None:
     """Repeat the paper: every number beside the printed one, on one page.
 
     The replays run on the virtual board.
     """
-    from armtempo.formats.atomic_file import replace_text
-    from armtempo.paper import experiment, motions, postures, searches, sheet
-
     made = motions.plans()
     with ProgressBar("searching") as progress:
         searched = searches.run(made.arm, made.job, quick, progress)

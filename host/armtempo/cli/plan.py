@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from armtempo.basics.errors import InputError
-from armtempo.cli import chosen, messages, options, results, sequences
+from armtempo import pipeline
+from armtempo.basics.errors import InputError, MissingPackageError
+from armtempo.cli import chosen, options, results, sequences
 from armtempo.cli.progress import ProgressBar
-
-if TYPE_CHECKING:
-    from armtempo.model.arm import Arm
-    from armtempo.model.job import Job
-    from armtempo.model.plan import Plan
+from armtempo.formats.atomic_file import check_not_input, check_replaceable, replace_text
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
+from armtempo.model.plan import Plan
+from armtempo.model.sequence import is_sequence
+from armtempo.planning import checks
+from armtempo.planning.free.corridor_curve import unit_of
+from armtempo.report import corridor_plot, drawing, json_summary
+from armtempo.robot import engine_room
 
 
 def _refine(ctx: click.Context, param: click.Parameter, value: str | None) -> int | str | None:
@@ -26,7 +32,7 @@ def _refine(ctx: click.Context, param: click.Parameter, value: str | None) -> in
     return int(value)
 
 
-@click.command()
+@click.command("plan")
 @click.argument("file", type=click.Path(path_type=Path), required=False)
 @options.job
 @options.arm
@@ -71,7 +77,7 @@ def _refine(ctx: click.Context, param: click.Parameter, value: str | None) -> in
     "--corridor-curve", is_flag=True, help="Instead of a plan: the motion time in ever wider corridors."
 )
 @options.as_json
-def command(
+def plan(
     file: Path | None,
     job_path: Path | None,
     arm_path: Path | None,
@@ -87,9 +93,6 @@ def command(
     FILE: a sequence file, or a job file, as with --job.
     Where neither an arm nor a job is named, this plans the demo's job for the arm that ships with armtempo.
     """
-    from armtempo.formats.atomic_file import check_not_input
-    from armtempo.model.sequence import is_sequence
-
     if file is not None and job_path is not None:
         raise InputError("FILE and --job are both given", "name one of them")
     if file is not None and is_sequence(file):
@@ -114,8 +117,6 @@ def command(
 
 def _changed(job: Job, changes: dict[str, Any]) -> Job:
     """The job with what options say instead."""
-    from dataclasses import replace
-
     given = {name: value for name, value in changes.items() if value is not None}
     if "degree" in given:
         given["degree"] = int(given["degree"])
@@ -124,9 +125,6 @@ def _changed(job: Job, changes: dict[str, Any]) -> Job:
 
 def _plans(arm: Arm, job: Job, split: bool) -> list[Plan]:
     """The plan of the job, or those of its parts; each one that the board can hold."""
-    from armtempo import pipeline
-    from armtempo.planning import checks
-
     with ProgressBar("planning") as progress:
         plans = pipeline.split(arm, job, progress) if split else [pipeline.plan(arm, job, progress)]
     for plan in plans:
@@ -149,27 +147,16 @@ def _save(made: dict[Path, Plan], force: bool) -> None:
 
 
 def _lines(file: Path, plan: Plan) -> list[str]:
-    from armtempo import pipeline
-    from armtempo.robot import engine_room
-
     room = engine_room.of_arm(plan.arm)
     return [f"arm: {chosen.words(plan.arm)}", *pipeline.summary(plan), room, f"written: {file}"]
 
 
 def _json(file: Path, plan: Plan) -> dict[str, Any]:
-    from armtempo.report import json_summary
-
     return {"file": str(file), **json_summary.of_plan(plan)}
 
 
 def _write_curve(arm: Arm, job: Job, target: Path, force: bool, as_json: bool) -> None:
     """Table to the terminal and as CSV, and the figure where matplotlib is installed."""
-    from armtempo import pipeline
-    from armtempo.basics.errors import MissingPackageError
-    from armtempo.formats.atomic_file import check_replaceable, replace_text
-    from armtempo.planning.free.corridor_curve import unit_of
-    from armtempo.report import corridor_plot, drawing
-
     table, picture = (target.with_name(f"{target.stem}-corridor{suffix}") for suffix in (".csv", ".png"))
     for file in (table, picture):
         check_replaceable(file, "", force)  # before the work, which takes a while
@@ -182,7 +169,7 @@ def _write_curve(arm: Arm, job: Job, target: Path, force: bool, as_json: bool) -
         drawing.save(corridor_plot.figure(points, unit, job.name), picture)
         written.append(str(picture))
     except MissingPackageError as error:
-        messages.show(error, "no plot")
+        results.show_error(error, "no plot")
     curve = [{f"corridor_{unit}": point.corridor, "duration_s": point.total_s} for point in points]
     lines = [*corridor_plot.lines(points, unit), f"written: {', '.join(written)}"]
     results.show(as_json, {"files": written, "curve": curve}, lines)

@@ -1,24 +1,88 @@
-"""Postures on the command line: by name, angles, a via point of a job, or the start of a trajectory."""
+"""``armtempo goto`` and ``home``, and postures as they take them: by name, angles, via point or trajectory file."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import click
+import numpy as np
+
+from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
-from armtempo.cli import chosen, results, state
+from armtempo.cli import chosen, options, results, state
+from armtempo.cli.options import BoardOptions
+from armtempo.cli.progress import ProgressBar
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
+from armtempo.model.plan import Plan
 from armtempo.model.posture import HOME as HOME
 from armtempo.model.posture import is_via as is_via
 from armtempo.model.posture import name_problem
+from armtempo.model.sequence_plan import SequencePlan, is_sequence_plan
+from armtempo.planning import planner, point_to_point, via_points
+from armtempo.robot.board import Board
+from armtempo.robot.stop_request import Stopped
 
-if TYPE_CHECKING:
-    from armtempo.basics.arrays import Array
-    from armtempo.model.arm import Arm
-    from armtempo.model.job import Job
-    from armtempo.model.plan import Plan
-    from armtempo.model.sequence_plan import SequencePlan
-    from armtempo.robot.board import Board
+
+@click.command("goto", context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
+@click.argument("where", nargs=-1, required=True, shell_complete=options.files)
+@options.job
+@options.board(options.arm_of_board, options.replace_arm, options.altered)
+def goto(where: tuple[str, ...], job_path: Path | None, given: BoardOptions) -> None:
+    """Move straight to a posture.
+
+    WHERE: 'home' or another posture of the arm file, angles such as '0,-60,40', a via point of the job such as P0,
+    or a trajectory file or a planned sequence for its start. All joints move together, within their limits. The arm
+    must be homed. Ctrl-C brakes, and so does 'armtempo stop' in another terminal.
+    """
+    if len(where) > 1:
+        raise InputError(
+            f"{len(where)} values for one posture",
+            f"write them as one, with commas: armtempo goto {','.join(where)}",
+        )
+    wanted = NamedPosture.of(where[0], given.arm_path, given.altered)
+    with chosen.board(given, wanted.arm) as board:
+        arm = chosen.arm_of_board(board, wanted.arm)
+        target_deg = wanted.angles_deg(arm, job_path)
+        board.configure(arm, replace=given.replace_arm)
+        try:
+            with ProgressBar("moving") as progress:
+                board.goto(target_deg, progress)
+        except Stopped:
+            say_where_it_is(board, given.as_json)
+            raise
+        say_where_it_is(board, given.as_json)
+
+
+@click.command("home", context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
+@click.argument("where", default=HOME, shell_complete=options.files)
+@click.option("--switches", is_flag=True, help="Move to the limit switches instead of taking WHERE on trust.")
+@options.job
+@options.board(options.arm_of_board, options.replace_arm, options.altered)
+def home(where: str, switches: bool, job_path: Path | None, given: BoardOptions) -> None:
+    """Declare where the arm stands.
+
+    WHERE: angles such as '0,-60,40', a posture of the arm file by its name, a via point of the job such as P0, or a
+    trajectory file for its start. Without it: the home posture of the arm file. Nothing moves; afterwards motions may
+    start. With --switches the joints that have a switch of known angle move: to it, off it, slowly to it again, and to
+    their home angle; in the order of 'homing' in the arm file, else one after the other.
+    """
+    if switches and where != HOME:
+        raise InputError(
+            "WHERE and --switches exclude each other",
+            "give WHERE where the arm stands, or --switches to drive to the limit switches",
+        )
+    wanted = NamedPosture.of(where, given.arm_path, given.altered)
+    with chosen.board(given, wanted.arm) as board:
+        arm = chosen.arm_of_board(board, wanted.arm)
+        angles_deg = wanted.angles_deg(arm, job_path)
+        board.configure(arm, replace=given.replace_arm)
+        if switches:
+            board.home_to_switches(arm)
+        else:
+            board.home(arm, angles_deg)
+        say_where_it_is(board, given.as_json)
 
 
 def is_named(text: str) -> bool:
@@ -40,8 +104,6 @@ class NamedPosture:
     @classmethod
     def of(cls, text: str, arm_path: Path | None, altered: bool) -> NamedPosture:
         """The posture that ``text`` names; InputError where its trajectory file or the arm cannot be read."""
-        from armtempo.model.sequence_plan import is_sequence_plan
-
         if text.endswith(".json") and is_sequence_plan(Path(text)):
             sequence = chosen.load_sequence_plan(Path(text), arm_path)
             return cls(text, sequence.arm, None, sequence)
@@ -57,8 +119,6 @@ class NamedPosture:
 
     def angles_deg(self, arm: Arm, job_path: Path | None) -> Array:
         """Angles in degrees (J,); InputError where the text is no posture, or does not fit the arm."""
-        from armtempo.planning import point_to_point, via_points
-
         if self.sequence is not None:
             return point_to_point.posture(self.sequence.start_deg or arm.home_deg, arm)
         if self.plan is not None:
@@ -100,10 +160,6 @@ def words(angles_deg: Array, arm: Arm) -> str:
 
 def via_deg(text: str, arm: Arm, job: Job) -> Array:
     """The angles of a via point of a job, degrees (J,); InputError where the job has no such point."""
-    import numpy as np
-
-    from armtempo.planning import planner
-
     points_deg, _ = planner.via_angles(arm, job)
     index = int(text[1:])
     if index >= len(points_deg):

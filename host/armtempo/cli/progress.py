@@ -11,7 +11,7 @@ from typing import Any, Self
 
 import click
 
-from armtempo.cli.verbosity import is_quiet
+from armtempo.cli.results import is_quiet
 
 _PATIENCE_S = 1.0
 _BAR_COLUMNS = 24

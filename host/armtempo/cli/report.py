@@ -8,10 +8,16 @@ from typing import Any
 
 import click
 
-from armtempo.cli import messages, options, results
+from armtempo import pipeline
+from armtempo.basics.errors import InputError, RunFolderError
+from armtempo.cli import options, results
+from armtempo.formats.atomic_file import check_replaceable
+from armtempo.report import evaluation, sequence_report, verdict
+from armtempo.robot.run import Run
+from armtempo.runs.sequence_reader import SequenceRun, is_sequence_run
 
 
-@click.command()
+@click.command("report")
 @click.argument(
     "runs", nargs=-1, required=True, type=click.Path(exists=True, file_okay=False, path_type=Path)
 )
@@ -23,18 +29,12 @@ from armtempo.cli import messages, options, results
 )
 @options.force("any other file too")
 @options.as_json
-def command(runs: tuple[Path, ...], out: Path | None, force: bool, as_json: bool) -> None:
+def report(runs: tuple[Path, ...], out: Path | None, force: bool, as_json: bool) -> None:
     """Write report.html and its figures into a run folder, of a motion or a sequence.
 
     RUNS: run folders. With two or more, each gets its page, and one more page compares them. One that cannot be
     read is named there.
     """
-    from armtempo import pipeline
-    from armtempo.basics.errors import InputError, RunFolderError
-    from armtempo.formats.atomic_file import check_replaceable
-    from armtempo.robot.run import Run
-    from armtempo.runs.sequence_reader import SequenceRun, is_sequence_run
-
     if len(runs) == 1:
         if out is not None:
             raise InputError(
@@ -53,7 +53,7 @@ def command(runs: tuple[Path, ...], out: Path | None, force: bool, as_json: bool
         try:
             pages[run] = pipeline.report(Run.load(run))
         except RunFolderError as error:
-            messages.show(error)
+            results.show_error(error)
     compared = pipeline.compare(runs, out)
     found = [_values(run, page) for run, page in pages.items()] if as_json else []
     results.show(
@@ -65,9 +65,6 @@ def command(runs: tuple[Path, ...], out: Path | None, force: bool, as_json: bool
 
 def _values(run: Path, page: Path) -> dict[str, Any]:
     """The verdict of a page, which is ``good``, ``bad`` or ``open``, with what it rests on."""
-    from armtempo.report import evaluation, sequence_report, verdict
-    from armtempo.runs.sequence_reader import is_sequence_run
-
     told = sequence_report.verdict_of(run) if is_sequence_run(run) else verdict.of(evaluation.evaluate(run))
     findings = [asdict(finding) for finding in told.findings]
     return {"folder": str(run), "page": str(page), "verdict": told.state, "findings": findings}

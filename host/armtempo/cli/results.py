@@ -1,4 +1,4 @@
-"""What a command found: lines for people, or with ``--json`` one document for programs.
+"""What commands print: results as lines or as one JSON document, errors, and remarks that ``--quiet`` leaves out.
 
 The keys of the documents carry units as names do (``_deg``, ``_s``, ``_mm``, ``_steps``, ``_bytes``); what is not
 known is null.
@@ -6,17 +6,21 @@ known is null.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterable
 from typing import Any
 
 import click
 
-from armtempo.cli import chosen
-from armtempo.cli.messages import DOCUMENT
+from armtempo.basics.errors import ArmtempoError
+from armtempo.formats.plain_text import visible
+
+_DOCUMENT = "armtempo.document"
+"""Key of click's context: a JSON document was printed."""
 
 
 def show(as_json: bool, values: Any, lines: Iterable[str]) -> None:
-    """Print the one or the other on stdout."""
+    """Print ``values`` as JSON, or ``lines``, on stdout."""
     if as_json:
         show_json(values)
         return
@@ -26,12 +30,36 @@ def show(as_json: bool, values: Any, lines: Iterable[str]) -> None:
 
 def show_json(values: Any) -> None:
     """Print one document, on one line."""
-    import json
-
-    click.get_current_context().meta[DOCUMENT] = True
+    click.get_current_context().meta[_DOCUMENT] = True
     click.echo(json.dumps(values, allow_nan=False))
+
+
+def show_error(error: ArmtempoError, who: str = "armtempo", as_json: bool = False) -> None:
+    """Write an error to stderr, ``who`` before it, and what to do next on the line below.
+
+    Characters that would steer the terminal are spelt out. ``as_json``: as a document on stdout, with ``error``,
+    ``hint`` and the ``exit_code``, unless one was printed there.
+    """
+    if as_json and _DOCUMENT not in click.get_current_context().meta:
+        click.echo(json.dumps({"error": error.problem, "hint": error.hint, "exit_code": error.exit_code}))
+        return
+    click.echo(f"{who}: {visible(error.problem)}", err=True)
+    if error.hint:
+        click.echo(f"hint: {visible(error.hint)}", err=True)
+
+
+def is_quiet() -> bool:
+    """Whether the command line began with ``armtempo --quiet``."""
+    context = click.get_current_context(silent=True)
+    return context is not None and bool(context.find_root().params.get("quiet"))
+
+
+def tell(text: str) -> None:
+    """Print a remark on stderr, unless ``armtempo --quiet``."""
+    if not is_quiet():
+        click.echo(text, err=True)
 
 
 def teller(as_json: bool) -> Callable[[str], None]:
     """What says how the work goes: on stdout, or on stderr where that is for the document."""
-    return chosen.tell if as_json else click.echo
+    return tell if as_json else click.echo

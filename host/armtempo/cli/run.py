@@ -1,48 +1,33 @@
-"""``armtempo run``: replay a motion and record what comes back."""
+"""``armtempo run`` and ``fetch``: replay a motion and record what comes back, or fetch what the board recorded."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, options, results, sequences
+from armtempo.cli.live import Live, repetition_line
+from armtempo.cli.options import BoardOptions
+from armtempo.model.plan import Plan
+from armtempo.model.sequence_plan import is_sequence_plan
+from armtempo.records.encoded_motion import EncodedMotion
+from armtempo.report import text_summary
+from armtempo.robot.board import Board
+from armtempo.robot.run import Run
 
-if TYPE_CHECKING:
-    from armtempo.model.plan import Plan
-    from armtempo.records.encoded_motion import EncodedMotion
-    from armtempo.robot.board import Board
-    from armtempo.robot.run import Run
 
-
-@click.command()
+@click.command("run")
 @click.argument("what", shell_complete=options.files)
 @click.option("--repeat", type=click.IntRange(1, 99), default=1, show_default=True, help="Repetitions.")
 @click.option("--live", is_flag=True, help="Open a window that follows the run (matplotlib and a display).")
 @options.speed
 @options.force("another motion that the board keeps under this one's name")
 @options.out
-@options.arm_of_file
-@options.replace_arm
-@options.altered
-@options.port
-@options.log_traffic
-@options.as_json
-def command(
-    what: str,
-    repeat: int,
-    live: bool,
-    percent: float,
-    force: bool,
-    out: Path | None,
-    arm_path: Path | None,
-    replace_arm: bool,
-    altered: bool,
-    port: str | None,
-    log_traffic: Path | None,
-    as_json: bool,
+@options.board(options.arm_of_file, options.replace_arm, options.altered)
+def run(
+    what: str, repeat: int, live: bool, percent: float, force: bool, out: Path | None, given: BoardOptions
 ) -> None:
     """Replay a motion and record it, or run a sequence.
 
@@ -52,30 +37,28 @@ def command(
     board sees to that itself. Between repetitions the arm returns along the same path. Ctrl-C brakes, and so
     does 'armtempo stop' in another terminal; 'armtempo speed', 'pause' and 'resume' work there too.
     """
-    from armtempo.model.sequence_plan import is_sequence_plan
-
     if chosen.is_file(what) and is_sequence_plan(Path(what)):
         only_for_motions(repeat, live)
-        sequence = chosen.load_sequence_plan(Path(what), arm_path)
-        with chosen.board(port, log_traffic, sequence.arm) as board:
-            board.configure(sequence.arm, replace=replace_arm)
-            results.teller(as_json)(f"arm: {chosen.words(sequence.arm)}")
+        sequence = chosen.load_sequence_plan(Path(what), given.arm_path)
+        with chosen.board(given, sequence.arm) as board:
+            board.configure(sequence.arm, replace=given.replace_arm)
+            results.teller(given.as_json)(f"arm: {chosen.words(sequence.arm)}")
             board.speed(percent / 100)
-            sequences.run_and_tell(board, sequence, force, chosen.runs(out), as_json)
+            sequences.run_and_tell(board, sequence, force, chosen.runs(out), given.as_json)
         return
-    plan = chosen.load_plan(Path(what), arm_path, altered) if chosen.is_file(what) else None
-    named = plan.arm if plan else chosen.named_arm(arm_path)
-    with chosen.board(port, log_traffic, named) as board:
+    plan = chosen.load_plan(Path(what), given.arm_path, given.altered) if chosen.is_file(what) else None
+    named = plan.arm if plan else chosen.named_arm(given.arm_path)
+    with chosen.board(given, named) as board:
         arm = chosen.arm_of_board(board, named)
-        board.configure(arm, replace=replace_arm)
-        results.teller(as_json)(f"arm: {chosen.words(arm)}")
+        board.configure(arm, replace=given.replace_arm)
+        results.teller(given.as_json)(f"arm: {chosen.words(arm)}")
         motion = board.upload(plan, replace=force) if plan else what
         board.speed(percent / 100)
         if isinstance(motion, str) and _is_sequence(board, motion):
             only_for_motions(repeat, live)
-            sequences.run_and_tell(board, motion, False, chosen.runs(out), as_json)
+            sequences.run_and_tell(board, motion, False, chosen.runs(out), given.as_json)
             return
-        run_and_tell(board, motion, repeat, chosen.runs(out), live, as_json)
+        run_and_tell(board, motion, repeat, chosen.runs(out), live, given.as_json)
 
 
 def only_for_motions(repeat: int, live: bool) -> None:
@@ -104,11 +87,29 @@ def run_and_tell(
 
     ``as_json``: the result as JSON, what happens on the other stream.
     """
-    from armtempo.cli.live import Live
-    from armtempo.report import text_summary
-
     virtual = chosen.virtual_words(board.port) if board.info.virtual else ""
     with Live(window=live, where=virtual, aside=as_json) as watcher:
         run = board.run(motion, repeat, out, watcher=watcher)
     results.show(as_json, run.to_json(), text_summary.result_lines(run.results))
     return run
+
+
+@click.command("fetch")
+@click.argument("what", required=False, shell_complete=options.files)
+@options.out
+@options.board(options.arm_of_file, options.altered)
+def fetch(what: str | None, out: Path | None, given: BoardOptions) -> None:
+    """Fetch the samples that the board keeps of its last run, such as one that its button started.
+
+    WHAT: what was run: a trajectory file, or the name of a motion on the board; without it the motion that
+    the button starts. A run under way is followed to its end. The samples go into a new run folder, once.
+    """
+    plan = (
+        chosen.load_plan(Path(what), given.arm_path, given.altered) if what and chosen.is_file(what) else None
+    )
+    named = plan.arm if plan else chosen.named_arm(given.arm_path)
+    with chosen.board(given, named) as board:
+        board.configure(chosen.arm_of_board(board, named))
+        run = board.fetch(plan or what, chosen.runs(out))
+        lines = [f"{run.name}: {run.path}", repetition_line(run.entries[-1])]
+        results.show(given.as_json, run.to_json(), lines)

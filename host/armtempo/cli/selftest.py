@@ -2,31 +2,28 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 import click
 
 from armtempo.cli import chosen, options, results
+from armtempo.cli.options import BoardOptions
 from armtempo.cli.progress import ProgressBar
-
-if TYPE_CHECKING:
-    from armtempo.selftest.result import Measurement, SelfTest
+from armtempo.selftest.result import Measurement, SelfTest
 
 
-@click.command()
-@options.port
-@options.log_traffic
-@options.as_json
-def command(port: str | None, log_traffic: Path | None, as_json: bool) -> None:
+@click.command("selftest")
+@options.board()
+def selftest(given: BoardOptions) -> None:
     """Let the board measure itself: clocks, flash, memory, link.
 
     Nothing needs to be connected, and nothing moves: the drivers must be off, and stay so. The board is reset at the
     end, so the arm's position is unknown then. Exit code 1 where anything is wrong.
     """
-    with chosen.board(chosen.port(port), log_traffic) as board, ProgressBar("self-test") as progress:
+    given = replace(given, port=chosen.port(given.port))
+    with chosen.board(given) as board, ProgressBar("self-test") as progress:
         found = board.selftest(progress)
-    results.show(as_json, found.to_json(), _lines(found))
+    results.show(given.as_json, found.to_json(), _lines(found))
     if found.failed:
         raise SystemExit(1)
 

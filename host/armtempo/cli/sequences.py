@@ -6,27 +6,28 @@ import sys
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
+from armtempo_shared.sequence import END, MOVE, REPEAT, WAIT
 
-from armtempo.basics.errors import InputError
+import armtempo
+from armtempo.basics.errors import ArmtempoError, InputError, LinkError
 from armtempo.cli import chosen, results
 from armtempo.cli.progress import ProgressBar
+from armtempo.cli.state import counted
+from armtempo.formats.atomic_file import check_not_input
 from armtempo.formats.text_table import aligned
-
-if TYPE_CHECKING:
-    from armtempo.link.board_messages import SequenceState
-    from armtempo.model.sequence_plan import SequencePlan, SequenceRow, Share
-    from armtempo.robot.board import Board
+from armtempo.link.board_messages import SequenceState
+from armtempo.model.sequence import Sequence, arm_named
+from armtempo.model.sequence_plan import PAUSE_S, SequencePlan, SequenceRow, Share
+from armtempo.robot.board import Board
+from armtempo.robot.sequence_run import cycles, where
+from armtempo.robot.stop_request import Stopped
 
 
 def plan(file: Path, arm_path: Path | None, output: Path | None, force: bool, as_json: bool) -> None:
     """Plan a sequence file, say what its time is made of, and write it."""
-    import armtempo
-    from armtempo.formats.atomic_file import check_not_input
-    from armtempo.model.sequence import Sequence, arm_named
-
     named = arm_path or arm_named(file)
     arm = chosen.load_arm(named)
     sequence = Sequence.load(file, arm)
@@ -51,8 +52,6 @@ def refuse_job_options(options: dict[str, Any]) -> None:
 
 def values(planned: SequencePlan) -> dict[str, Any]:
     """The same as ``lines``, as plain values."""
-    from armtempo.model.sequence_plan import PAUSE_S
-
     cycles = [
         {"step": cycle.step, "times": cycle.times or None, **_share(cycle.share)} for cycle in planned.cycles
     ]
@@ -75,8 +74,6 @@ def _share(share: Share) -> dict[str, Any]:
 
 def _duration_s(planned: SequencePlan, row: SequenceRow) -> float | None:
     """What a row takes; None where it takes no time of its own."""
-    from armtempo_shared.sequence import MOVE, WAIT
-
     if row.op == MOVE:
         return float(planned.legs[row.number].duration_s)
     return row.amount / 1000 if row.op == WAIT else None
@@ -84,10 +81,6 @@ def _duration_s(planned: SequencePlan, row: SequenceRow) -> float | None:
 
 def lines(planned: SequencePlan) -> list[str]:
     """Each row with its time, the cycle, the whole."""
-    from armtempo_shared.sequence import END, REPEAT
-
-    from armtempo.model.sequence_plan import PAUSE_S
-
     rows, depth = [("step", "", "seconds")], 0
     for row in planned.rows:
         depth -= row.op == END
@@ -145,11 +138,6 @@ def run_and_tell(
 
     ``as_json``: the end as JSON. Exit code 1 where an input did not come.
     """
-    from armtempo.basics.errors import ArmtempoError, LinkError
-    from armtempo.cli.state import counted
-    from armtempo.robot.sequence_run import cycles, where
-    from armtempo.robot.stop_request import Stopped
-
     say = results.teller(as_json)
     shown = Shown(sequence if not isinstance(sequence, str) else None, say)
     try:

@@ -1,29 +1,24 @@
-"""``armtempo speed``: how fast what moves goes on."""
+"""``armtempo speed``, ``pause`` and ``resume``: how fast what moves continues."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 from armtempo_shared import wire
 
 from armtempo.basics.errors import BoardError, LinkError
 from armtempo.cli import chosen, options, results
+from armtempo.cli.options import BoardOptions
+from armtempo.robot.board import Board
+from armtempo.robot.shared_board import SharedBoard
 
-if TYPE_CHECKING:
-    from armtempo.robot.board import Board
-    from armtempo.robot.shared_board import SharedBoard
 
-
-@click.command()
+@click.command("speed")
 @click.argument("percent", type=click.FloatRange(1, 100))
-@options.port
-@options.log_traffic
-@options.as_json
-def command(percent: float, port: str | None, log_traffic: Path | None, as_json: bool) -> None:
+@options.board()
+def speed(percent: float, given: BoardOptions) -> None:
     """Let what moves go on at PERCENT of its planned speed.
 
     PERCENT: 1 to 100.
@@ -32,13 +27,11 @@ def command(percent: float, port: str | None, log_traffic: Path | None, as_json:
     armtempo program has the port, it is asked to do it, and what it starts later runs at that speed too.
     """
     words = f"{percent:g} % of the planned speed"
-    change(
-        port, log_traffic, Asked("speed", lambda board: board.speed(percent / 100), words, percent), as_json
-    )
+    _change(given, _Asked("speed", lambda board: board.speed(percent / 100), words, percent))
 
 
 @dataclass(frozen=True)
-class Asked:
+class _Asked:
     """A change of speed."""
 
     what: str
@@ -49,19 +42,17 @@ class Asked:
     """Of the planned speed; None: as before the pause."""
 
 
-def change(port: str | None, log_traffic: Path | None, asked: Asked, as_json: bool) -> None:
+def _change(given: BoardOptions, asked: _Asked) -> None:
     """Ask for it, through the program that has the port where there is one, and say so."""
-    name = chosen.port(port, others=True)
-    program = _ask(name, log_traffic, asked)
-    values = {"asked": asked.what, "speed_percent": asked.percent, "port": name, "program": program}
-    results.show(as_json, values, [asked.words + (f", through {program}" if program else "")])
+    given = chosen.any_port(given)
+    program = _ask(given, asked)
+    values = {"asked": asked.what, "speed_percent": asked.percent, "port": given.port, "program": program}
+    results.show(given.as_json, values, [asked.words + (f", through {program}" if program else "")])
 
 
-def _ask(name: str, log_traffic: Path | None, asked: Asked) -> str | None:
+def _ask(given: BoardOptions, asked: _Asked) -> str | None:
     """Ask for it; through which program, None where over the port itself."""
-    from armtempo.robot.shared_board import SharedBoard
-
-    with chosen.shared_or_own(name, log_traffic) as board:
+    with chosen.shared_or_own(given) as board:
         if asked.what == "speed" and not isinstance(board, SharedBoard) and not board.status().moving:
             raise LinkError("nothing moves", "'armtempo run --speed' begins at a lower speed")
         try:
@@ -73,3 +64,20 @@ def _ask(name: str, log_traffic: Path | None, asked: Asked) -> str | None:
                 f"there is nothing to {asked.what}: nothing moves", "start a motion first"
             ) from None
         return board.program if isinstance(board, SharedBoard) else None
+
+
+@click.command("pause")
+@options.board()
+def pause(given: BoardOptions) -> None:
+    """Let what moves come to rest on its path; 'armtempo resume' goes on, 'armtempo stop' ends it.
+
+    The drivers hold meanwhile. A run, its pauses counted, lasts at most 1 h 49 min.
+    """
+    _change(given, _Asked("pause", lambda board: board.pause(), "paused", 0.0))
+
+
+@click.command("resume")
+@options.board()
+def resume(given: BoardOptions) -> None:
+    """Go on along the path at the speed before the pause."""
+    _change(given, _Asked("resume", lambda board: board.resume(), "going on"))

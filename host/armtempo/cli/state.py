@@ -1,11 +1,48 @@
-"""A board's state in lines, as ``status`` and ``stop`` print it."""
+"""``armtempo status``, and a board's state in lines, as it and others print it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 
-from armtempo.cli import chosen
+import click
+
+from armtempo.basics.errors import InputError
+from armtempo.cli import chosen, options, results
+from armtempo.cli.options import BoardOptions
+from armtempo.formats.text_table import aligned
+from armtempo.model.arm import Arm
 from armtempo.robot.board_state import BoardState, JointState, SequenceStand, ToolPlace
+
+
+@click.command("status")
+@options.board(options.arm_of_board)
+def status(given: BoardOptions) -> None:
+    """Show the board, its state, and where the joints stand.
+
+    Also while another armtempo program has the port.
+    """
+    given = chosen.any_port(given)
+    found = _named(chosen.board_state(given), given.arm_path)
+    if given.as_json:
+        results.show_json(found.to_json())
+        return
+    for line in lines(found):
+        click.echo(line)
+
+
+def _named(found: BoardState, arm_path: Path | None) -> BoardState:
+    """In degrees, where the arm that is named, or the one that ships, is what the board is set up for."""
+    named: Arm | None = None
+    try:
+        named = chosen.named_arm(arm_path)
+    except InputError as error:  # the board is worth looking at all the same
+        results.tell(f"armtempo: {error}")
+    if named is not None and found.arm_crc and not found.arm and not found.named(named).arm:
+        results.tell(
+            f"the board is set up for another arm than {chosen.words(named)}; see 'armtempo configure'"
+        )
+    return found.named(named).named(Arm.paper())
 
 
 def lines(state: BoardState) -> list[str]:
@@ -65,8 +102,6 @@ def _rest(state: BoardState) -> str:
 
 def joint_lines(state: BoardState) -> list[str]:
     """A line a joint: its name, its angle with the steps, the encoder's angle with the counts; and the tool."""
-    from armtempo.formats.text_table import aligned
-
     rows = [_cells(joint) for joint in state.joints]
     lines = [row.rstrip() for row in aligned(rows, (12, 10, 1, 1))] if rows else []
     return [*lines, f"tool at {tool_words(state.tool)}"] if state.tool else lines

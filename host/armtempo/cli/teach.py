@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
+from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, jog, keys, options
+from armtempo.cli.keys import END, INTERRUPT, Keys
+from armtempo.cli.options import BoardOptions
+from armtempo.formats.atomic_file import replace_text
+from armtempo.model import job_text, posture, posture_text, shipped
+from armtempo.model.arm import Arm
+from armtempo.project.settings import ARM, ProjectSettings, nothing_set
+from armtempo.robot.board import Board
 
-if TYPE_CHECKING:
-    from armtempo.cli.keys import Keys
-    from armtempo.cli.teach_points import TaughtPoints
-    from armtempo.robot.board import Board
 
-
-@click.command()
+@click.command("teach")
 @click.argument(
     "job_file", required=False, metavar="[JOB.toml]", type=click.Path(dir_okay=False, path_type=Path)
 )
@@ -29,7 +32,7 @@ if TYPE_CHECKING:
 @options.arm_of_board
 @options.port
 @options.log_traffic
-def command(
+def teach(
     job_file: Path | None,
     name: str | None,
     by_hand: bool,
@@ -54,26 +57,21 @@ def command(
     if name is not None:
         file = _own_arm_file(arm_path, name)
         arm = chosen.load_arm(arm_path)
-        with chosen.board(port, log_traffic, arm) as board:
+        with chosen.board(BoardOptions(port, log_traffic), arm) as board:
             jog.prepare(board, arm)
             _write_posture(board, file, name, replace_old)
     elif job_file is not None:
-        from armtempo.cli import teach_points
-
-        teach_points.check_free(job_file, replace_old)
+        check_free(job_file, replace_old)
         if not keys.is_terminal():
             raise InputError("the keys of teach need a terminal", "run it in one")
         named = chosen.named_arm(arm_path)
-        with chosen.board(port, log_traffic, named) as board:
+        with chosen.board(BoardOptions(port, log_traffic), named) as board:
             jog.prepare(board, chosen.arm_of_board(board, named))
             _write_job(board, job_file, by_hand, gamepad)
 
 
 def _own_arm_file(arm_path: Path | None, name: str) -> Path:
     """The arm file to write to; InputError for one that ships, and for what is no name."""
-    from armtempo.model import posture, shipped
-    from armtempo.project.settings import ARM, ProjectSettings, nothing_set
-
     if problem := posture.name_problem(name):
         raise InputError(f"--posture {name}: {problem}", "choose another name")
     setting = ProjectSettings().get(ARM, arm_path)
@@ -89,8 +87,6 @@ def _own_arm_file(arm_path: Path | None, name: str) -> Path:
 
 
 def _write_posture(board: Board, file: Path, name: str, replace_old: bool) -> None:
-    from armtempo.model import posture_text
-
     arm = board.arm
     assert arm is not None  # it was configured
     angles_deg = posture_text.digits(arm, board.posture_deg().tolist())
@@ -103,8 +99,6 @@ def _write_posture(board: Board, file: Path, name: str, replace_old: bool) -> No
 
 def _write_job(board: Board, file: Path, by_hand: bool, gamepad: bool) -> None:
     """Collect the points and write them; where that fails they are told."""
-    from armtempo.cli.teach_points import TaughtPoints
-
     arm = board.arm
     assert arm is not None  # it was configured
     points = TaughtPoints(arm, board.posture_deg)
@@ -124,8 +118,6 @@ _MORE = "  p            take a point                   u       forget the last o
 
 
 def _guide(board: Board, pressed: Keys, points: TaughtPoints) -> None:
-    from armtempo.cli.teach_points import by_hand
-
     guided = board.by_hand()
     click.echo(
         "hold the arm: it sinks when the motors' current goes off. Enter: off; any other key: leave it on"
@@ -139,3 +131,87 @@ def _guide(board: Board, pressed: Keys, points: TaughtPoints) -> None:
             "and ends"
         )
         by_hand(pressed, points, guided.button_pressed)
+
+
+TAKE, UNDO = "p", "u"
+_BY_HAND_S = 0.3
+
+
+class TaughtPoints:
+    """The points so far; ``where`` gives the posture of the arm, (J,) in degrees."""
+
+    def __init__(self, arm: Arm, where: Callable[[], Array]) -> None:
+        self.points_deg: list[list[float]] = []
+        self._arm = arm
+        self.where = where
+
+    @property
+    def keys(self) -> dict[str, Callable[[], str]]:
+        """What the keys do that a screen has for them."""
+        return {TAKE: self.take, UNDO: self.undo}
+
+    def take(self) -> str:
+        """Take where the arm stands; says what was done."""
+        point = posture_text.digits(self._arm, self.where().tolist())
+        if problem := self._arm.angles_problem(point):
+            return f"not taken: {problem}"
+        if self.points_deg and point == self.points_deg[-1]:
+            return "not taken: the arm stands where it stood at the last point"
+        self.points_deg.append(point)
+        return f"point {len(self.points_deg)} taken: {_row(point)}"
+
+    def undo(self) -> str:
+        """Forget the last point."""
+        if not self.points_deg:
+            return "there is no point to forget"
+        self.points_deg.pop()
+        return f"point {len(self.points_deg) + 1} forgotten"
+
+    def save(self, file: Path) -> None:
+        """Write the job; InputError for fewer than two points."""
+        text = job_text.of_points(job_text.name_of(file), self.points_deg)
+        replace_text(file, text)
+        click.echo(
+            f"written: {file}, {len(self.points_deg)} via points; 'armtempo plan --job {file}' plans it"
+        )
+
+    def tell(self) -> None:
+        """Print the points, where they cannot become a file: nothing that was taught is lost."""
+        for point in self.points_deg:
+            click.echo(f"[[via]]\nangles_deg = [{_row(point)}]", err=True)
+
+
+def check_free(file: Path, replace_old: bool) -> None:
+    """InputError where the job file is there already, before anything moves."""
+    if file.exists() and not replace_old:
+        raise InputError(f"{file} exists, so it is kept", "choose another name, or replace it with --replace")
+    if not file.parent.is_dir():
+        raise InputError(f"{file.parent}: there is no such folder", "make it, or choose another place")
+
+
+def by_hand(keys: Keys, points: TaughtPoints, button: Callable[[], bool] = lambda: False) -> None:
+    """Take points while the arm is moved by hand, until q, Ctrl-C or the end of the input.
+
+    ``button``: whether the board's button, which takes a point too, was pressed since it was asked last.
+    """
+    said = ""
+    while True:
+        shown = f"{_row(points.where().round(2).tolist())} ° by the encoders"
+        click.echo(
+            f"\r\x1b[K{len(points.points_deg)} points | {shown}{' | ' if said else ''}{said}", nl=False
+        )
+        key = keys.read(_BY_HAND_S)
+        if key in ("q", "Q", END):
+            break
+        if key == INTERRUPT:
+            click.echo()
+            raise KeyboardInterrupt
+        if key in points.keys:
+            said = points.keys[key]()
+        if button():
+            said = points.take()
+    click.echo()
+
+
+def _row(point: list[float]) -> str:
+    return ", ".join(f"{angle + 0.0:.12g}" for angle in point)

@@ -9,11 +9,12 @@ import click
 
 from armtempo.basics.errors import LinkError
 from armtempo.cli import chosen, options
+from armtempo.simulator import LaunchOptions, launch
 
 _LOOK_S = 0.5
 
 
-@click.command()
+@click.command("virtual-board")
 @click.option(
     "--flash",
     type=click.Path(file_okay=False, path_type=Path),
@@ -49,7 +50,7 @@ _LOOK_S = 0.5
 @options.arm
 @click.option("--ideal", is_flag=True, help="Ideal motors, as without an arm.")
 @click.option("--seed", default=0, show_default=True, help="Tells one board from another, and its scatter.")
-def command(
+def virtual_board(
     flash: Path | None,
     real_time: bool,
     edge_log: Path | None,
@@ -66,8 +67,6 @@ def command(
     The port can be opened like a serial device, by armtempo (--port) and by any other program. Its motors are as
     the arm file describes them; without one they are ideal, for whatever arm the board is set up for.
     """
-    from armtempo.simulator import LaunchOptions, launch
-
     wanted = LaunchOptions(
         flash,
         virtual_time=not real_time,

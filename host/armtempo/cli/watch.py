@@ -1,54 +1,55 @@
-"""``armtempo watch``: look on while another program moves the arm."""
+"""``armtempo watch`` and ``monitor``: what another program does with the arm, as state or as traffic."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 
 from armtempo.cli import chosen, options, results
+from armtempo.cli.options import BoardOptions
+from armtempo.link import traffic
+from armtempo.link.traffic import Chunk
+from armtempo.robot.shared_board import SharedBoard
 
-_EVERY_S = 0.5
+_STATE_S = 0.5
 
 
-@click.command()
-@options.port
-@options.log_traffic
-@options.as_json
-def command(port: str | None, log_traffic: Path | None, as_json: bool) -> None:
+@click.command("watch")
+@options.board()
+def watch(given: BoardOptions) -> None:
     """Show samples, states and what happens, as another armtempo program that has the port hears it.
 
     Where no program has it, the board is asked for its state. Ctrl-C ends it; a motion under way goes on.
     """
-    from armtempo.robot.shared_board import SharedBoard
-
-    name = chosen.port(port, others=True)
-    with chosen.shared_or_own(name, log_traffic, any_program=True) as board:
+    given = chosen.any_port(given)
+    with chosen.shared_or_own(given, any_program=True) as board:
         if isinstance(board, SharedBoard):
-            _show(board.watch("sample", "status", "event"), as_json)
-            chosen.tell(f"{board.program} has given up {name}")
+            _show_messages(board.watch("sample", "status", "event"), given.as_json)
+            results.tell(f"{board.program} has given up {given.port}")
         else:
-            _show(_states(board), as_json)
+            _show_messages(_states(board), given.as_json)
 
 
 def _states(board: Any) -> Iterator[dict[str, Any]]:
     while True:
         yield {"topic": "status", "status": board.state().to_json()}
-        time.sleep(_EVERY_S)
+        time.sleep(_STATE_S)
 
 
-def _show(messages: Iterator[dict[str, Any]], as_json: bool) -> None:
+def _show_messages(messages: Iterator[dict[str, Any]], as_json: bool) -> None:
     for message in messages:
         if as_json:
             results.show_json(message)
         else:
-            click.echo(_line(message))
+            click.echo(_message_line(message))
 
 
-def _line(message: dict[str, Any]) -> str:
+def _message_line(message: dict[str, Any]) -> str:
     topic = message["topic"]
     if topic == "sample":
         degrees = message.get("commanded_deg")
@@ -68,3 +69,53 @@ def _line(message: dict[str, Any]) -> str:
         ]
         return f"{state['state']:<11}  {'  '.join(joints)}"
     return "  ".join(f"{key} {value}" for key, value in message.items() if key != "topic")
+
+
+_POLL_S = 1.0
+Say = Callable[[float, str, list[str]], None]
+
+
+@click.command("monitor")
+@click.argument("file", required=False, type=click.Path(path_type=Path))
+@options.board()
+def monitor(file: Path | None, given: BoardOptions) -> None:
+    """Show decoded traffic.
+
+    FILE: what '--log-traffic FILE' recorded; without it, what another armtempo program that has the port says
+    and hears, else the board is asked once a second. Ctrl-C ends it; a motion under way goes on.
+    With --json each line is a document.
+    """
+    say = _print_json if given.as_json else _print
+    if file is not None:
+        _show_file(file, say)
+        return
+    given = chosen.any_port(given)
+    with chosen.shared_or_own(given, any_program=True, sink=partial(_show_chunk, say)) as board:
+        if isinstance(board, SharedBoard):
+            for message in board.watch("traffic"):
+                say(message["time_s"], message["direction"], message["words"])
+            results.tell(f"{board.program} has given up {given.port}")
+            return
+        while True:
+            board.status()
+            board.client.session.poll(_POLL_S)
+            board.client.session.events.clear()
+
+
+def _show_file(file: Path, say: Say) -> None:
+    decoder = traffic.Decoder()
+    for chunk in traffic.read_log(file):
+        _show_chunk(say, chunk, decoder.feed(chunk.direction, chunk.data))
+
+
+def _show_chunk(say: Say, chunk: Chunk, words: list[str]) -> None:
+    say(chunk.time_s, chunk.direction, words)
+
+
+def _print(time_s: float, direction: str, words: list[str]) -> None:
+    for line in words:
+        click.echo(f"{time_s:10.4f} {direction} {line}")
+
+
+def _print_json(time_s: float, direction: str, words: list[str]) -> None:
+    results.show_json({"time_s": time_s, "direction": direction, "words": words})

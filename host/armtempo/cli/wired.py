@@ -1,18 +1,125 @@
-"""The board and the arm for ``output`` and ``input``, directly or through the program that has the port."""
+"""``armtempo output`` and ``input``, directly or through the program that has the port."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Any
 
-from armtempo.basics.errors import LinkError
-from armtempo.cli import chosen
+import click
+
+from armtempo.basics.errors import InputError, LinkError
+from armtempo.cli import chosen, options, results
+from armtempo.cli.options import BoardOptions
 from armtempo.link.board_messages import Levels
 from armtempo.model.arm import Arm
-from armtempo.robot.outputs import Way
+from armtempo.model.outputs import Input, Output
+from armtempo.robot.board_state import record_crc
+from armtempo.robot.outputs import BoardOutput, Way
 from armtempo.robot.shared_board import SharedBoard
+
+
+@click.command("output", context_settings={"ignore_unknown_options": True})  # so that -10 is a value
+@click.argument("name", required=False)
+@click.argument("value", required=False)
+@options.board(options.arm_of_board)
+def output(name: str | None, value: str | None, given: BoardOptions) -> None:
+    """Set an output of the arm, or list them.
+
+    NAME: an [output.NAME] of the arm file. VALUE: a state of it such as open, or a number: 0 or 1, a duty of 0 to 1,
+    degrees of a servo. Without VALUE: what it is set to; without NAME: all of them. Also while a motion runs, and while
+    another armtempo program has the port.
+    """
+    if name is not None and name.startswith("-"):
+        raise InputError(f"no such option: {name}", "see 'armtempo output --help'")
+    with _board(given) as board:
+        if name is not None:
+            output = BoardOutput(board.way, board.arm, name)
+            if value is not None:
+                output.set(value)
+        levels = board.levels().outputs
+        found = [
+            (entry, raw)
+            for entry, raw in zip(board.arm.outputs, levels, strict=True)
+            if name in (None, entry.name)
+        ]
+    if given.as_json:
+        _print_json([_output_values(*entry) for entry in found], name)
+        return
+    if not found:
+        results.tell(f"arm {chosen.words(board.arm)} has no outputs: write [output.NAME] tables in its file")
+    for line in _output_lines(found):
+        click.echo(line)
+
+
+def _print_json(values: list[dict[str, Any]], name: str | None) -> None:
+    results.show_json(values if name is None else values[0])
+
+
+def _output_values(output: Output, raw: int) -> dict[str, Any]:
+    return {
+        "name": output.name,
+        "kind": output.kind,
+        "pin": output.pin,
+        "value": round(output.value(raw), 4),
+        "unit": output.unit,
+        "state": output.state(raw),
+        "range": list(output.range),
+        "safe": output.safe,
+        "states": dict(output.states),
+    }
+
+
+def _output_lines(found: list[tuple[Output, int]]) -> list[str]:
+    return [
+        f"{output.name:<12} {output.kind:<6} {output.pin:<4} {output.words(raw):<16} {_choices(output)}"
+        for output, raw in found
+    ]
+
+
+def _choices(output: Output) -> str:
+    states = [f"{name} = {value:g}" for name, value in output.states]
+    low, high = output.range
+    return ", ".join([*states, f"{low:g} to {high:g} {output.unit}".rstrip()])
+
+
+@click.command("input")
+@click.argument("name", required=False)
+@options.board(options.arm_of_board)
+def read_inputs(name: str | None, given: BoardOptions) -> None:
+    """Read the inputs of the arm.
+
+    NAME: an [input.NAME] of the arm file; without it all of them. Also while a motion runs, and while another armtempo
+    program has the port.
+    """
+    with _board(given) as board:
+        if name is not None:
+            board.arm.input(name)
+        levels = board.levels()
+        found = [
+            (entry, levels.active(number))
+            for number, entry in enumerate(board.arm.inputs)
+            if name in (None, entry.name)
+        ]
+    if given.as_json:
+        values = [_input_values(*entry) for entry in found]
+        results.show_json(values if name is None else values[0])
+        return
+    if not found:
+        results.tell(f"arm {chosen.words(board.arm)} has no inputs: write [input.NAME] tables in its file")
+    for line in _input_lines(found):
+        click.echo(line)
+
+
+def _input_values(entry: Input, active: bool) -> dict[str, Any]:
+    return {"name": entry.name, "pin": entry.pin, "active": active}
+
+
+def _input_lines(found: list[tuple[Input, bool]]) -> list[str]:
+    return [
+        f"{entry.name:<12} {entry.pin:<4} {'active' if active else 'inactive'}" for entry, active in found
+    ]
 
 
 @dataclass(frozen=True)
@@ -28,11 +135,11 @@ class Wired:
 
 
 @contextmanager
-def board(port: str | None, arm_path: Path | None, log_traffic: Path | None) -> Iterator[Wired]:
+def _board(given: BoardOptions) -> Iterator[Wired]:
     """Raises LinkError where the board is set up for another arm than the one that is named."""
-    name = chosen.port(port, others=True)
-    named = chosen.named_arm(arm_path)
-    with chosen.shared_or_own(name, log_traffic, named) as found:
+    given = chosen.any_port(given)
+    named = chosen.named_arm(given.arm_path)
+    with chosen.shared_or_own(given, named) as found:
         if isinstance(found, SharedBoard):
             yield Wired(found, _same_arm(found.state().arm_crc, named))
             return
@@ -42,8 +149,6 @@ def board(port: str | None, arm_path: Path | None, log_traffic: Path | None) -> 
 
 
 def _same_arm(arm_crc: int, named: Arm | None) -> Arm:
-    from armtempo.robot.board_state import record_crc
-
     arm = named or Arm.paper()
     if record_crc(arm) != arm_crc:
         raise LinkError(

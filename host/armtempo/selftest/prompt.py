@@ -17,7 +17,7 @@ import serial
 from armtempo.basics.errors import LinkError
 
 _FOLDER = Path(__file__).with_name("on_board")
-_SILENCE_S = 40.0
+_SILENCE_S = 20.0
 """Longest time without a byte from code that runs: longer than the board's watchdog takes."""
 _READ_S = 5.0
 _ENTER_S = 30.0
@@ -28,6 +28,18 @@ CONTINUE = "import armtempo_board\narmtempo_board.start()"
 """The board program goes on as it was before it was left; only before a soft reset."""
 RESET = "import machine\nmachine.reset()"
 """As the reset button: the program starts anew, and nothing is left of what was done at the prompt."""
+
+
+class PartError(LinkError):
+    """The code of a part raised an exception on the board."""
+
+
+class SilentError(LinkError):
+    """The board does not answer in ``part``."""
+
+    def __init__(self, part: str, problem: str) -> None:
+        super().__init__(problem, _cure(part))
+        self.part = part
 
 
 @dataclass(frozen=True)
@@ -51,9 +63,10 @@ class Prompt:
         with _as_link_error("start"):
             self._port.enter_raw_repl(soft_reset, timeout_overall=_ENTER_S)
 
-    def measure(self, part: str, **arguments: Any) -> Measured:
-        """Send ``on_board/PART.py`` and call its ``measure`` with these arguments."""
-        text = "".join((_FOLDER / f"{name}.py").read_text(encoding="utf-8") for name in ("common", part))
+    def measure(self, *parts: str, **arguments: Any) -> Measured:
+        """Send files of ``on_board`` and call ``measure`` of the last one with these arguments."""
+        part = parts[-1]
+        text = "".join((_FOLDER / f"{name}.py").read_text(encoding="utf-8") for name in ("common", *parts))
         return self._run(part, f"{text}\ntell(measure(**{arguments!r}))\n")
 
     def rates(self) -> dict[str, float]:
@@ -77,7 +90,7 @@ class Prompt:
             output, errors = self._port.exec_raw(code, timeout=_SILENCE_S)
         if errors:
             last = errors.decode(errors="replace").strip().splitlines()[-1]
-            raise LinkError(f"self-test, {part}: {last}", _cure(part))
+            raise PartError(f"self-test, {part}: {last}", _cure(part))
         lines = output.splitlines()
         bulk = b"".join(unhexlify(line[1:].strip()) for line in lines if line.startswith(_BULK))
         values = next((line for line in reversed(lines) if line.startswith(b"{")), b"{}")
@@ -114,8 +127,8 @@ def _as_link_error(part: str) -> Iterator[None]:
         with redirect_stdout(StringIO()):  # mpremote prints what it got instead of an answer
             yield
     except (TransportError, serial.SerialException, OSError) as error:
-        raise LinkError(
-            f"self-test, {part}: the board fell silent ({error}); its watchdog resets it", _cure(part)
+        raise SilentError(
+            part, f"the board fell silent in {part!r} ({error}); its watchdog resets it within 10 s"
         ) from error
 
 

@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from typing import Any
+
+import numpy as np
 
 from armtempo.basics.errors import LinkError
 from armtempo.basics.progress import Progress, stage, watched
 from armtempo.link import Client
-from armtempo.selftest import board_part, link_part
-from armtempo.selftest.prompt import RESET, Prompt, at_prompt
+from armtempo.selftest import board_part, link_part, motion, pulse_part
+from armtempo.selftest.prompt import RESET, Measured, PartError, Prompt, SilentError, at_prompt
 from armtempo.selftest.result import Measurement, SelfTest, judged, left_out
 
 DRIVERS = "drivers"
 UNIQUE_ID_DIGITS = 24
 _ARM_RECORD = "/flash/armtempo/arm.ata"
 _BACK_S = 60.0
+_SIMULATED_TURN_US = 1000
+"""What a turn of the loop takes on a virtual board, about as on the chip."""
+_SEED, _STOPS, _WAITS_US = 5, 50, (22_000, 120_000)
+_SIMULATED_STOPS = 5
+"""E-stops at random moments of the motion, which begins 20 ms after its start."""
 _LOOK_S = 0.3
 
 
@@ -35,7 +42,6 @@ def run(client: Client, progress: Progress | None = None) -> SelfTest:
         work(0, 1)
         found.data[link_part.PART] = link_part.trips(client)
         _leave(client, lambda prompt: _at_prompt(prompt, found, work))
-        found.add(link_part.judge(found.data[link_part.PART], found.simulated))
         found.add([_same_room(info.engine_room, client.info.engine_room)])
         work(1, 1)
     return found
@@ -85,7 +91,7 @@ def _check_drivers(prompt: Prompt) -> None:
     try:
         found = _drivers(prompt)
         on = found["active"] is not None and found["output"] and found["level"] == found["active"]
-    except LinkError as error:
+    except PartError as error:
         if "ImportError" not in error.problem:
             raise
         raise LinkError(
@@ -94,8 +100,9 @@ def _check_drivers(prompt: Prompt) -> None:
         ) from None
     if on:
         raise LinkError(
-            "the drivers are on (ENABLE, PE12, is active), and the self-test would switch them off",
-            "support the arm, then press the board's reset button, which switches them off, and run it again",
+            "the drivers are on (ENABLE, PE12, is active)",
+            "support the arm, then press the board's reset button, which switches them off, and run the self-test "
+            "again; if they are still on, look for a short at PE12",
         )
     prompt.at_end = RESET
 
@@ -105,49 +112,108 @@ def _drivers(prompt: Prompt) -> dict[str, Any]:
 
 
 def _at_prompt(prompt: Prompt, found: SelfTest, work: Progress) -> None:
-    prompt.enter(soft_reset=True)
-    drivers = _drivers(prompt)
-    found.data[DRIVERS] = drivers
-    found.add(_driver_lines(drivers))
-    stage("board")
-    work(0.1, 1)
-    identity = found.data[board_part.BOARD] = prompt.measure("identity").values
-    found.add(board_part.judge(identity, found.board_id))
-    stage("cycles")
-    work(0.3, 1)
-    cycles = found.data[board_part.CYCLES] = prompt.measure("cycles").values
-    found.add(board_part.judge_cycles(cycles))
-    stage("link")
-    work(0.4, 1)
-    found.data[link_part.PART] |= prompt.rates()
+    """All parts, each whatever became of the others, until the board falls silent in one."""
+    try:
+        prompt.enter(soft_reset=True)
+        drivers = found.data[DRIVERS] = _drivers(prompt)
+        found.add(_driver_lines(drivers))
+        work(0.1, 1)
+        if measured := _part(prompt, found, board_part.BOARD, "identity"):
+            found.add(board_part.judge(measured.values, found.board_id))
+        work(0.2, 1)
+        if measured := _part(prompt, found, board_part.CYCLES, "cycles"):
+            found.add(board_part.judge_cycles(measured.values))
+        work(0.3, 1)
+        stage(link_part.PART)
+        found.data[link_part.PART] |= prompt.rates()
+        found.add(link_part.judge(found.data[link_part.PART], found.simulated))
+        if is_off(drivers):
+            _move(prompt, found, work)
+    except SilentError as error:
+        found.add([_failed(error.part, error)])
+
+
+def _part(prompt: Prompt, found: SelfTest, part: str, *files: str, **arguments: Any) -> Measured | None:
+    """What a part gave; None, with a line about it, where its code raised."""
+    stage(part)
+    try:
+        measured = prompt.measure(*files, **arguments)
+    except PartError as error:
+        found.add([_failed(part, error)])
+        return None
+    found.data.setdefault(part, measured.values)
+    return measured
+
+
+def _failed(part: str, error: LinkError) -> Measurement:
+    return judged(part, "the whole part", error.problem, "an answer", False, error.hint)
+
+
+def _move(prompt: Prompt, found: SelfTest, work: Progress) -> None:
+    """The parts that make steps, with the drivers off."""
+    joints = found.data[DRIVERS]["joints"]
+    for done, forward in ((0.4, True), (0.5, False)):
+        work(done, 1)
+        moved = motion.make(joints, forward)
+        arguments = _arguments(moved, found)
+        if measured := _part(prompt, found, pulse_part.PULSES, "engine", "pulses", **arguments):
+            found.add(pulse_part.judge(measured, moved, joints, forward))
+            found.add([_still_off(measured, found)])
+            if forward:
+                found.add(pulse_part.judge_turns(measured.values))
+    work(0.6, 1)
+    count = _SIMULATED_STOPS if found.simulated else _STOPS
+    waits_us = np.random.default_rng(_SEED).integers(*_WAITS_US, count).tolist()
+    if measured := _part(prompt, found, pulse_part.SAFETY, "engine", "estop", waits_us=waits_us, **arguments):
+        found.add(pulse_part.judge_stops(measured.values))
+        found.add([_still_off(measured, found)])
+
+
+def _arguments(moved: motion.TestMotion, found: SelfTest) -> dict[str, Any]:
+    return {
+        "record": _ARM_RECORD,
+        "motion": moved.record.hex(),
+        "start_steps": moved.start_steps,
+        "idle_us": _SIMULATED_TURN_US if found.simulated else 0,
+    }
 
 
 def _driver_lines(found: dict[str, Any]) -> Iterator[Measurement]:
     if found["active"] is None:
         yield left_out(
             DRIVERS,
-            "no arm is configured, so the level that switches drivers off is unknown",
+            "no arm is configured, so the level that switches drivers off is unknown; no pulses were made",
             "run 'armtempo configure' with your arm file, then the self-test again",
         )
         return
-    level = "high" if found["level"] else "low"
-    yield judged(
+    yield _off_line("ENABLE (PE12)", found["active"], (found["output"], found["driven"], found["level"]))
+
+
+def _still_off(measured: Measured, found: SelfTest) -> Measurement:
+    """After a part that made steps."""
+    return _off_line("ENABLE after that", found.data[DRIVERS]["active"], measured.values["enable"])
+
+
+def _off_line(what: str, active: int, state: Sequence[int]) -> Measurement:
+    level = "high" if state[2] else "low"
+    return judged(
         DRIVERS,
-        "ENABLE (PE12)",
-        f"{level}, {'driven' if found['output'] else 'not driven'}",
-        f"{'low' if found['active'] else 'high'}, driven",
-        is_off(found),
-        "take power from the drivers, look for a short at PE12",
+        what,
+        f"{level}, {'driven' if state[0] else 'not driven'}",
+        f"{'low' if active else 'high'}, driven",
+        _off(active, state),
+        "take power from the drivers, look for a short at PE12; no pulses were made",
     )
 
 
 def is_off(found: dict[str, Any]) -> bool:
     """Whether ENABLE is driven to its inactive level, and is at it."""
-    return bool(
-        found["active"] is not None
-        and found["output"]
-        and found["driven"] == found["level"] == 1 - found["active"]
-    )
+    active = found["active"]
+    return active is not None and _off(active, (found["output"], found["driven"], found["level"]))
+
+
+def _off(active: int, state: Sequence[int]) -> bool:
+    return bool(state[0] and state[1] == state[2] == 1 - active)
 
 
 def _back(client: Client) -> None:

@@ -62,7 +62,7 @@ def searches() -> Figure:
         return (100.0 * (x[:, 1:] - x[:, :-1] ** 2) ** 2 + (1.0 - x[:, :-1]) ** 2).sum(axis=1)
 
     histories = {}
-    for name in ("ga", "iaga", "pso", "hpso", "cs", "acs"):
+    for name in optimise.ALGORITHMS:
         settings = optimise.Settings(name, population=20, iterations=300)
         runs = [
             optimise.minimise(valley, [(-2.0, 2.0)] * 5, np.random.default_rng(seed), settings).history

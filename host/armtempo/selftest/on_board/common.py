@@ -42,7 +42,7 @@ def feed():
     if watchdog._kept:
         watchdog._kept.deinit()
         watchdog._kept = None
-    machine.WDT(timeout=30000).feed()
+    machine.WDT(timeout=10000).feed()
 
 
 def enable():

@@ -1,4 +1,4 @@
-"""Things that go wrong at a given time of a motion, as the options ask for."""
+"""Things that go wrong at a given time of a motion, or from power-up on, as the options ask for."""
 
 import machine_state
 from chip.processor import TICKS_PER_MS
@@ -16,6 +16,9 @@ class Faults:
         self._faults = faults
         self._run = 0
         board.observers.append(self)
+        for fault in faults:
+            if fault["run"] == 0:
+                _KINDS[fault["kind"]](board, fault)
 
     def counting(self, timer, now):
         """A timer started or stopped."""
@@ -67,7 +70,38 @@ def _crash(board, fault):
     board.crash = True
 
 
+def _dead_pin(board, fault):
+    board.pins.line(fault["name"]).is_dead = True
+
+
+def _short(board, fault):
+    one, other = fault["name"].split("-")
+    board.pins.line(one).tied_to = board.pins.line(other)
+
+
+def _half_clock(board, fault):
+    board.timers[2].divider = 2
+
+
+def _slow_flash(board, fault):
+    machine_state.flash.busy_ms = fault["ms"]
+
+
+def _late_interrupts(board, fault):
+    board.late_ticks = int(fault["ms"] * TICKS_PER_MS)
+
+
+def _dead_stream(board, fault):
+    board.dma.streams[fault["joint"]].is_dead = True
+
+
 _KINDS = {
+    "dead_pin": _dead_pin,
+    "short": _short,
+    "half_clock": _half_clock,
+    "slow_flash": _slow_flash,
+    "late_interrupts": _late_interrupts,
+    "dead_stream": _dead_stream,
     "stall": _stall,
     "input": _input,
     "block": _block,

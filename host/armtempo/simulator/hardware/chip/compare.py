@@ -108,6 +108,9 @@ class Channel:
     def _match_alone(self, total, times):
         due = self.due
         modulus = self.timer.modulus
+        if self.mode == _FROZEN:
+            self.due += (1 + (total - due) // modulus) * modulus
+            return 0
         while due <= total:
             times.append(due)
             due += modulus

@@ -33,6 +33,7 @@ class Stream:
 
     def __init__(self, number):
         self.number = number
+        self.is_dead = False  # an injected fault: it answers no request
         self.at = memory.index("DMA1") + 4 + 6 * number
         self.ring = None
         self.place = 0
@@ -41,6 +42,8 @@ class Stream:
 
     def requests(self):
         """(timer, channel) pairs that this stream listens to."""
+        if self.is_dead:
+            return ()
         selection = (memory.words[self.at + CR] >> 25) & 7
         return REQUESTS.get((self.number, selection), ())
 

@@ -44,6 +44,7 @@ class FlashFolder:
         self.cwd = "/flash"
         self.operations = 0
         self._stall = stall
+        self.busy_ms = 0  # an injected fault: each operation takes longer
         self._cut_at = cut_at
         self._writing = []
         self._unsynced = []
@@ -79,7 +80,7 @@ class FlashFolder:
     def operation(self, ms=_WRITE_MS):
         """Count a change; True where the power fails during it."""
         self.operations += 1
-        self._stall(ms)
+        self._stall(ms + self.busy_ms)
         return self.operations == self._cut_at
 
     def power_fails(self):

@@ -39,6 +39,8 @@ class Line:
         self.name = PORTS[port.index] + str(number)
         self.external = None
         self.driven = False  # by a timer channel
+        self.is_dead = False  # injected faults: it does not toggle;
+        self.tied_to = None  # another line toggles with it
         self.level = 0
         self.pulses = (0, 0)
         self.sinks = []
@@ -69,6 +71,10 @@ class Line:
 
     def edges(self, before, count, times, origin):
         """The pin toggled ``count`` times from level ``before``, at ``origin`` + each of ``times`` ticks."""
+        if self.is_dead:
+            return
+        if self.tied_to:
+            self.tied_to.edges(before, count, times, origin)
         self.level = before ^ (count & 1)
         at = self.port.at + IDR
         memory.poke(at, memory.words[at] & ~(1 << self.number) | self.level << self.number)

@@ -7,7 +7,17 @@ on the way, each a little late, as on the chip.
 
 import sys
 
-from chip import backup_sram, cycle_counter, dma, gpio, memory, timer_registers, timers
+from chip import (
+    backup_sram,
+    capture,
+    cycle_counter,
+    dma,
+    external_lines,
+    gpio,
+    memory,
+    timer_registers,
+    timers,
+)
 
 TICKS_PER_MS = 84_000
 TICKS_PER_US = 84
@@ -48,6 +58,7 @@ class Chip:
                                    (12, 16, 1), (13, 16, 1), (14, 16, 1)):  # fmt: skip
             self.timers[number] = timers.TimerUnit(self, number, bits, rate)
         self.timers[2].follower = self.timers[5]
+        self.reader = capture.PortReader(self)
         self.counting = []
         self.pending = []
         self.masked = False
@@ -65,6 +76,7 @@ class Chip:
         self.unspent_ticks = 0
         self.lost_ticks = 0
         self.crash = False
+        self.late_ticks = 0  # an injected fault: interrupts come late by this
         self.watchdog_ticks = 0
         self.watchdog_deadline = None
         self.millisecond = None
@@ -100,6 +112,10 @@ class Chip:
                 register, bit = _RCC_TIMERS[number]
                 timer.clocked = bool(memory.words[memory.index("RCC") + register] >> bit & 1)
                 timer.sync(self.now)
+        if "DMA2" in names or "TIM1" in names:
+            self.reader.sync()
+        if "EXTI" in names:
+            external_lines.sync(self)
         for block in blocks:
             memory.accept(block)
         self._find_happening()
@@ -185,6 +201,8 @@ class Chip:
         for timer in self.counting:
             timer.run(target)
         self.now = target
+        if self.reader.streams:
+            self.reader.run(target)
         if self.follow:
             self.follow()
 
@@ -226,7 +244,7 @@ class Chip:
     def _interrupt(self, source, detail, function, argument):
         self.serving = True
         self.woken = True
-        self._run(self.now + INTERRUPT_TICKS)
+        self._run(self.now + INTERRUPT_TICKS + self.late_ticks)
         if source in self.timers:
             self.timers[source].acknowledge(detail)
         try:

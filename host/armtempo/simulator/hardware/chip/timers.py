@@ -18,6 +18,7 @@ class TimerUnit:
         self.modulus = self.full
         self.rate = rate
         self.scale = 1
+        self.divider = 1  # an injected fault: its clock is slower by this
         self.plain = rate == 1  # one count a tick
         self.origin = 0
         self.total = 0
@@ -85,7 +86,7 @@ class TimerUnit:
 
     def _update(self, now):
         """An update event (UG): prescaler and period take effect, the counter starts from 0."""
-        self.scale = (memory.words[self.at + PSC] & 0xFFFF) + 1
+        self.scale = ((memory.words[self.at + PSC] & 0xFFFF) + 1) * self.divider
         self.plain = self.rate == 1 and self.scale == 1
         self._reload(memory.words[self.at + ARR] & (self.full - 1))
         memory.poke(self.at + CNT, 0)

@@ -1,0 +1,245 @@
+"""The commands: the module and the function of each, what it does in a line, and examples.
+
+The help page and the Tab key take a line from here, so that they import no command's module. A test takes each example
+through the command's own parser, and compares the line with the function's docstring.
+"""
+
+from __future__ import annotations
+
+import click
+
+
+class Entry:
+    """Where a command is, as ``module:function``, and what is said of it without importing it."""
+
+    def __init__(self, where: str, summary: str, *examples: str) -> None:
+        self.module, self.function = where.split(":")
+        self.summary = summary
+        self.examples = examples
+
+    def short_help(self, width: int = 45) -> str:
+        """The line as click cuts it."""
+        return click.Command(None, help=self.summary).get_short_help_str(width)
+
+    @property
+    def epilog(self) -> str:
+        """The end of its help page."""
+        lines = "\n".join(f"  armtempo {line}" for line in self.examples)
+        return f"Examples:\n\n\b\n{lines}"
+
+
+GROUPS: dict[str, dict[str, Entry]] = {
+    "Plan": {
+        "new": Entry(
+            "new:new",
+            "Make a project folder: arm file, first job, settings, and a page with the next commands.",
+            "new my_arm",
+            "new my_arm --like ar4 --port /dev/ttyACM0",
+        ),
+        "plan": Entry(
+            "plan:plan",
+            "Plan a job and write its trajectory file, or plan a sequence.",
+            "plan",
+            "plan --job pick.toml -o pick.json",
+            "plan sequence.toml",
+            "plan --path free --corridor-mm 5",
+        ),
+        "ik": Entry(
+            "ik:ik",
+            "Print all solutions of the inverse kinematics for a pose, or for each pose of a file.",
+            "ik --position 240 180 80",
+            "ik --arm ar4 --position 300 0 300 --rpy 0 90 0 --json",
+        ),
+        "fk": Entry(
+            "fk:fk",
+            "Print the tool's pose and every frame for given joint angles.",
+            "fk 0,-60,40",
+            "fk first.json",
+        ),
+        "check": Entry(
+            "check:check",
+            "Hold an arm file, and a job if named, against common sense: what looks wrong, and what to do about it.",
+            "check",
+            "check --arm my_arm.toml --job first.toml --picture arm.png",
+        ),
+        "import": Entry(
+            "exchange:import_table",
+            "Make a job file from the CSV file TABLE: a line a via point, a column a driven joint.",
+            "import points.csv",
+            "import motion.csv --tolerance-deg 0.05 -o back.toml",
+        ),
+        "export": Entry(
+            "exchange:export",
+            "Write a motion as CSV or as a ROS JointTrajectory, sampled at any rate.",
+            "export first.json -o first.csv --rate 250",
+            "export first.json --format ros > first.yaml",
+        ),
+        "import-urdf": Entry(
+            "exchange:import_urdf",
+            "Make an arm file of a URDF's chain of revolute joints: its Denavit-Hartenberg rows and ranges.",
+            "import-urdf robot.urdf -o arm.toml --tip tool0",
+        ),
+    },
+    "Run": {
+        "demo": Entry(
+            "demo:demo",
+            "Plan, replay and report the paper's feeding motion.",
+            "demo",
+            "demo --pick-and-place",
+        ),
+        "home": Entry(
+            "posture:home", "Declare where the arm stands.", "home", "home 0,-60,40", "home --switches"
+        ),
+        "goto": Entry(
+            "posture:goto", "Move straight to a posture.", "goto home", "goto 10,-50,30", "goto first.json"
+        ),
+        "jog": Entry(
+            "jog:jog",
+            "Jog: move a joint or the tool a little, straight, never beyond a range.",
+            "jog",
+            "jog --joint 2 --by -5",
+            "jog --axis z --by 10 --speed 50",
+        ),
+        "teach": Entry(
+            "teach:teach",
+            "Teach: keep where the arm stands.",
+            "teach points.toml",
+            "teach --posture above_tray",
+        ),
+        "run": Entry(
+            "run:run",
+            "Replay a motion and record it, or run a sequence.",
+            "run first.json",
+            "run first.json --repeat 3 --speed 50",
+            "run sequence_name",
+        ),
+        "speed": Entry("speed:speed", "Let what moves go on at PERCENT of its planned speed.", "speed 50"),
+        "pause": Entry(
+            "speed:pause",
+            "Let what moves come to rest on its path; 'armtempo resume' goes on, 'armtempo stop' ends it.",
+            "pause",
+        ),
+        "resume": Entry("speed:resume", "Go on along the path at the speed before the pause.", "resume"),
+        "output": Entry(
+            "wired:output",
+            "Set an output of the arm, or list them.",
+            "output",
+            "output gripper open",
+            "output lamp 0.5",
+        ),
+        "input": Entry("wired:read_inputs", "Read the inputs of the arm.", "input", "input part"),
+        "stop": Entry("stop:stop", "Brake or freeze, and say where the arm stands.", "stop", "stop --now"),
+        "clear": Entry("stop:clear", "Clear the pending fault, once its cause is gone.", "clear"),
+        "status": Entry(
+            "state:status",
+            "Show the board, its state, and where the joints stand.",
+            "status",
+            "status --json",
+        ),
+        "watch": Entry(
+            "watch:watch",
+            "Show samples, states and what happens, as another armtempo program that has the port hears it.",
+            "watch",
+            "watch --json > samples.jsonl",
+        ),
+        "fetch": Entry(
+            "run:fetch",
+            "Fetch the samples that the board keeps of its last run, such as one that its button started.",
+            "fetch",
+            "fetch first.json",
+        ),
+        "report": Entry(
+            "report:report",
+            "Write report.html and its figures into a run folder, of a motion or a sequence.",
+            "report runs/first-001",
+            "report runs/first-001 runs/first-002 --out both.html",
+        ),
+        "panel": Entry(
+            "panel:panel",
+            "See the arm in a browser: move it, teach it, run it, watch it.",
+            "panel",
+            "panel --port sim --arm ar4",
+        ),
+    },
+    "Board": {
+        "ports": Entry("config:ports", "List the serial ports, likely boards first.", "ports"),
+        "deploy": Entry(
+            "deploy:deploy",
+            "Put the board program on a board, or bring it up to date.",
+            "deploy --port /dev/ttyACM0",
+            "deploy --mpy",
+        ),
+        "undeploy": Entry("deploy:undeploy", "Take the board program off a board.", "undeploy"),
+        "firmware": Entry(
+            "firmware:firmware",
+            "Build a MicroPython firmware with the board program in it.",
+            "firmware --board STM32F4DISC --micropython ~/micropython",
+        ),
+        "flash": Entry(
+            "firmware:flash",
+            "Put MicroPython with the board program in it on a board; 'armtempo deploy' comes next.",
+            "flash",
+            "flash --image armtempo-firmware-STM32F4DISC.zip --port /dev/ttyACM0",
+        ),
+        "selftest": Entry(
+            "selftest:selftest",
+            "Let the board measure itself: clocks, flash, memory, link.",
+            "selftest --port /dev/ttyACM0",
+            "selftest --json > selftest.json",
+        ),
+        "configure": Entry(
+            "deploy:configure",
+            "Set the board up for an arm, also in the place of another one.",
+            "configure --arm my_arm.toml",
+        ),
+        "upload": Entry(
+            "stored:upload",
+            "Store a trajectory file, or a planned sequence with its motions, on the board.",
+            "upload first.json",
+            "upload first.json --name pick --default",
+        ),
+        "list": Entry(
+            "stored:list_motions",
+            "List the motions and sequences on the board, and where they begin and end.",
+            "list",
+        ),
+        "show": Entry("stored:show", "Show a stored motion, read back.", "show pick"),
+        "remove": Entry("stored:remove", "Remove stored motions from the board.", "remove pick place"),
+        "rename": Entry("stored:rename", "Give a stored motion another name.", "rename pick pick_old"),
+        "virtual-board": Entry(
+            "virtual_board:virtual_board",
+            "Start a virtual board, print its port, and run it until Ctrl-C.",
+            "virtual-board",
+            "virtual-board --flash my_board --real-time",
+        ),
+        "monitor": Entry("watch:monitor", "Show decoded traffic.", "monitor", "monitor traffic.log"),
+        "config": Entry(
+            "config:config",
+            "Show what a command in this folder, with these options, takes for arm, port, job and run folder, and why.",
+            "config",
+        ),
+        "doctor": Entry(
+            "doctor:doctor",
+            "Examine Python, packages, ports, permissions, project, arm file and board, and say what to do.",
+            "doctor",
+            "doctor --port /dev/ttyACM0",
+        ),
+        "help": Entry(
+            "help:show_page", "Show a page of the documentation, or list them.", "help", "help recovery"
+        ),
+    },
+    "Develop": {
+        "paper": Entry(
+            "paper:paper",
+            "Repeat the paper: every number beside the printed one, on one page.",
+            "paper --quick",
+        ),
+        "completion": Entry(
+            "help:completion",
+            "Print a script that lets SHELL complete commands and options.",
+            "completion bash >> ~/.bashrc",
+        ),
+    },
+}
+"""In the order of the help page."""
+COMMANDS = {name: entry for entries in GROUPS.values() for name, entry in entries.items()}

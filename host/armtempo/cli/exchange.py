@@ -1,0 +1,194 @@
+"""``armtempo import``, ``export`` and ``import-urdf``: from and for other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+from armtempo_shared.limits import MAX_JOINTS
+
+from armtempo.basics.errors import InputError
+from armtempo.cli import chosen, options, results
+from armtempo.formats import toml_table
+from armtempo.formats.atomic_file import check_not_input, check_replaceable, replace_text
+from armtempo.model import via_table
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
+from armtempo.model.plan import Plan
+from armtempo.model.via_table import ImportedPath
+from armtempo.new_arm import arm_text
+from armtempo.new_arm import urdf_fitting as fitting
+from armtempo.new_arm import urdf_reader as reader
+
+
+@click.command("import")
+@click.argument("table", type=click.Path(dir_okay=False, path_type=Path))
+@options.arm
+@click.option("--name", help="Name of the job; without it the table's file name.")
+@click.option("--radians", is_flag=True, help="The angles are in radians.")
+@click.option(
+    "--tolerance-deg",
+    type=float,
+    metavar="DEG",
+    help="Leave out lines that the path keeps to within DEG without them. A table with a column time_s is a sampled "
+    "motion, for which this is 0.1 unless given.",
+)
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Job file to write; without it the job's name with .toml. An existing file of other content is kept.",
+)
+@options.force("an existing FILE of other content")
+@options.as_json
+def import_table(
+    table: Path,
+    arm_path: Path | None,
+    name: str | None,
+    radians: bool,
+    tolerance_deg: float | None,
+    output: Path | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Make a job file from the CSV file TABLE: a line a via point, a column a driven joint.
+
+    Columns are separated by commas, semicolons or tabs. What 'armtempo export' wrote comes back as a job of few via
+    points along the same path.
+    """
+    arm = chosen.load_arm(arm_path)
+    title = name or table.stem
+    target = output or Path(f"{title}.toml")
+    check_not_input(target, (table, arm.source))
+    found = via_table.via_from_csv(table, arm, radians, tolerance_deg)
+    text = via_table.job_text(title, found)
+    Job.of_table(toml_table.parse(text, str(table)), arm)
+    check_replaceable(target, text, force)
+    replace_text(target, text)
+    values = {
+        "file": str(target),
+        "lines": found.lines,
+        "via_points": len(found.via_deg),
+        "thinned_to_deg": found.thinned_to_deg,
+    }
+    results.show(as_json, values, _import_lines(target, found))
+
+
+def _import_lines(target: Path, found: ImportedPath) -> list[str]:
+    written = f"written: {target}; plan it with: armtempo plan --job {target}"
+    if found.thinned_to_deg is None:
+        return [written]
+    thinned = (
+        f"{found.lines} lines thinned to {len(found.via_deg)} via points: a spline through them keeps to the table "
+        f"within {found.thinned_to_deg:g} deg; the times are planned anew"
+    )
+    return [thinned, written]
+
+
+@click.command("export")
+@click.argument("trajectory", type=click.Path(dir_okay=False, path_type=Path))
+@click.option(
+    "--format",
+    "kind",
+    type=click.Choice(["csv", "ros"]),
+    default="csv",
+    show_default=True,
+    help="csv: degrees, a line a time; ros: trajectory_msgs/JointTrajectory in YAML, radians.",
+)
+@click.option("--rate", type=float, default=100.0, show_default=True, metavar="HZ", help="Points a second.")
+@click.option("--frame-id", default="", help="header.frame_id of the ROS message.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="File to write; without it standard output. An existing FILE of other content is kept.",
+)
+@options.force("an existing FILE of other content")
+@options.altered
+@options.as_json
+def export(
+    trajectory: Path,
+    kind: str,
+    rate: float,
+    frame_id: str,
+    output: Path | None,
+    force: bool,
+    altered: bool,
+    as_json: bool,
+) -> None:
+    """Write a motion as CSV or as a ROS JointTrajectory, sampled at any rate.
+
+    TRAJECTORY: a trajectory file, as 'armtempo plan' writes it.
+    """
+    if as_json and output is None:
+        raise InputError("--json is about the file of -o", "give -o FILE, or leave --json out")
+    plan = Plan.load(trajectory, altered)
+    text = plan.to_csv(rate) if kind == "csv" else plan.to_ros(rate, frame_id)
+    if output is None:
+        click.echo(text.encode(), nl=False)  # UTF-8 as in a file, whatever the terminal
+    else:
+        check_not_input(output, (trajectory,))
+        check_replaceable(output, text, force)
+        replace_text(output, text)
+        values = {"file": str(output), "format": kind, "rate_hz": rate}
+        results.show(as_json, values, [f"written: {output}"])
+
+
+@click.command("import-urdf")
+@click.argument("urdf", type=click.Path(dir_okay=False, path_type=Path))
+@click.option(
+    "-o",
+    "--out",
+    required=True,
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Arm file to write (TOML).",
+)
+@click.option("--base", metavar="LINK", help="Link that the arm stands on; without it the URDF's root.")
+@click.option(
+    "--tip",
+    metavar="LINK",
+    help="Link whose frame is the tool's; without it the one that fingers follow, or the end.",
+)
+@click.option("--force", is_flag=True, help="Replace FILE if it is there.")
+@options.as_json
+def import_urdf(urdf: Path, out: Path, base: str | None, tip: str | None, force: bool, as_json: bool) -> None:
+    """Make an arm file of a URDF's chain of revolute joints: its Denavit-Hartenberg rows and ranges.
+
+    URDF: the robot's description, a .urdf or .xacro file.
+
+    The rows are held against the URDF's own forward kinematics at 1000 random postures before anything is
+    written. Motors, which a URDF does not describe, are left as comments to fill in. Needs the extra 'urdf'.
+    """
+    if out.exists() and not force:
+        raise InputError(f"{out}: is there already", "choose another name, or --force to replace it")
+    if out.exists() and urdf.exists() and out.samefile(urdf):
+        raise InputError(f"{out}: is the URDF itself", "choose another name")
+    chain = reader.read(urdf, base, tip)
+    fit = fitting.fit(chain)
+    text = arm_text.arm_text(chain, fit, urdf.name)
+    Arm.of_table(toml_table.parse(text, str(out)))  # what would not be read again is not written
+    replace_text(out, text)
+    values = {
+        "file": str(out),
+        "robot": chain.robot,
+        "base": chain.base,
+        "tip": chain.tip,
+        "joints": len(chain.joints),
+        "postures": fit.postures,
+        "worst_position_mm": float(fit.position_mm),
+        "worst_rotation_deg": float(fit.rotation_deg),
+    }
+    lines = [
+        f"{chain.robot!r}: {len(chain.joints)} joints from link {chain.base!r} to {chain.tip!r}",
+        f"worst error at {fit.postures} random postures: {fit.position_mm:.2g} mm and {fit.rotation_deg:.2g} degrees",
+        f"wrote {out}; now put its motors in, then: armtempo check --arm {out}",
+    ]
+    if len(chain.joints) > MAX_JOINTS:
+        lines.append(
+            f"the board drives {MAX_JOINTS} joints, this chain has {len(chain.joints)}: lock some of them by "
+            "fixed_deg = ANGLE in the place of their motors, or choose a part of it with --base and --tip"
+        )
+    results.show(as_json, values, lines)

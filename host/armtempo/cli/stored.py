@@ -1,0 +1,204 @@
+"""What the board keeps: ``armtempo upload``, ``list``, ``show``, ``remove`` and ``rename``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from armtempo.basics.errors import InputError
+from armtempo.cli import chosen, options, posture, results
+from armtempo.cli.options import BoardOptions
+from armtempo.cli.progress import ProgressBar
+from armtempo.formats.text_table import aligned
+from armtempo.link.board_messages import StoredMotion
+from armtempo.model.arm import Arm
+from armtempo.model.sequence_plan import is_sequence_plan
+from armtempo.records import encoded_motion
+from armtempo.records.encoded_motion import EncodedMotion
+from armtempo.robot.board import Board
+from armtempo.robot.board_state import record_crc
+
+
+@click.command("upload")
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--name", metavar="NAME", help="Name on the board; without it the job's name.")
+@click.option("--default", "as_default", is_flag=True, help="Let the board's button start it.")
+@options.force("another motion that the board keeps under this name")
+@options.board(options.arm_of_file, options.replace_arm, options.altered)
+def upload(file: Path, name: str | None, as_default: bool, force: bool, given: BoardOptions) -> None:
+    """Store a trajectory file, or a planned sequence with its motions, on the board.
+
+    FILE: what 'armtempo plan' has written.
+    """
+    if is_sequence_plan(file):
+        plan = chosen.load_sequence_plan(file, given.arm_path, name)
+        with chosen.board(given, plan.arm) as board:
+            board.configure(plan.arm, replace=given.replace_arm)
+            with ProgressBar("uploading") as progress:
+                board.upload_sequence(plan, as_default, progress, force)
+            virtual = board.info.virtual
+        values = {"name": plan.name, "sequence": True, "motions": len(plan.legs), "virtual": virtual}
+        results.show(given.as_json, values, [f"{plan.name}: sequence and {len(plan.legs)} motions stored"])
+        return
+    motion = encoded_motion.of_plan(chosen.load_plan(file, given.arm_path, given.altered), name)
+    with chosen.board(given, motion.arm) as board:
+        board.configure(motion.arm, replace=given.replace_arm)
+        with ProgressBar("uploading") as progress:
+            board.upload(motion, default=as_default, progress=progress, replace=force)
+        virtual = board.info.virtual
+        where = f" on {chosen.virtual_words(board.port)}" if virtual else ""
+    values = {"name": motion.name, "sequence": False, "size_bytes": len(motion.data), "virtual": virtual}
+    results.show(given.as_json, values, [f"{motion.name}: {len(motion.data)} bytes stored{where}"])
+
+
+@click.command("list")
+@options.board(options.arm_of_board)
+def list_motions(given: BoardOptions) -> None:
+    """List the motions and sequences on the board, and where they begin and end.
+
+    The one marked * is what the board's button starts.
+    """
+    with chosen.board(given) as board:
+        found = board.list()
+        if given.as_json:
+            results.show_json({"virtual": board.info.virtual, "motions": [_listed(one) for one in found]})
+            return
+        arm = _arm_of(board, given.arm_path)
+        virtual = f"  on {chosen.virtual_words(board.port)}" if board.info.virtual else ""
+        click.echo(f"{'name':<26}{'bytes':>8}{'joints':>8}{'seconds':>10}  checksum{virtual}")
+        for entry in found:
+            click.echo(_row(entry))
+            for line in _ends(board, entry, arm):
+                click.echo(f"    {line}")
+
+
+def _listed(entry: StoredMotion) -> dict[str, Any]:
+    return {
+        "name": entry.name,
+        "sequence": entry.sequence,
+        "size_bytes": entry.size,
+        "crc": entry.crc,
+        "joints": entry.joints,
+        "duration_s": entry.duration_s,
+        "default": entry.default,
+    }
+
+
+def _arm_of(board: Board, arm_path: Path | None) -> Arm | None:
+    """The arm that the board is set up for, as far as it is known."""
+    named = chosen.named_arm(arm_path)
+    if named is not None and record_crc(named) != board.info.arm_crc:
+        results.tell(
+            f"the board is set up for another arm than {chosen.words(named)}; see 'armtempo configure'"
+        )
+        named = None
+    try:
+        return chosen.arm_of_board(board, named)
+    except InputError:
+        return None
+
+
+def _row(entry: StoredMotion) -> str:
+    name = entry.name + (" *" if entry.default else "")
+    if entry.sequence:
+        return f"{name:<26}{entry.size:>8}{'sequence':>18}  {entry.crc:08x}"
+    if not entry.joints:
+        return f"{name:<26}{entry.size:>8}  damaged; upload it again or remove it"
+    return f"{name:<26}{entry.size:>8}{entry.joints:>8}{entry.duration_s:>10.3f}  {entry.crc:08x}"
+
+
+def _ends(board: Board, entry: StoredMotion, arm: Arm | None) -> list[str]:
+    """Where a motion begins and ends, in degrees and steps, where the arm is known."""
+    if arm is None or not entry.joints:
+        return []
+    try:
+        trajectory = board.read(entry.name, arm).trajectory
+    except InputError as error:
+        return [str(error)]
+    ends = ("from", trajectory(0.0)), ("to", trajectory(trajectory.duration_s))
+    return [f"{word:<5}{posture.words(angles_deg, arm)}" for word, angles_deg in ends]
+
+
+@click.command("show")
+@click.argument("name")
+@options.board(options.arm_of_board)
+def show(name: str, given: BoardOptions) -> None:
+    """Show a stored motion, read back.
+
+    NAME: as 'armtempo list' shows it.
+    """
+    named = chosen.named_arm(given.arm_path)
+    with chosen.board(given) as board:
+        motion = board.read(name, chosen.arm_of_board(board, named))
+    speeds = _top_speeds_deg_s(motion)
+    results.show(given.as_json, motion_values(motion, speeds), motion_lines(motion, speeds))
+
+
+def _top_speeds_deg_s(motion: EncodedMotion) -> list[float]:
+    """Of each driven joint, by samples."""
+    times = np.linspace(0.0, motion.trajectory.duration_s, 2001)
+    found: list[float] = np.abs(motion.trajectory(times, 1)).max(axis=0).tolist()
+    return found
+
+
+def motion_values(motion: EncodedMotion, speeds: list[float]) -> dict[str, Any]:
+    trajectory = motion.trajectory
+    return {
+        "name": motion.name,
+        "size_bytes": len(motion.data),
+        "duration_s": trajectory.duration_s,
+        "degree": trajectory.joints[0].degree,
+        "timing": "shared" if trajectory.shared else "per-joint",
+        "start_deg": [float(angle) for angle in motion.start_deg],
+        "end_deg": trajectory(trajectory.duration_s).tolist(),
+        "joints": [
+            {"name": joint.name, "duration_s": spline.duration_s, "top_speed_deg_s": speed}
+            for joint, spline, speed in zip(motion.arm.driven, trajectory.joints, speeds, strict=True)
+        ],
+    }
+
+
+def motion_lines(motion: EncodedMotion, speeds: list[float]) -> list[str]:
+    trajectory = motion.trajectory
+    found = [
+        f"{motion.name}: {len(motion.data)} bytes, {trajectory.duration_s:.4f} s, "
+        f"degree {trajectory.joints[0].degree}, {'shared' if trajectory.shared else 'per-joint'} timing",
+        f"from {posture.words(motion.start_deg, motion.arm)}",
+        f"to   {posture.words(trajectory(trajectory.duration_s), motion.arm)}",
+    ]
+    pairs = zip(motion.arm.driven, trajectory.joints, strict=True)
+    lasting = aligned([(joint.name, f"{spline.duration_s:.4f}") for joint, spline in pairs], (12, 9))
+    return found + [f"{row} s, up to {speed:.2f} deg/s" for row, speed in zip(lasting, speeds, strict=True)]
+
+
+@click.command("remove")
+@click.argument("names", nargs=-1, required=True)
+@options.board()
+def remove(names: tuple[str, ...], given: BoardOptions) -> None:
+    """Remove stored motions from the board.
+
+    NAMES: as 'armtempo list' shows them.
+    """
+    with chosen.board(given) as board:
+        for name in names:
+            board.remove(name)
+            results.teller(given.as_json)(f"{name}: removed")
+    if given.as_json:
+        results.show_json({"removed": names})
+
+
+@click.command("rename")
+@click.argument("old")
+@click.argument("new")
+@options.board()
+def rename(old: str, new: str, given: BoardOptions) -> None:
+    """Give a stored motion another name.
+
+    OLD: its name, as 'armtempo list' shows it. NEW: at most 24 of the characters a-z A-Z 0-9 - _.
+    """
+    with chosen.board(given) as board:
+        board.rename(old, new)
+    results.show(given.as_json, {"old": old, "new": new}, [f"{old} is now {new}"])

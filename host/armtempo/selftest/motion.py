@@ -1,0 +1,75 @@
+"""The motion of the self-test: all joints of the board's arm together, a few steps from rest to rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from armtempo_shared import motion as motion_record
+from armtempo_shared.limits import STEP_FRACTION_BITS, TICK_FRACTION_BITS, TICK_HZ
+
+from armtempo.basics.arrays import Array
+from armtempo.splines import bspline, time_axis
+from armtempo.splines.trajectory import JointSpline
+
+_DEGREE = 5
+_MOST_STEPS = 200
+_FEWER = 15
+"""Steps by which each joint makes fewer than the one before it, so that they step at different times."""
+_SHORTEST_S = 0.12
+_PEAK = 1.875
+"""Peak speed of 10 u³ - 15 u⁴ + 6 u⁵ over u in 0..1."""
+_OF_RATE = 0.5
+
+
+@dataclass(frozen=True)
+class TestMotion:
+    """Where it begins, in steps; its record; and when each joint steps, seconds."""
+
+    start_steps: list[int]
+    record: bytes
+    steps_s: list[Array]
+
+    __test__ = False  # for pytest
+
+
+def make(joints: Sequence[dict[str, Any]], forward: bool) -> TestMotion:
+    """``joints``: rows of the arm record; ``forward``: towards more steps, about the middle of each range."""
+    counts = [
+        min(_MOST_STEPS - _FEWER * number, joint["max_steps"] - joint["min_steps"])
+        for number, joint in enumerate(joints)
+    ]
+    lows = [
+        (joint["max_steps"] + joint["min_steps"] - count) // 2
+        for joint, count in zip(joints, counts, strict=True)
+    ]
+    slowest = min(joint["max_rate"] / max(count, 1) for joint, count in zip(joints, counts, strict=True))
+    duration_s = max(_SHORTEST_S, _PEAK / (_OF_RATE * slowest))
+    ends = [
+        (low, low + count) if forward else (low + count, low) for low, count in zip(lows, counts, strict=True)
+    ]
+    times = time_axis.control_points([duration_s], _DEGREE)
+    splines = [JointSpline(_DEGREE, 1, bspline.fit(end, _DEGREE), times) for end in ends]
+    angles = [_fixed(spline.angle_points_deg, STEP_FRACTION_BITS) for spline in splines]
+    axis = _fixed(times * TICK_HZ, TICK_FRACTION_BITS)
+    record = motion_record.pack(_DEGREE, angles, [axis], 1, 0, 0)
+    steps = [_crossings_s(spline, *end, duration_s) for spline, end in zip(splines, ends, strict=True)]
+    return TestMotion([end[0] for end in ends], record, steps)
+
+
+def _fixed(points: Array, bits: int) -> list[int]:
+    return [int(value) for value in np.rint(points * 2.0**bits)]
+
+
+def _crossings_s(spline: JointSpline, start: int, end: int, duration_s: float) -> Array:
+    """When the spline crosses each half step, by bisection: (|end - start|,)."""
+    sign = 1 if end > start else -1
+    halves = start + sign * (np.arange(abs(end - start)) + 0.5)
+    low, high = np.zeros(len(halves)), np.full(len(halves), duration_s)
+    for _ in range(50):
+        middle = (low + high) / 2
+        before = sign * (spline(middle) - halves) < 0
+        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    return np.asarray(high)

@@ -1,0 +1,62 @@
+"""How long the outputs go on after an E-stop: its interrupt, triggered by software (EXTI_SWIER, RM0090 12.3.5)."""
+
+_ESTOP_LINE = 15
+_PUPDR_SHIFT = 2 * _ESTOP_LINE
+
+
+def pull_inactive(engine):
+    """An input that is not wired would be tripped: draw it to the other level. A switch is stronger."""
+    pull = 2 if engine.inputs._estop_level else 1
+    at = stm.GPIOE + stm.GPIO_PUPDR
+    mem32[at] = mem32[at] & ~(3 << _PUPDR_SHIFT) | pull << _PUPDR_SHIFT
+
+
+def trial(engine, wait_us, bit, idle_us):
+    """Cycles from the trigger to the end of its interrupt, after so long in a motion; -1 where the outputs go on."""
+    from armtempo_board.hardware import isr
+
+    engine.start()
+    then = time.ticks_us()
+    while time.ticks_diff(time.ticks_us(), then) < wait_us:
+        serve(engine, idle_us)
+    at = stm.EXTI + stm.EXTI_SWIER
+    before = cycles()
+    mem32[at] = bit
+    took = (cycles() - before) & 0xFFFFFFFF
+    return took if engine.block[isr.FROZEN] else -1
+
+
+def measure(record, motion, start_steps, waits_us, idle_us):
+    """Cycles of each trial, the writing of the register taken off; the fault of each."""
+    from binascii import unhexlify
+
+    feed()
+    count_cycles()
+    engine, _ = make_engine(record, True)
+    pull_inactive(engine)
+    nothing = min([trial_cost() for _ in range(5)])
+    took = []
+    faults = []
+    motion = unhexlify(motion)
+    try:
+        for wait_us in waits_us:
+            load(engine, motion, start_steps)
+            took.append(max(trial(engine, wait_us, 1 << _ESTOP_LINE, idle_us) - nothing, -1))
+            while engine.moving:
+                serve(engine, idle_us)
+            faults.append(engine.fault)
+            engine.clear()
+            feed()
+    finally:
+        engine.freeze()
+        off = enable()
+        engine.close()
+    return {"cycles": took, "faults": faults, "enable": off}
+
+
+def trial_cost():
+    """Cycles to write the register."""
+    at = stm.EXTI + stm.EXTI_SWIER
+    before = cycles()
+    mem32[at] = 0
+    return (cycles() - before) & 0xFFFFFFFF
