@@ -15,7 +15,7 @@ from armtempo.model.plan import Plan
 from armtempo.model.tool_pose import Pose
 from armtempo.planning import checks, planner
 from armtempo.planning.free import corridor
-from armtempo.planning.free.tool import Tool
+from armtempo.planning.tool import Tool
 from armtempo.splines import bspline
 
 from tests.benchmark import corridors

@@ -24,12 +24,15 @@ ME, OTHER = "me", "other"
 
 
 async def _inner(scope: Any, receive: Any, send: Any) -> None:
+    message = await receive() if scope["type"] == "http" else {"body": b""}
     await send({"type": "http.response.start", "status": 200, "headers": []})
-    await send({"type": "http.response.body", "body": b"here"})
+    await send({"type": "http.response.body", "body": message["body"]})
 
 
-def answer(access: Access, kind: str = "http", query: str = "", **headers: str) -> list[dict[str, Any]]:
-    """What is sent for a request."""
+def answer(
+    access: Access, kind: str = "http", query: str = "", body: tuple[bytes, ...] = (b"",), **headers: str
+) -> list[dict[str, Any]]:
+    """What is sent for a request whose ``body`` comes in chunks."""
     sent: list[dict[str, Any]] = []
     given = [(name.replace("_", "-").encode(), value.encode()) for name, value in headers.items()]
     scope = {
@@ -39,11 +42,15 @@ def answer(access: Access, kind: str = "http", query: str = "", **headers: str) 
         "headers": given,
         "client": ("1.2.3.4", 5),
     }
+    chunks = list(body)
+
+    async def receive() -> dict[str, Any]:
+        return {"type": "http.request", "body": chunks.pop(0), "more_body": bool(chunks)}
 
     async def send(message: Any) -> None:
         sent.append(message)
 
-    asyncio.run(access(scope, lambda: None, send))  # type: ignore[arg-type, return-value]
+    asyncio.run(access(scope, receive, send))
     return sent
 
 
@@ -59,11 +66,21 @@ def answer(access: Access, kind: str = "http", query: str = "", **headers: str) 
         ("", {"host": "127.0.0.1", "content_length": "many"}, False),
     ],
 )
-def test_who_may_ask_on_the_loopback_address(query: str, headers: dict[str, str], allowed: bool) -> None:
+def test_who_may_ask_on_the_loopback_address(
+    query: str, headers: dict[str, str], allowed: bool, caplog: pytest.LogCaptureFixture
+) -> None:
     access = Access(_inner, {"127.0.0.1"}, "")
     assert (answer(access, query=query, **headers)[0].get("status") == 200) == allowed
     if not allowed:
+        assert "refused '/' from 1.2.3.4" in caplog.text
         assert answer(access, "websocket", query, **headers)[0]["type"] == "websocket.close"
+
+
+def test_a_body_in_chunks_is_whole_or_refused() -> None:
+    access = Access(_inner, {"127.0.0.1"}, "")
+    assert answer(access, body=(b"a", b"", b"b"), host="127.0.0.1")[-1]["body"] == b"ab"
+    large = answer(access, body=(b"x" * MOST_BYTES, b"x", b"not read"), host="127.0.0.1")
+    assert large[0]["status"] == 413
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import socket
 import subprocess
 import time
 from collections.abc import Callable, Iterator
@@ -106,16 +107,18 @@ class Panel:
 class Panels:
     """Panels on one board, one after the other: a new one only if the last was killed."""
 
-    def __init__(self, folder: Path, port: str, cables: tuple[Cable, Cable]) -> None:
-        self._folder, self._port, self._cables = folder, port, cables
+    def __init__(
+        self, folder: Path, port: str, cables: tuple[Cable, Cable], options: tuple[str, ...]
+    ) -> None:
+        self._folder, self._port, self._cables, self._options = folder, port, cables, options
         self._last: Panel | None = None
 
     def __call__(self) -> Panel:
         """One that runs."""
         if self._last is None or not self._last.running:
             self.close()
-            options = ("--arm", "paper", "--job", "job.toml", "--web-port", "0", "--no-show")
-            process = commandline.start("panel", *options, "--port", self._port, folder=self._folder)
+            options = ("--web-port", "0", "--no-show", "--port", self._port, *self._options)
+            process = commandline.start("panel", *options, folder=self._folder)
             assert process.stdout
             address = process.stdout.readline().strip()
             assert address.startswith("http://127.0.0.1:"), (
@@ -131,15 +134,25 @@ class Panels:
             self._last.end()
 
 
+def asked(address: str, request: bytes) -> bytes:
+    """The first line of the panel's answer to the bytes of a request; b"" where it hangs up."""
+    host, port = address.removeprefix("http://").strip("/").split(":")
+    with socket.create_connection((host, int(port)), timeout=WAIT_S) as line, suppress(ConnectionError):
+        line.sendall(request.replace(b"HOST", f"{host}:{port}".encode()))
+        return line.recv(4096).partition(b"\r\n")[0]
+    return b""
+
+
 @contextmanager
-def panels(folder: Path) -> Iterator[Panels]:
-    """For the paper's arm and job."""
+def panels(folder: Path, cables: tuple[Cable, Cable] | None = None, arm: str = "paper") -> Iterator[Panels]:
+    """For an arm that ships, and the paper's job if it is the paper's."""
     (folder / "job.toml").write_text(shipped.job_path().read_text(encoding="utf-8"), encoding="utf-8")
-    cables = Cable(), Cable()
+    ways = cables or (Cable(), Cable())
+    job = ("--job", "job.toml") if arm == "paper" else ()
     with ExitStack() as stack:
-        virtual = stack.enter_context(launch(LaunchOptions(virtual_time=False, arm=ARM)))
-        relay = stack.enter_context(Relay(virtual.port, folder / "port", *cables))
-        made = Panels(folder, relay.port, cables)
+        virtual = stack.enter_context(launch(LaunchOptions(virtual_time=False, arm=armtempo.Arm.of(arm))))
+        relay = stack.enter_context(Relay(virtual.port, folder / "port", *ways))
+        made = Panels(folder, relay.port, ways, ("--arm", arm, *job))
         stack.callback(made.close)
         yield made
 
@@ -171,12 +184,12 @@ def home(page: Any) -> None:
     """Say that the arm is at home."""
     page.get_by_role("button", name="The arm is at home").click()
     page.get_by_role("dialog").get_by_role("button", name="The arm is at home").click()
-    page.wait_for_selector('[aria-label="joint 1 +"]:not([disabled])')
+    page.wait_for_selector('[aria-label$=" +"]:not([disabled])')
 
 
 def hold(page: Any) -> None:
     """Hold a jog button until the arm moves; again if a busy browser was silent for too long, as then it lets go."""
-    button = page.get_by_label("joint 1 +")
+    button = page.locator('[aria-label$=" +"]').first
     for _ in range(20):
         button.hover()
         page.mouse.down()

@@ -60,6 +60,9 @@ def test_the_whole_way(window: Any, panel: Panel) -> None:
     if not all(joint.known for joint in panel.state().joints):
         assert page.get_by_label("joint 1 +").is_disabled()
     home(page)
+    for number in ("1e9", "-1", "true", "'x'", "null", "[1]", "{}"):  # buttons that there are not
+        page.evaluate(f"emitEvent('armtempo-press', {number})")
+    page.evaluate("window.socket.emit('event', {id: 'x', client_id: 'x', listener_id: 5, args: []})")
     page.get_by_role("tab", name="Plan").click()
     page.get_by_role("button", name="Plan", exact=True).click()
     page.wait_for_selector("text=Motion time 6.79")
@@ -79,6 +82,7 @@ def test_the_whole_way(window: Any, panel: Panel) -> None:
     assert len(list((panel.folder / "runs").glob("*/run.json"))) == 2
     page.get_by_role("tab", name="Board").click()
     page.wait_for_selector("text=Stop: the arm brakes along its path.")
+    assert "jog" not in page.inner_text(".nicegui-log")
     assert not errors
 
 
@@ -137,6 +141,34 @@ def test_a_sequence_is_edited_saved_and_run(window: Any, panel: Panel) -> None:
     page.keyboard.press("Escape")
     page.wait_for_selector("text=cycle 0: stopped")
     assert page.locator(".armtempo-lit").count() == 0
+
+
+_SOCKET = b"/_nicegui_ws/socket.io/?EIO=4&transport=websocket HTTP/1.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+_KEY = b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+
+
+@pytest.mark.parametrize(
+    ("request_", "status"),
+    [
+        (b"GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n", b"403"),
+        (b"GET / HTTP/1.1\r\nHost: HOST\r\nOrigin: http://evil.example\r\n\r\n", b"403"),
+        (b"GET " + _SOCKET + _KEY + b"Host: HOST\r\nOrigin: http://evil.example\r\n\r\n", b"403"),
+        (b"POST / HTTP/1.1\r\nHost: HOST\r\nContent-Length: 1000001\r\n\r\n", b"403"),
+        (
+            b"POST / HTTP/1.1\r\nHost: HOST\r\nTransfer-Encoding: chunked\r\n\r\n"
+            + 17 * (b"10000\r\n" + 0x10000 * b"x" + b"\r\n"),
+            b"413",
+        ),
+        (b"POST / HTTP/1.1\r\nHost: HOST\r\nTransfer-Encoding: chunked\r\n\r\nmany\r\n", b"400"),
+        (b"GET / HTTP/1.1\r\nHost: HOST\r\nX: " + 400_000 * b"x" + b"\r\n\r\n", b"400"),
+        (b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03\r\n\r\n", b"400"),
+        (b"GET /runs/..%2f..%2f/job.toml HTTP/1.1\r\nHost: HOST\r\n\r\n", b"404"),
+        (b"GET / HTTP/1.1\r\nHost: HOST\r\n\r\n", b"200"),
+    ],
+    ids=["host", "origin", "socket", "size", "chunks", "chunk", "header", "bytes", "path", "good"],
+)
+def test_what_is_no_request_of_its_pages_is_refused(panel: Panel, request_: bytes, status: bytes) -> None:
+    assert panels.asked(panel.address, request_).split(b" ")[1:2] == [status]
 
 
 def test_it_fits_desktop_tablet_and_phone(window: Any, panel: Panel) -> None:

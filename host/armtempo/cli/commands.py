@@ -183,9 +183,9 @@ GROUPS: dict[str, dict[str, Entry]] = {
         ),
         "selftest": Entry(
             "selftest:selftest",
-            "Let the board measure itself: clocks, flash, memory, link.",
+            "Let the board measure itself: clocks, flash, memory, link, pulses, E-stop.",
             "selftest --port /dev/ttyACM0",
-            "selftest --json > selftest.json",
+            "selftest --out first-power-on",
         ),
         "configure": Entry(
             "deploy:configure",

@@ -13,6 +13,7 @@ from armtempo.cli import main
 TOPICS = {
     "first-hour": "host",
     "first-hour-board": "host",
+    "first-power-on": "host",
     "day": "host",
     "files": "host",
     "arms": "host",

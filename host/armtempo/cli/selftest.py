@@ -3,26 +3,40 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import click
 
 from armtempo.cli import chosen, options, results
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.progress import ProgressBar
+from armtempo.selftest import page
 from armtempo.selftest.result import Measurement, SelfTest
 
 
 @click.command("selftest")
+@click.option(
+    "--out",
+    "-o",
+    type=click.Path(file_okay=False, path_type=Path),
+    metavar="FOLDER",
+    help="Write selftest.json and a page with figures, selftest.html, to FOLDER.",
+)
+@options.force("the files of an earlier self-test in FOLDER")
 @options.board()
-def selftest(given: BoardOptions) -> None:
-    """Let the board measure itself: clocks, flash, memory, link.
+def selftest(given: BoardOptions, out: Path | None, force: bool) -> None:
+    """Let the board measure itself: clocks, flash, memory, link, pulses, E-stop.
 
     Nothing needs to be connected, and nothing moves: the drivers must be off, and stay so. The board is reset at the
     end, so the arm's position is unknown then. Exit code 1 where anything is wrong.
     """
+    if out is not None:
+        page.check_free(out, force)
     given = replace(given, port=chosen.port(given.port))
     with chosen.board(given) as board, ProgressBar("self-test") as progress:
         found = board.selftest(progress)
+    if out is not None:
+        page.write(found, out)
     results.show(given.as_json, found.to_json(), _lines(found))
     if found.failed:
         raise SystemExit(1)
@@ -40,5 +54,5 @@ def _lines(found: SelfTest) -> list[str]:
 
 def _words(line: Measurement) -> list[str]:
     expected = f"   (expected: {line.expected})" if line.expected else ""
-    words = [f"  {line.verdict.value:<6}{line.part:<8}{line.what}: {line.measured}{expected}"]
+    words = [f"  {line.verdict.word:<6}{line.part:<8}{line.what}: {line.measured}{expected}"]
     return [*words, f"  {'':<14}-> {line.cure}"] if line.cure else words

@@ -17,6 +17,7 @@ Application = Callable[[Scope, Receive, Send], Awaitable[None]]
 COOKIE = "armtempo_token"
 MOST_BYTES = 1_000_000
 """Of the body of a request; a page of via points has a few thousand."""
+_TOO_MUCH = f"more than {MOST_BYTES} bytes"
 _LOG = logging.getLogger("armtempo")
 
 
@@ -35,17 +36,25 @@ class Access:
         if scope["type"] == "lifespan":
             await self._inner(scope, receive, send)
             return
-        reason = self._refusal(scope)
-        if not reason:
-            await self._inner(scope, receive, self._with_cookie(scope, send))
+        if reason := self._refusal(scope):
+            await self._refuse(scope, send, 403, reason)
             return
+        if scope["type"] == "http":
+            whole = await _body(receive)
+            if whole is None:
+                await self._refuse(scope, send, 413, _TOO_MUCH)
+                return
+            receive = _again(whole, receive)
+        await self._inner(scope, receive, self._with_cookie(scope, send))
+
+    async def _refuse(self, scope: Scope, send: Send, status: int, reason: str) -> None:
         client = (scope.get("client") or ("?",))[0]
-        _LOG.warning("panel: refused %s from %s: %s", scope.get("path", "?"), client, reason)
+        _LOG.warning("panel: refused %r from %s: %s", scope.get("path", "?"), client, reason)
         if scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008})
             return
         await send(
-            {"type": "http.response.start", "status": 403, "headers": [(b"content-type", b"text/plain")]}
+            {"type": "http.response.start", "status": status, "headers": [(b"content-type", b"text/plain")]}
         )
         await send({"type": "http.response.body", "body": f"armtempo: {reason}\n".encode()})
 
@@ -60,7 +69,7 @@ class Access:
             return "the request comes from a page of another origin"
         length = headers.get(b"content-length", b"0")
         if not length.isdigit() or int(length) > MOST_BYTES:
-            return f"more than {MOST_BYTES} bytes"
+            return _TOO_MUCH
         if self._token and not any(
             hmac.compare_digest(given, self._token) for given in _given(scope, headers)
         ):
@@ -79,6 +88,30 @@ class Access:
             await send(message)
 
         return send_cookie
+
+
+async def _body(receive: Receive) -> MutableMapping[str, Any] | None:
+    """The whole body of a request as one message; None for one that is too large, which no header has to say."""
+    parts: list[bytes] = []
+    while True:
+        message = await receive()
+        if message["type"] != "http.request":
+            return message
+        parts.append(message.get("body", b""))
+        if sum(map(len, parts)) > MOST_BYTES:
+            return None
+        if not message.get("more_body", False):
+            return {"type": "http.request", "body": b"".join(parts), "more_body": False}
+
+
+def _again(first: MutableMapping[str, Any], receive: Receive) -> Receive:
+    """Receives ``first`` once more, then what else comes."""
+    waiting = [first]
+
+    async def received() -> MutableMapping[str, Any]:
+        return waiting.pop() if waiting else await receive()
+
+    return received
 
 
 def _name(host: str) -> str:

@@ -23,8 +23,8 @@ class CurveChart:
         options = {
             "title": {"text": title, "left": 0, "textStyle": {"fontSize": 13}},
             "animation": False,
-            "grid": {"left": 55, "right": 15, "top": 35, "bottom": 25},
-            "legend": {"top": 2, "right": 5},
+            "grid": {"left": 55, "right": 15, "top": 50, "bottom": 25},
+            "legend": {"top": 20, "left": 50},
             "tooltip": {"trigger": "axis"},
             "xAxis": {
                 "type": "value",

@@ -78,7 +78,7 @@ def _header(page: PanelPage) -> None:
         stop.classes("armtempo-stop").tooltip(words.STOP_HINT)
         with ui.column().classes("armtempo-title"):
             ui.label(f"{words.TITLE} · {operator.arm.name}").classes("text-subtitle1 ellipsis")
-            ui.label("").classes("ellipsis").props('id="armtempo-state" role="status"')
+            ui.label("").props('id="armtempo-state" role="status"')
         take = ui.button(words.TAKE_CONTROL, on_click=lambda: operator.take_control(page.client)).props(
             "outline color=white"
         )
@@ -125,7 +125,7 @@ def _events(page: PanelPage) -> None:
 
     def press(event: Any) -> None:
         number = event.args
-        if isinstance(number, int) and 0 <= number < len(page.buttons):
+        if type(number) is int and 0 <= number < len(page.buttons):
             page.attempt(lambda: hold.press(page.client, page.buttons[number], page.jog_percent / 100))
 
     ui.on("armtempo-stop", lambda: operator.stop())

@@ -16,13 +16,13 @@ from starlette.responses import FileResponse, PlainTextResponse
 
 from armtempo.basics.errors import InputError
 from armtempo.panel import layout, words
-from armtempo.panel.access import Access
+from armtempo.panel.access import MOST_BYTES, Access
 from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.held_jog import ButtonHold
 from armtempo.panel.operator import Operator
 
-_RECONNECT_S = 3.0
-"""A page whose connection breaks keeps control if it is back within this time; what it holds is released at once."""
+_RECONNECT_S = 20.0
+"""A page whose connection breaks is kept for so long, so that a busy browser need not load it again."""
 _SUFFIXES = (".html", ".svg", ".png", ".csv", ".json")
 
 
@@ -52,20 +52,25 @@ class Panel:
         hosts = _names(host) if token else {"127.0.0.1", "localhost", "::1"}
         guarded = Access(self._api, hosts, token)
         config = uvicorn.Config(
-            guarded, log_level="warning", ws_max_size=1_000_000, timeout_graceful_shutdown=1
+            guarded,
+            log_level="warning",
+            http="h11",  # the parser that limits the size of headers
+            ws_max_size=MOST_BYTES,
+            timeout_graceful_shutdown=1,
         )
         uvicorn.Server(config).run(sockets=[listening])
 
     def _page(self) -> None:
         client = ui.context.client
-        if not self._operator.holder:
+        holder = Client.instances.get(self._operator.holder)
+        if holder is None or not holder.has_socket_connection:
             self._operator.take_control(client.id)
         layout.build(self._operator, self._hold, self._shape)
         client.on_disconnect(lambda: self._hold.release(client.id))
         client.on_delete(lambda: self._gone(client.id))
 
     def _gone(self, client: str) -> None:
-        """A page was closed, or its connection did not come back: another one may take control."""
+        """A page was closed, or its connection did not come back."""
         self._operator.release(client)
         self._operator.monitors.discard(client)
 

@@ -17,8 +17,10 @@ from armtempo.selftest.result import Measurement, judged
 PULSES, SAFETY, TURNS = "pulses", "safety", "cycles"
 _RESOLUTION_US = 2.0
 """A sample each microsecond, the two ports half of one apart, and the rounding of a step time."""
+_LONGEST_TURN_US = 4000
+"""The capture keeps 4096 samples; after a longer turn some are lost."""
 _SLOWEST_STOP_US = 30.0
-_CYCLES_PER_US = 168
+CYCLES_PER_US = 168
 _SHORTED = "look for a short between the two pins, and take what is connected off one after the other"
 
 
@@ -36,6 +38,18 @@ def rises_us(measured: Measured) -> dict[str, Array]:
     return found
 
 
+def errors_us(measured: Measured, motion: TestMotion) -> dict[str, Any]:
+    """By pin the times of its steps, ms, and how much later each was captured, us; pins with all steps only."""
+    found = rises_us(measured)
+    wanted = {pin: 1e6 * steps for pin, steps in zip(measured.values["steps"], motion.steps_s, strict=True)}
+    offset = _offset_us(found, wanted)
+    return {
+        pin: [(steps / 1000).round(3).tolist(), (found[pin] - offset - steps).round(2).tolist()]
+        for pin, steps in wanted.items()
+        if len(found[pin]) == len(steps)
+    }
+
+
 def judge(
     measured: Measured, motion: TestMotion, joints: Sequence[dict[str, Any]], forward: bool
 ) -> Iterator[Measurement]:
@@ -45,6 +59,13 @@ def judge(
     if values["fault"]:
         name, meaning, cure = ERRORS[values["fault"]]
         yield judged(PULSES, f"motion {way}", f"fault {name}: {meaning}", "no fault", False, cure)
+    longest_us = values["longest_turn_cycles"] / CYCLES_PER_US
+    if longest_us > _LONGEST_TURN_US:
+        measured_words = f"a turn of the loop took {longest_us:.0f} us"
+        yield judged(
+            PULSES, f"capture {way}", measured_words, f"below {_LONGEST_TURN_US}", False, "run it again"
+        )
+        return
     found = rises_us(measured)
     wanted = {pin: 1e6 * steps for pin, steps in zip(values["steps"], motion.steps_s, strict=True)}
     offset = _offset_us(found, wanted)
@@ -57,7 +78,7 @@ def judge(
         "never seen" if values["directions"] is None else str(values["directions"])[1:-1],
         str(levels)[1:-1],
         values["directions"] in (levels, None),
-        "look for a short at the DIR pins (board/docs/hardware.md)",
+        "look for a short at the DIR pins, see 'armtempo help hardware'",
     )
 
 
@@ -107,19 +128,19 @@ def _channel(
 
 def judge_turns(values: dict[str, Any]) -> Iterator[Measurement]:
     """Figures of the loop while all joints move, and of the heap."""
-    mean, longest = (values[name] / _CYCLES_PER_US for name in ("turn_cycles", "longest_turn_cycles"))
+    mean, longest = (values[name] / CYCLES_PER_US for name in ("turn_cycles", "longest_turn_cycles"))
     yield Measurement(
         TURNS,
         "a turn of the engine's loop with its capture, all joints moving",
         f"{mean:.0f} us, the longest {longest:.0f}",
     )
-    stages = ", ".join(f"{name} {count}" for name, count in values["free"].items())
+    stages = ", ".join(f"{name} {values['free'][name]}" for name in ("engine", "loaded", "moved"))
     yield Measurement("memory", "free heap beside engine and capture", f"{stages} bytes")
 
 
 def judge_stops(values: dict[str, Any]) -> Iterator[Measurement]:
     """Lines about what ``on_board/estop.py`` measured."""
-    took_us = np.array(values["cycles"]) / _CYCLES_PER_US
+    took_us = np.array(values["cycles"]) / CYCLES_PER_US
     gone_on = int(np.sum(took_us < 0))
     wrong = sum(fault != codes.ESTOP for fault in values["faults"])
     yield judged(

@@ -160,6 +160,7 @@ def _move(prompt: Prompt, found: SelfTest, work: Progress) -> None:
             found.add(pulse_part.judge(measured, moved, joints, forward))
             found.add([_still_off(measured, found)])
             if forward:
+                found.data[pulse_part.PULSES]["error_us"] = pulse_part.errors_us(measured, moved)
                 found.add(pulse_part.judge_turns(measured.values))
     work(0.6, 1)
     count = _SIMULATED_STOPS if found.simulated else _STOPS

@@ -1,7 +1,5 @@
 """Goes in front of parts that make steps: the engine for the board's own arm, without drivers, inputs and encoders."""
 
-import struct
-
 from armtempo_shared import armrecord
 
 

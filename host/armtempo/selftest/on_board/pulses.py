@@ -88,8 +88,8 @@ def begin(captures):
     mem32[_TIM1 + stm.TIM_CCR1] = _PERIOD // 2
     mem32[_TIM1 + stm.TIM_EGR] = 1
     mem32[_TIM1 + stm.TIM_SR] = 0
-    mem32[stm.DMA2 + stm.DMA_LIFCR] = 0x0F7D0F7D
-    mem32[stm.DMA2 + stm.DMA_HIFCR] = 0x0F7D0F7D
+    mem32[stm.DMA2 + 8] = 0x0F7D0F7D
+    mem32[stm.DMA2 + 12] = 0x0F7D0F7D
     for capture in captures:
         capture.arm()
     mem32[_TIM1 + stm.TIM_DIER] = _REQUESTS

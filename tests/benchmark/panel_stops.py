@@ -1,0 +1,239 @@
+"""What the panel takes to stop the arm, and what many watching pages cost: ``python -m tests.benchmark.panel_stops``.
+
+A held jog is ended twenty times each by its button, by closing its tab, by killing the browser, by killing the panel's
+program and by cutting the cable: from then until the arm rests, by the board's clock. Then ten more pages watch an arm
+of six joints: processor time of the panel's program while the arm moves, samples that were lost, and a hundred times
+the time from the key press in a browser until the board has answered the stop. The board is a virtual one in real time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import asyncio
+import multiprocessing
+import os
+import re
+import tempfile
+import time
+import urllib.request
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlencode
+
+from armtempo.link import board_messages
+from armtempo.link.board_messages import Done, Fault, Sample
+from armtempo_shared import wire
+from armtempo_shared.limits import TICK_HZ
+
+from tests.system import panels
+from tests.system.held_jogs import Cable
+from tests.system.panels import Panel, Panels
+
+HOWS = ("button", "tab", "browser", "server", "cable")
+WATCHING = 10
+_STOP = bytes((wire.COMMAND["stop"][1],))
+_EVENTS = {wire.EVENT[name][1] for name in ("sample", "done", "fault")}
+_PATIENCE_S = 60.0
+
+
+class Ear(Cable):
+    """A cable from the board that notes what the board says."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._parser = wire.Parser()
+        self.sample: tuple[float, Sample] | None = None
+        """The last one, and when it came."""
+        self.end: Done | Fault | None = None
+        """Of the last motion; None while it moves."""
+        self.stopped_s = 0.0
+        """When the board answered a stop last."""
+
+    def __call__(self, data: bytes) -> tuple[bytes, float]:
+        now_s = time.monotonic()
+        self._parser.feed(data)
+        while (frame := self._parser.next()) is not None:
+            if frame.number == wire.EVENT["ok"][1] and frame.payload[:1] == _STOP:
+                self.stopped_s = now_s
+            elif frame.number in _EVENTS:
+                event = board_messages.event(frame.number, frame.payload)
+                if isinstance(event, Sample):
+                    self.sample, self.end = (now_s, event), None
+                elif isinstance(event, Done | Fault):
+                    self.end = event
+        return super().__call__(data)
+
+    def rest_s(self, begin_s: float, before: tuple[float, Sample]) -> float:
+        """Seconds of the board's clock from ``begin_s`` until it rested; ``before``: the last sample before."""
+        limit_s = time.monotonic() + _PATIENCE_S
+        while self.end is None:
+            assert time.monotonic() < limit_s, "the arm moves on"
+            time.sleep(0.002)
+        return (self.end.ticks - before[1].ticks) / TICK_HZ - (begin_s - before[0])
+
+
+def moving(ear: Ear) -> tuple[float, Sample]:
+    """The last sample of a motion that is under way."""
+    limit_s = time.monotonic() + _PATIENCE_S
+    while ear.end is not None or ear.sample is None or ear.sample[1].index < 3:
+        assert time.monotonic() < limit_s, "no motion"
+        time.sleep(0.01)
+    return ear.sample
+
+
+def held_jog(play: Any, browser: Any, running: Panels, ear: Ear, how: str) -> float:
+    """Hold a jog, end it, and give the seconds until the arm rested."""
+    panel = running()
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        if how == "browser":
+            with panels.chromium_to_kill(play, Path(folder)) as (made, process):
+                return _ended(made.new_context(viewport=panels.SMALL), panel, ear, process.kill)
+        window = browser.new_context(viewport=panels.SMALL)
+        try:
+            return _ended(window, panel, ear, how)
+        finally:
+            window.close()
+            panel.cut(False)
+
+
+def _ended(window: Any, panel: Panel, ear: Ear, how: Any) -> float:
+    page = panels.opened(window, panel.address)
+    panels.home(page)
+    panels.hold(page)
+    end = {
+        "button": page.mouse.up,
+        "tab": page.close,
+        "server": panel.process.kill,
+        "cable": lambda: panel.cut(True),
+    }.get(how, how)
+    before = moving(ear)
+    begin_s = time.monotonic()
+    end()
+    found = ear.rest_s(begin_s, before)
+    if how == "button":
+        panels.wait_for(page, "idle")
+    return found
+
+
+# pages that watch
+
+
+def watch(address: str) -> None:
+    """Ten pages without a browser: they take what the panel sends them."""
+    asyncio.run(_watch(address))
+
+
+async def _watch(address: str) -> None:
+    import socketio
+
+    clients = []
+    for _ in range(WATCHING):
+        with urllib.request.urlopen(address) as answer:
+            found = re.search(r"query: (\{.*client_id.*\}),\n", answer.read().decode())
+        assert found
+        query = {**ast.literal_eval(found.group(1)), "document_id": "d", "tab_id": "t"}
+        client = socketio.AsyncClient()
+        await client.connect(
+            f"{address}?{urlencode(query)}", transports=["websocket"], socketio_path="_nicegui_ws/socket.io"
+        )
+        clients.append(client)
+    await asyncio.sleep(3600)
+
+
+def processor_s(pid: int) -> float:
+    """Processor time that a process has had."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def stops(page: Any, ear: Ear, times: int) -> list[float]:
+    """Seconds from the key press to the board's answer."""
+    found = []
+    for number in range(times):
+        button = page.locator('[aria-label$=" +"]').nth(number % 2)
+        button.hover()
+        page.mouse.down()
+        moving(ear)
+        begin_s = time.monotonic()
+        page.keyboard.press("Escape")
+        limit_s = begin_s + _PATIENCE_S
+        while ear.stopped_s < begin_s:
+            assert time.monotonic() < limit_s, "no answer"
+            time.sleep(0.0005)
+        found.append(ear.stopped_s - begin_s)
+        page.mouse.up()
+        panels.wait_for(page, "idle")
+        if number % 10 == 9:
+            panels.home(page)
+    return found
+
+
+def watched(browser: Any, times: int) -> None:
+    """Print what ten watching pages cost, and how long a stop takes then."""
+    ear = Ear()
+    with (
+        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder,
+        panels.panels(Path(folder), (Cable(), ear), "ar4") as running,
+    ):
+        panel = running()
+        page = panels.opened(browser.new_context(viewport=panels.SMALL), panel.address)
+        panels.home(page)
+        watching = multiprocessing.get_context("spawn").Process(target=watch, args=(panel.address,))
+        watching.start()
+        time.sleep(5)
+        show("Escape to the board's answer", stops(page, ear, times))
+        begin_s, before_s = time.monotonic(), processor_s(panel.process.pid)
+        while time.monotonic() < begin_s + 20.0:
+            page.locator('[aria-label$=" +"]').first.hover()
+            page.mouse.down()
+            with suppress(AssertionError):
+                moving(ear)
+            page.wait_for_timeout(1500)
+            page.mouse.up()
+            panels.wait_for(page, "idle")
+            panels.home(page)
+        share = (processor_s(panel.process.pid) - before_s) / (time.monotonic() - begin_s)
+        print(f"processor time of the panel: {100 * share:.0f} %; samples lost: {panel.state().samples_lost}")
+        watching.kill()
+        watching.join()
+
+
+def show(name: str, seconds: list[float]) -> None:
+    """A line: median and worst in ms, of how many, and how busy the machine was."""
+    ordered = sorted(1000 * value for value in seconds)
+    print(
+        f"{name:<30} median {ordered[len(ordered) // 2]:6.0f} ms   worst {ordered[-1]:6.0f} ms   of {len(ordered)}"
+        f"   load {os.getloadavg()[0]:.1f} on {os.cpu_count()} processors",
+        flush=True,
+    )
+
+
+def main() -> None:
+    """Print the figures."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--times", type=int, default=20)
+    parser.add_argument("--stops", type=int, default=100)
+    parser.add_argument("--only", choices=[*HOWS, "watched"], action="append")
+    options = parser.parse_args()
+    wanted = options.only or [*HOWS, "watched"]
+    with panels.playwright() as play:
+        browser = panels.chromium(play)
+        ear = Ear()
+        with (
+            tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder,
+            panels.panels(Path(folder), (Cable(), ear)) as running,
+        ):
+            for how in [how for how in HOWS if how in wanted]:
+                found = [held_jog(play, browser, running, ear, how) for _ in range(options.times)]
+                show(f"jog, {how}", found)
+        if "watched" in wanted:
+            watched(browser, options.stops)
+        browser.close()
+
+
+if __name__ == "__main__":
+    main()
