@@ -7,7 +7,7 @@ pyb.usb_mode("VCP")
 
 try:
     import armtempo_archive  # noqa: F401  finds the program where it is no part of the firmware
-except (ImportError, OSError):  # it is, or its archive is not, or not wholly, deployed
+except Exception:  # it is, or its archive is not, or not wholly, deployed
     pass
 try:
     from armtempo_board import keep_watchdog_fed
