@@ -284,7 +284,8 @@ class Engine(EngineParts):
             """Let the motion's own time go on at another rate, in thousandths; 0: pause, RESUME: as before it.
 
             Each change takes as long as the record says, with acceleration and jerk as in ``brake``. It begins as
-            braking does; one that comes while the rate is changing waits until that has ended, and only the last one counts.
+            braking does; one that comes while the rate is changing waits until that has ended, and only the last
+            one counts.
             """
             if not self.moving:
                 raise Refused(codes.NOT_MOVING)
