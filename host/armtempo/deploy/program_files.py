@@ -133,7 +133,10 @@ def library(mpy: int | None) -> dict[str, bytes]:
     if mpy is None:
         sources = {name: path.read_bytes() for name, path in modules().items()} | {_HASH: _hash().encode()}
         return {f"{LIBRARY}/{name}": data for name, data in sources.items()}
-    return {f"{LIBRARY}/{name}": data for name, data in _compiled(mpy).items()}
+    packed = dict(compiled(mpy))
+    reader = f"{_READER_NAME}.mpy"
+    files = {reader: packed.pop(reader), ARCHIVE: archive.pack(packed, _AT_START)}
+    return {f"{LIBRARY}/{name}": data for name, data in files.items()}
 
 
 def start_files() -> dict[str, bytes]:
@@ -147,8 +150,8 @@ def _hash() -> str:
     return f"def program_crc(board, shared):\n    return 0x{own_crc():08X}\n"
 
 
-def _compiled(mpy: int) -> Mapping[str, bytes]:
-    """The archive of the compact program, compiled, and what reads it; kept for the next time."""
+def compiled(mpy: int) -> Mapping[str, bytes]:
+    """The modules of the compact program, compiled, and the one that reads their archive; kept for the next time."""
     compiler, architecture = _compiler(mpy)
     here = Path(__file__).parent
     folders = [*map(package_folder, PACKAGES), here, Path(launcher.__file__).parent / "hardware"]
@@ -159,16 +162,15 @@ def _compiled(mpy: int) -> Mapping[str, bytes]:
 def _compile(compiler: str, architecture: str) -> dict[str, bytes]:
     reader = (package_folder(PACKAGES[0]) / _READER).read_text(encoding="utf-8")
     texts = {**compact_files(_hash()), f"{_READER_NAME}.py": reader}
-    compiled = {}
+    found = {}
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder) / "module.py", Path(folder) / "module.mpy"
         for path, text in texts.items():
             source.write_text(text, encoding="utf-8")
             name = Path(path).stem
             _run(compiler, f"-march={architecture}", "-O3", "-s", name, "-o", str(target), str(source))
-            compiled[f"{path[:-3]}.mpy"] = target.read_bytes()
-    outside = f"{_READER_NAME}.mpy"
-    return {outside: compiled.pop(outside), ARCHIVE: archive.pack(compiled, _AT_START)}
+            found[f"{path[:-3]}.mpy"] = target.read_bytes()
+    return found
 
 
 def compact_files(hash_module: str = "") -> dict[str, str]:
