@@ -35,6 +35,7 @@ STATE = BoardState(
     state="idle",
     moving=False,
     speed_percent=100.0,
+    rest_s=0.0,
     fault="",
     frames_bad=0,
     samples_lost=0,
