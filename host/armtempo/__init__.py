@@ -58,6 +58,7 @@ __all__ = [
     "Stop",
     "StopRequest",
     "Stopped",
+    "ToolWay",
     "Trajectory",
     "Wait",
     "WaitInput",
@@ -105,6 +106,7 @@ if TYPE_CHECKING:
     from armtempo.model.sequence_plan import SequencePlan
     from armtempo.model.steps import Count, Goto, Repeat, RunMotion, SetOutput, Step, Wait, WaitInput
     from armtempo.model.tool_pose import Pose
+    from armtempo.model.tool_way import ToolWay
     from armtempo.pipeline import compare, connect, plan, plan_sequence, summary
     from armtempo.ports.listing import find_ports
     from armtempo.robot.board import Board
@@ -149,6 +151,7 @@ _HOMES = {
     "armtempo.model.sequence": ("Sequence",),
     "armtempo.model.sequence_plan": ("SequencePlan",),
     "armtempo.model.tool_pose": ("Pose",),
+    "armtempo.model.tool_way": ("ToolWay",),
     "armtempo.pipeline": ("compare", "connect", "plan", "plan_sequence", "summary"),
     "armtempo.robot.board": ("Board",),
     "armtempo.robot.board_state": ("BoardState",),

@@ -13,7 +13,7 @@ from armtempo.model.job import Job, Stop
 from armtempo.planning import planner
 from armtempo.planning.free import corridor, corridor_curve
 from armtempo.planning.free.corridor_curve import CorridorTime
-from armtempo.planning.free.tool import Tool
+from armtempo.planning.tool import Tool
 from armtempo.report import corridor_plot
 
 from tests.host import problems

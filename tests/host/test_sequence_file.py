@@ -79,6 +79,21 @@ def test_without_a_start_it_begins_where_its_first_step_leads(tmp_path: Path) ->
     assert planned(tmp_path, "wait_s = 1", top="").start_deg is None
 
 
+def test_a_goto_in_a_line_moves_the_tool_straight_and_slowly(tmp_path: Path) -> None:
+    line = "goto = [6, -60, 40]\nline = true\nspeed_mm_s = 20"
+    plan = planned(tmp_path, 'goto = "a"', line, line)
+    assert words(plan) == ["goto a", "line to 6, -60, 40°"]
+    times = np.linspace(0.0, plan.legs[1].duration_s, 2001)
+    way = forward(ARM, plan.legs[1](times))[:, :3, 3]
+    along = (way[-1] - way[0]) / np.linalg.norm(way[-1] - way[0])
+    assert np.abs(np.cross(way - way[0], along)).max() < 0.5
+    assert np.linalg.norm(np.diff(way, axis=0), axis=1).max() / times[1] == pytest.approx(20.0, rel=0.01)
+    with pytest.raises(InputError, match="give the sequence a start"):
+        planned(tmp_path, line, top="")
+    with pytest.raises(InputError, match="line = true only"):
+        planned(tmp_path, 'goto = "a"\nspeed_mm_s = 20')
+
+
 def test_equal_motions_are_planned_and_kept_once(tmp_path: Path) -> None:
     plan = planned(tmp_path, *['goto = "a"', 'goto = "b"'] * 3)
     assert len(plan.legs) == 3

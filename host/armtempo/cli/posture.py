@@ -27,14 +27,16 @@ from armtempo.robot.stop_request import Stopped
 
 @click.command("goto", context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
 @click.argument("where", nargs=-1, required=True, shell_complete=options.files)
+@click.option("--line", is_flag=True, help="The tool goes in a straight line and turns evenly.")
 @options.job
 @options.board(options.arm_of_board, options.replace_arm, options.altered)
-def goto(where: tuple[str, ...], job_path: Path | None, given: BoardOptions) -> None:
+def goto(where: tuple[str, ...], line: bool, job_path: Path | None, given: BoardOptions) -> None:
     """Move straight to a posture.
 
     WHERE: 'home' or another posture of the arm file, angles such as '0,-60,40', a via point of the job such as P0,
-    or a trajectory file or a planned sequence for its start. All joints move together, within their limits. The arm
-    must be homed. Ctrl-C brakes, and so does 'armtempo stop' in another terminal.
+    or a trajectory file or a planned sequence for its start. All joints move together, within their limits; with
+    --line so that the tool goes in a straight line. The arm must be homed. Ctrl-C brakes, and so does 'armtempo
+    stop' in another terminal.
     """
     if len(where) > 1:
         raise InputError(
@@ -48,7 +50,7 @@ def goto(where: tuple[str, ...], job_path: Path | None, given: BoardOptions) -> 
         board.configure(arm, replace=given.replace_arm)
         try:
             with ProgressBar("moving") as progress:
-                board.goto(target_deg, progress)
+                board.goto(target_deg, progress, line=line)
         except Stopped:
             say_where_it_is(board, given.as_json)
             raise

@@ -13,9 +13,10 @@ from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
 from armtempo.formats import json_codec, toml_table
 from armtempo.formats.toml_table import Table
-from armtempo.model import pose_table, shipped, via_table
+from armtempo.model import pose_table, shipped, tool_way, via_table
 from armtempo.model.arm import Arm
-from armtempo.model.tool_pose import Pose
+from armtempo.model.tool_pose import TOLERANCE_DEG, TOLERANCE_MM, Pose
+from armtempo.model.tool_way import ToolWay
 from armtempo.optimise import ALGORITHMS
 
 GRADIENT = "gradient"
@@ -60,6 +61,11 @@ class Job:
     """Each entry: the driven joints' angles in degrees, (J,), or a pose."""
     stops: tuple[Stop, ...] = field(default=(), metadata=json_codec.ADDED)
     """Via points between the ends where the motion comes to rest, in order."""
+    ways: tuple[ToolWay, ...] = field(default=(), metadata=json_codec.ADDED)
+    """What is asked of the tool on the way to some via points, in order."""
+    speed_mm_s: float | None = field(default=None, metadata=json_codec.ADDED)
+    acceleration_mm_s2: float | None = field(default=None, metadata=json_codec.ADDED)
+    """Limits of the tool on all ways."""
     path: str = field(default="through", metadata=json_codec.ADDED)
     """``"through"``: the spline of Eqs. (13) and (14); ``"free"``: it may bend between the via points."""
     corridor_deg: float | None = field(default=None, metadata=json_codec.ADDED)
@@ -142,11 +148,14 @@ class Job:
     def of_table(cls, top: Table, arm: Arm) -> Job:
         """The job described by the top table of a TOML file; errors as in ``load``."""
         parameters = top.table("parameters")
-        vias, stops = _vias(top, arm)
+        vias, stops, ways = _vias(top, arm)
         job = cls(
             name=name_of(top),
             via=vias,
             stops=stops,
+            ways=ways,
+            speed_mm_s=tool_way.limit(top, "speed_mm_s"),
+            acceleration_mm_s2=tool_way.limit(top, "acceleration_mm_s2"),
             path=top.choice("path", PATHS, cls.path),
             corridor_deg=_corridor(top, "corridor_deg"),
             corridor_mm=_corridor(top, "corridor_mm"),
@@ -226,11 +235,14 @@ def is_name(name: str, longest: int = MAX_NAME) -> bool:
     return 0 < len(name) <= longest and all(letter in _LETTERS for letter in name)
 
 
-def _vias(top: Table, arm: Arm) -> tuple[tuple[tuple[float, ...] | Pose, ...], tuple[Stop, ...]]:
-    """``via_deg``: lists of angles; or ``via``: tables with ``angles_deg`` or a pose, and stops among them."""
+def _vias(
+    top: Table, arm: Arm
+) -> tuple[tuple[tuple[float, ...] | Pose, ...], tuple[Stop, ...], tuple[ToolWay, ...]]:
+    """``via_deg``: lists of angles; or ``via``: tables with ``angles_deg`` or a pose, stops and ways among them."""
     if top.has("via_deg") == top.has("via"):
         raise top.fail("via_deg", "given, or else [[via]] tables, but not both")
     stops: list[Stop] = []
+    ways: list[ToolWay] = []
     if top.has("via_deg"):
         rows = top.array("via_deg", "a list of at least 2 lists of angles")
         named = Table({f"via_deg P{n}": row for n, row in enumerate(rows)}, top.file)
@@ -240,12 +252,17 @@ def _vias(top: Table, arm: Arm) -> tuple[tuple[tuple[float, ...] | Pose, ...], t
     else:
         tables = top.tables("via", lambda n: f"via P{n}")
         stops = [_stop(table, n, len(tables)) for n, table in enumerate(tables) if _stops(table)]
-        vias = [_via(table, f"{top.file}: via P{n}", arm) for n, table in enumerate(tables)]
+        found = [tool_way.read(table, n) for n, table in enumerate(tables)]
+        vias = [
+            _via(table, f"{top.file}: via P{n}", arm, way)
+            for n, (table, way) in enumerate(zip(tables, found, strict=True))
+        ]
+        ways = [way for way in found if way]
     if len(vias) < 2:
         raise InputError(f"{top.file}: {len(vias)} via point is not a motion", "at least 2 are needed")
     if len(vias) - 1 > MAX_SEGMENTS:
         raise InputError(f"{top.file}: {len(vias)} via points", f"the board holds at most {MAX_SEGMENTS + 1}")
-    return tuple(vias), tuple(stops)
+    return tuple(vias), tuple(stops), tuple(ways)
 
 
 def _stops(table: Table) -> bool:
@@ -265,7 +282,7 @@ def _stop(table: Table, via: int, count: int) -> Stop:
     return Stop(via, dwell_s)
 
 
-def _via(table: Table, where: str, arm: Arm) -> tuple[float, ...] | Pose:
+def _via(table: Table, where: str, arm: Arm, way: ToolWay | None) -> tuple[float, ...] | Pose:
     forms = [key for key in ("angles_deg", "matrix", "position_mm", "posture") if table.has(key)]
     if len(forms) != 1:
         raise InputError(
@@ -274,16 +291,24 @@ def _via(table: Table, where: str, arm: Arm) -> tuple[float, ...] | Pose:
         )
     if forms == ["posture"]:
         name = table.text("posture")
-        table.done()
+        _done(table, way)
         return _named(name, where, arm)
     if forms == ["angles_deg"]:
         found = read_angles(table, "angles_deg", arm)
-        table.done()
+        _done(table, way)
         return found
     posture = table.numbers("posture_deg", len(arm.joints)) if table.has("posture_deg") else None
     pose = pose_table.read(table, where)
     table.done()
+    if way and way.line:  # its tolerances are those of the line
+        pose = replace(pose, tolerance_mm=TOLERANCE_MM, tolerance_deg=TOLERANCE_DEG)
     return replace(pose, posture_deg=posture)
+
+
+def _done(table: Table, way: ToolWay | None) -> None:
+    if way and way.line:
+        table.known("tolerance_mm", "tolerance_deg")
+    table.done()
 
 
 def _named(name: str, where: str, arm: Arm) -> tuple[float, ...] | Pose:

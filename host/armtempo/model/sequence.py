@@ -14,6 +14,7 @@ from armtempo.basics.errors import InputError
 from armtempo.formats import toml_table
 from armtempo.formats.spelling import did_you_mean
 from armtempo.formats.toml_table import Table
+from armtempo.model import tool_way
 from armtempo.model.arm import Arm, read_posture
 from armtempo.model.job import Job, is_name, name_of, read_angles
 from armtempo.model.plan import Plan
@@ -182,7 +183,11 @@ class _Reader:
             target = self._motion(table, "goto")
         else:
             target = self.posture(table, "goto")
-        return [Goto(target, where=_place(table), step=step)]
+        line = table.boolean("line", False)
+        if table.has("speed_mm_s") and not line:
+            raise table.fail("speed_mm_s", "given with line = true only")
+        speed = tool_way.limit(table, "speed_mm_s")
+        return [Goto(target, line=line, speed_mm_s=speed, where=_place(table), step=step)]
 
     def posture(self, table: Table, key: str) -> ArmPosture:
         """A posture by name, or as angles."""

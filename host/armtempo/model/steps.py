@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, field
 
 from armtempo_shared.sequence import MAX_REPEATS, MAX_WAIT_MS
 
@@ -46,6 +46,10 @@ class Goto(Placed):
     """Move straight to a posture: of the arm by its name, or by angles in degrees (J,); or to where a motion begins."""
 
     target: ArmPosture | SourceMotion | Job | Plan | str | tuple[float, ...]
+    line: bool = field(default=False, kw_only=True)
+    """The tool goes there in a straight line."""
+    speed_mm_s: float | None = field(default=None, kw_only=True)
+    """Of the tool on a line at most."""
 
 
 @checked_fields

@@ -41,13 +41,19 @@ class Desk:
                 raise InputError(f"P{number}: {problem}", "change it")
         vias = tuple(tuple(map(float, row)) for row in rows)
         stops = tuple(stop for stop in self.job.stops if stop.via < len(vias) - 1)
-        return replace(self.job, via=vias, path=path, stops=stops)
+        ways = tuple(way for way in self.job.ways if way.via < len(vias))
+        return replace(self.job, via=vias, path=path, stops=stops, ways=ways)
 
     def save(self, job: Job) -> Path:
         """Write the via points and the path into the job's file; its other lines and comments stay.
 
         A job without a file gets one in the folder. InputError if it cannot be written.
         """
+        if job.ways or job.stops:
+            raise InputError(
+                "the panel writes via points as angles alone: lines, speeds and stops of the job would be lost",
+                "change the via points in the job's file",
+            )
         file = self.file or self.folder / f"{job.name}.toml"
         if not file.resolve().is_relative_to(self.folder.resolve()):
             raise InputError(

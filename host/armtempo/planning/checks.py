@@ -99,6 +99,47 @@ def check_job(arm: Arm, job: Job) -> None:
         )
 
 
+def leads_tool(job: Job) -> bool:
+    """Whether the job asks for lines or arcs of the tool, or limits its speed."""
+    return bool(job.ways) or job.speed_mm_s is not None or job.acceleration_mm_s2 is not None
+
+
+def _check_ways(job: Job, where: str) -> None:
+    """InputError for lines and speeds of the tool that do not go together with the rest of the job."""
+    if is_free(job):
+        raise InputError(
+            f"{where}: lines and speeds of the tool need a path that is fixed before its time",
+            'take path = "through", or leave them out',
+        )
+    if job.timing != "shared" or job.degree != 5:
+        raise InputError(
+            f'{where}: lines and speeds of the tool need timing = "shared" and degree 5',
+            "leave timing and degree out",
+        )
+    vias = [way.via for way in job.ways]
+    if vias != sorted(set(vias)) or (vias and vias[-1] >= len(job.via)):
+        raise InputError(
+            f"{where}: its ways lead to via points {vias}", "give each via point one way, in order"
+        )
+    led = {way.via for way in job.ways if way.line}
+    for way in job.ways:
+        if way.blend_mm and way.via + 1 not in led:
+            raise InputError(
+                f"{where}: blend_mm at P{way.via} needs a line on both sides of it",
+                "leave it out: the motion rests there; or give the next via point line = true",
+            )
+    for stop in job.stops:
+        if stop.dwell_s > 0.0:
+            raise InputError(
+                f"{where}: lines of the tool and dwell_s do not go together",
+                "leave dwell_s out, or wait in a sequence",
+            )
+        if any(way.blend_mm and way.via == stop.via for way in job.ways):
+            raise InputError(
+                f"{where}: the motion cannot rest at P{stop.via} and cut its corner", "leave one out"
+            )
+
+
 def is_free(job: Job) -> bool:
     """Whether the path may leave the spline through the via points; a corridor of 0 leaves it no room."""
     return job.path == "free" and 0.0 not in (job.corridor_deg, job.corridor_mm)
@@ -117,7 +158,9 @@ def _check_path(job: Job) -> None:
         raise InputError(
             f"{where}: {corridors[0]} must be 0 or more", f"give {corridors[0]} a width, or leave it out"
         )
-    if job.stops and not is_free(job):
+    if leads_tool(job):
+        _check_ways(job, where)
+    elif job.stops and not is_free(job):
         raise InputError(
             f"{where}: the spline through the via points rests at its ends only",
             'a stop needs path = "free", or plan the stretches between the stops one by one with --split',

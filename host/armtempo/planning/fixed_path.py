@@ -46,22 +46,38 @@ class Optimum:
     """No axis nearby with as many variables takes less; 0 where that was not found out."""
 
 
+@dataclass(frozen=True, eq=False)
+class Along:
+    """What has limits along a path besides its joints: the way of the tool, and parts of it.
+
+    ``pieces``: power coefficients on each segment of the time axis, (V, m, degree + 1), of which only derivatives
+    count; ``limits``: of its first three derivatives by time, (V, 3).
+    """
+
+    pieces: Array
+    limits: Array
+
+
 class FixedPath:
     """A path with limits, whose time axis has ``refine`` segments for each of the path.
 
     ``angle_points_deg``: (n + degree, J), one of ``limits`` each. With ``mirrored`` ends the axis is one of
-    intervals (``time_axis.step_map``), else all differences of its control points are free.
+    intervals (``time_axis.step_map``), else all differences of its control points are free. ``along``: what else has
+    limits along it.
     """
 
     def __init__(
         self, angle_points_deg: Array, degree: int, limits: Sequence[Limits], refine: int = 1,
-        mirrored: bool = False,
+        mirrored: bool = False, along: Along | None = None,
     ) -> None:  # fmt: skip
         pieces = bspline.subdivide(bspline.polynomials(angle_points_deg, degree), refine)
         self.degree, self.refine = degree, refine
         self.variables = MotionVariables(len(pieces), degree, 0)
         self.angle = np.ascontiguousarray(np.moveaxis(pieces, 2, 0))
         self.limits = np.array([limit.values for limit in limits])
+        if along is not None:
+            self.angle = np.concatenate([self.angle, along.pieces])
+            self.limits = np.concatenate([self.limits, along.limits])
         self._weights = time_weights(self.variables)
         self._equalities = _mirror(self.variables) if mirrored else Equalities.none()
 

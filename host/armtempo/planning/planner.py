@@ -33,6 +33,10 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     checks.check_job(arm, job)
     via, notes = via_angles(arm, job)
     way = free_plan.motion if checks.is_free(job) else through_plan.motion
+    if checks.leads_tool(job):
+        from armtempo.planning.line import line_plan  # here, because most jobs need no kinematics
+
+        way = line_plan.motion
     with watched(progress) as told:
         planned = way(arm, job, via, told)
     trajectory = planned.trajectory

@@ -17,7 +17,9 @@ from armtempo.model.posture import ArmPosture
 from armtempo.model.sequence import Sequence
 from armtempo.model.sequence_plan import SequencePlan, SequenceRow, check_size
 from armtempo.model.steps import SourceMotion, Step
+from armtempo.model.tool_pose import Pose
 from armtempo.planning import checks, planner, via_points
+from armtempo.planning.line import line_move
 from armtempo.splines.trajectory import Trajectory
 
 Angles = tuple[float, ...]
@@ -111,6 +113,8 @@ class _Compiler:
         return [*(first if apart else ()), begin, *rows, close], last
 
     def _goto(self, step: kinds.Goto, here: _End) -> tuple[list[SequenceRow], _End]:
+        if step.line:
+            return self._line(step, here)
         target = self._target(step)
         if here.angles_deg is None or here.angles_deg == target.angles_deg:
             return [], _End(target.angles_deg, target.name)
@@ -119,6 +123,34 @@ class _Compiler:
             self._known[key] = self._add(self._straight(step, here.angles_deg, target.angles_deg))
         words = f"goto {target.name}"
         return [_move(self._known[key], step.step, words)], _End(target.angles_deg, target.name)
+
+    def _line(self, step: kinds.Goto, here: _End) -> tuple[list[SequenceRow], _End]:
+        """A straight line of the tool; to a posture given as a pose in the branch in which the arm is."""
+        posture = self.arm.posture(step.target) if isinstance(step.target, str) else step.target
+        pose = posture.where if isinstance(posture, ArmPosture) else None
+        target = None if isinstance(pose, Pose) else self._target(step)
+        if here.angles_deg is None:
+            raise InputError(
+                f"{step.where}goto: a line begins somewhere, and where the arm stands is not known",
+                "give the sequence a start, or put a goto without line before it",
+            )
+        if target and target.angles_deg == here.angles_deg:
+            return [], here
+        key = ("line", here.angles_deg, target.angles_deg if target else pose, step.speed_mm_s)
+        if key not in self._known:
+            to = target.angles_deg if target else pose
+            assert to is not None
+            try:
+                found = line_move.straight_line(self.arm, here.angles_deg, to, step.speed_mm_s, self.progress)
+            except ArmtempoError as error:
+                raise type(error)(f"{step.where}goto: {error.problem}", error.hint) from error
+            self._known[key] = self._add(found)
+        if target:
+            end = _End(target.angles_deg, target.name)
+        else:
+            leg = self.legs[self._known[key]]
+            end = _End(_angles(leg(leg.duration_s)), posture.name if isinstance(posture, ArmPosture) else "")
+        return [_move(self._known[key], step.step, f"line to {end.name}")], end
 
     def _run(self, step: kinds.RunMotion, here: _End) -> tuple[list[SequenceRow], _End]:
         motion = self._motion(step.motion)

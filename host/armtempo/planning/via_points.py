@@ -106,10 +106,15 @@ def resolve(arm: Arm, job: Job) -> Resolved:
     notes: list[Note] = []
     posture = setup.home
     branch: Branch | None = None
+    led = {way.via for way in job.ways if way.line}
     for number, via in enumerate(job.via):
         where = f"job {job.name!r}, P{number}"
         choice = None
-        if isinstance(via, Pose):
+        if number in led and isinstance(via, Pose):
+            target = via.exact(where)
+            needed = _led(arm, job, number, np.degrees(postures[-1])[setup.driven], setup)
+            notes += _miss_note(setup, target, needed, number)
+        elif isinstance(via, Pose):
             target = via.exact(where)
             previous = posture if via.posture_deg is None else _preferred(setup, via.posture_deg, where)
             home_first = via.posture_deg in (None, arm.all_home_deg)
@@ -124,6 +129,15 @@ def resolve(arm: Arm, job: Job) -> Resolved:
             if before and Pose in (type(via), type(job.via[number - 1])):
                 notes += _branch_note(before, branch, choice, number)
     return Resolved(np.degrees(np.array(postures)[:, setup.driven]), tuple(notes))
+
+
+def _led(arm: Arm, job: Job, number: int, before_deg: Array, setup: _Setup) -> Array:
+    """Where the line to a via point leads to from driven angles (J,): all joints, (joints,) in rad."""
+    from armtempo.planning.line import stretches  # here, because most jobs have no lines
+
+    found = setup.home.copy()
+    found[setup.driven] = np.radians(stretches.end_deg(arm, job, number, before_deg))
+    return found
 
 
 def posture_deg(arm: Arm, posture: ArmPosture) -> Array:

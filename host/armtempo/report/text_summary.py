@@ -76,6 +76,9 @@ def _settings(plan: Plan) -> list[str]:
     if checks.is_free(job):
         pieces = len(first.angle_points_deg) - first.degree
         return ["free path", timing, f"{pieces} pieces{auto}", f"{job.starts} starts", f"seed {job.seed}"]
+    if checks.leads_tool(job):
+        pieces = len(first.angle_points_deg) - first.degree
+        return ["tool led", timing, f"{pieces} pieces", f"refine {first.refine}{auto}"]
     search = f"{job.optimiser}, {job.population} x {job.iterations}"
     if job.optimiser == GRADIENT:
         search = f"{job.optimiser}, {job.starts} starts"

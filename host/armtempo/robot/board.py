@@ -242,18 +242,20 @@ class Board:
         progress: Progress | None = None,
         stop: StopRequest | None = None,
         speed: float = 1.0,
+        line: bool = False,
     ) -> None:
         """Move straight to a posture, all joints together within their limits; ``progress`` counts seconds.
 
-        ``where``: also the file of a plan, for where it begins. ``speed``: part of the quickest, 0.01 to 1. Raises
-        LinkError where the position is unknown, InputError for a posture that does not fit the arm.
+        ``where``: also the file of a plan, for where it begins. ``speed``: part of the quickest, 0.01 to 1.
+        ``line``: the tool goes in a straight line. Raises LinkError where the position is unknown, InputError for a
+        posture that does not fit the arm, PlanError where the arm cannot follow the line.
         """
         permille(speed)  # InputError for one that is none
         arm = self._known_arm()
         target_deg = posture_deg(where, arm)
         with self._stoppable(stop) as wanted:
             self._start.home_virtual_arm(arm)
-            goto.go_to(self.client, arm, target_deg, wanted, progress, speed)
+            goto.go_to(self.client, arm, target_deg, wanted, progress, goto.MovePace(speed, line))
 
     def jog(
         self,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import dataclass, replace
 
 from armtempo_shared import limits
 
@@ -18,6 +19,17 @@ from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.robot import arm_state
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.stored_motion import TEMPORARY, SampleSink, raise_fault, replay, store
+from armtempo.splines.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class MovePace:
+    """How to go to a posture."""
+
+    speed: float = 1.0
+    """Part of the quickest."""
+    line: bool = False
+    """The tool goes in a straight line, instead of the joints each at an even pace."""
 
 
 def go_to(
@@ -26,16 +38,29 @@ def go_to(
     target_deg: Array,
     stop: StopRequest,
     progress: Progress | None = None,
-    speed: float = 1.0,
+    pace: MovePace | None = None,
 ) -> None:
-    """Move straight to a posture (J,), ``speed`` times as fast as the limits allow; nothing happens if it is there.
+    """Move straight to a posture (J,); nothing happens if it is there.
 
-    Raises LinkError where the position is unknown, BoardError where the board refuses or a fault ends the move.
+    Raises LinkError where the position is unknown, BoardError where the board refuses or a fault ends the move,
+    PlanError where the tool cannot go there in a line.
     """
     if not arm_state.is_at(client, arm, target_deg):
         here = arm_state.posture_deg(client, arm)
-        trajectory = point_to_point.straight(TEMPORARY + "goto", here, target_deg, arm, speed)
+        trajectory = motion(arm, here, target_deg, pace or MovePace())
         move_once(client, encoded_motion.of_trajectory(trajectory, arm), stop, progress)
+
+
+def motion(arm: Arm, here_deg: Array, target_deg: Array, pace: MovePace) -> Trajectory:
+    """The motion from one posture (J,) to another; errors as in ``go_to``."""
+    name = TEMPORARY + "goto"
+    if not pace.line:
+        return point_to_point.straight(name, here_deg, target_deg, arm, pace.speed)
+    from armtempo.planning.line import line_move  # here, because it loads the whole planner
+
+    target = point_to_point.posture(target_deg, arm)
+    trajectory = line_move.straight_line(arm, here_deg.tolist(), target.tolist())
+    return replace(line_move.slower(trajectory, pace.speed), name=name)
 
 
 def go_back(client: Client, motion: EncodedMotion, stop: StopRequest) -> None:

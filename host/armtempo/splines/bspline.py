@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from math import comb
 
@@ -33,12 +34,14 @@ def basis(degree: int) -> Array:
     return matrix
 
 
-def fit(points_deg: ArrayLike, degree: int) -> Array:
+def fit(points_deg: ArrayLike, degree: int, rests: Sequence[int] = ()) -> Array:
     """Control points of the spline through ``points_deg`` that starts and ends at rest.
 
     ``points_deg``: (n + 1,) or (n + 1, J). Returns (n + degree,) or (n + degree, J). A banded solve of
-    Eq. (13) or (14); the cubic rests in speed, the quintic also in acceleration. Raises InputError for
-    fewer than two points or values that are not finite.
+    Eq. (13) or (14); the cubic rests in speed, the quintic also in acceleration. A quintic stands still at the points
+    ``rests`` too, where it may go on in any direction, and only comes near to the two points before and after each;
+    they are at least DEGREE apart and from the ends. Raises
+    InputError for fewer than two points or values that are not finite.
     """
     from scipy.linalg import solve_banded  # here, because loading it takes longer than most commands
 
@@ -52,10 +55,12 @@ def fit(points_deg: ArrayLike, degree: int) -> Array:
     edge = (degree - 1) // 2
     right = np.zeros((len(points) + degree - 1, *points.shape[1:]))
     right[edge : edge + len(points)] = points
-    return np.asarray(solve_banded((degree - 1, degree - 1), _bands(len(right), row, degree), right))
+    for rest in rests:
+        right[rest : rest + degree] = points[rest]
+    return np.asarray(solve_banded((degree - 1, degree - 1), _bands(len(right), row, degree, rests), right))
 
 
-def _bands(size: int, row: Array, degree: int) -> Array:
+def _bands(size: int, row: Array, degree: int, rests: Sequence[int]) -> Array:
     """The matrix of Eq. (13) or (14) in LAPACK band storage, (2 degree - 1, size)."""
     edge, width = (degree - 1) // 2, degree - 1
     bands = np.zeros((2 * width + 1, size))
@@ -69,6 +74,8 @@ def _bands(size: int, row: Array, degree: int) -> Array:
         put(size - 1 - at, size - degree, rest)
     for at in range(edge, size - edge):
         put(at, at - edge, row)
+    for control in (control for rest in rests for control in range(rest, rest + degree)):
+        put(control, control - edge, np.eye(degree)[edge])
     return bands
 
 

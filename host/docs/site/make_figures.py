@@ -55,6 +55,59 @@ def motion() -> Figure:
     return plots.motion(plan.trajectory, [joint.limits for joint in joints], [joint.name for joint in joints])
 
 
+GLUING = """
+name = "glue"
+speed_mm_s = 60
+acceleration_mm_s2 = 400
+[[via]]
+position_mm = [240, 60, 300]
+rpy_deg = [180, 0, 90]
+[[via]]
+position_mm = [320, 60, 300]
+rpy_deg = [180, 0, 90]
+line = true
+[[via]]
+position_mm = [320, -60, 300]
+rpy_deg = [180, 0, 90]
+line = true
+blend_mm = 25
+[[via]]
+position_mm = [240, -60, 300]
+rpy_deg = [180, 0, 90]
+line = true
+[[via]]
+position_mm = [240, 60, 300]
+rpy_deg = [180, 0, 90]
+arc_through_mm = [210, 0, 300]
+"""
+
+
+def lines() -> Figure:
+    """A seam of lines, a cut corner and an arc for the AR4: the tool from above, and its speed."""
+    arm = armtempo.Arm.load("ar4")
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "glue.toml"
+        file.write_text(GLUING, encoding="utf-8")
+        plan = armtempo.plan(arm, file)
+    times = np.linspace(0.0, plan.total_s, 4001)
+    way = armtempo.forward(arm, plan.trajectory(times))[:, :2, 3]
+    corners = armtempo.forward(arm, plan.via_deg)[:, :2, 3]
+    speed = np.linalg.norm(np.diff(way, axis=0), axis=1) / times[1]
+    figure, grid = plots.new_figure(1, 2, 9.6, 3.6)
+    seam, speeds = grid[0]
+    seam.plot(*way.T, color=plots.COLOURS[0])
+    seam.plot(*corners.T, "o", color=plots.COLOURS[1], markersize=4)
+    for number, corner in enumerate(corners[:-1]):
+        seam.annotate(f"P{number}", corner, textcoords="offset points", xytext=(5, 5), fontsize=8)
+    seam.set(aspect="equal", xlabel="x (mm)", ylabel="y (mm)")
+    speeds.plot(times[1:], speed, color=plots.COLOURS[0])
+    speeds.axhline(60.0, color=plots.LIMIT_COLOUR, linestyle="--", linewidth=1.0)
+    speeds.set(xlabel="time (s)", ylabel="speed of the tool (mm/s)")
+    for axes in (seam, speeds):
+        plots.theme(axes)
+    return figure
+
+
 def searches() -> Figure:
     """How the six searches close in on the least of a narrow curved valley in five dimensions (Rosenbrock's)."""
 
@@ -124,6 +177,7 @@ TOOL = ["-m", "armtempo"]
 DRAWN: dict[str, Callable[[], Figure]] = {
     "solutions.png": solutions,
     "motion.png": motion,
+    "lines.png": lines,
     "searches.png": searches,
     "steps.png": steps,
 }

@@ -9,7 +9,7 @@ import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.progress import alive
-from armtempo.planning.free.tool import Tool
+from armtempo.planning.tool import Tool
 from armtempo.splines import bernstein
 
 SHARP = 1e-3

@@ -15,7 +15,7 @@ from armtempo.planning import planner
 from armtempo.planning.free import corridor
 from armtempo.planning.free.angle_bounds import of_path
 from armtempo.planning.free.layout import DEGREE
-from armtempo.planning.free.tool import Tool
+from armtempo.planning.tool import Tool
 from armtempo.splines import bspline
 
 _NARROWER = 8

@@ -19,10 +19,10 @@ from armtempo.planning import collocation
 from armtempo.planning.collocation import Curve, Points
 from armtempo.planning.free import angle_bounds
 from armtempo.planning.free.layout import DEGREE, DWELL_SEGMENTS, Layout, Vias
-from armtempo.planning.free.tool import Tool
 from armtempo.planning.free.tool_rows import ToolRows, ToolTargets
 from armtempo.planning.limit_rows import LimitRows
 from armtempo.planning.motion_program import Block, MotionProgram, mean_slopes, time_weights
+from armtempo.planning.tool import Tool
 from armtempo.planning.variables import MotionVariables, time_points
 from armtempo.splines import bspline
 

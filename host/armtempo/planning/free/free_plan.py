@@ -23,10 +23,10 @@ from armtempo.planning.free.angle_bounds import of_path
 from armtempo.planning.free.free_motion import Demand, FreeMotion, Tolerance, through
 from armtempo.planning.free.free_path import Effort, Shortest
 from armtempo.planning.free.layout import DEGREE, LEAST_PIECES, uniform
-from armtempo.planning.free.tool import Tool
 from armtempo.planning.lower_bounds import Floor
 from armtempo.planning.planned import Planned
 from armtempo.planning.time_parameterization import MIN_DURATION_S
+from armtempo.planning.tool import Tool
 from armtempo.planning.variables import time_points
 from armtempo.splines import bspline, extremes, time_axis
 from armtempo.splines.trajectory import JointSpline, Trajectory

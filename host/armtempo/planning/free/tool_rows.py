@@ -8,7 +8,7 @@ import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.planning.collocation import Points
-from armtempo.planning.free.tool import Tool, ToolState
+from armtempo.planning.tool import Tool, ToolState
 from armtempo.planning.variables import MotionVariables, angle_basis
 
 

@@ -14,6 +14,7 @@ from armtempo.basics.errors import InputError, PlanError
 from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint
 from armtempo.planning import brake_time, point_to_point
+from armtempo.planning.brake_time import BrakeTimes
 from armtempo.planning.jog import jog_law
 from armtempo.planning.jog.jog_law import DEGREE, WayLaw, WayLimits
 from armtempo.planning.jog.jog_line import AXES, FollowedLine, ToolLine
@@ -64,8 +65,8 @@ class JogMotion:
     """A jog that is planned."""
 
     trajectory: Trajectory
-    brake_s: float
-    """From anywhere on it the arm can come to rest in this time."""
+    brakes: BrakeTimes
+    """How long it takes to come to rest."""
     ends: str
     """Why it ends before it was to, in words; "" if it does not."""
 
@@ -115,7 +116,7 @@ def plan(name: str, arm: Arm, here_deg: Sequence[float], move: JogMove, speed: f
     )
     trajectory, ends = found
     limits = [joint.limits for joint in arm.driven]
-    return JogMotion(trajectory, brake_time.brake_time_s(trajectory, limits), ends)
+    return JogMotion(trajectory, brake_time.of_motion(trajectory, limits), ends)
 
 
 def number_of_joint(arm: Arm, joint: int | str) -> int:

@@ -48,18 +48,40 @@ class Tool:
         """For angles (P, J) of the moving joints."""
         chained = self._frames(angles_deg)
         *rotation, position = (np.stack(part, axis=-1) for part in chained[-1])
+        axes, slopes = self._by_row(chained, position)
+        by_joint = "rpi,rj->pij"
+        return ToolState(
+            position,
+            np.stack(rotation, axis=-1),
+            np.einsum(by_joint, slopes, self.turns),
+            np.einsum(by_joint, axes, self.turns),
+        )
+
+    def _by_row(self, chained: list[Frame[Array]], position: Array) -> tuple[Array, Array]:
+        """Axis of each row that turns, for a degree, and how the tool moves with it: each (R, P, 3)."""
         axes, slopes = [], []
         for row in self._rows:
             axis = np.radians(1.0) * np.stack(chained[row].z, axis=-1)
             axes.append(axis)
             slopes.append(np.cross(axis, position - np.stack(chained[row].origin, axis=-1)))
-        by_joint = "rpi,rj->pij"
-        return ToolState(
-            position,
-            np.stack(rotation, axis=-1),
-            np.einsum(by_joint, np.array(slopes), self.turns),
-            np.einsum(by_joint, np.array(axes), self.turns),
-        )
+        return np.array(axes), np.array(slopes)
+
+    def moved(self, angles_deg: Array, rate: Array, bend: Array) -> tuple[Array, Array]:
+        """First and second derivatives of the position where angles (P, J) have these, each (P, J): each (P, 3).
+
+        As a row turns, it carries the axes of those after it along.
+        """
+        chained = self._frames(angles_deg)
+        axes, slopes = self._by_row(chained, np.stack(chained[-1].origin, axis=-1))
+        rates, bends = (each @ self.turns.T for each in (rate, bend))
+        first, second = np.zeros(axes.shape[1:]), np.zeros(axes.shape[1:])
+        carried = np.zeros(axes.shape[1:])
+        for number, (axis, slope) in enumerate(zip(axes, slopes, strict=True)):
+            own = rates[:, number, None]
+            first += own * slope
+            second += bends[:, number, None] * slope + own * np.cross(2.0 * carried + own * axis, slope)
+            carried += own * axis
+        return first, second
 
     def positions_mm(self, angles_deg: Array) -> Array:
         """Only where it is, (P, 3), for angles (P, J)."""

@@ -1,0 +1,103 @@
+"""What a job asks of the tool on the way to a via point: a straight line, an arc, a speed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from armtempo.basics.arguments import checked_fields
+from armtempo.basics.errors import InputError
+from armtempo.formats.toml_table import Table
+
+LINE_TOLERANCE_MM, LINE_TOLERANCE_DEG = 0.5, 0.5
+"""How far the tool may leave a line or an arc, unless the job says otherwise."""
+TOLERANCE_MM, TOLERANCE_DEG = (0.01, 100.0), (0.01, 90.0)
+"""Least and largest values."""
+LEAST = 1e-3
+"""Speeds, accelerations and cut corners are at least so much."""
+MOST = 1e6
+KEYS = ("line", "arc_through_mm", "blend_mm", "speed_mm_s", "acceleration_mm_s2")
+"""What a via point's table may ask of the way to it."""
+
+
+@checked_fields
+@dataclass(frozen=True)
+class ToolWay:
+    """The way to via point ``via``, counted from 0."""
+
+    via: int
+    line: bool = False
+    """The tool follows the straight line, or with ``arc_through_mm`` the arc, and turns evenly."""
+    arc_through_mm: tuple[float, ...] | None = None
+    """A point (3,) between the via points."""
+    tolerance_mm: float = LINE_TOLERANCE_MM
+    tolerance_deg: float = LINE_TOLERANCE_DEG
+    """How far the tool may leave it."""
+    blend_mm: float = 0.0
+    """So far before and after the via point the corner to the next line is cut; 0: the motion rests there."""
+    speed_mm_s: float | None = None
+    acceleration_mm_s2: float | None = None
+    """The tool's limits on the way; None: those of the job."""
+
+    def __post_init__(self) -> None:
+        """InputError for what no planner can keep."""
+        where = f"the way to P{self.via}"
+        if self.via < 1:
+            raise InputError(f"{where}: nothing leads there", "give line at a later via point")
+        if self.arc_through_mm is not None and (not self.line or len(self.arc_through_mm) != 3):
+            raise InputError(
+                f"{where}: an arc goes through a point x, y, z", "give 3 numbers, and line = true"
+            )
+        if self.blend_mm and not self.line:
+            raise InputError(f"{where}: blend_mm cuts the corner at the end of a line", "add line = true")
+        for key, (least, most) in (("tolerance_mm", TOLERANCE_MM), ("tolerance_deg", TOLERANCE_DEG)):
+            if not least <= getattr(self, key) <= most:
+                raise InputError(
+                    f"{where}: {key} {getattr(self, key):g} is not allowed", f"give {least:g} to {most:g}"
+                )
+        for key in ("blend_mm", "speed_mm_s", "acceleration_mm_s2"):
+            value = getattr(self, key)
+            if value is None or (key == "blend_mm" and value == 0.0):
+                continue
+            if not LEAST <= value <= MOST:
+                raise InputError(f"{where}: {key} {value:g} is not allowed", f"give {LEAST:g} to {MOST:g}")
+
+
+def read(table: Table, via: int) -> ToolWay | None:
+    """What the table of a via point asks of the way to it, None where nothing; InputError for what is not allowed."""
+    if not any(table.has(key) for key in KEYS):
+        table.known(*KEYS)
+        return None
+    arc = table.numbers("arc_through_mm", 3) if table.has("arc_through_mm") else None
+    line = table.boolean("line", arc is not None)
+    if via == 0:
+        key = next(key for key in KEYS if table.has(key))
+        raise table.fail(key, "left out at the first via point: nothing leads there")
+    if arc and not line:
+        raise table.fail("line", "true with arc_through_mm")
+    if table.has("blend_mm") and not line:
+        raise table.fail("blend_mm", "given with line = true only")
+    return ToolWay(
+        via,
+        line,
+        arc,
+        _tolerance(table, "tolerance_mm", TOLERANCE_MM, LINE_TOLERANCE_MM) if line else LINE_TOLERANCE_MM,
+        _tolerance(table, "tolerance_deg", TOLERANCE_DEG, LINE_TOLERANCE_DEG) if line else LINE_TOLERANCE_DEG,
+        table.number("blend_mm", least=LEAST, most=MOST) if table.has("blend_mm") else 0.0,
+        limit(table, "speed_mm_s"),
+        limit(table, "acceleration_mm_s2"),
+    )
+
+
+def _tolerance(table: Table, key: str, allowed: tuple[float, float], default: float) -> float:
+    return table.number(key, default, least=allowed[0], most=allowed[1])
+
+
+def limit(table: Table, key: str) -> float | None:
+    """A limit of the tool, None where it is not given."""
+    return table.number(key, least=LEAST, most=MOST) if table.has(key) else None
+
+
+def at(ways: Sequence[ToolWay], via: int) -> ToolWay | None:
+    """What is asked of the way to this via point."""
+    return next((way for way in ways if way.via == via), None)

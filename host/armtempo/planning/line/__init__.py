@@ -1,0 +1,1 @@
+"""Straight lines and arcs of the tool, and speeds that it keeps."""

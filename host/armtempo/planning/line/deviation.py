@@ -1,0 +1,125 @@
+"""How far the tool leaves its way, proven for all of it.
+
+At equal u, the tool of the joints' spline and the place that the way has there differ by e(u). Over a piece of length h
+it is above the chord between e at both ends by no more than h^2 / 8 of the largest second derivative; both second
+derivatives are bounded by Bernstein coefficients. Pieces that may hold the largest are halved.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from armtempo.basics.arrays import Array
+from armtempo.basics.progress import alive
+from armtempo.model.tool_pose import APPROACH, WHOLE
+from armtempo.planning.line.tool_path import Bounds, ToolPath
+from armtempo.planning.tool import Tool
+from armtempo.splines import bernstein
+
+_SHARP = 0.02
+"""How far, relative, a bound may lie above what is reached."""
+_MOST_PIECES = 20_000
+
+
+class LineDeviation(NamedTuple):
+    """No place of the way is left by more."""
+
+    position_mm: float
+    rotation_deg: float
+
+
+class _Bends(NamedTuple):
+    """Bounds of second derivatives over pieces, each (N,): of the position in mm, of the rotation's matrix."""
+
+    position: Array
+    rotation: Array
+
+
+def proven(
+    angles_deg: Array, ways: Array, tool: Tool, path: ToolPath, fixed: tuple[str, ...], enough: LineDeviation
+) -> LineDeviation:
+    """Bounds on the deviation of a spline from its way.
+
+    ``angles_deg``: Bernstein coefficients (S, 6, J), ``ways``: (S, 6). Found to 2 %, or to that part of ``enough``.
+    """
+    bounds = path.bounds
+    floor = np.array([enough.position_mm, _chord(enough.rotation_deg)]) * _SHARP
+    counts = np.array([1.0, 1.0 if fixed else 0.0])
+    outside = max(0.0, -float(ways.min()), float(ways.max()) - path.length)
+    best = np.zeros(2)
+    while True:
+        alive()
+        reached = counts * _at_ends(angles_deg, ways, tool, path, fixed)
+        bends = _bends(angles_deg, ways, tool, bounds)
+        best = np.maximum(best, reached.max(axis=0))
+        most = reached + counts * np.stack(bends, axis=1) / 8.0
+        open_ = np.any(most > best * (1.0 + _SHARP) + floor, axis=1)
+        if not open_.any() or 2 * np.count_nonzero(open_) > _MOST_PIECES:
+            found = np.maximum(best * (1.0 + _SHARP) + floor, most.max(axis=0) if open_.any() else 0.0)
+            beyond_deg = float(np.degrees(bounds.turn)) * outside
+            turned_deg = _degrees(float(found[1])) + beyond_deg
+            return LineDeviation(float(found[0]) + bounds.slope * outside, turned_deg if fixed else 0.0)
+        angles_deg, ways = halved(angles_deg[open_]), halved(ways[open_, :, None])[:, :, 0]
+
+
+def _at_ends(angles_deg: Array, ways: Array, tool: Tool, path: ToolPath, fixed: tuple[str, ...]) -> Array:
+    """Larger deviation at both ends of pieces, (N, 2): position in mm, and the chord of the turn."""
+    found = []
+    for end in (0, -1):
+        state = tool.at(angles_deg[:, end])
+        position, rotation = path.poses(ways[:, end])
+        away = np.linalg.norm(state.position_mm - position, axis=1)
+        axes = slice(2, 3) if fixed == (APPROACH,) else slice(0, 3)
+        turned = (state.rotation - rotation)[:, :, axes]
+        found.append(np.stack([away, _per_axis(fixed) * np.linalg.norm(turned, axis=(1, 2))], axis=1))
+    return np.asarray(np.maximum(found[0], found[1]))
+
+
+def _per_axis(fixed: tuple[str, ...]) -> float:
+    """Brings the norm of a difference of rotations to that of one axis square to the turn: 2 sin(angle / 2)."""
+    return float(np.sqrt(0.5)) if fixed == WHOLE else 1.0
+
+
+def _chord(angle_deg: float) -> float:
+    return 2.0 * float(np.sin(np.radians(min(angle_deg, 180.0)) / 2.0))
+
+
+def _degrees(chord: float) -> float:
+    return float(np.degrees(2.0 * np.arcsin(min(chord / 2.0, 1.0))))
+
+
+def _bends(angles_deg: Array, ways: Array, tool: Tool, bounds: Bounds) -> _Bends:
+    """Largest second derivative over each piece of arm and way together.
+
+    Columns of the Jacobian are no longer than the reach of their joint; as another joint turns, they change by no more
+    than the reach of the outer one of both. Axes turn no faster than all joints together.
+    """
+    turns = np.radians(angles_deg @ tool.turns.T)
+    speed, bend = derivatives(turns, 2)
+    reach = tool.reach_mm
+    outer = np.minimum(reach[:, None], reach[None, :])
+    position = bend @ reach + np.einsum("nk,kj,nj->n", speed, outer, speed)
+    turn = speed.sum(axis=1)
+    rotation = bend.sum(axis=1) + 2.0 * turn**2
+    way_speed, way_bend = (each[:, 0] for each in derivatives(ways[:, :, None], 2))
+    position = position + bounds.slope * way_bend + bounds.bend * way_speed**2
+    rotation = rotation + bounds.turn * way_bend + (bounds.turn_bend + bounds.turn**2) * way_speed**2
+    return _Bends(position, rotation)
+
+
+def derivatives(pieces: Array, orders: int) -> list[Array]:
+    """Largest first and later derivatives over Bernstein pieces (N, 6, J): each (N, J)."""
+    found, scale = [], 1.0
+    for _ in range(orders):
+        scale *= pieces.shape[1] - 1
+        pieces = np.diff(pieces, axis=1)
+        found.append(scale * np.abs(pieces).max(axis=1))
+    return found
+
+
+def halved(pieces: Array) -> Array:
+    """Both halves of pieces (N, 6, J) by turns: (2 N, 6, J)."""
+    halves = bernstein.halves(np.moveaxis(pieces, 1, 2))
+    return np.asarray(halves.transpose(0, 2, 3, 1).reshape(-1, *pieces.shape[1:]))

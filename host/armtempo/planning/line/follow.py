@@ -1,0 +1,249 @@
+"""The joints' angles along a way of the tool, each posture next to the one before.
+
+The arm stays in its branch, or passes a singular posture where the tool's way leads through it; where the joints cannot
+follow, the error says at which place and why.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import PlanError
+from armtempo.kinematics.branches import branch_of
+from armtempo.kinematics.chain import all_angles_deg
+from armtempo.kinematics.geometry import Geometry
+from armtempo.kinematics.shape import refusals
+from armtempo.model.arm import Arm
+from armtempo.model.tool_pose import APPROACH, WHOLE
+from armtempo.planning.line.tool_path import ToolPath, rotation_vectors
+from armtempo.planning.tool import Tool
+
+STEPS = 32
+"""Places at which a way is looked at, at least."""
+_MOST_STEP_DEG = 4.0
+"""No joint turns farther from one posture to the next."""
+_FINEST = 2.0**-14
+"""Steps of the way are no smaller part of it."""
+_NEWTON_STEPS = 12
+_ON_IT = 1e-9
+"""A posture this near to the way, as a part of the reach or in rad, is on it."""
+_DROPPED = 1e-9
+"""Smaller singular values, as a part of the largest, count as none."""
+_SINGULAR = 0.02
+"""Least singular value of the Jacobian, lengths as parts of the reach: below, a posture is called singular."""
+_STRAIGHT = 0.05
+"""rad; where a joint's turn by so much changes the branch, that part of the arm is straight."""
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A way of the tool for an arm, with what of the orientation counts: WHOLE, (APPROACH,) or ()."""
+
+    arm: Arm
+    path: ToolPath
+    fixed: tuple[str, ...]
+    name: str
+    """What messages call it: "P1 to P2"."""
+
+    def place(self, way: float) -> str:
+        """A place on it in words."""
+        return f"{self.name}, at {max(way, 0.0):.1f} of {self.path.length:.1f} mm"
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """Postures along a course."""
+
+    course: Course
+    tool: Tool
+    ways: Array
+    """(K,), from 0."""
+    angles_deg: Array
+    """(K, J)."""
+
+    @property
+    def end_deg(self) -> Array:
+        """At its end, (J,)."""
+        return np.asarray(self.angles_deg[-1])
+
+    def at(self, ways: Array) -> Array:
+        """The postures at any ways (N,) within it, exactly on it: (N, J)."""
+        near = np.stack([np.interp(ways, self.ways, column) for column in self.angles_deg.T], axis=1)
+        if _is_loose(self.course, self.tool):
+            from scipy.interpolate import (
+                CubicSpline,
+            )  # here, because loading it takes longer than most commands
+
+            near = CubicSpline(self.ways, self.angles_deg)(ways)
+        angles, missed = _corrected(self.course, self.tool, ways, near)
+        worst = int(np.argmax(missed))
+        if not missed[worst] <= _ON_IT:
+            raise _stuck(self.course, self.tool, float(ways[worst]), near[worst])
+        return angles
+
+
+def follow(course: Course, start_deg: Array) -> Followed:
+    """The postures from ``start_deg`` (J,) on, which is at its start.
+
+    Raises PlanError, naming the place, where a joint leaves its range or cannot follow.
+    """
+    tool = Tool(course.arm, list(range(len(course.arm.driven))), start_deg)
+    length, step = course.path.length, 1.0 / STEPS
+    places, postures = [0.0], [np.asarray(start_deg, dtype=float)]
+    while places[-1] < 1.0:
+        step = min(step, 1.0 - places[-1])
+        place = places[-1] + step if 1.0 - places[-1] - step > 1e-9 else 1.0
+        ways = np.array([place * length])
+        near = _ahead(places, postures, place)
+        angles, missed = _corrected(course, tool, ways, near[None])
+        if missed[0] <= _ON_IT and np.max(np.abs(angles[0] - postures[-1])) <= _MOST_STEP_DEG:
+            _check_range(course, float(ways[0]), angles[0])
+            places.append(place)
+            postures.append(angles[0])
+            step = min(2.0 * step, 1.0 / STEPS)
+        elif step > _FINEST:
+            step *= 0.5
+        else:
+            raise _stuck(course, tool, float(places[-1] * length), postures[-1])
+    return Followed(course, tool, np.array(places) * length, np.array(postures))
+
+
+def _ahead(places: list[float], postures: list[Array], place: float) -> Array:
+    """A guess from the last two postures."""
+    if len(places) < 2:
+        return postures[-1]
+    part = (place - places[-1]) / (places[-1] - places[-2])
+    return np.asarray(postures[-1] + min(part, 2.0) * (postures[-1] - postures[-2]))
+
+
+def _corrected(course: Course, tool: Tool, ways: Array, near_deg: Array) -> tuple[Array, Array]:
+    """Postures on the course near some (N, J), and what they still miss, (N,)."""
+    position, rotation = course.path.poses(ways)
+    angles = near_deg.copy()
+    missed = np.full(len(ways), np.inf)
+    for _ in range(_NEWTON_STEPS):
+        gap, slope = _gap(course, tool, position, rotation, angles)
+        missed = np.abs(gap).max(axis=1)
+        if not np.all(np.isfinite(gap)) or missed.max() <= 1e-2 * _ON_IT:
+            break
+        step = np.linalg.pinv(slope, rcond=_DROPPED) @ gap[:, :, None]
+        angles = angles + np.clip(step[:, :, 0], -10.0 * _MOST_STEP_DEG, 10.0 * _MOST_STEP_DEG)
+    return angles, missed
+
+
+def _gap(
+    course: Course, tool: Tool, position: Array, rotation: Array, angles_deg: Array
+) -> tuple[Array, Array]:
+    """How far poses are from postures (N, J), and how that falls with the angles: (N, M) and (N, M, J)."""
+    state = tool.at(angles_deg)
+    reach = float(tool.reach_mm.max()) or 1.0
+    gaps = [(position - state.position_mm) / reach]
+    slopes = [state.slope_mm_deg / reach]
+    if course.fixed == WHOLE:
+        gaps.append(rotation_vectors(rotation @ np.swapaxes(state.rotation, 1, 2)))
+        slopes.append(state.axes_deg)
+    elif course.fixed == (APPROACH,):
+        axis = state.rotation[:, :, 2]
+        gaps.append(rotation[:, :, 2] - axis)
+        slopes.append(np.cross(state.axes_deg, axis[:, :, None], axis=1))
+    return np.concatenate(gaps, axis=1), np.concatenate(slopes, axis=1)
+
+
+def _rank(fixed: tuple[str, ...]) -> int:
+    return 6 if fixed == WHOLE else 5 if fixed else 3
+
+
+def _is_loose(course: Course, tool: Tool) -> bool:
+    """Whether the arm can take many postures at a place."""
+    return bool(tool.turns.shape[1] > _rank(course.fixed))
+
+
+def singular_value(course: Course, tool: Tool, ways: Array, angles_deg: Array) -> Array:
+    """How far postures (N, J) are from a singular one: the least singular value of the Jacobian that counts, (N,)."""
+    position, rotation = course.path.poses(ways)
+    slope = np.degrees(_gap(course, tool, position, rotation, angles_deg)[1])
+    values = np.linalg.svd(slope, compute_uv=False)
+    return np.asarray(values[:, min(_rank(course.fixed), values.shape[1]) - 1])
+
+
+def _check_range(course: Course, way: float, angles_deg: Array) -> None:
+    for joint, angle in zip(course.arm.driven, angles_deg, strict=True):
+        low, high = joint.range_deg
+        if not low - 1e-6 <= angle <= high + 1e-6:
+            end = low if angle < low else high
+            raise PlanError(
+                f"{course.place(way)}: {joint.name} reaches the end of its range, {end:g} degrees, so the tool "
+                "cannot follow",
+                "move the line, or give posture_deg of another branch at its start",
+            )
+
+
+def _stuck(course: Course, tool: Tool, way: float, angles_deg: Array) -> PlanError:
+    """Why the joints cannot follow from here on."""
+    place = course.place(way)
+    if tool.turns.shape[1] < _rank(course.fixed):
+        count = tool.turns.shape[1]
+        return PlanError(
+            f"{place}: {count} joints with a motor cannot keep the tool's orientation on the way as well",
+            "ask for less of the orientation at its end: approach, or position_mm alone",
+        )
+    least = float(singular_value(course, tool, np.array([way]), angles_deg[None])[0])
+    if least < _SINGULAR:
+        return PlanError(
+            f"{place}: the arm comes to a singular posture{_which(course.arm, angles_deg)}, where its joints cannot "
+            "follow the tool",
+            "move the line away from it, turn the tool otherwise, or leave line out between these via points",
+        )
+    return PlanError(f"{place}: the arm reaches no further", "move the line nearer to the arm")
+
+
+def passed(found: Followed) -> list[str]:
+    """Where the arm changes its branch on the way, or comes near to a singular posture, in words."""
+    course, words = found.course, []
+    geometry = Geometry.of(course.arm)
+    if not refusals(geometry):
+        postures = np.radians(all_angles_deg(course.arm, found.angles_deg))
+        before = branch_of(geometry, postures[0])
+        for way, posture in zip(found.ways[1:], postures[1:], strict=True):
+            here = branch_of(geometry, posture).after(before)
+            if parts := before.differs(here):
+                words.append(
+                    f"{course.place(float(way))}: the arm changes its branch ({', '.join(parts)}), from {before} to "
+                    f"{here}, through a singular posture"
+                )
+            before = here
+    if not _is_loose(course, found.tool):
+        values = singular_value(course, found.tool, found.ways, found.angles_deg)
+        least = int(np.argmin(values))
+        if values[least] < _SINGULAR and not words:
+            posture = found.angles_deg[least]
+            words.append(
+                f"{course.place(float(found.ways[least]))}: the arm comes near to a singular posture"
+                f"{_which(course.arm, posture)}, so its joints turn far there"
+            )
+    return words
+
+
+def _which(arm: Arm, angles_deg: Array) -> str:
+    """What of the arm is singular, in words, for arms of the closed form."""
+    straight = straight_parts(arm, angles_deg)
+    return f" ({', '.join(straight)})" if straight else ""
+
+
+def straight_parts(arm: Arm, angles_deg: Array) -> list[str]:
+    """Which of base, elbow and wrist are about to change their branch, in words; none for arms without closed form."""
+    geometry = Geometry.of(arm)
+    if refusals(geometry):
+        return []
+    here = np.radians(all_angles_deg(arm, angles_deg))
+    words = {"base": "wrist over the base", "elbow": "elbow straight", "wrist": "wrist straight"}
+    found = set()
+    for joint in range(len(here)):
+        for shift in (-_STRAIGHT, _STRAIGHT):
+            turned = here.copy()
+            turned[joint] += shift
+            found |= set(branch_of(geometry, here).differs(branch_of(geometry, turned)))
+    return [words[part] for part in words if part in found]

@@ -1,0 +1,203 @@
+"""The joints' spline of a job that leads the tool, of as many segments as prove that the tool stays near its way.
+
+Each stretch from rest to rest is a spline of its own: at a rest between two, five control points are the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from armtempo_shared import motion as record
+from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS
+
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import PlanError
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
+from armtempo.planning import checks
+from armtempo.planning.free.angle_bounds import of_path
+from armtempo.planning.line import stretches as cut
+from armtempo.planning.line.deviation import LineDeviation, proven
+from armtempo.planning.line.follow import Followed, follow
+from armtempo.planning.line.stretches import Stretch
+from armtempo.splines import bspline
+
+DEGREE = 5
+_LINE_PIECES, _THROUGH_PIECES = 8, 8
+"""Segments of a line at first, and of the spline between two via points."""
+_SAME_DEG = 1e-4
+"""Two postures as near as this are one."""
+_FLOOR, _CORNER = 0.2, 2.5
+"""Least slowness of the way, and where a corner is cut, as a part of its mean."""
+_SMOOTH = 0.05
+"""The slowness of the way is smoothed over this part of it."""
+_TABLE = 512
+
+
+@dataclass(frozen=True, eq=False)
+class Led:
+    """A stretch with the postures along its way."""
+
+    stretch: Stretch
+    followed: Followed
+    places: Array
+    """Where its knots are: parts of the way at equal steps of u, (_TABLE + 1,)."""
+
+    def ways(self, count: int) -> Array:
+        """Ways at the knots of ``count`` segments: (count + 1,)."""
+        steps = np.linspace(0.0, 1.0, count + 1)
+        parts = np.interp(steps, np.linspace(0.0, 1.0, _TABLE + 1), self.places)
+        return np.asarray(parts * self.followed.course.path.length)
+
+    def keeps(self, away: LineDeviation) -> bool:
+        """Whether the tool is as near to its way as the job asks."""
+        enough = self.stretch.enough
+        return away.position_mm <= enough.position_mm and away.rotation_deg <= enough.rotation_deg
+
+
+@dataclass(frozen=True, eq=False)
+class LinePath:
+    """The joints' spline of all stretches."""
+
+    angle_points_deg: Array
+    """(S + 5, J)."""
+    way_points: Array
+    """Of the ways of all stretches one after the other, as a spline with the same knots: (S + 5,)."""
+    knots: tuple[int, ...]
+    """Segments before each stretch, and all."""
+    arrivals: tuple[int, ...]
+    """Segments before each via point; where a corner is cut, nearly."""
+
+    def deviation(self, number: int, led: Led) -> LineDeviation:
+        """How far the tool leaves its way in a stretch at most."""
+        first, last = self.knots[number], self.knots[number + 1]
+        angles = of_path(self.angle_points_deg, DEGREE)[first:last]
+        ways = of_path(self.way_points[:, None], DEGREE)[first:last, :, 0]
+        course, tool = led.followed.course, led.followed.tool
+        return proven(angles, ways - ways[0, 0], tool, course.path, course.fixed, led.stretch.enough)
+
+
+def led_stretches(arm: Arm, job: Job, via_deg: Array) -> dict[int, Led]:
+    """The stretches of a job in which the tool is led, by their number; PlanError where the arm cannot follow."""
+    speeds = np.array([limit.speed_deg_s for limit in checks.limits_of(arm)])
+    found = {}
+    for number, stretch in enumerate(cut.of_job(job)):
+        if stretch.ways:
+            followed = _followed(arm, job, stretch, via_deg)
+            found[number] = Led(stretch, followed, _places(followed, speeds))
+    return found
+
+
+def _followed(arm: Arm, job: Job, stretch: Stretch, via_deg: Array) -> Followed:
+    found = follow(cut.course(arm, job, stretch, via_deg[stretch.first]), via_deg[stretch.first])
+    off = np.abs(found.end_deg - via_deg[stretch.last])
+    worst = int(np.argmax(off))
+    if off[worst] > _SAME_DEG:
+        raise PlanError(
+            f"{stretch.name}: along the line the arm comes to P{stretch.last} with {arm.driven[worst].name} at "
+            f"{found.end_deg[worst]:.4g} degrees, not {via_deg[stretch.last, worst]:.4g}",
+            f"give P{stretch.last} as a pose, or the angles of the branch of P{stretch.first}; or leave line out",
+        )
+    return found
+
+
+def _places(found: Followed, speeds: Array) -> Array:
+    """Places on the way at equal steps of u: slow at both ends, and where the joints have far to turn."""
+    u = np.linspace(0.0, 1.0, _TABLE + 1)
+    places = found.ways / found.ways[-1]
+    taken = np.abs(np.diff(found.angles_deg, axis=0) / speeds).max(axis=1) / np.diff(places)
+    slow = np.interp(u, 0.5 * (places[1:] + places[:-1]), taken)
+    slow = np.maximum(slow, _FLOOR * slow.mean())
+    path = found.course.path
+    for place, cut_mm in zip(path.starts[1:-1], path.cuts, strict=True):
+        if cut_mm > 0.0:  # as many segments there as on a line so much longer
+            near = np.abs(u * path.length - place) < cut_mm
+            slow[near] = np.maximum(slow[near], _CORNER * slow.mean())
+    reach = int(3 * _SMOOTH * _TABLE)
+    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / (_SMOOTH * _TABLE)) ** 2)
+    slow = np.convolve(np.pad(slow, reach, mode="reflect"), kernel / kernel.sum(), mode="valid")
+    done = np.concatenate([[0.0], np.cumsum(0.5 * (slow[1:] + slow[:-1]))])
+    eased = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+    return np.asarray(np.interp(eased, done / done[-1], u))
+
+
+def proven_path(
+    arm: Arm, job: Job, via_deg: Array, led: Mapping[int, Led]
+) -> tuple[LinePath, dict[int, LineDeviation]]:
+    """The spline with as few segments as prove that the tool stays near its way, and how near in each stretch.
+
+    Raises PlanError where the board could not hold so many.
+    """
+    stretches = cut.of_job(job)
+    most = _most_segments(arm)
+    pieces = [
+        _LINE_PIECES * len(stretch.ways) if stretch.ways else _THROUGH_PIECES * (stretch.last - stretch.first)
+        for stretch in stretches
+    ]
+    if sum(pieces) > most:
+        raise PlanError(
+            f"job {job.name!r}: its lines and the ways between them need {sum(pieces)} segments at least, the board "
+            f"holds {most}",
+            "use fewer via points, or plan the stretches between rests one by one with --split",
+        )
+    while True:
+        path = _path(stretches, pieces, via_deg, led)
+        found = {number: path.deviation(number, one) for number, one in led.items()}
+        wide = [number for number, one in led.items() if not one.keeps(found[number])]
+        if not wide:
+            return path, found
+        for number in wide:
+            pieces[number] *= 2
+        if sum(pieces) > most:
+            raise PlanError(
+                f"{led[wide[0]].stretch.name}: with {pieces[wide[0]] // 2} segments the tool is only proven to stay "
+                f"within {found[wide[0]].position_mm:.3g} mm and {found[wide[0]].rotation_deg:.3g} deg of its way, and "
+                f"the board holds {most} in all",
+                "widen tolerance_mm and tolerance_deg, keep away from singular postures, or plan with --split",
+            )
+
+
+def _most_segments(arm: Arm) -> int:
+    """The most that the board's record holds."""
+    most = MAX_SEGMENTS
+    while record.size(DEGREE, len(arm.driven), True, most, 1) > MAX_MOTION_BYTES:
+        most -= 1
+    return most
+
+
+def _path(
+    stretches: Sequence[Stretch], pieces: Sequence[int], via_deg: Array, led: Mapping[int, Led]
+) -> LinePath:
+    """The spline through postures of all stretches, with a rest between each two."""
+    knots, arrivals = [0], [0]
+    rows = []
+    before = 0.0
+    for number, (stretch, count) in enumerate(zip(stretches, pieces, strict=True)):
+        if number in led:
+            ways = led[number].ways(count)
+            angles = led[number].followed.at(ways)
+            passed = _passed(led[number], ways)
+        else:
+            points = bspline.fit(via_deg[stretch.first : stretch.last + 1], DEGREE)
+            fine = bspline.polynomials(bspline.refined(points, _THROUGH_PIECES, DEGREE), DEGREE)
+            angles = np.concatenate([fine[:, 0], fine[-1:].sum(axis=1)])
+            ways = np.linspace(0.0, 1.0, count + 1)
+            passed = [_THROUGH_PIECES * via for via in range(1, stretch.last - stretch.first + 1)]
+        angles[[0, -1]] = via_deg[[stretch.first, stretch.last]]
+        rows.append(np.column_stack([angles, before + ways])[0 if number == 0 else 1 :])
+        before += float(ways[-1])
+        arrivals += [knots[-1] + knot for knot in passed]
+        knots.append(knots[-1] + count)
+    whole = bspline.fit(np.concatenate(rows), DEGREE, knots[1:-1])
+    return LinePath(np.asarray(whole[:, :-1]), np.asarray(whole[:, -1]), tuple(knots), tuple(arrivals))
+
+
+def _passed(one: Led, ways: Array) -> list[int]:
+    """The knots of a stretch nearest to each of its via points but the first, increasing."""
+    found: list[int] = []
+    for place in one.followed.course.path.starts[1:]:
+        nearest = int(np.argmin(np.abs(ways - place)))
+        found.append(max(nearest, found[-1] + 1) if found else max(nearest, 1))
+    return found

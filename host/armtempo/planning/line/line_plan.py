@@ -1,0 +1,179 @@
+"""The trajectory of a job that leads the tool along lines and arcs, or limits its speed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from armtempo.basics.arrays import Array
+from armtempo.basics.progress import Progress, stage
+from armtempo.model import tool_way
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
+from armtempo.model.parts import Limits
+from armtempo.model.plan import Search
+from armtempo.planning import checks, lower_bounds, time_parameterization
+from armtempo.planning.fixed_path import FixedPath
+from armtempo.planning.free.angle_bounds import of_path
+from armtempo.planning.line.deviation import LineDeviation
+from armtempo.planning.line.follow import passed
+from armtempo.planning.line.line_path import DEGREE, Led, LinePath, led_stretches, proven_path
+from armtempo.planning.line.tool_limits import ToolLimits, along, excess, reached
+from armtempo.planning.lower_bounds import Floor
+from armtempo.planning.planned import Planned
+from armtempo.planning.tool import Tool
+from armtempo.planning.variables import time_points
+from armtempo.splines import bspline, time_axis
+from armtempo.splines.trajectory import JointSpline, Trajectory
+
+_GAP, _PAYS = 1e-3, 1e-3
+"""How near to its local optimum a time axis comes, and what a finer one has to save."""
+_REFINE_FACTOR = 8
+
+
+def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
+    """The motion through via angles (n + 1, J), the tool led as the job asks.
+
+    Raises PlanError, naming via points and place, where the arm cannot follow, or the tool is not proven to stay near
+    its way.
+    """
+    stage("following the tool's way")
+    led = led_stretches(arm, job, via_deg)
+    path, away = proven_path(arm, job, via_deg, led)
+    checks.check_ranges(arm, path.angle_points_deg, DEGREE)
+    notes = [_away(led[number], found) for number, found in away.items()]
+    notes += [words for one in led.values() for words in passed(one.followed)]
+    return _timed(arm, job, path, notes, progress)
+
+
+def _away(led: Led, found: LineDeviation) -> str:
+    turned = f" and {found.rotation_deg:.2g} deg" if led.followed.course.fixed else ""
+    return f"{led.stretch.name}: the tool leaves its way by no more than {found.position_mm:.2g} mm{turned} (proven)"
+
+
+def _timed(arm: Arm, job: Job, path: LinePath, notes: list[str], progress: Progress) -> Planned:
+    """The shortest time axis on the path."""
+    limits = checks.limits_of(arm)
+    segments = path.knots[-1]
+    moving = [
+        int(joint) for joint in np.flatnonzero(np.ptp(path.angle_points_deg, axis=0) > checks.TOLERANCE)
+    ]
+    points, own = path.angle_points_deg[:, moving], [limits[joint] for joint in moving]
+    most = time_parameterization.most_refine(job, segments, len(limits))
+    tool = Tool(arm, list(range(len(limits))), path.angle_points_deg[0])
+    tool_limits = _tool_limits(job, path)
+    pieces = bspline.polynomials(path.angle_points_deg, DEGREE)
+    levels = [job.refine] if isinstance(job.refine, int) else _levels(most)
+    differences, before, best = np.ones(segments + DEGREE - 1), 1, None
+    history = []
+    for number, refine in enumerate(levels):
+        stage(f"refining to {refine}")
+        watched = None
+        if tool_limits.any:
+            fine = bspline.subdivide(pieces, refine)
+            watched = along(fine, tool, tool_limits.refined(refine))
+        axis = FixedPath(points, DEGREE, own, refine, along=watched)
+        found = axis.optimum(time_axis.cut(differences, before, refine, DEGREE), _GAP)
+        history.append(found.total_s)
+        pays = best is None or found.total_s < best[1].total_s * (1.0 - _PAYS)
+        if best is None or found.total_s < best[1].total_s:
+            best = (refine, found)
+        differences, before = found.differences_s, refine
+        progress(number + 1, len(levels))
+        if not pays:
+            break
+    assert best is not None
+    refine, found = best
+    stretch = max(1.0, time_parameterization.MIN_DURATION_S / found.total_s)
+    if tool_limits.any:
+        stage("proving the tool's limits")
+        curve = (
+            _bernstein(path.angle_points_deg, refine),
+            of_path(time_points(found.differences_s, DEGREE)[:, None], DEGREE),
+        )
+        over = excess(curve[0], curve[1][:, :, 0], tool, tool_limits.refined(refine))
+        stretch = max(stretch, over)
+    times = time_points(found.differences_s * stretch, DEGREE)
+    joints = tuple(
+        JointSpline(DEGREE, refine, np.ascontiguousarray(column), times, path.arrivals)
+        for column in path.angle_points_deg.T
+    )
+    floor = _floor(points, path.knots, own, found.total_s)
+    search = Search(
+        joints=tuple(moving),
+        intervals_s=found.differences_s,
+        total_s=found.total_s * stretch,
+        searched_s=history[0],
+        evaluations=len(history),
+        history_s=np.minimum.accumulate(history),
+        optimum_s=found.bound_s,
+        floor_s=floor.time_s,
+        floor_kind=floor.kind,
+    )
+    notes += _limit_notes(job, path, refine, times, tool)
+    return Planned(Trajectory(job.name, joints, True), (search,), tuple(notes))
+
+
+def _levels(most: int) -> list[int]:
+    """Refinements to go through, each only where the one before saved enough."""
+    return [1, min(_REFINE_FACTOR, most)][: min(most, 2)]
+
+
+def _floor(points: Array, knots: Sequence[int], limits: Sequence[Limits], about_s: float) -> Floor:
+    """No time law along the path that rests between its stretches takes less."""
+    parts = []
+    for first, last in pairwise(knots):
+        stretch = points[first : last + DEGREE]
+        moving = np.ptp(stretch, axis=0) > checks.TOLERANCE
+        own = [limit for limit, moves in zip(limits, moving, strict=True) if moves]
+        share = about_s * (last - first) / knots[-1]
+        parts.append(lower_bounds.of_path(stretch[:, moving], DEGREE, own, share))
+    return Floor(sum(part.time_s for part in parts), parts[0].kind)
+
+
+def _bernstein(points: Array, parts: int) -> Array:
+    """Bernstein coefficients of control points (S + 5, J) with each segment cut: (S * parts, 6, J)."""
+    return of_path(bspline.refined(points, parts, DEGREE), DEGREE)
+
+
+def _asked(job: Job, via: int) -> tuple[float, float]:
+    """Limits of the tool's speed and acceleration on the way to a via point; infinite where there is none."""
+    way = tool_way.at(job.ways, via)
+    both = []
+    for key in ("speed_mm_s", "acceleration_mm_s2"):
+        own = getattr(way, key) if way else None
+        asked = own if own is not None else getattr(job, key)
+        both.append(np.inf if asked is None else asked)
+    return both[0], both[1]
+
+
+def _tool_limits(job: Job, path: LinePath) -> ToolLimits:
+    """The tool's limits on each segment; where a corner is cut, its segments keep those of both ways."""
+    segments = path.knots[-1]
+    limits = np.full((2, segments), np.inf)
+    for via, (first, last) in enumerate(pairwise(path.arrivals), 1):
+        from_rest, to_rest = first in path.knots, last in path.knots
+        own = slice(first if from_rest else first - 1, last if to_rest else last + 1)
+        limits[:, own] = np.minimum(limits[:, own], np.array(_asked(job, via))[:, None])
+    return ToolLimits(*limits)
+
+
+def _limit_notes(job: Job, path: LinePath, refine: int, times: Array, tool: Tool) -> list[str]:
+    """What the tool reaches on each way whose speed or acceleration the job limits, proven."""
+    angles, axis = _bernstein(path.angle_points_deg, refine), of_path(times[:, None], DEGREE)[:, :, 0]
+    notes = []
+    for via, (first, last) in enumerate(pairwise(path.arrivals), 1):
+        asked = _asked(job, via)
+        if not np.any(np.isfinite(asked)):
+            continue
+        own = slice(first * refine, last * refine)
+        found = reached(angles[own], axis[own], tool)
+        words = [
+            f"{value:.4g} {unit}"
+            for value, limit, unit in zip(found, asked, ("mm/s", "mm/s²"), strict=True)
+            if np.isfinite(limit)
+        ]
+        notes.append(f"P{via - 1} to P{via}: the tool moves at no more than {' and '.join(words)} (proven)")
+    return notes

@@ -1,0 +1,148 @@
+"""Limits of the tool's speed and acceleration along a path: what a time axis watches, and what is proven of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from armtempo.basics.arrays import Array
+from armtempo.basics.progress import alive
+from armtempo.planning.fixed_path import Along
+from armtempo.planning.line.deviation import derivatives, halved
+from armtempo.planning.tool import Tool
+from armtempo.splines import bspline
+
+_DIRECTIONS = 8
+"""The acceleration is watched in so many directions of the plane in which the tool moves; between two of them it may be
+2 % larger, so each has as much less."""
+_SHARP = 2e-3
+"""How far, relative, a bound may lie above what is reached."""
+_MOST_PIECES = 100_000
+
+
+@dataclass(frozen=True, eq=False)
+class ToolLimits:
+    """Limits on each segment of a path, (S,); infinite where there is none."""
+
+    speed_mm_s: Array
+    acceleration_mm_s2: Array
+
+    @property
+    def any(self) -> bool:
+        """Whether there is one."""
+        return bool(np.any(np.isfinite(self.speed_mm_s)) or np.any(np.isfinite(self.acceleration_mm_s2)))
+
+    def refined(self, parts: int) -> ToolLimits:
+        """The same with each segment cut into ``parts``."""
+        return ToolLimits(np.repeat(self.speed_mm_s, parts), np.repeat(self.acceleration_mm_s2, parts))
+
+
+def along(pieces_deg: Array, tool: Tool, limits: ToolLimits) -> Along:
+    """The way of the tool on each segment, for a time axis to watch; ``pieces_deg``: power coefficients (S, 6, J).
+
+    Speeds and positions at six places of a segment make polynomials: near enough for the search, what comes of it is
+    proven by ``excess``.
+    """
+    degree = pieces_deg.shape[1] - 1
+    u = 0.5 - 0.5 * np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
+    powers = u[:, None] ** np.arange(degree + 1)
+    angles = np.einsum("up,spj->suj", powers, pieces_deg)
+    rates = np.einsum("up,spj->suj", powers[:, :-1], bspline.derivative(pieces_deg))
+    state = tool.at(angles.reshape(-1, angles.shape[2]))
+    moved = np.einsum("nij,nj->ni", state.slope_mm_deg, rates.reshape(-1, angles.shape[2]))
+    moved = moved.reshape(*angles.shape[:2], 3)
+    fitted = np.linalg.pinv(powers)
+    positions = np.einsum("pu,sui->spi", fitted, state.position_mm.reshape(moved.shape))
+    speed = np.einsum("pu,su->sp", np.linalg.pinv(powers[:, :-1]), np.linalg.norm(moved, axis=2))
+    way = np.concatenate([np.zeros((len(speed), 1)), speed / np.arange(1, degree + 1)], axis=1)
+    scale = np.cos(np.pi / (2 * _DIRECTIONS))
+    watched = [way / limits.speed_mm_s[:, None]]
+    for direction in _plane_directions(positions):
+        part = np.einsum("spi,si->sp", positions, direction)
+        watched.append(part / (scale * limits.acceleration_mm_s2[:, None]))
+    most = np.full((len(watched), 3), np.inf)
+    most[0, 0], most[1:, 1] = 1.0, 1.0
+    return Along(np.array(watched), most)
+
+
+def _plane_directions(positions: Array) -> list[Array]:
+    """Directions (S, 3) in the plane in which each segment bends; ``positions``: power coefficients (S, 6, 3)."""
+    _, _, axes = np.linalg.svd(positions[:, 1:] * np.arange(1, positions.shape[1])[:, None])
+    angles = np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS
+    return [np.cos(angle) * axes[:, 0] + np.sin(angle) * axes[:, 1] for angle in angles]
+
+
+def reached(angles_deg: Array, times_s: Array, tool: Tool) -> tuple[float, float]:
+    """Bounds of the tool's speed (mm/s) and acceleration (mm/s^2) on pieces.
+
+    ``angles_deg``: Bernstein coefficients (S, 6, J), ``times_s``: (S, 6). With ' = d/du, p the tool's position and
+    n = p'' t' - p' t'', speed is |p'| / t' and acceleration |n| / t'^3; n' = p''' t' - p' t'''.
+    """
+    group = np.zeros(len(angles_deg), dtype=np.intp)
+    speed, acceleration = _largest(angles_deg, times_s, tool, group, 1)
+    return float(speed[0]), float(acceleration[0])
+
+
+def excess(angles_deg: Array, times_s: Array, tool: Tool, limits: ToolLimits) -> float:
+    """The factor on time that brings the tool within its limits, proven; 1 at least. Arguments as in ``reached``."""
+    kinds, group = np.unique(
+        np.stack([limits.speed_mm_s, limits.acceleration_mm_s2], axis=1), axis=0, return_inverse=True
+    )
+    speed, acceleration = _largest(angles_deg, times_s, tool, group.reshape(-1), len(kinds))
+    return float(np.max([1.0, *(speed / kinds[:, 0]), *np.sqrt(acceleration / kinds[:, 1])]))
+
+
+def _largest(
+    angles_deg: Array, times_s: Array, tool: Tool, group: np.ndarray, groups: int
+) -> tuple[Array, Array]:
+    """Bounds of speed and acceleration over the pieces of each group, (groups,): branch and bound by halves."""
+    best = np.zeros((groups, 2))
+    while True:
+        alive()
+        most, here = _bounds(angles_deg, times_s, tool)
+        np.maximum.at(best, group, here)
+        open_ = np.any(most > best[group] * (1.0 + _SHARP) + 1e-9, axis=1)
+        if not open_.any() or 2 * np.count_nonzero(open_) > _MOST_PIECES:
+            best = best * (1.0 + _SHARP) + 1e-9
+            np.maximum.at(best, group, most)
+            return best[:, 0], best[:, 1]
+        angles_deg, group = halved(angles_deg[open_]), np.repeat(group[open_], 2)
+        times_s = halved(times_s[open_, :, None])[:, :, 0]
+
+
+def _bounds(angles_deg: Array, times_s: Array, tool: Tool) -> tuple[Array, Array]:
+    """Speed and acceleration over pieces at most, and in their middle: each (N, 2)."""
+    q, t = (_middle(pieces, order) for pieces, order in ((angles_deg, 2), (times_s[:, :, None], 2)))
+    first, second = tool.moved(*q)
+    t1, t2 = t[1], t[2]
+    bend = second * t1 - first * t2
+    d1, d2, d3 = derivatives(np.radians(angles_deg @ tool.turns.T), 3)
+    outer = np.minimum(tool.reach_mm[:, None], tool.reach_mm[None, :])
+    pairs = np.einsum("nk,kj,nj->n", d1, outer, d1)
+    jump = d2 @ tool.reach_mm + pairs
+    third = d3 @ tool.reach_mm + 3.0 * np.einsum("nk,kj,nj->n", d2, outer, d1) + d1.sum(axis=1) * pairs
+    slopes = np.diff(times_s, axis=1) * (times_s.shape[1] - 1)
+    least, largest = slopes.min(axis=1), slopes.max(axis=1)
+    jerk = derivatives(times_s[:, :, None], 3)[2][:, 0]
+    here = np.linalg.norm(first, axis=1)
+    fastest = here + 0.5 * jump
+    most_bend = np.linalg.norm(bend, axis=1) + 0.5 * (third * largest + fastest * jerk)
+    t1 = t1[:, 0]
+    return (
+        np.stack([fastest / least, most_bend / least**3], axis=1),
+        np.stack([here / t1, np.linalg.norm(bend, axis=1) / t1**3], axis=1),
+    )
+
+
+def _middle(pieces: Array, orders: int) -> list[Array]:
+    """Value and derivatives in the middle of Bernstein pieces (N, 6, J): each (N, J)."""
+    found, scale = [], 1.0
+    for _ in range(orders + 1):
+        degree = pieces.shape[1] - 1
+        binomials = np.array([1.0])
+        for _ in range(degree):  # halving each time
+            binomials = np.convolve(binomials, [0.5, 0.5])
+        found.append(scale * np.einsum("b,nbj->nj", binomials, pieces))
+        scale, pieces = scale * degree, np.diff(pieces, axis=1)
+    return found

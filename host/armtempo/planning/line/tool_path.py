@@ -1,0 +1,209 @@
+"""The way that a job asks of the tool between two rests: straight lines, arcs, and corners that are cut.
+
+A place on it is the way to it in mm, ``way``; where the tool only turns, in degrees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import PlanError
+
+_STILL_MM, _STILL_DEG = 1e-6, 1e-6
+"""Shorter ways and smaller turns are none."""
+_HALF_TURN_DEG = 179.9
+"""Of a turn by more it is not known which way it goes."""
+_FLAT = 1e-9
+_CORNER_BEND = 15.0 / 16.0
+"""Largest f'' of ``_corner``."""
+
+
+@dataclass(frozen=True, eq=False)
+class ToolPiece:
+    """A straight line, or an arc, with the tool turning evenly about one axis of the base."""
+
+    start: Array
+    """Pose at its start, (4, 4)."""
+    length: float
+    """mm, or of a turn on the spot degrees."""
+    direction: Array
+    """Of the way at the start, (3,); 0 for a turn on the spot."""
+    inward: Array
+    """To the centre of the arc times its curvature, (3,) in 1/mm; 0 for a line."""
+    turn: Array
+    """Rotation vector for a mm of way, (3,) in rad."""
+
+    def moved(self, way: Array) -> Array:
+        """Position relative to the start at ways (N,): (N, 3)."""
+        bend = float(np.linalg.norm(self.inward))
+        if bend == 0.0:
+            return way[:, None] * self.direction
+        along, across = np.sin(bend * way) / bend, (1.0 - np.cos(bend * way)) / bend
+        return np.asarray(along[:, None] * self.direction + across[:, None] * self.inward / bend)
+
+    def turned(self, way: Array) -> Array:
+        """Rotation from the start's orientation: (N, 3, 3)."""
+        return rotations(way[:, None] * self.turn)
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Largest derivatives by the way: of position and orientation, first and second (mm, rad)."""
+
+    slope: float
+    bend: float
+    turn: float
+    turn_bend: float
+
+
+@dataclass(frozen=True, eq=False)
+class ToolPath:
+    """Pieces one after the other; ``cuts``: the way before and after each corner that is cut there, in mm."""
+
+    pieces: tuple[ToolPiece, ...]
+    cuts: tuple[float, ...] = ()
+
+    @property
+    def starts(self) -> Array:
+        """Way at the start of each piece, and at the end: (n + 1,)."""
+        return np.concatenate([[0.0], np.cumsum([piece.length for piece in self.pieces])])
+
+    @property
+    def length(self) -> float:
+        """All of it."""
+        return float(self.starts[-1])
+
+    def poses(self, way: Array) -> tuple[Array, Array]:
+        """Positions (N, 3) and rotations (N, 3, 3) at ways (N,); beyond the ends the way goes on."""
+        starts = self.starts
+        number = np.clip(np.searchsorted(starts, way, side="right") - 1, 0, len(self.pieces) - 1)
+        positions, rotated = np.empty((len(way), 3)), np.empty((len(way), 3, 3))
+        for index, piece in enumerate(self.pieces):
+            own = number == index
+            local = way[own] - starts[index]
+            positions[own] = piece.start[:3, 3] + piece.moved(local)
+            rotated[own] = piece.turned(local) @ piece.start[:3, :3]
+        for index, cut in enumerate(self.cuts):
+            place = starts[index + 1]
+            near = np.abs(way - place) < cut
+            if cut > 0.0 and near.any():
+                positions[near], rotated[near] = self._cut(index, (way[near] - place) / cut, cut)
+        return positions, rotated
+
+    def _cut(self, index: int, part: Array, cut: float) -> tuple[Array, Array]:
+        """Poses in a cut corner, ``part`` from -1 to 1: both pieces' ways, each of them slowing down to it."""
+        before, after = self.pieces[index], self.pieces[index + 1]
+        left, right = cut * _corner(-part), cut * _corner(part)
+        end = np.array([before.length])
+        moved = before.moved(before.length - left) - before.moved(end) + after.moved(right)
+        back = before.turned(before.length - left) @ np.swapaxes(before.turned(end), 1, 2)
+        return after.start[:3, 3] + moved, after.turned(right) @ back @ after.start[:3, :3]
+
+    @property
+    def bounds(self) -> Bounds:
+        """Of the whole."""
+        bends = [float(np.linalg.norm(piece.inward)) for piece in self.pieces]
+        turns = [float(np.linalg.norm(piece.turn)) for piece in self.pieces]
+        corner = max((2.0 * _CORNER_BEND / cut for cut in self.cuts if cut > 0.0), default=0.0)
+        bend, turn = max(bends) + corner, max(turns)
+        # In a corner the ways of both pieces sum up to one at most, each with its own turn
+        slope = max(float(np.linalg.norm(piece.direction)) for piece in self.pieces)
+        return Bounds(slope, bend, turn, turn * corner + turn * turn)
+
+
+def _corner(part: Array) -> Array:
+    """0 up to -1, its argument from 1 on, between with a second derivative 15/16 (1 - x^2)^2: twice smooth."""
+    x = np.clip(part, -1.0, 1.0)
+    inner = (5.0 + 16.0 * x + 15.0 * x**2 - 5.0 * x**4 + x**6) / 32.0
+    return np.asarray(np.where(part > 1.0, part, inner))
+
+
+def line(start: Array, end: Array, turn: Array, where: str) -> ToolPiece:
+    """The straight line between two poses (4, 4), turning by a rotation vector, (3,) in rad."""
+    way = end[:3, 3] - start[:3, 3]
+    length = float(np.linalg.norm(way))
+    if length > _STILL_MM:
+        return ToolPiece(start, length, way / length, np.zeros(3), turn / length)
+    turned_deg = float(np.degrees(np.linalg.norm(turn)))
+    if turned_deg <= _STILL_DEG:
+        raise PlanError(
+            f"{where}: the tool is there already", "leave line out, or move one of the via points"
+        )
+    return ToolPiece(start, turned_deg, np.zeros(3), np.zeros(3), turn / turned_deg)
+
+
+def arc(start: Array, through: Sequence[float], end: Array, turn: Array, where: str) -> ToolPiece:
+    """The arc from a pose (4, 4) through a point to another one."""
+    first, middle, last = start[:3, 3], np.array(through), end[:3, 3]
+    one, other = middle - first, last - first
+    normal = np.cross(one, other)
+    size = float(np.linalg.norm(normal))
+    if size <= _FLAT * float(np.linalg.norm(one) * np.linalg.norm(other)) or size == 0.0:
+        raise PlanError(
+            f"{where}: the three points of the arc are on one line, or two of them are the same",
+            "move arc_through_mm aside, or give line = true",
+        )
+    centre = np.cross(normal, one) * (other @ other) + np.cross(other, normal) * (one @ one)
+    centre /= 2.0 * size**2
+    radius = float(np.linalg.norm(centre))
+    direction = np.cross(normal / size, -centre / radius)
+    to_end = other - centre
+    angle = float(np.arctan2(to_end @ direction, to_end @ (-centre / radius))) % (2.0 * np.pi)
+    length = radius * angle
+    return ToolPiece(start, length, direction, centre / radius**2, turn / length)
+
+
+def turn_between(start: Array, end: Array, where: str) -> Array:
+    """Rotation vector of the base that turns one orientation (3, 3) into another, (3,) in rad."""
+    vector = np.asarray(rotation_vectors((end @ start.T)[None])[0])
+    _check_turn(vector, where)
+    return vector
+
+
+def turn_of_axis(start: Array, end: Array, where: str) -> Array:
+    """The same that turns one direction (3,) into another, and no more."""
+    normal = np.cross(start, end)
+    size = float(np.linalg.norm(normal))
+    angle = float(np.arctan2(size, start @ end))
+    vector = normal * (angle / size) if size > 0.0 else np.array([angle, 0.0, 0.0])
+    _check_turn(vector, where)
+    return np.asarray(vector)
+
+
+def _check_turn(vector: Array, where: str) -> None:
+    if np.degrees(np.linalg.norm(vector)) > _HALF_TURN_DEG:
+        raise PlanError(
+            f"{where}: the tool turns by half a turn, and which way is left open",
+            "add a via point with an orientation between the two",
+        )
+
+
+def rotations(vectors: Array) -> Array:
+    """Rotations by rotation vectors (N, 3), Rodrigues: (N, 3, 3)."""
+    angle = np.linalg.norm(vectors, axis=1)
+    x, y, z = vectors.T
+    zero = np.zeros_like(x)
+    cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
+    first = np.sinc(angle / np.pi)[:, None, None]
+    second = 0.5 * (np.sinc(angle / (2.0 * np.pi)) ** 2)[:, None, None]
+    return np.asarray(np.eye(3) + first * cross + second * (cross @ cross))
+
+
+def rotation_vectors(matrices: Array) -> Array:
+    """Rotation vectors of (N, 3, 3), not for half turns: (N, 3)."""
+    twist = 0.5 * np.stack(
+        [
+            matrices[:, 2, 1] - matrices[:, 1, 2],
+            matrices[:, 0, 2] - matrices[:, 2, 0],
+            matrices[:, 1, 0] - matrices[:, 0, 1],
+        ],
+        axis=1,
+    )
+    sine = np.linalg.norm(twist, axis=1)
+    angle = np.arctan2(sine, 0.5 * (np.trace(matrices, axis1=1, axis2=2) - 1.0))
+    scale = np.divide(angle, sine, out=np.ones_like(sine), where=sine > 1e-12)
+    return np.asarray(twist * scale[:, None])

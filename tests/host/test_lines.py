@@ -1,0 +1,256 @@
+"""Lines, arcs, cut corners and speeds of the tool: plans looked at by code of their own, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from armtempo.basics.errors import InputError, PlanError
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job, Stop
+from armtempo.model.plan import Plan
+from armtempo.model.tool_pose import Pose
+from armtempo.model.tool_way import ToolWay
+from armtempo.planning import planner
+from armtempo.planning.free.angle_bounds import of_path
+from armtempo.planning.line import deviation, line_path, tool_path
+from armtempo.planning.line.deviation import LineDeviation
+from armtempo.planning.line.follow import Course, follow, passed
+from armtempo.planning.line.tool_path import ToolPath
+from armtempo.robot import goto
+from armtempo.splines import bspline
+
+from tests.benchmark.lines import line_faults, random_lines, tool_poses
+from tests.host.independent import faults
+
+ARM = Arm.of("parol6")
+START = (90.0, -100.0, 200.0, 5.0, 40.0, 180.0)
+HERE = tool_poses(ARM, np.array([START]))[0]
+
+
+def moved(x: float, y: float, z: float) -> Pose:
+    """The tool's pose at the start, moved in mm."""
+    pose = HERE.copy()
+    pose[:3, 3] += (x, y, z)
+    return Pose(tuple(map(tuple, pose.tolist())))
+
+
+HALF = tuple(np.array(moved(30, 10, -15).matrix)[:3, 3])
+FLIPPED = ((90.0, -100.0, 200.0, -90.0, 40.0, 180.0), (95.0, -100.0, 200.0, 90.0, -40.0, 0.0))
+"""The wrist turned over on the way."""
+JOB = Job(
+    "lines", via=(START, moved(60, 20, -30), moved(-20, 30, 0)), ways=(ToolWay(1, True), ToolWay(2, True))
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [3, 1005])
+def test_random_lines_hold_when_looked_at_densely(seed: int) -> None:
+    arm, job = random_lines(seed)
+    plan = planner.plan(arm, job)
+    assert faults(plan, 1e9) + line_faults(plan) == [], f"seed {seed}"
+
+
+@pytest.fixture(scope="module")
+def plan() -> Plan:
+    ways = (
+        ToolWay(1, True, speed_mm_s=80.0, acceleration_mm_s2=700.0),
+        ToolWay(2, True, (40.0, 150.0, 440.0)),
+    )
+    return planner.plan(ARM, replace(JOB, ways=ways, refine=2))
+
+
+def test_a_line_and_an_arc_keep_speed_tolerance_and_rests(plan: Plan, tmp_path: Path) -> None:
+    assert faults(plan) + line_faults(plan) == []
+    assert any("no more than 80 mm/s" in note or "no more than 79." in note for note in plan.notes)
+    spline = plan.trajectory.joints[0]
+    assert np.abs(plan.trajectory(spline.via_times_s, 1)).max() < 1e-6
+    plan.save(tmp_path / "plan.json")
+    again = Plan.load(tmp_path / "plan.json")
+    assert again.job == plan.job
+    assert again.notes == plan.notes
+
+
+def test_faults_of_a_line_are_seen(plan: Plan) -> None:
+    """The check itself: a plan held against a line nearby, and against a lower speed."""
+    ways = (replace(plan.job.ways[0], speed_mm_s=79.0), plan.job.ways[1])
+    assert line_faults(replace(plan, job=replace(plan.job, ways=ways)))
+    ways = (replace(plan.job.ways[0], tolerance_mm=0.01), plan.job.ways[1])
+    assert line_faults(replace(plan, job=replace(plan.job, ways=ways)))
+
+
+def test_the_bound_holds_and_is_sharp() -> None:
+    """Random splines beside a line: no sample of them is beyond the bound, and it is near to the largest."""
+    seed = 31
+    rng = np.random.default_rng(seed)
+    led = line_path.led_stretches(ARM, replace(JOB, via=JOB.via[:2], ways=JOB.ways[:1]), _via(JOB)[:2])[0]
+    course, tool = led.followed.course, led.followed.tool
+    for size in (0.03, 1.0, 5.0):
+        angles = bspline.fit(led.followed.at(led.ways(8)), 5)
+        angles = angles + size * rng.uniform(-1, 1, angles.shape)
+        ways = bspline.fit(led.ways(8), 5)
+        found = deviation.proven(
+            of_path(angles, 5),
+            of_path(ways[:, None], 5)[:, :, 0],
+            tool,
+            course.path,
+            course.fixed,
+            LineDeviation(0.5, 0.5),
+        )
+        u = np.linspace(0.0, 1.0, 201)
+        powers = u[:, None] ** np.arange(6)
+        dense = np.einsum("up,spj->suj", powers, bspline.polynomials(angles, 5)).reshape(-1, 6)
+        along = np.einsum("up,sp->su", powers, bspline.polynomials(ways, 5)).ravel()
+        poses = tool_poses(ARM, dense)
+        position, rotation = course.path.poses(along)
+        away = np.linalg.norm(poses[:, :3, 3] - position, axis=1).max()
+        cosine = 0.5 * (np.trace(poses[:, :3, :3] @ np.swapaxes(rotation, 1, 2), axis1=1, axis2=2) - 1.0)
+        turned = np.degrees(np.arccos(np.clip(cosine.min(), -1.0, 1.0)))
+        assert away <= found.position_mm <= 1.05 * away + 0.02, f"seed {seed}, {size}"
+        assert turned <= found.rotation_deg <= 1.05 * turned + 0.05, f"seed {seed}, {size}"
+
+
+def _via(job: Job) -> np.ndarray:
+    return planner.via_angles(ARM, job)[0]
+
+
+def test_a_cut_corner_is_smooth_and_near() -> None:
+    first = tool_path.line(HERE, np.array(moved(60, 0, 0).matrix), np.array([0.0, 0.0, 0.4]), "")
+    corner = np.array(moved(60, 0, 0).matrix)
+    corner[:3, :3] = first.turned(np.array([first.length]))[0] @ HERE[:3, :3]
+    end = np.array(moved(60, 40, 0).matrix)
+    path = ToolPath((first, tool_path.line(corner, end, np.array([0.3, 0.0, 0.0]), "")), (15.0,))
+    ways = np.linspace(0.0, path.length, 20_001)
+    position, rotation = path.poses(ways)
+    speed = np.linalg.norm(np.diff(position, axis=0), axis=1) / np.diff(ways)
+    assert speed.max() <= 1.0 + 1e-9
+    assert np.linalg.norm(np.diff(position, 2, axis=0), axis=1).max() / ways[1] ** 2 <= path.bounds.bend
+    turned = tool_path.rotation_vectors(rotation[1:] @ np.swapaxes(rotation[:-1], 1, 2)) / ways[1]
+    assert np.linalg.norm(turned, axis=1).max() <= path.bounds.turn * (1 + 1e-6)
+    assert np.linalg.norm(np.diff(turned, axis=0), axis=1).max() / ways[1] <= path.bounds.turn_bend * (
+        1 + 1e-3
+    )
+    inside = np.abs(ways - 60.0) < 15.0
+    away = np.min(np.linalg.norm(position[inside, None] - position[None, ~inside][:, ::50], axis=2))
+    assert away < 1.0
+    assert 1.0 < np.linalg.norm(position - corner[:3, 3], axis=1).min() < 15.0
+
+
+def test_arcs_go_through_their_point() -> None:
+    start, end = np.eye(4), np.eye(4)
+    end[:3, 3] = (0.0, 20.0, 0.0)
+    piece = tool_path.arc(start, (-10.0, 10.0, 0.0), end, np.zeros(3), "")
+    assert piece.length == pytest.approx(10.0 * np.pi)
+    half = piece.moved(np.array([0.5 * piece.length, piece.length]))
+    assert half == pytest.approx(np.array([[-10.0, 10.0, 0.0], [0.0, 20.0, 0.0]]))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"via": (START, moved(400, 0, 0))}, "P0 to P1, at .* of 400.0 mm"),
+        ({"via": (START, moved(0, 0, 0))}, "the tool is there already"),
+        ({"ways": (ToolWay(1, True, blend_mm=80.0), ToolWay(2, True))}, "more than half"),
+        ({"via": FLIPPED}, "joint 4 at -90 degrees, not 90"),
+        ({"ways": (ToolWay(1, True, HALF),)}, "one line"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_followed_says_where(change: dict[str, object], message: str) -> None:
+    job = replace(JOB, **change)  # type: ignore[arg-type]
+    job = replace(job, ways=tuple(way for way in job.ways if way.via < len(job.via)))
+    with pytest.raises(PlanError, match=message):
+        planner.plan(ARM, job)
+
+
+def test_a_straight_wrist_on_the_way_is_named() -> None:
+    """A line on which joint 5 passes 0: the arm changes its branch, and the place is said."""
+    start = np.array([90.0, -100.0, 200.0, 0.0, 8.0, 180.0])
+    pose = tool_poses(ARM, start[None])[0]
+    end = tool_poses(ARM, np.array([[90.0, -100.0, 200.0, 0.0, -8.0, 180.0]]))[0]
+    turn = tool_path.turn_between(pose[:3, :3], end[:3, :3], "")
+    path = ToolPath((tool_path.line(pose, end, turn, ""),))
+    found = follow(Course(ARM, path, ("roll", "pitch", "yaw"), "P0 to P1"), start)
+    words = passed(found)
+    assert len(words) == 1
+    assert "changes its branch (wrist)" in words[0]
+    assert f"of {path.length:.1f} mm" in words[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"path": "free"}, 'take path = "through"'),
+        ({"timing": "per-joint"}, 'need timing = "shared"'),
+        ({"degree": 3}, "degree 5"),
+        ({"stops": (Stop(1, 1.0),)}, "do not go together"),
+        ({"ways": (ToolWay(3, True),)}, "lead to via points"),
+        ({"ways": (ToolWay(1, True, blend_mm=5.0),)}, "needs a line on both sides"),
+    ],
+)
+def test_jobs_that_do_not_fit_are_refused(change: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError) as raised:
+        planner.plan(ARM, replace(JOB, **change))  # type: ignore[arg-type]
+    assert message in f"{raised.value.problem} {raised.value.hint}"
+
+
+def test_goto_in_a_line_is_as_slow_as_asked() -> None:
+    end = tuple(np.array(START) + np.array([2.0, 2.0, -2.0, 0.0, 1.0, 0.0]))
+    whole, half = (
+        goto.motion(ARM, np.array(START), np.array(end), goto.MovePace(speed, True)) for speed in (1.0, 0.5)
+    )
+    assert half.duration_s == pytest.approx(2.0 * whole.duration_s)
+    assert half(half.duration_s) == pytest.approx(np.array(end), abs=1e-6)
+    times = np.linspace(0.0, half.duration_s, 301)
+    way = tool_poses(ARM, half(times))[:, :3, 3]
+    along = (way[-1] - way[0]) / np.linalg.norm(way[-1] - way[0])
+    assert np.abs(np.cross(way - way[0], along)).max() < 0.5
+
+
+FILE = """
+name = "glue"
+speed_mm_s = 50
+[[via]]
+angles_deg = [90, -100, 200, 5, 40, 180]
+[[via]]
+position_mm = [58, 156, 418]
+approach = [0.056, -0.343, -0.9376]
+line = true
+tolerance_mm = 0.2
+blend_mm = 5
+[[via]]
+position_mm = [-22, 166, 448]
+arc_through_mm = [20, 170, 440]
+speed_mm_s = 20
+"""
+
+
+def test_a_job_file_says_all_of_it(tmp_path: Path) -> None:
+    file = tmp_path / "glue.toml"
+    file.write_text(FILE, encoding="utf-8")
+    job = Job.load(file, ARM)
+    assert job.ways == (
+        ToolWay(1, True, tolerance_mm=0.2, blend_mm=5.0),
+        ToolWay(2, True, (20.0, 170.0, 440.0), speed_mm_s=20.0),
+    )
+    assert job.speed_mm_s == 50.0
+    assert isinstance(job.via[1], Pose)
+    assert job.via[1].tolerance_mm == Pose.tolerance_mm
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("line = true\n", "", "blend_mm"),
+        ("blend_mm = 5", "blend_mm = 0", "blend_mm"),
+        ("blend_mm = 5", "speed_mm_s = -1", "speed_mm_s"),
+        ("arc_through_mm = [20, 170, 440]", "arc_through_mm = [20, 170]", "arc_through_mm"),
+        ("5, 40, 180]", "5, 40, 180]\nline = true", "first via point"),
+    ],
+)  # fmt: skip
+def test_what_a_file_may_not_say(tmp_path: Path, old: str, new: str, message: str) -> None:
+    file = tmp_path / "glue.toml"
+    file.write_text(FILE.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(InputError, match=message):
+        Job.load(file, ARM)
