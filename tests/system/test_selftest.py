@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from armtempo import connect
 from armtempo.basics.errors import LinkError
+from armtempo.diagnosis.finding import Level
 from armtempo.records import encode
 from armtempo.selftest import prompt as selftest_parts
 from armtempo.selftest import rate_part
@@ -97,9 +98,11 @@ def test_what_is_sent_compiles_for_the_chip(part: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("most", [1_000, 20_000, 60_000])
 def test_the_highest_rate_is_found_and_judged(most: int) -> None:
     found = rate_part.highest(lambda rate: rate <= most, 3)
-    assert found is not None and most - 0.04 * rate_part.stated(3) < found <= most
+    assert found is not None
+    assert most - 0.04 * rate_part.stated(3) < found <= most
     (line,) = rate_part.judge(found, 3)
-    assert line.verdict.value == "wrong" and line.cure
+    assert line.verdict is Level.ERROR
+    assert line.cure
     assert rate_part.highest(lambda rate: True, 3) == rate_part.stated(3)
     assert rate_part.highest(lambda rate: None, 3) is None
 

@@ -65,7 +65,7 @@ def at_rates(rates: Sequence[int], duration_s: float) -> bytes:
     ends = [rate * duration_s / _PEAK for rate in rates]
     angles = [_fixed(bspline.fit((0.0, end), _DEGREE), STEP_FRACTION_BITS) for end in ends]
     axis = _fixed(times * TICK_HZ, TICK_FRACTION_BITS)
-    return motion_record.pack(_DEGREE, angles, [axis], 1, 0, 0)
+    return motion_record.pack(_DEGREE, angles, [axis], 1, motion_record.NO_RAMPS, 0)
 
 
 def _fixed(points: Array, bits: int) -> list[int]:

@@ -129,7 +129,10 @@ def _at_prompt(prompt: Prompt, found: SelfTest, work: Progress) -> None:
         found.add(link_part.judge(found.data[link_part.PART], found.simulated))
         if is_off(drivers):
             _move(prompt, found, work)
-            _rates(prompt, found, work)
+            if not found.data.get(pulse_part.PULSES, {}).get(
+                "fault"
+            ):  # else no motion would tell of its rate
+                _rates(prompt, found, work)
     except SilentError as error:
         found.add([_failed(error.part, error)])
 
