@@ -88,7 +88,8 @@ class Followed:
 def follow(course: Course, start_deg: Array, end_deg: Array | None = None) -> Followed:
     """The postures from ``start_deg`` (J,) on, which is at its start.
 
-    An arm that can take many postures at a place goes over evenly to ``end_deg``, where that is given. Raises PlanError, naming the place, where a joint leaves its range or cannot follow.
+    An arm that can take many postures at a place goes over evenly to ``end_deg``, where that is given. Raises
+    PlanError, naming the place, where a joint leaves its range or cannot follow.
     """
     tool = Tool(course.arm, list(range(len(course.arm.driven))), start_deg)
     length, step = course.path.length, 1.0 / STEPS
