@@ -185,9 +185,9 @@ COMMANDS: "dict[str, str]" = {
     "status": "What the board is doing. `known`: one bit per joint, its position is known. `run`: number of the "
     "current or last run since the start. `ticks`: motion clock. `path`: the motion's own time, which is behind the "
     "clock where the speed was below 100 %. `fault_joint`: also the joint whose switch ended the last homing motion. "
-    "`rate`: the speed that is wanted, in thousandths, 0 in a pause; while "
-    "nothing moves that of the next start. Tail: per joint commanded steps and encoder "
-    "counts (two i32).",
+    "`rate`: the speed that is wanted, in thousandths, 0 in a pause; while nothing moves that of the next start. "
+    "`rest_ms`: in how many milliseconds the arm would rest if it were stopped now, or will after a stop; 0 where "
+    "nothing moves, or where a stop freezes. Tail: per joint commanded steps and encoder counts (two i32).",
     "put_begin": "Begins an upload of `size` bytes; the tail is the trajectory's name, or `/arm` for the arm "
     "record. `crc` is the record's own checksum, its last four bytes. An upload under way is given up.",
     "put_data": "The bytes from `offset` on; pieces may overlap what came before but leave no hole. Answer: "
@@ -213,7 +213,7 @@ COMMANDS: "dict[str, str]" = {
     "a fault; 2: it is held, and brakes without a fault when no `hold` came for 300 ms. Answer: number of the run and "
     "its length in ticks. Or starts a sequence, each of whose motions is a run of its own; then the answer has the "
     "number of the last run and 0.",
-    "stop": "`now` 0: brake along the path (freeze where the motion has no braking time); 1: freeze.",
+    "stop": "`now` 0: brake along the path (freeze where the motion has no brake times); 1: freeze.",
     "speed": "Lets the motion's own time go on at `rate` thousandths of its planned rate (10 to 1000), along the same "
     "path; 0: pause, 65535: as before the pause. Refused with `fixed_speed`, or with `too_long` where the run would "
     "last longer than 1 h 49 min. While nothing moves: the rate of this session's next start.",

@@ -1,6 +1,7 @@
 """Constants of the wire protocol; its messages are in ``table.py``, its frames in ``wire.py``."""
 
-PROTOCOL_VERSION = 2
+PROTOCOL_VERSION = 4
+"""Never 3: MicroPython takes that byte, which each ``hello`` has, for Ctrl-C."""
 SYNC = 0xA5
 MAX_PAYLOAD = 256
 OVERHEAD = 9

@@ -6,17 +6,18 @@ angles in steps / 2**28, times in ticks / 2**16.
 ::
 
     offset  type   field
-    0       4s     magic  b"ATM1"
+    0       4s     magic  b"ATM2"
     4       B      degree k, 3 or 5
     5       B      joints
-    6       B      flags: bit 0, all joints share one time axis; bit 1, ``brake_ticks`` holds for every change
-                   of speed (without it for braking only)
+    6       B      flags: bit 0, all joints share one time axis
     7       B      0
     8       H      segments n of the angle splines
     10      H      refine R: the time axes have n * R segments
-    12      I      brake_ticks: in how many ticks the motion may brake to rest anywhere (0: not at all)
-    16      I      crc32 of the arm record it was made for
-    20      q[]    per joint: n + k angle control points; its n * R + k time control points,
+    12      I      crc32 of the arm record it was made for
+    16      H[32]  how long it takes to come to rest, by where that begins: at 32 equal steps of the motion's time from
+                   its start to its end, in 16384 ticks, linear in between; all 0: it cannot
+    80      H[32]  the same for any other change of the speed
+    144     q[]    per joint: n + k angle control points; its n * R + k time control points,
                    or, with a shared axis, those once behind the last joint
     end     I      crc32 over all before it
 """
@@ -29,13 +30,23 @@ from armtempo_shared.limits import MAX_JOINTS, MAX_SEGMENTS
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from typing import BinaryIO
 
-MAGIC = b"ATM1"
+    Ramps = tuple[Sequence[int], Sequence[int]]
+
+MAGIC = b"ATM2"
 SHARED_AXIS = 1
-RAMPS = 2
-_HEAD = "<4sBBBBHHII"
-HEAD_SIZE = struct.calcsize(_HEAD)
+RAMP_ENTRIES = 32
+RAMP_UNIT_TICKS = 16384
+"""195 us; the longest ramp is 65535 of it, 12.8 s."""
+_HEAD = "<4sBBBBHHI"
+_RAMPS = "<%dH" % RAMP_ENTRIES
+_RAMPS_SIZE = struct.calcsize(_RAMPS)
+_RAMPS_AT = struct.calcsize(_HEAD)
+HEAD_SIZE = _RAMPS_AT + 2 * _RAMPS_SIZE
+NO_RAMPS = (0,) * RAMP_ENTRIES, (0,) * RAMP_ENTRIES
+"""Of a motion that can neither brake nor change its speed."""
 
 
 class MotionError(ValueError):
@@ -54,18 +65,21 @@ def pack(
     angles: "list[list[int]]",
     times: "list[list[int]]",
     refine: int,
-    brake_ticks: int,
+    ramps: "Ramps",
     arm_crc: int,
 ) -> bytes:
     """A motion record of n path segments with ``refine`` R time segments each.
 
     ``angles``: per joint its n + k control points (int, steps * 2**28); ``times``: per joint, or one for
-    all, its n * R + k control points (int, ticks * 2**16). ``brake_ticks`` must hold for every change of speed.
+    all, its n * R + k control points (int, ticks * 2**16). ``ramps``: RAMP_ENTRIES lengths of ramps to rest and as many
+    of others, in RAMP_UNIT_TICKS.
     """
     segments = len(angles[0]) - degree
     shared = len(times) == 1 and len(angles) > 1
-    flags = RAMPS | (SHARED_AXIS if shared else 0)
-    head = struct.pack(_HEAD, MAGIC, degree, len(angles), flags, 0, segments, refine, brake_ticks, arm_crc)
+    flags = SHARED_AXIS if shared else 0
+    head = struct.pack(_HEAD, MAGIC, degree, len(angles), flags, 0, segments, refine, arm_crc)
+    for lengths in ramps:
+        head += struct.pack(_RAMPS, *lengths)
     body: "list[int]" = []
     for joint, points in enumerate(angles):
         body.extend(points)
@@ -87,18 +101,37 @@ class MotionHead:
     def __init__(self, head: bytes, length: int) -> None:
         if length < HEAD_SIZE + 4 or len(head) < HEAD_SIZE:
             raise MotionError("too short")
-        (magic, self.degree, self.joints, flags, zero, self.segments, self.refine, self.brake_ticks,
+        (magic, self.degree, self.joints, flags, zero, self.segments, self.refine,
          self.arm_crc) = struct.unpack_from(_HEAD, head, 0)  # fmt: skip
-        if magic != MAGIC or zero != 0 or flags & ~(SHARED_AXIS | RAMPS):
+        if magic != MAGIC or zero != 0 or flags & ~SHARED_AXIS:
             raise MotionError("not a motion record of this version")
         if self.degree not in (3, 5) or not 1 <= self.joints <= MAX_JOINTS:
             raise MotionError("unknown degree or number of joints")
         if self.segments < 1 or self.refine < 1 or self.segments * self.refine > MAX_SEGMENTS:
             raise MotionError("number of segments out of range")
         self.shared = bool(flags & SHARED_AXIS)
-        self.ramps = bool(flags & RAMPS)
+        self.ramps = bytes(head[_RAMPS_AT:HEAD_SIZE])
+        self.can_brake = any(self.ramps)
         if length != size(self.degree, self.joints, self.shared, self.segments, self.refine):
             raise MotionError("length does not fit the header")
+
+    def ramp_units(self, at: int, duration: int, to_rest: bool) -> int:
+        """How long a change of speed takes, in RAMP_UNIT_TICKS, that begins at a time of the motion.
+
+        ``at``, and how long the motion lasts, in a unit of which that is less than 8192, so all are small integers of
+        the board: ``at`` rounded down, ``duration`` up. What is between two entries is taken up to 2 units later where
+        the next one is longer.
+        """
+        parts = RAMP_ENTRIES - 1
+        at = parts * min(max(at, 0), duration)
+        first = min(at // duration, parts - 1)
+        at -= first * duration
+        place = 2 * first + (0 if to_rest else _RAMPS_SIZE)
+        ramps = self.ramps
+        before, after = ramps[place] + (ramps[place + 1] << 8), ramps[place + 2] + (ramps[place + 3] << 8)
+        if after > before:
+            at = min(at + 2 * parts, duration)
+        return before - (before - after) * at // duration
 
     def angle_offset(self, joint: int) -> int:
         """Byte offset of the joint's first angle control point."""

@@ -98,7 +98,7 @@ def motion_record(arm: bytes, segments: int) -> bytes:
     """A slow motion of all joints in so many segments, from 0, that may brake."""
     total_s = 0.1 * segments
     motion = bytearray(motions.cruise(100.0, arm[5], total_s / 2, total_s))
-    struct.pack_into("<II", motion, 12, 84_000, wire.record_crc(arm))
+    struct.pack_into("<I64H", motion, 12, wire.record_crc(arm), *[6] * 64)
     struct.pack_into("<I", motion, len(motion) - 4, crc32(motion[:-4]))
     return bytes(motion)
 

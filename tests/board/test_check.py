@@ -33,7 +33,7 @@ def straight(times_s: list[float], angles: list[float]) -> bytes:
         [[round(angle * 2**limits.STEP_FRACTION_BITS) for angle in angles]],
         [[round(time * limits.TICK_HZ * 2**limits.TICK_FRACTION_BITS) for time in times_s]],
         1,
-        0,
+        motion.NO_RAMPS,
         0,
     )
 

@@ -18,7 +18,7 @@ ARM = stand_in.arm(3)
 def random_motion(numbers: random.Random, segments: int = 6, joints: int = 3) -> bytes:
     """A motion record for ``ARM``; its numbers mean nothing."""
     points = [[numbers.randrange(2**40) for _ in range(segments + 5)] for _ in range(joints)]
-    return motion.pack(5, points, points, 1, 0, wire.record_crc(ARM))
+    return motion.pack(5, points, points, 1, motion.NO_RAMPS, wire.record_crc(ARM))
 
 
 def ready(pipe: Pipe) -> tuple[Client, bytes]:

@@ -1,4 +1,4 @@
-"""Brake time: braking by it keeps the limits from anywhere, and a shorter one does not."""
+"""Brake times: changes of speed that take them keep the limits from anywhere, and shorter ones do not."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.model.arm import Arm
 from armtempo.model.parts import Limits
-from armtempo.model.plan import Plan
 from armtempo.planning import brake_time, planner, point_to_point
 from armtempo.splines.trajectory import Trajectory
 
@@ -18,50 +18,59 @@ from tests.host import problems
 PROBLEMS = {problem.name: problem for problem in problems.load()}
 
 
-def braked_excess(plan: Plan, brake_s: float, starts: int = 60) -> tuple[float, float]:
-    """Largest speed, and acceleration or jerk, over their limits: by differences of the slowed motion."""
-    step = brake_s / 4000
-    x = np.arange(4001) / 4000
-    rate = 1 - (10 * x**3 - 15 * x**4 + 6 * x**5)
-    passed = np.concatenate([[0], np.cumsum((rate[1:] + rate[:-1]) / 2)]) * step
-    worst = np.zeros(3)
-    limits = np.array([joint.limits.values for joint in plan.arm.driven if joint.limits])
-    for start in np.linspace(0, plan.trajectory.duration_s - 0.5 * brake_s, starts):
-        values = plan.trajectory(start + passed)
-        for order in range(3):
-            values = np.diff(values, axis=0) / step
-            worst[order] = max(worst[order], np.max(np.abs(values) / limits[:, order]))
-    return float(worst[0]), float(worst[1:].max())
+def changed_excess(
+    trajectory: Trajectory, limits: list[Limits], starts_s: Array, lengths_s: Array, rate: tuple[float, float]
+) -> Array:
+    """Largest speed, and acceleration or jerk, over their limits as the rate goes from one to the other: (starts, 2).
+
+    By differences of the stretched motion; behind its end it rests, so differences there do not count.
+    """
+    before, after = rate
+    x = np.linspace(0.0, 1.0, 151)
+    rates = before + (after - before) * (10 * x**3 - 15 * x**4 + 6 * x**5)
+    passed = np.concatenate([[0.0], np.cumsum((rates[1:] + rates[:-1]) / 2)]) / 150
+    times = starts_s[:, None] + lengths_s[:, None] * passed
+    values = trajectory(times.ravel()).reshape(*times.shape, -1)
+    allowed = np.array([limit.values for limit in limits])
+    worst = []
+    for order in (1, 2, 3):
+        values = np.diff(values, axis=1) * 150 / lengths_s[:, None, None]
+        inside = times[:, order:, None] < trajectory.duration_s
+        worst.append(np.max(np.abs(values) * inside / allowed[:, order - 1], axis=(1, 2)))
+    return np.column_stack([worst[0], np.maximum(*worst[1:])])
+
+
+def every_start(trajectory: Trajectory, count: int = 61) -> Array:
+    """Starts that are no multiples of those that were tried."""
+    return np.linspace(0.0, trajectory.duration_s, count, endpoint=False)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["feeding", "feeding-shared", "there-and-back"])
-def test_braking_keeps_its_limits_and_no_shorter_time_does(name: str) -> None:
+def test_every_change_keeps_its_limits_from_anywhere_and_quicker_ones_do_not(name: str) -> None:
     plan = planner.plan(PROBLEMS[name].arm, replace(PROBLEMS[name].job, iterations=100))
     limits = [joint.limits for joint in plan.arm.driven if joint.limits]
-    found = brake_time.brake_time_s(plan.trajectory, limits)
-    speed, other = braked_excess(plan, min(found, 1.9 * plan.trajectory.duration_s))
-    assert speed <= 1 + 1e-6
-    assert other <= brake_time.EXCESS * 1.01
-    _, shorter = braked_excess(plan, 0.8 * found)
-    assert shorter > 1.0
-    assert 0.01 < found < 4 * plan.trajectory.duration_s
+    brakes = brake_time.of_motion(plan.trajectory, limits)
+    starts = every_start(plan.trajectory)
+    for lengths, rates in (
+        (brakes.rest_s(starts), ((1.0, 0.0), (0.6, 0.0))),
+        (brakes.change_s(starts), ((0.0, 1.0), (0.95, 0.6), (0.1, 0.7))),
+    ):
+        for rate in rates:
+            found = changed_excess(plan.trajectory, limits, starts, lengths, rate)
+            assert found[:, 0].max() <= 1 + 1e-6
+            assert found[:, 1].max() <= brake_time.EXCESS * 1.02, rate
+    quicker = changed_excess(plan.trajectory, limits, starts, 0.85 * brakes.rest_s(starts), (1.0, 0.0))
+    assert np.mean(quicker[:, 1] > brake_time.EXCESS) > 0.6
 
 
-def changed_excess(
-    trajectory: Trajectory, limits: list[Limits], brake_s: float, rate: tuple[float, float]
-) -> float:
-    """Largest acceleration or jerk over its limit as the rate goes from one to the other, by differences."""
-    before, after = rate
-    x = np.linspace(0.0, 1.0, 201)
-    rates = before + (after - before) * (10 * x**3 - 15 * x**4 + 6 * x**5)
-    step = brake_s / 200
-    passed = np.concatenate([[0.0], np.cumsum((rates[1:] + rates[:-1]) / 2)]) * step
-    times = np.linspace(0.0, trajectory.duration_s, 50, endpoint=False)[:, None] + passed
-    values = trajectory(times.ravel()).reshape(*times.shape, -1)
-    allowed = np.array([limit.values for limit in limits])
-    _, acceleration, jerk = (np.diff(values, order, axis=1) / step**order for order in (1, 2, 3))
-    return float(max(np.max(np.abs(acceleration) / allowed[:, 1]), np.max(np.abs(jerk) / allowed[:, 2])))
+def test_braking_near_an_end_is_quick() -> None:
+    """The times follow the motion: at its ends, where it is slow, it takes a part of what the worst takes."""
+    arm = Arm.paper()
+    motion = point_to_point.straight("go", [0.0, -60.0, 40.0], [40.0, -50.0, 50.0], arm)
+    brakes = brake_time.of_motion(motion, [joint.limits for joint in arm.driven])
+    late = brakes.rest_s(0.9 * motion.duration_s)
+    assert late < 0.3 * brakes.longest_rest_s
 
 
 def test_the_worst_change_of_rate_needs_the_whole_brake_time() -> None:
@@ -69,14 +78,18 @@ def test_the_worst_change_of_rate_needs_the_whole_brake_time() -> None:
     arm = Arm.paper()
     motion = point_to_point.straight("go", [0.0, -60.0, 40.0], [1.0, -60.0, 40.0], arm)
     limits = [joint.limits for joint in arm.driven]
-    brake_s = brake_time.brake_time_s(motion, limits)
-    worst = max(changed_excess(motion, limits, brake_s, rate) for rate in ((1.0, 0.0), (0.0, 1.0)))
+    brakes = brake_time.of_motion(motion, limits)
+    starts = every_start(motion, 121)
+    worst = max(
+        changed_excess(motion, limits, starts, brakes.rest_s(starts), (1.0, 0.0))[:, 1].max(),
+        changed_excess(motion, limits, starts, brakes.change_s(starts), (0.0, 1.0))[:, 1].max(),
+    )
     assert 0.97 * brake_time.EXCESS <= worst <= 1.01 * brake_time.EXCESS
 
 
-def test_a_motion_beyond_its_limits_has_no_brake_time() -> None:
+def test_a_motion_beyond_its_limits_has_no_brake_times() -> None:
     arm = Arm.paper()
     motion = point_to_point.straight("go", [0.0, -60.0, 40.0], [40.0, -50.0, 50.0], arm)
     tight = [replace(joint.limits, jerk_deg_s3=joint.limits.jerk_deg_s3 / 2) for joint in arm.driven]
     with pytest.raises(InputError, match="beyond the arm's acceleration or jerk limits"):
-        brake_time.brake_time_s(motion, tight)
+        brake_time.of_motion(motion, tight)

@@ -10,7 +10,7 @@ import pytest
 from armtempo.basics.errors import LinkError
 from armtempo.cli import main
 from armtempo.diagnosis import machine
-from armtempo.diagnosis.item import Condition
+from armtempo.diagnosis.finding import Level
 from armtempo.ports.listing import Port
 from armtempo.robot import board_check
 from armtempo.robot.board_state import BoardState
@@ -35,6 +35,7 @@ STATE = BoardState(
     state="idle",
     moving=False,
     speed_percent=100.0,
+    rest_s=0.0,
     fault="",
     frames_bad=0,
     samples_lost=0,
@@ -44,41 +45,37 @@ STATE = BoardState(
 
 
 def test_a_sound_board_has_nothing_wrong() -> None:
-    assert {item.level for item in board_check.examine_board(STATE)} == {Condition.GOOD}
+    assert {item.level for item in board_check.examine_board(STATE)} == {Level.GOOD}
 
 
 @pytest.mark.parametrize(
     ("change", "level", "words", "cure"),
     [
-        ({"program_current": False}, Condition.WRONG, "another than", "armtempo deploy"),
-        ({"fault": "estop"}, Condition.WRONG, "estop", "armtempo clear"),
+        ({"program_current": False}, Level.ERROR, "another than", "armtempo deploy"),
+        ({"fault": "estop"}, Level.ERROR, "estop", "armtempo clear"),
         (
             {"arm_problem": "not used: the record is damaged"},
-            Condition.WRONG,
+            Level.ERROR,
             "damaged",
             "armtempo configure",
         ),
-        ({"free_heap": 3_000}, Condition.NOTE, "3000 bytes of heap", "firmware"),
-        ({"frames_bad": 7}, Condition.NOTE, "7 damaged messages", "cable"),
+        ({"free_heap": 3_000}, Level.NOTE, "3000 bytes of heap", "firmware"),
+        ({"frames_bad": 7}, Level.NOTE, "7 damaged messages", "cable"),
     ],
 )
-def test_what_is_wrong_with_a_board(
-    change: dict[str, object], level: Condition, words: str, cure: str
-) -> None:
+def test_what_is_wrong_with_a_board(change: dict[str, object], level: Level, words: str, cure: str) -> None:
     found = [
-        item
-        for item in board_check.examine_board(replace(STATE, **change))
-        if item.level is not Condition.GOOD
+        item for item in board_check.examine_board(replace(STATE, **change)) if item.level is not Level.GOOD
     ]  # type: ignore[arg-type]
     assert [item.level for item in found] == [level]
-    assert words in found[0].found
+    assert words in found[0].what
     assert cure in found[0].next_step
 
 
 def test_a_board_that_does_not_answer() -> None:
     (item,) = board_check.examine_board(LinkError("no answer within 2 s; check power and cable"))
-    assert item.level is Condition.WRONG
-    assert "no answer" in item.found
+    assert item.level is Level.ERROR
+    assert "no answer" in item.what
 
 
 def test_a_port_that_may_not_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -86,7 +83,7 @@ def test_a_port_that_may_not_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(machine.os, "access", lambda *_: False)
     monkeypatch.setattr(machine.sys, "platform", "linux")
     (item,) = machine.ports()
-    assert item.level is Condition.WRONG
+    assert item.level is Level.ERROR
     assert "dialout" in item.next_step
 
 
@@ -95,9 +92,9 @@ def test_packages_that_are_missing(monkeypatch: pytest.MonkeyPatch) -> None:
         raise machine.PackageNotFoundError(name)
 
     monkeypatch.setattr(machine, "version", nothing)
-    levels = {item.what: item.level for item in machine.packages()}
-    assert levels["numpy"] is Condition.WRONG
-    assert levels["matplotlib"] is Condition.NOTE
+    levels = {item.where: item.level for item in machine.packages()}
+    assert levels["numpy"] is Level.ERROR
+    assert levels["matplotlib"] is Level.NOTE
     assert "sphinx" not in levels
 
 

@@ -11,11 +11,13 @@ from armtempo.basics.errors import InputError, PlanError
 from armtempo.model.arm import Arm
 from armtempo.model.parts import Limits
 from armtempo.planning import checks
+from armtempo.planning.brake_time import BrakeTimes
 from armtempo.records import encode
 from armtempo.splines.trajectory import JointSpline, Trajectory
 from armtempo_shared import armrecord, limits, motion
 
 ARM = Arm.paper()
+BRAKES = BrakeTimes(1.0, np.arange(5.0, 37.0), np.arange(100.0, 420.0, 10.0))
 
 
 def trajectory(shared: bool) -> Trajectory:
@@ -29,10 +31,12 @@ def trajectory(shared: bool) -> Trajectory:
 
 @pytest.mark.parametrize("shared", [False, True])
 def test_control_points_arrive_as_steps_and_ticks(shared: bool) -> None:
-    record = motion.Motion(encode.motion_record(trajectory(shared), ARM, brake_s=0.5))
+    record = motion.Motion(encode.motion_record(trajectory(shared), ARM, BRAKES))
     assert (record.degree, record.joints, record.segments, record.refine) == (5, 3, 2, 2)
     assert record.shared == shared
-    assert record.brake_ticks == limits.TICK_HZ // 2
+    end = 31 * 200
+    assert [record.ramp_units(200 * place, end, True) for place in range(32)] == [*range(6, 37), 36]
+    assert [record.ramp_units(at, end, False) for at in (-5, 0, end, end + 1)] == [101, 101, 410, 410]
     for joint, per_deg in enumerate((6400 / 180, 32000 / 360, 6400 / 180)):
         angles = np.frombuffer(record.data, "<i8", 7, record.angle_offset(joint)) / 2.0**28
         np.testing.assert_allclose(angles, (np.arange(7) + 10 * joint) * per_deg, atol=2.0**-28)

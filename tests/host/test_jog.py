@@ -118,7 +118,7 @@ def test_a_stop_is_quick() -> None:
             from_speed_s = max(
                 1.5 * speed / most.acceleration_deg_s2, (10 / 3**0.5 * speed / 1.25 / most.jerk_deg_s3) ** 0.5
             )
-            assert motion.brake_s < 2.0 * from_speed_s
+            assert motion.brakes.longest_rest_s < 2.0 * from_speed_s
 
 
 @pytest.mark.slow
@@ -209,7 +209,7 @@ def test_a_line_that_the_joints_cannot_follow_is_made_shorter(
 def test_a_held_jog_is_a_small_record() -> None:
     for move in (JogMove(INF, joint=0), JogMove(INF, axis="x"), JogMove(-INF, axis="y")):
         motion = jog_motion.plan("x", AR4, on_steps(AR4, ELBOW_DEG), move)
-        assert len(encode.motion_record(motion.trajectory, AR4, motion.brake_s)) < 2048
+        assert len(encode.motion_record(motion.trajectory, AR4, motion.brakes)) < 2048
 
 
 @pytest.mark.parametrize(

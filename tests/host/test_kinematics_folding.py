@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from armtempo.basics.arrays import Array
 from armtempo.kinematics import Geometry, PoseSolver, branch_of, forward, inverse, inverse_of_pose, refusals
 from armtempo.kinematics.of_arm import inverse as inverse_of_arm
 from armtempo.kinematics.solutions import OK
@@ -13,6 +14,8 @@ from armtempo.kinematics.solver import CLOSED_FORM
 from armtempo.model.arm import Arm
 from armtempo.model.parts import Joint
 from armtempo.model.tool_pose import Pose
+from armtempo.new_arm.urdf_rows import AxisLine, Near, derive, rounded
+from armtempo.new_arm.urdf_rows import geometry as geometry_of
 
 ROWS = {
     "pedestal": Joint("base", 120.0, 35.0, 90.0, 30.0, (-0.001, 0.001)),
@@ -70,3 +73,56 @@ def test_a_row_between_the_joints_or_one_that_can_turn_is_no_pedestal() -> None:
     free = replace(arm, joints=(replace(ROWS["pedestal"], range_deg=(-90.0, 90.0)), *arm.joints))
     for one in (between, free):
         assert refusals(Geometry.of(one)) == ["it has 7 joints, not 6"]
+
+
+AXES = {
+    "IRB 140": ("z 0 0 0", "y 70 0 352", "y 70 0 712", "x 70 0 712", "y 450 0 712", "x 450 0 712", "x 515 0 712"),
+    "KR 16": ("-z 0 0 0", "y 260 0 675", "y 940 0 675", "-x 940 0 640", "y 1610 0 640", "-x 940 0 640", "x 1768 0 640"),
+    "Niryo One": ("z 0 0 103", "-y 0 0 183", "-y 0 0 393", "x 37 0 425", "-y 217 0 425", "x 235 0 425", "x 235 0 425"),
+}  # fmt: skip
+"""Axes of robot descriptions at angles 0, with a point of each in mm; the last one is the tool's."""
+
+
+@pytest.mark.parametrize("name", AXES)
+def test_arms_as_robot_descriptions_have_them_are_answered_in_closed_form(name: str) -> None:
+    """On a pedestal that is turned and leans, so the first row is constant."""
+    lean = np.eye(4)
+    lean[:3, :3] = [[0.6, 0.0, 0.8], [0.0, 1.0, 0.0], [-0.8, 0.0, 0.6]]
+    lean[:3, 3] = 100.0, 50.0, 300.0
+    lines = []
+    for text in AXES[name]:
+        axis, *point = text.split()
+        direction = np.eye(3)["xyz".index(axis[-1])] * (-1.0 if axis[0] == "-" else 1.0)
+        lines.append(AxisLine(lean[:3, :3] @ np.array(point, float) + lean[:3, 3], lean[:3, :3] @ direction))
+    tool = lean.copy()
+    tool[:3, 3] = lines[-1].point
+    rows = rounded(derive(lines[:-1], tool, Near(1e-6, 1e-7)), 6)
+    assert rows[0].joint is None
+    still = tuple((index, 0.0) for index, row in enumerate(rows) if row.joint is None)
+    geometry = replace(geometry_of(rows), still=still)
+    assert refusals(geometry) == []
+    rng = np.random.default_rng(2)
+    angles = np.zeros((20, len(rows)))
+    angles[:, geometry.core] = rng.uniform(-3.0, 3.0, (20, 6))
+    poses = forward(geometry, angles)
+    assert poses[0] == pytest.approx(
+        _turned(lines, angles[0, [index for index, row in enumerate(rows) if row.joint is not None]], tool),
+        abs=1e-3,
+    )
+    found = inverse(geometry, poses)
+    for rows_found, outcomes, before in zip(found.angles_rad, found.outcome, angles, strict=True):
+        there = rows_found[outcomes == OK]
+        assert np.abs(np.sin(0.5 * (there - before))).max(axis=1).min() < 1e-6
+
+
+def _turned(lines: list[AxisLine], angles: Array, tool: Array) -> Array:
+    """The tool's pose by turning about the axes one by one, outermost first (Rodrigues' formula)."""
+    pose = tool
+    for line, angle in reversed(list(zip(lines, angles, strict=False))):
+        x, y, z = line.direction
+        cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        turn = np.eye(4)
+        turn[:3, :3] += np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+        turn[:3, 3] = line.point - turn[:3, :3] @ line.point
+        pose = turn @ pose
+    return pose

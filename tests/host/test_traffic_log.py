@@ -25,7 +25,7 @@ def test_recorded_traffic_replays(tmp_path: Path) -> None:
     assert replayed.hello() == seen[0]
     with pytest.raises(LinkError, match="replay"):
         replayed.status()
-    assert "ok hello protocol=2" in path.read_text(encoding="utf-8")
+    assert f"ok hello protocol={wire.PROTOCOL_VERSION}" in path.read_text(encoding="utf-8")
 
 
 def test_traffic_log_refuses_other_files(tmp_path: Path) -> None:

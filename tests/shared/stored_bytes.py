@@ -18,6 +18,7 @@ from armtempo.link.board_messages import Positions, Sample
 from armtempo.runs import run_folder
 from armtempo_shared import armrecord, motion, sequence, wire
 
+RAMPS = tuple(range(1, 33)), tuple(range(1000, 65000, 2000))
 KEPT = Path(__file__).with_name("stored_bytes.json")
 
 
@@ -43,7 +44,7 @@ def _records() -> Iterator[tuple[str, str]]:
         yield f"arm record, version {record[4]}", record.hex()
     for axes in (1, 2):
         times = [[100 * (axis + 1) + place for place in range(5)] for axis in range(axes)]
-        record = motion.pack(3, [[1, 2, 3, 4, 5], [6, 7, 8, 9, 10]], times, 1, 11, 12)
+        record = motion.pack(3, [[1, 2, 3, 4, 5], [6, 7, 8, 9, 10]], times, 1, RAMPS, 12)
         yield f"motion record {record[:4].decode()}, time axes {axes}", record.hex()
     record = sequence.pack(1, [(2, 3, 4, 5, 6), (7, 8, 9, 10, 11)], [("ä", 12)], ["b"])
     yield f"sequence record {record[:4].decode()}", record.hex()

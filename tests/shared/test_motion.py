@@ -9,6 +9,7 @@ import pytest
 from armtempo_shared import limits, motion
 
 ARM_CRC = 0x12345678
+RAMPS = tuple(range(1, 33)), tuple(range(1000, 65000, 2000))
 
 
 def packed(
@@ -17,7 +18,7 @@ def packed(
     rng = random.Random(seed)
     angles = [[rng.getrandbits(63) - 2**62 for _ in range(segments + degree)] for _ in range(joints)]
     times = [[rng.getrandbits(60) for _ in range(segments * refine + degree)] for _ in range(axes)]
-    return motion.pack(degree, angles, times, refine, 4711, ARM_CRC)
+    return motion.pack(degree, angles, times, refine, RAMPS, ARM_CRC)
 
 
 @pytest.mark.parametrize(("joints", "axes"), [(1, 1), (2, 1), (2, 2), (3, 3), (6, 6), (3, 1), (6, 1)])
@@ -26,7 +27,7 @@ def test_every_point_is_found_at_its_offset(degree: int, joints: int, axes: int)
     data = packed(degree, joints, axes)
     view = motion.Motion(data)
     assert (view.degree, view.joints, view.segments, view.refine) == (degree, joints, 6, 2)
-    assert (view.brake_ticks, view.arm_crc, view.shared) == (4711, ARM_CRC, axes == 1 and joints > 1)
+    assert (view.can_brake, view.arm_crc, view.shared) == (True, ARM_CRC, axes == 1 and joints > 1)
     assert len(data) == motion.size(degree, joints, view.shared, 6, 2)
     rng = random.Random(1)
     for joint in range(joints):
@@ -64,6 +65,7 @@ def test_any_other_length_is_refused() -> None:
         (4, 4, "degree"),
         (5, 0, "degree"),
         (5, limits.MAX_JOINTS + 1, "degree"),
+        (6, 2, "version"),
         (6, 4, "version"),
         (7, 1, "version"),
         (0, ord("B"), "version"),

@@ -132,7 +132,7 @@ def test_changes_keep_the_brake_times_limits() -> None:
             "any", via_deg=[ends[0], (ends[0] + ends[1]) / 2 + 3, ends[1]], population=5, iterations=5
         )
         trajectory = armtempo.plan(arm, job).trajectory
-        ramp_s = brake_time.brake_time_s(trajectory, limits)
+        brakes = brake_time.of_motion(trajectory, limits)
         worst = 0.0
         for _ in range(60):
             before, after = (
@@ -140,13 +140,12 @@ def test_changes_keep_the_brake_times_limits() -> None:
                 if rng.random() < 0.6
                 else rng.permutation([0.0, rng.uniform(0.1, 1.0)])
             )
-            step = ramp_s / 1500
+            start = rng.uniform(0, trajectory.duration_s)
+            step = float(brakes.change_s(start) if after else brakes.rest_s(start)) / 1500
             x = np.arange(1501) / 1500
             rate = before + (after - before) * (10 * x**3 - 15 * x**4 + 6 * x**5)
             passed = np.concatenate([[0], np.cumsum((rate[1:] + rate[:-1]) / 2)]) * step
-            values = trajectory(
-                np.minimum(rng.uniform(0, trajectory.duration_s) + passed, trajectory.duration_s)
-            )
+            values = trajectory(np.minimum(start + passed, trajectory.duration_s))
             for order in range(3):
                 values = np.diff(values, axis=0) / step
                 if order:

@@ -213,6 +213,7 @@ class Commands:
             samples.next - samples.first,
             samples.lost,
             self.link.reader.bad,
+            controller.rest_ms(),
         )
         size = calcsize(row[_ANSWER])
         return size + controller.put_snapshot(reply, self._ticks_at, _ANSWER_AT + size)

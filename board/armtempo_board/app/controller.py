@@ -226,7 +226,7 @@ class Controller(ArmState):
         self.duration_ticks = self.engine.rates.duration_ticks
         self.run_number += 1
         self._braking = False
-        self._can_brake = motion.brake_ticks > 0
+        self._can_brake = motion.can_brake
         heap.tidy()
         heap.collect_often(0)
         self.running = True
@@ -278,6 +278,10 @@ class Controller(ArmState):
     def speed(self) -> int:
         """The rate that is wanted of the motion's own time, in thousandths; 0 in a pause."""
         return self.engine.rates.wanted if self.moving() else self._next_rate
+
+    def rest_ms(self) -> int:
+        """In how many milliseconds what moves rests after a stop, now or before; 0: at once."""
+        return self.engine.rest_ms() if self.engine and self.engine.moving else 0
 
     def state(self) -> int:
         """Number of the state (messages.STATES)."""

@@ -44,6 +44,8 @@ LEAD_TICKS = const(1680000)
 _PREFILLS = const(32)
 _ROUNDS = const(8)  # of filling the queues, before other work gets its turn
 _PERMILLE = const(1000)
+_KITICKS_PER_32_MS = const(2625)
+_MOST_KITICKS = const(5_000_000)  # a minute
 _ALL_JOINTS = const(0xFF)
 # work beside the filling of queues: one of these in each call of ``service``
 _POLL_SWITCHES = const(0)
@@ -112,7 +114,7 @@ class Engine(EngineParts):
         except MemoryError:  # what the first attempt left free lies otherwise
             gc.collect()
             override = self._new_override()
-        override.begin(rate, motion.brake_ticks, duration_ticks)
+        override.begin(rate, motion, duration_ticks)
         if override.end_ticks() > LONGEST_RUN_TICKS:
             raise Refused(codes.TOO_LONG)
         return override
@@ -247,8 +249,8 @@ class Engine(EngineParts):
         """Come to rest along the path; freeze where the motion's record has no time for it, or at rest in a pause.
 
         Over that time acceleration and jerk stay within 1.25 times the arm's limits. Braking begins behind what is
-        in the rings, about 75 ms from now; where the rate is changing, behind that. A motion that is over by then ends
-        by itself.
+        in the rings, about 75 ms from now; where the rate is changing, behind that. A motion that ends by itself before
+        it would have come to rest does that.
         """
         rates = self.rates
         if not self.moving or rates.braked:
@@ -263,10 +265,23 @@ class Engine(EngineParts):
         else:
             self._change_rate()
 
+    def rest_ms(self) -> int:
+        """In how many milliseconds it rests after ``brake``, which came before or comes now; 0: at once."""
+        return (
+            min(self.rates.rest_kiticks(self._ahead_kiticks()), _MOST_KITICKS) * 32 // _KITICKS_PER_32_MS + 1
+        )
+
+    def _ahead_kiticks(self) -> int:
+        """How far ahead steps are in the rings; allocates nothing."""
+        ahead_kiticks = 0
+        for joint in self.drives:
+            ahead_kiticks = max(joint.ahead_kiticks(), ahead_kiticks)
+        return ahead_kiticks
+
     def change_rate(self, rate: int) -> None:
         """Let the motion's own time go on at another rate, in thousandths; 0: pause, RESUME: as before it.
 
-        Each change takes the record's brake time, with acceleration and jerk as in ``brake``. It begins as braking
+        Each change takes as long as the record says, with acceleration and jerk as in ``brake``. It begins as braking
         does; one that comes while the rate is changing waits until that has ended, and only the last one counts.
         """
         if not self.moving:
@@ -280,7 +295,7 @@ class Engine(EngineParts):
         if not rates.is_due():
             return
         self._readings.convert()  # by the law that they were taken under
-        law = rates.ramp(max([joint.ahead_kiticks() for joint in self.drives]))
+        law = rates.ramp(self._ahead_kiticks())
         if law is None:
             return
         for joint in self.drives:

@@ -79,7 +79,7 @@ class NextMotion:
             self._expect(motion, number, stands_at(motion, number))
         yield
         override = Override()
-        override.begin(rate, motion.brake_ticks, endpoints.duration_ticks(motion))
+        override.begin(rate, motion, endpoints.duration_ticks(motion))
         if override.end_ticks() > LONGEST_RUN_TICKS:
             raise Refused(codes.TOO_LONG)
         pulse_ticks = self._engine.block[isr.PULSE_TICKS]

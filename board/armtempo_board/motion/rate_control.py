@@ -30,8 +30,8 @@ class RateControl:
         self._clock = clock
         self.override: "Any" = None
         self.wanted = self._before_pause = _PERMILLE
-        self.duration_ticks = 0
-        self._can_brake = self._can_change = False
+        self.duration_ticks = self._end_kiticks = 0
+        self._can_brake = False
         self.braked = self.end_moves = self.waits = False
 
     def begin(self, override: "Any", motion: "MotionHead") -> None:
@@ -39,8 +39,8 @@ class RateControl:
         self.override = override
         self.wanted = self._before_pause = override.rate
         self.duration_ticks = override.end_ticks()
-        self._can_brake = motion.brake_ticks > 0
-        self._can_change = self._can_brake and motion.ramps
+        self._end_kiticks = self.duration_ticks >> 10
+        self._can_brake = motion.can_brake
         self.braked = self.end_moves = self.waits = False
 
     def brake(self) -> bool:
@@ -62,7 +62,7 @@ class RateControl:
         """Want another rate, in thousandths; 0: pause, RESUME: as before it."""
         if self.braked:
             raise Refused(codes.BUSY)
-        if not self._can_change:
+        if not self._can_brake:
             raise Refused(codes.FIXED_SPEED)
         if rate == RESUME:
             rate = self._before_pause
@@ -82,18 +82,40 @@ class RateControl:
     def ramp(self, ahead_kiticks: int) -> "array[int] | None":
         """Begin the change, behind what is in the rings: the law that all joints are to follow; None: it ends before.
 
-        ``ahead_kiticks``: how far ahead steps are in them.
+        ``ahead_kiticks``: how far ahead steps are in them. Where it would come to rest later than it ends by itself,
+        it does that.
         """
         ahead_kiticks = max(LOOKAHEAD_KITICKS + _LAW_MARGIN_KITICKS, ahead_kiticks)
         start_ticks = (self._clock.kiticks() + ahead_kiticks) << 10
         self.waits = False
-        if start_ticks >= self.duration_ticks:
+        if start_ticks >= self.duration_ticks or (
+            self.braked and self.override.ramp_end_ticks(start_ticks, 0) >= self.duration_ticks
+        ):
             return None
         self.override.ramp(start_ticks, self.wanted)
         self._end_at(self.override.steady_ticks() if self.braked else self.override.end_ticks())
         law: "array[int]" = self.override.law
         return law
 
+    def rest_kiticks(self, ahead_kiticks: int) -> int:
+        """How long from now it takes to come to rest after a stop: one that came before, or one now; 0 by freezing.
+
+        Allocates nothing.
+        """
+        now = self._clock.kiticks()
+        end = self._end_kiticks
+        if not self.braked or self.waits:
+            if not self._can_brake:
+                return 0
+            override = self.override
+            if self.stands():
+                end = override.steady_kiticks
+            else:
+                start = now + max(LOOKAHEAD_KITICKS + _LAW_MARGIN_KITICKS, ahead_kiticks)
+                end = min(override.rest_kiticks(max(start, override.steady_kiticks)), end)
+        return max(end - now, 0)
+
     def _end_at(self, ticks: int) -> None:
         self.duration_ticks = ticks
+        self._end_kiticks = ticks >> 10
         self.end_moves = True

@@ -8,6 +8,7 @@ for. Imported before a motion, and forgotten after it.
 from array import array
 
 from armtempo_shared.limits import LONGEST_RUN_TICKS
+from micropython import const
 
 from armtempo_board.stepgen import interval_steps, time_law
 from armtempo_board.stepgen.time_law import (
@@ -23,36 +24,76 @@ from armtempo_board.stepgen.time_law import (
     START_HIGH,
 )
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
+_UNIT_BITS = const(14)  # RAMP_UNIT_TICKS of the record
+_MOST_PARTS = const(8190)  # of a motion's time, to look up its ramps
+
 
 class Override:
     """``law`` is what the joints follow; ``rate`` that behind its ramp, steady from ``steady_kiticks`` on."""
 
     def __init__(self) -> None:
         self.law = array("i", bytes(4 * time_law.LAW_WORDS))
-        self.begin(PERMILLE, 0, 0)
+        self.begin(PERMILLE, None, 0)
 
-    def begin(self, rate: int, ramp_ticks: int, duration_ticks: int) -> None:
-        """Stand at time 0 of a motion. ``ramp_ticks``: length of each ramp, rounded up to the grid; at most 12.8 s."""
-        grid = time_law.RAMP_GRID_TICKS
-        self._ramp_ticks = min(-(-ramp_ticks // grid), time_law.LONGEST_RAMP_TICKS // grid) * grid
+    def begin(self, rate: int, motion: "Any", duration_ticks: int) -> None:
+        """Stand at time 0 of a motion, a ``MotionHead``, which says how long its ramps are."""
+        self._motion = motion
         self._duration_ticks = duration_ticks
+        self._shift = 10
+        while duration_ticks >> self._shift > _MOST_PARTS:
+            self._shift += 1
+        self._parts = (duration_ticks >> self._shift) + 1
         self._motion_ticks = self._real_ticks = 0  # at the end of the last ramp
+        self._motion_kiticks = self._real_kiticks = 0
         self.rate = rate
         time_law.set_length(self.law, 0)
         self._set(time_law.START_HIGH, rate, rate)
         self._set(time_law.END_HIGH, rate, rate)
         self.steady_kiticks = -1 << 20
 
+    def ramp_end_ticks(self, from_ticks: int, rate: int) -> int:
+        """Real time at which a ramp to another rate would end that begins at a real time, behind the last ramp."""
+        thousands = self._thousands(from_ticks)
+        return (
+            self._real_ticks
+            + PERMILLE * thousands
+            + self._ramp_ticks(self._motion_ticks + self.rate * thousands, rate)
+        )
+
+    def rest_kiticks(self, from_kiticks: int) -> int:
+        """Real time, in Ki ticks, at which a ramp to rest would end that begins at a real time; allocates nothing."""
+        since = max(from_kiticks - self._real_kiticks, 0)
+        at = self._motion_kiticks + since // PERMILLE * self.rate + since % PERMILLE * self.rate // PERMILLE
+        units = self._motion.ramp_units(at >> (self._shift - 10), self._parts, True)
+        return self._real_kiticks + since + (units << (_UNIT_BITS - 10))
+
+    def _thousands(self, from_ticks: int) -> int:
+        """Thousands of ticks from the last ramp's end, rounded up."""
+        return max(-(-(from_ticks - self._real_ticks) // PERMILLE), 0)
+
+    def _ramp_ticks(self, at_ticks: int, rate: int) -> int:
+        """Length of a ramp that begins at a time of the motion, rounded up to the grid."""
+        grid = time_law.RAMP_GRID_TICKS
+        units = self._motion.ramp_units(at_ticks >> self._shift, self._parts, rate == 0)
+        return min(-(-(units << _UNIT_BITS) // grid), time_law.LONGEST_RAMP_TICKS // grid) * grid
+
     def ramp(self, from_ticks: int, rate: int) -> None:
         """Go to another rate, from a real time on that lies behind the last ramp."""
-        thousands = max(-(-(from_ticks - self._real_ticks) // PERMILLE), 0)
+        thousands = self._thousands(from_ticks)
         self._real_ticks += PERMILLE * thousands
         self._motion_ticks += self.rate * thousands
-        time_law.set_length(self.law, self._ramp_ticks)
+        length = self._ramp_ticks(self._motion_ticks, rate)
+        time_law.set_length(self.law, length)
         self._set(time_law.START_HIGH, self.rate, rate)
-        self._real_ticks += self._ramp_ticks
-        self._motion_ticks += (self.rate + rate) * (self._ramp_ticks // (2 * PERMILLE))
+        self._real_ticks += length
+        self._motion_ticks += (self.rate + rate) * (length // (2 * PERMILLE))
         self._set(time_law.END_HIGH, self.rate, rate)
+        self._motion_kiticks = self._motion_ticks >> 10
+        self._real_kiticks = self._real_ticks >> 10
         self.rate = rate
         self.steady_kiticks = (self._real_ticks >> 10) + 1
 
@@ -80,7 +121,7 @@ class Override:
     def is_too_long(self, from_ticks: int, rate: int) -> bool:
         """Whether at a rate, taken up at about a real time, the run could last longer than LONGEST_RUN_TICKS."""
         left = max(self._duration_ticks - self._motion_ticks, 0)
-        latest = max(from_ticks, self._real_ticks) + 2 * self._ramp_ticks
+        latest = max(from_ticks, self._real_ticks) + 2 * time_law.LONGEST_RAMP_TICKS
         return rate > 0 and latest + left * PERMILLE // rate > LONGEST_RUN_TICKS
 
 

@@ -11,8 +11,6 @@ from armtempo.basics.errors import InputError, PortGivenUpError
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import tell
 from armtempo.formats.spelling import did_you_mean
-from armtempo.link import patiently
-from armtempo.link.traffic import Sink
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job, is_name
@@ -20,14 +18,14 @@ from armtempo.model.tool_pose import Pose
 from armtempo.ports.names import SIM, is_sim
 from armtempo.project import board_port
 from armtempo.project.settings import ARM, JOB, RUNS, ProjectSettings, nothing_set
-from armtempo.robot import connect, shared_board
-from armtempo.robot.board import Board
-from armtempo.robot.board_state import BoardState, record_crc
-from armtempo.robot.shared_board import SharedBoard
 
-if TYPE_CHECKING:  # what plans takes long to import, and most commands need none of it
+if TYPE_CHECKING:  # planner and link take long to import: a command without a plan or a board needs neither
+    from armtempo.link.traffic import Sink
     from armtempo.model.plan import Plan
     from armtempo.model.sequence_plan import SequencePlan
+    from armtempo.robot.board import Board
+    from armtempo.robot.board_state import BoardState
+    from armtempo.robot.shared_board import SharedBoard
 
 _ANEW = ", started for this command: its arm begins at home; 'armtempo virtual-board' keeps one running"
 
@@ -113,6 +111,8 @@ def arm_of_board(board: Board, named: Arm | None) -> Arm:
     """
     if named is not None:
         return named
+    from armtempo.robot.board_state import record_crc
+
     paper = Arm.paper()
     if board.info.arm_crc == record_crc(paper):
         tell(f"arm: {paper.name}, which the board is set up for")
@@ -213,6 +213,8 @@ def board(
 
     ``wait``: a few seconds for a port that another program has, see ``connect``.
     """
+    from armtempo.robot import connect
+
     opened: Callable[..., Board] = connect.connect if wait else connect.connect_now
     log = given.log_traffic
     found = opened(given.port, arm, log_traffic=log, sink=sink, any_program=any_program, tell=tell)
@@ -228,6 +230,8 @@ def shared_or_own(
 
     ``given`` names a port. A program that opens it just now answers for it soon; one that ends gives it up.
     """
+    from armtempo.link import patiently
+    from armtempo.robot import shared_board
 
     def either() -> SharedBoard | Board:
         shared = shared_board.find(given.port or "")

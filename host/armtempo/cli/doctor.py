@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 
 import click
@@ -11,7 +10,7 @@ from armtempo.basics.errors import ArmtempoError
 from armtempo.cli import chosen, options, results
 from armtempo.cli.options import BoardOptions
 from armtempo.diagnosis import arm_check, machine
-from armtempo.diagnosis.item import Condition, Item
+from armtempo.diagnosis.finding import Finding, Level, error, good, note
 from armtempo.model import shipped
 from armtempo.project import board_port, settings
 from armtempo.project.settings import ProjectSettings
@@ -37,7 +36,7 @@ def doctor(arm_path: Path | None, port: str | None, as_json: bool) -> None:
         "arm": _arm(arm_path),
         "board": _board(port, arm_path),
     }
-    wrong = any(item.level is Condition.WRONG for items in parts.values() for item in items)
+    wrong = any(item.level is Level.ERROR for items in parts.values() for item in items)
     if as_json:
         results.show_json({part: [_values(item) for item in items] for part, items in parts.items()})
     else:
@@ -46,33 +45,33 @@ def doctor(arm_path: Path | None, port: str | None, as_json: bool) -> None:
         raise SystemExit(1)
 
 
-def _project(arm_path: Path | None, port: str | None) -> list[Item]:
+def _project(arm_path: Path | None, port: str | None) -> list[Finding]:
     project = ProjectSettings()
     given = {settings.ARM: arm_path, settings.PORT: port}
     try:
         found = [project.get(name, given.get(name)) for name in settings.NAMES]
-    except ArmtempoError as error:
-        return [Item("armtempo.toml", str(error), Condition.WRONG, "correct that")]
-    return [Item(one.name, f"{one.value} ({one.source})" if one else "not set") for one in found]
+    except ArmtempoError as refused:
+        return [error("armtempo.toml", str(refused), "correct that")]
+    return [good(one.name, f"{one.value} ({one.source})" if one else "not set") for one in found]
 
 
-def _arm(arm_path: Path | None) -> list[Item]:
+def _arm(arm_path: Path | None) -> list[Finding]:
     try:
         setting = ProjectSettings().get(settings.ARM, arm_path)
         return arm_check.examine_arm(shipped.find(setting.value).path) if setting else []
-    except ArmtempoError as error:
-        return [Item("arm file", str(error), Condition.WRONG, "name an arm file that is there")]
+    except ArmtempoError as refused:
+        return [error("arm file", str(refused), "name an arm file that is there")]
 
 
-def _board(port: str | None, arm_path: Path | None) -> list[Item]:
+def _board(port: str | None, arm_path: Path | None) -> list[Finding]:
     try:
         name = board_port.choose(port, others=True).value
     except ArmtempoError:  # none was named and none can be meant: nothing is wrong with that
-        return [Item("board", "not looked at", Condition.NOTE, "give --port PORT, or --port sim")]
+        return [note("board", "not looked at", "give --port PORT, or --port sim")]
     try:
         return board_check.examine_board(_named(chosen.board_state(BoardOptions(name)), arm_path))
-    except ArmtempoError as error:
-        return board_check.examine_board(error)
+    except ArmtempoError as refused:
+        return board_check.examine_board(refused)
 
 
 def _named(state: BoardState, arm_path: Path | None) -> BoardState:
@@ -84,16 +83,21 @@ def _named(state: BoardState, arm_path: Path | None) -> BoardState:
     return state if arm is None else state.named(arm)
 
 
-def _values(item: Item) -> dict[str, str]:
-    return {**asdict(item), "level": item.level.value}
+def _values(item: Finding) -> dict[str, str]:
+    return {
+        "what": item.where,
+        "found": item.what,
+        "level": item.level.word,
+        "next_step": item.next_step,
+    }
 
 
-def _print(parts: dict[str, list[Item]]) -> None:
-    width = max(len(item.what) for items in parts.values() for item in items)
+def _print(parts: dict[str, list[Finding]]) -> None:
+    width = max(len(item.where) for items in parts.values() for item in items)
     for part, items in parts.items():
         if items:
             click.echo(part)
         for item in items:
-            click.echo(f"  {item.level.value:<6}{item.what:<{width}}  {item.found}")
+            click.echo(f"  {item.level.word:<6}{item.where:<{width}}  {item.what}")
             if item.next_step:
                 click.echo(f"  {'':<6}{'':<{width}}  -> {item.next_step}")

@@ -54,5 +54,5 @@ def _lines(found: SelfTest) -> list[str]:
 
 def _words(line: Measurement) -> list[str]:
     expected = f"   (expected: {line.expected})" if line.expected else ""
-    words = [f"  {line.verdict.value:<6}{line.part:<8}{line.what}: {line.measured}{expected}"]
+    words = [f"  {line.verdict.word:<6}{line.part:<8}{line.what}: {line.measured}{expected}"]
     return [*words, f"  {'':<14}-> {line.cure}"] if line.cure else words

@@ -63,7 +63,7 @@ def lines(state: BoardState) -> list[str]:
 
 def motion_lines(state: BoardState) -> list[str]:
     """What the board is doing, where the joints are."""
-    found = [f"state     {state.state}{_speed(state)}"]
+    found = [f"state     {state.state}{_speed(state)}{_rest(state)}"]
     if state.fault:
         found.append(f"fault     {state.fault}; see 'armtempo clear'")
     found += [f"          {line}" for line in joint_lines(state)]
@@ -88,6 +88,16 @@ def _speed(state: BoardState) -> str:
     if state.speed_percent == 100.0 or not state.moving:
         return ""
     return f", at {state.speed_percent:g} % of the planned speed" if state.speed_percent else ", in a pause"
+
+
+def _rest(state: BoardState) -> str:
+    if not state.moving or not state.rest_s:
+        return ""
+    return (
+        f", at rest in {state.rest_s:.2f} s"
+        if state.state == "braking"
+        else f"; a stop takes {state.rest_s:.2f} s"
+    )
 
 
 def joint_lines(state: BoardState) -> list[str]:

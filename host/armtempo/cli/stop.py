@@ -66,6 +66,9 @@ def _tell(given: BoardOptions, answer: StopAnswer, now: bool) -> None:
 def _rest(shared: SharedBoard) -> BoardState | None:
     """Where the arm comes to rest; None where the other program gives up the port before."""
     try:
+        found = shared.state()
+        if found.moving and found.rest_s:
+            results.tell(f"at rest in {found.rest_s:.2f} s")
         return shared.wait_for_rest()
     except NoAnswerError:
         raise

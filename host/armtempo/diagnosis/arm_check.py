@@ -9,7 +9,6 @@ import numpy as np
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.diagnosis import drives, encoders, geometry, resolution, torque, units, wiring
 from armtempo.diagnosis.finding import Finding, Level, error, note
-from armtempo.diagnosis.item import Condition, Item
 from armtempo.model.arm import STILL_DEG, Arm
 from armtempo.model.posture import HOME
 
@@ -97,12 +96,12 @@ def _motors(arm: Arm) -> list[Finding]:
     return [note("motors", text, "give them a motor and limits table if they are to be driven")]
 
 
-def examine_arm(path: Path) -> list[Item]:
+def examine_arm(path: Path) -> list[Finding]:
     """Whether the arm file can be read, and how many errors and warnings a check finds in it."""
     arm, findings = check(path)
     errors = sum(finding.level is Level.ERROR for finding in findings)
     warnings = sum(finding.level is Level.WARNING for finding in findings)
     name = f"{arm.name}, {len(arm.driven_indices)} driven joints" if arm else "not readable"
-    level = Condition.WRONG if errors else Condition.NOTE if warnings else Condition.GOOD
+    level = Level.ERROR if errors else Level.NOTE if warnings else Level.GOOD
     advice = f"armtempo check --arm {path}" if errors or warnings else ""
-    return [Item(str(path), f"{name}; {errors} errors, {warnings} warnings", level, advice)]
+    return [Finding(level, str(path), f"{name}; {errors} errors, {warnings} warnings", advice)]

@@ -1,4 +1,4 @@
-"""What a check found: how bad, where, what, and what to do about it."""
+"""What an examination found, of a file, a machine or a board: how bad, where, what, and what to do about it."""
 
 from __future__ import annotations
 
@@ -15,17 +15,23 @@ class Level(Enum):
     """It may work, but is probably not meant so."""
     NOTE = "note"
     """Worth knowing; nothing looks wrong."""
+    GOOD = "ok"
+
+    @property
+    def word(self) -> str:
+        """The level where something works or does not, as on a machine: ``ok``, ``note`` or ``wrong``."""
+        return "wrong" if self is Level.ERROR else self.value
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing found in an arm file or a job."""
+    """One thing found."""
 
     level: Level
     where: str
-    """The joint, or the part of the file."""
+    """The joint, the part of the file, the package, the port."""
     what: str
-    next_step: str
+    next_step: str = ""
 
 
 def error(where: str, what: str, next_step: str) -> Finding:
@@ -41,3 +47,8 @@ def warning(where: str, what: str, next_step: str) -> Finding:
 def note(where: str, what: str, next_step: str) -> Finding:
     """A finding that is worth knowing."""
     return Finding(Level.NOTE, where, what, next_step)
+
+
+def good(where: str, what: str) -> Finding:
+    """A finding that is as it should be."""
+    return Finding(Level.GOOD, where, what)

@@ -10,7 +10,7 @@ import sys
 from importlib.metadata import PackageNotFoundError, requires, version
 
 from armtempo.basics import installation
-from armtempo.diagnosis.item import Condition, Item
+from armtempo.diagnosis.finding import Finding, Level, error, good, note
 from armtempo.ports.listing import Port, find_ports
 
 LEAST_PYTHON = (3, 11)
@@ -18,36 +18,28 @@ _NO_PORT = "connect a board by its USB socket, or use --port sim; a board withou
 _GROUP = "sudo usermod -a -G dialout $USER, then log in again"
 
 
-def examine_machine() -> list[Item]:
+def examine_machine() -> list[Finding]:
     """Versions of armtempo, Python and the operating system."""
     from armtempo.basics.version import installed_version
 
     python = f"{platform.python_version()} ({platform.python_implementation()})"
     fits = sys.version_info[:2] >= LEAST_PYTHON
     least = ".".join(map(str, LEAST_PYTHON))
-    return [
-        Item("armtempo", installed_version()),
-        Item(
-            "Python",
-            python,
-            Condition.GOOD if fits else Condition.WRONG,
-            "" if fits else f"install Python {least} or newer",
-        ),
-        _flash_tool(),
-        Item("system", f"{platform.system()} {platform.release()}, {platform.machine()}"),
-    ]
+    found = good("Python", python) if fits else error("Python", python, f"install Python {least} or newer")
+    system = good("system", f"{platform.system()} {platform.release()}, {platform.machine()}")
+    return [good("armtempo", installed_version()), found, _flash_tool(), system]
 
 
-def _flash_tool() -> Item:
+def _flash_tool() -> Finding:
     found = shutil.which("dfu-util") or shutil.which("st-flash")
     if found:
-        return Item("flash tool", found)
-    return Item("flash tool", "not installed", Condition.NOTE, "for 'armtempo flash': install dfu-util")
+        return good("flash tool", found)
+    return note("flash tool", "not installed", "for 'armtempo flash': install dfu-util")
 
 
-def packages() -> list[Item]:
+def packages() -> list[Finding]:
     """Each package that armtempo needs or can use, with its version, or how to get it."""
-    found: dict[str, Item] = {}
+    found: dict[str, Finding] = {}
     for requirement in requires("armtempo") or []:
         name = re.split(r"[^A-Za-z0-9._-]", requirement)[0]
         extra = re.search(r"extra == ['\"](\w+)['\"]", requirement)
@@ -58,26 +50,26 @@ def packages() -> list[Item]:
     return [*found.values()]
 
 
-def _package(name: str, extra: str) -> Item:
+def _package(name: str, extra: str) -> Finding:
     """A package of the core (``extra`` = "") or of an extra."""
     try:
-        return Item(name, version(name))
+        return good(name, version(name))
     except PackageNotFoundError:
         if extra:
             advice = f"{installation.command(name, extra)} if you want it"
-            return Item(name, "not installed", Condition.NOTE, advice)
-        return Item(name, "missing", Condition.WRONG, "pip install --force-reinstall armtempo")
+            return note(name, "not installed", advice)
+        return error(name, "missing", "pip install --force-reinstall armtempo")
 
 
-def ports() -> list[Item]:
+def ports() -> list[Finding]:
     """The serial ports, each with whether it can be opened by this user."""
     found = [_port(port) for port in find_ports()]
-    return found or [Item("ports", "none", Condition.NOTE, _NO_PORT)]
+    return found or [note("ports", "none", _NO_PORT)]
 
 
-def _port(port: Port) -> Item:
+def _port(port: Port) -> Finding:
     what = f"{port.description or 'serial port'}{', a MicroPython board' if port.board else ''}"
     if sys.platform == "linux" and not os.access(port.device, os.R_OK | os.W_OK):
-        level = Condition.WRONG if port.board else Condition.NOTE
-        return Item(port.device, f"{what}; no permission to open it", level, _GROUP)
-    return Item(port.device, what)
+        level = Level.ERROR if port.board else Level.NOTE
+        return Finding(level, port.device, f"{what}; no permission to open it", _GROUP)
+    return good(port.device, what)

@@ -70,6 +70,8 @@ class Status:
     samples_kept: int
     samples_lost: int
     frames_bad: int
+    rest_ms: int
+    """Until the arm rests after a stop, one that came before or one now; 0: at once."""
     positions: Positions
 
     @property

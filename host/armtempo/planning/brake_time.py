@@ -1,19 +1,22 @@
-"""The time in which a motion can brake to rest, or change its speed otherwise, anywhere on its path.
+"""How long a motion takes to brake to rest, or to change its speed otherwise, by where on its path that begins.
 
 The board lets the motion's own time run at another rate, so the arm stays on its path: in the brake time the rate goes
-from r0 to r1 as r0 + (r1 - r0) (10 x³ - 15 x⁴ + 6 x⁵), x = time since its beginning / brake time. Braking is r1 = 0;
-so are a change of speed, a pause, and going on.
+from r0 to r1 as r0 + (r1 - r0) (10 x³ - 15 x⁴ + 6 x⁵), x = time since its beginning / brake time. Braking and pauses
+are r1 = 0; changes of speed and going on have times of their own.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from armtempo_shared.limits import TICK_HZ
+from armtempo_shared.motion import RAMP_ENTRIES, RAMP_UNIT_TICKS
 
+from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.model.parts import Limits
-from armtempo.splines.bspline import Array
 from armtempo.splines.trajectory import Trajectory
 
 EXCESS = 1.25
@@ -21,70 +24,162 @@ EXCESS = 1.25
 limits themselves a motion that is already at them could only brake very slowly: braking adds to the acceleration and
 jerk of the path."""
 
-RATES = ((1.0, 0.0), (0.0, 1.0), (1.0, 0.5), (0.5, 1.0), (1.0, 0.75), (0.75, 1.0), (0.9, 0.2), (0.2, 0.9))
-"""Rates before and after, for which the brake time is found; between others less is needed."""
+Rates = tuple[tuple[float, float], ...]
+TO_REST: Rates = ((1.0, 0.0), (0.75, 0.0), (0.5, 0.0), (0.25, 0.0), (0.1, 0.0))
+OTHERS: Rates = (
+    (0.0, 1.0),
+    (1.0, 0.01),
+    (1.0, 0.5),
+    (0.5, 1.0),
+    (1.0, 0.75),
+    (0.75, 1.0),
+    (0.9, 0.2),
+    (0.2, 0.9),
+)
+"""Rates before and after, for which the times are found; between others less is needed. The first one of TO_REST and
+the first two of OTHERS need most."""
 
-_LONGER = 1.05
-_STARTS = 400
+UNIT_S = RAMP_UNIT_TICKS / TICK_HZ
+_LONGEST = 65535
+_LONGER = 1.02
+_STARTS = 6  # in each part of the table
 _PHASES = 40
 _SAMPLES = 4000
+_SHORTEST_S = 0.01
+_HALVINGS = 6
+_NEGLIGIBLE = 1e-6  # of RAMP_UNIT_TICKS
 
 
-def brake_time_s(trajectory: Trajectory, limits: Sequence[Limits]) -> float:
-    """Shortest brake time, in seconds, that keeps EXCESS times the limits wherever a change of rate starts.
+@dataclass(frozen=True, eq=False)
+class BrakeTimes:
+    """How long changes take that begin at RAMP_ENTRIES equal steps of a motion's time, in RAMP_UNIT_TICKS.
 
-    One of ``limits`` for each joint. Speed never rises. Found on a grid of starts and times, to 1 %.
-    Raises InputError where the motion itself exceeds EXCESS times the limits.
+    Linear in between. ``to_rest``, ``others``: (RAMP_ENTRIES,), whole numbers.
     """
-    time = np.linspace(0.0, trajectory.duration_s, _SAMPLES)
-    motion = [trajectory(time, order) for order in (1, 2, 3)]
-    allowed = np.array([limit.values for limit in limits])
-    if any(np.any(np.abs(motion[n]) > EXCESS * allowed[:, n]) for n in (1, 2)):
+
+    duration_s: float
+    to_rest: Array
+    others: Array
+
+    def rest_s(self, time_s: float | Array) -> Array:
+        """How long braking takes from a time of the motion on."""
+        return self._at(self.to_rest, time_s)
+
+    def change_s(self, time_s: float | Array) -> Array:
+        """How long another change of speed takes."""
+        return self._at(self.others, time_s)
+
+    def _at(self, table: Array, time_s: float | Array) -> Array:
+        return np.asarray(UNIT_S * np.interp(time_s, np.linspace(0.0, self.duration_s, RAMP_ENTRIES), table))
+
+    @property
+    def longest_rest_s(self) -> float:
+        """The longest brake time."""
+        return UNIT_S * float(self.to_rest.max())
+
+
+def of_motion(trajectory: Trajectory, limits: Sequence[Limits]) -> BrakeTimes:
+    """The shortest times that keep EXCESS times the limits, one of ``limits`` for each joint, to 2 %.
+
+    Speed never rises. Found on a grid of starts and times, and looked at again on a finer one. Raises InputError where
+    the motion itself exceeds EXCESS times the limits.
+    """
+    ramps = _Ramps(trajectory, np.array([limit.values for limit in limits]))
+    if ramps.worst_of_motion > EXCESS:
         raise InputError(
             f"the motion {trajectory.name!r} goes beyond the arm's acceleration or jerk limits",
             "plan it again",
         )
-    high = 0.01
-    whole = RATES[:2]
-    while _excess(time, motion, allowed, high, whole) > EXCESS:
-        high *= 2
-    low = high / 2
-    while high > 1.01 * low:
-        middle = 0.5 * (low + high)
-        low, high = (
-            (middle, high) if _excess(time, motion, allowed, middle, whole) > EXCESS else (low, middle)
-        )
-    while _excess(time, motion, allowed, high, RATES[2:]) > EXCESS:
-        high *= _LONGER
-    return high
+    to_rest = _table(ramps, TO_REST, TO_REST[:1], np.full(RAMP_ENTRIES, _SHORTEST_S / UNIT_S))
+    return BrakeTimes(trajectory.duration_s, to_rest, _table(ramps, OTHERS, OTHERS[:2], to_rest))
 
 
-def _excess(
-    time: Array, motion: list[Array], allowed: Array, brake_s: float, rates: Sequence[tuple[float, float]]
-) -> float:
-    """Largest acceleration or jerk over its limit during changes between ``rates``, over all starts."""
-    x = np.linspace(0.0, 1.0, _PHASES + 1)
-    slopes = [
-        np.vstack((np.diff(values, axis=0) / np.diff(time)[:, None], 0.0 * values[:1])) for values in motion
-    ]
-    worst = 0.0
-    for before, after in rates:
-        change = after - before
-        rate = before + change * x**3 * (10 - 15 * x + 6 * x**2)
-        rate1 = change * 30 * x**2 * (1 - x) ** 2 / brake_s
-        rate2 = change * 60 * x * (1 - x) * (1 - 2 * x) / brake_s**2
-        passed = before * x + change * x**4 * (2.5 - 3 * x + x**2)
-        at = time[:: _SAMPLES // _STARTS, None] + brake_s * passed
-        place = np.searchsorted(time, at, side="right") - 1  # the same for all joints
-        beyond = at > time[-1]
-        for joint, (_, acceleration_limit, jerk_limit) in enumerate(allowed):
-            speed, acceleration, jerk = (
-                np.where(beyond, 0.0, values[place, joint] + slope[place, joint] * (at - time[place]))
-                for values, slope in zip(motion, slopes, strict=True)
-            )
+def _table(ramps: _Ramps, rates: Rates, worst: Rates, least: Array) -> Array:
+    """Entries from ``least`` on; ``worst``: the rates that need most."""
+    parts = RAMP_ENTRIES - 1
+    place = np.arange(_STARTS * parts + 1) / _STARTS
+    needed = (
+        ramps.shortest_s(place / parts, worst, UNIT_S * np.interp(place, np.arange(RAMP_ENTRIES), least))
+        / UNIT_S
+    )
+    table = np.maximum(needed[::_STARTS], least)
+    _lift(table, place, needed)
+    table = np.minimum(np.ceil(table), _LONGEST)
+    place = np.arange(2 * _STARTS * parts + 1) / (2 * _STARTS)
+    while True:
+        length_s = UNIT_S * np.interp(place, np.arange(RAMP_ENTRIES), table)
+        excess = ramps.excess(place / parts, length_s, rates)
+        if not np.any(found := (excess > EXCESS) & (length_s < UNIT_S * _LONGEST)):
+            return table
+        _lift(table, place, np.where(found, _LONGER * length_s / UNIT_S, 0.0))
+        table = np.minimum(np.ceil(table), _LONGEST)
+
+
+def _lift(table: Array, place: Array, needed: Array) -> None:
+    """Lengthen the entries where the table between them is less than ``needed``, by as little as will do."""
+    part = np.minimum(place.astype(int), len(table) - 2)
+    weight = place - part
+    while True:
+        missing = needed - (1.0 - weight) * table[part] - weight * table[part + 1]
+        worst = int(np.argmax(missing))
+        if missing[worst] <= _NEGLIGIBLE:
+            return
+        share = np.array([1.0 - weight[worst], weight[worst]])
+        table[part[worst] : part[worst] + 2] += missing[worst] * share / np.sum(share**2)
+
+
+class _Ramps:
+    """Acceleration and jerk of a motion while its rate changes, over their limits (J, 3)."""
+
+    def __init__(self, trajectory: Trajectory, allowed: Array) -> None:
+        self._duration_s = trajectory.duration_s
+        self._allowed = allowed
+        time = np.linspace(0.0, trajectory.duration_s, _SAMPLES)
+        # speeds, accelerations and jerks over their limits' units; rest behind the end
+        self._motion = np.stack([trajectory(time, order) for order in (1, 2, 3)], axis=1)  # (T, 3, J)
+        self.worst_of_motion = float(np.max(np.abs(self._motion[:, 1:]) / allowed.T[1:]))
+
+    def shortest_s(self, starts: Array, rates: Rates, least_s: Array) -> Array:
+        """From ``least_s`` on, to 1 %, for each of ``starts``, parts of the motion's time."""
+        low, high = least_s.copy(), least_s.copy()
+        left = np.arange(len(starts))
+        while len(left := left[self.excess(starts[left], high[left], rates) > EXCESS]):
+            low[left], high[left] = high[left], 2.0 * high[left]
+            left = left[high[left] < 2.0 * UNIT_S * _LONGEST]
+        left = np.flatnonzero(high > low)
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low[left] + high[left])
+            fails = self.excess(starts[left], middle, rates) > EXCESS
+            low[left] = np.where(fails, middle, low[left])
+            high[left] = np.where(fails, high[left], middle)
+        return high
+
+    def excess(self, starts: Array, length_s: Array, rates: Rates) -> Array:
+        """The largest acceleration or jerk over its limit in changes between ``rates``, for each start."""
+        x = np.linspace(0.0, 1.0, _PHASES + 1)
+        worst = np.zeros(len(starts))
+        if not len(starts):
+            return worst
+        length = length_s[:, None]
+        for before, after in rates:
+            change = after - before
+            rate = (before + change * x**3 * (10 - 15 * x + 6 * x**2))[:, None]
+            rate1 = (change * 30 * x**2 * (1 - x) ** 2 / length)[..., None]
+            rate2 = (change * 60 * x * (1 - x) * (1 - 2 * x) / length**2)[..., None]
+            passed = before * x + change * x**4 * (2.5 - 3 * x + x**2)
+            speed, acceleration, jerk = self._at(self._duration_s * starts[:, None] + length * passed)
             changed2 = acceleration * rate**2 + speed * rate1
             changed3 = jerk * rate**3 + 3 * acceleration * rate * rate1 + speed * rate2
-            worst = max(
-                worst, np.abs(changed2).max() / acceleration_limit, np.abs(changed3).max() / jerk_limit
-            )
-    return float(worst)
+            for changed, limit in ((changed2, self._allowed[:, 1]), (changed3, self._allowed[:, 2])):
+                worst = np.maximum(worst, np.max(np.abs(changed) / limit, axis=(1, 2)))
+        return worst
+
+    def _at(self, time_s: Array) -> tuple[Array, Array, Array]:
+        """Speed, acceleration and jerk at times, each (..., J)."""
+        place = time_s * ((_SAMPLES - 1) / self._duration_s)
+        before = np.minimum(place.astype(int), _SAMPLES - 2)
+        part = (place - before)[..., None, None]
+        values = self._motion[before]
+        values += part * (self._motion[before + 1] - values)
+        values[place > _SAMPLES - 1] = 0.0
+        return values[..., 0, :], values[..., 1, :], values[..., 2, :]

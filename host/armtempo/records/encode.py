@@ -17,6 +17,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.boards import pin_number
 from armtempo.model.parts import DrivenJoint
 from armtempo.planning import checks
+from armtempo.planning.brake_time import BrakeTimes
 from armtempo.records import output_rows
 from armtempo.splines.trajectory import Trajectory
 
@@ -39,10 +40,10 @@ def step_rates(arm: Arm) -> list[int]:
     return [_max_rate(joint) for joint in arm.driven]
 
 
-def motion_record(trajectory: Trajectory, arm: Arm, brake_s: float = 0.0) -> bytes:
+def motion_record(trajectory: Trajectory, arm: Arm, brakes: BrakeTimes | None = None) -> bytes:
     """The motion record (layout: ``armtempo_shared.motion``), tied to the arm by the checksum of its record.
 
-    ``brake_s``: time in which the motion may brake to rest anywhere (0: not at all).
+    ``brakes``: how long it takes to come to rest and to change its speed; None: it can do neither.
     Raises InputError where trajectory and arm do not fit each other or the record's number range, PlanError
     where the board could not hold the numbers.
     """
@@ -62,9 +63,15 @@ def motion_record(trajectory: Trajectory, arm: Arm, brake_s: float = 0.0) -> byt
     times = [_fixed(spline.time_points_s * limits.TICK_HZ, limits.TICK_FRACTION_BITS) for spline in axes]
     checks.check_held(trajectory, arm)
     first = trajectory.joints[0]
-    brake_ticks = round(brake_s * limits.TICK_HZ)
     crc = record_crc(arm_record(arm))
-    return motion.pack(first.degree, angles, times, first.refine, brake_ticks, crc)
+    return motion.pack(first.degree, angles, times, first.refine, _ramps(brakes), crc)
+
+
+def _ramps(brakes: BrakeTimes | None) -> motion.Ramps:
+    """The lengths of ramps as whole numbers."""
+    if brakes is None:
+        return motion.NO_RAMPS
+    return [int(entry) for entry in brakes.to_rest], [int(entry) for entry in brakes.others]
 
 
 def _fixed(points: NDArray[np.float64], bits: int) -> list[int]:

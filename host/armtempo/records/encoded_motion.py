@@ -50,12 +50,12 @@ class EncodedMotion:
 
 
 def of_trajectory(trajectory: Trajectory, arm: Arm) -> EncodedMotion:
-    """A trajectory of ``arm`` with the time in which it can brake to rest anywhere.
+    """A trajectory of ``arm`` with the times in which it can brake to rest and change its speed.
 
     Raises InputError or PlanError where the board could not replay it.
     """
-    brake_s = brake_time.brake_time_s(trajectory, [joint.limits for joint in arm.driven])
-    return EncodedMotion(trajectory.name, arm, trajectory, encode.motion_record(trajectory, arm, brake_s))
+    brakes = brake_time.of_motion(trajectory, [joint.limits for joint in arm.driven])
+    return EncodedMotion(trajectory.name, arm, trajectory, encode.motion_record(trajectory, arm, brakes))
 
 
 def of_plan(plan: Plan, name: str | None = None) -> EncodedMotion:

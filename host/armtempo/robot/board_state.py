@@ -93,6 +93,8 @@ class BoardState:
     """Whether steps may still come."""
     speed_percent: float
     """Of the planned speed, as it was asked for last; 0 in a pause."""
+    rest_s: float
+    """Until the arm rests after a stop, one that came before or one now; 0: at once."""
     fault: str
     """Name of the pending fault, "" for none."""
     frames_bad: int
@@ -175,6 +177,7 @@ def read(client: Client, port: str) -> BoardState:
         state=status.state,
         moving=status.moving,
         speed_percent=status.rate / 10,
+        rest_s=status.rest_ms / 1000,
         fault=fault_name(status.fault),
         frames_bad=status.frames_bad,
         samples_lost=status.samples_lost,

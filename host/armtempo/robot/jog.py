@@ -39,7 +39,7 @@ _FIRST = 2  # times it is said at once: a virtual board keeps to real time from 
 def rest_s(motion: JogMotion, told: bool = False) -> float:
     """A held jog rests so long after the board heard its last hold; ``told``: after a stop that arrives."""
     silence_s = 0.0 if told else HOLD_TIMEOUT_MS / 1000.0
-    return silence_s + BEFORE_BRAKING_S + motion.brake_s
+    return silence_s + BEFORE_BRAKING_S + motion.brakes.longest_rest_s
 
 
 def plan(client: Client, arm: Arm, move: JogMove, speed: float = jog_motion.SPEED) -> JogMotion:
@@ -58,7 +58,7 @@ def step(client: Client, arm: Arm, move: JogMove, speed: float, stop: StopReques
 
 
 def _encoded(motion: JogMotion, arm: Arm) -> EncodedMotion:
-    data = encode.motion_record(motion.trajectory, arm, motion.brake_s)
+    data = encode.motion_record(motion.trajectory, arm, motion.brakes)
     return EncodedMotion(motion.trajectory.name, arm, motion.trajectory, data)
 
 

@@ -21,7 +21,7 @@ from armtempo.robot.board_state import BoardState
 ANSWER_S = 8.0
 """The program that has the port answers a request within this time, even where the board is silent, or it hangs."""
 REST_S = 10.0
-"""A board that was told to stop rests within this time: it brakes for at most 5 s, then it is frozen."""
+"""A board that was told to stop rests so long after the time that it says, at the latest."""
 _LOOK_S = 0.05
 
 
@@ -72,12 +72,14 @@ class SharedBoard:
         return Levels(found["inputs"], tuple(found["outputs"]))
 
     def wait_for_rest(self) -> BoardState:
-        """The state in which the board comes to rest; LinkError if it does not within REST_S."""
-        limit_s = time.monotonic() + REST_S
-        while (state := self.state()).moving:
+        """The state in which the board comes to rest; LinkError if it does not in time."""
+        state = self.state()
+        limit_s = time.monotonic() + REST_S + state.rest_s
+        while state.moving:
             if time.monotonic() > limit_s:
                 raise LinkError("the board was told to stop and does not", "switch off the motors' power")
             time.sleep(_LOOK_S)
+            state = self.state()
         return state
 
     def watch(self, *topics: str, timeout_s: float | None = None) -> Iterator[dict[str, Any]]:

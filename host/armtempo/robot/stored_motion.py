@@ -22,7 +22,8 @@ SampleSink = Callable[[Sample, float], object]
 """Gets each sample and the length of the motion in seconds."""
 
 BRAKE_S = 5.0
-"""Braking takes no longer than this; then the board is told to freeze."""
+"""A board that does not rest after this, nor _LATER_S later than it said, is told to freeze."""
+_LATER_S = 1.0
 FREEZE_S = 2.0
 """Freezing takes no longer than this."""
 TURN_S = 1.0
@@ -126,13 +127,18 @@ class Brake:
     def __init__(self, client: Client, stop: StopRequest, now: bool = False) -> None:
         self._client = client
         self._stop = stop
-        brake_s = 0.0 if now else BRAKE_S
-        self._steps: list[tuple[float, Callable[[], object]]] = [
-            (0.0, lambda: send_stop(client, now)),
-            (brake_s, lambda: send_stop(client, now=True)),
-            (brake_s + FREEZE_S, _does_not_stop),
-        ]
+        self._steps = [(0.0, self._freeze if now else self._brake), *self._later(0.0 if now else BRAKE_S)]
         self._asked_s = 0.0
+
+    def _later(self, brake_s: float) -> list[tuple[float, Callable[[], object]]]:
+        return [(brake_s, self._freeze), (brake_s + FREEZE_S, _does_not_stop)]
+
+    def _freeze(self) -> None:
+        send_stop(self._client, now=True)
+
+    def _brake(self) -> None:
+        if send_stop(self._client):
+            self._steps = self._later(max(BRAKE_S, self._client.status().rest_ms / 1000 + _LATER_S))
 
     def __call__(self) -> None:
         if not self._stop.wanted:

@@ -7,7 +7,7 @@ from typing import Any
 
 from armtempo_shared.limits import TICK_HZ
 
-from armtempo.diagnosis.item import Condition
+from armtempo.diagnosis.finding import Level
 from armtempo.selftest.result import Measurement, judged
 
 BOARD, CYCLES, MEMORY = "board", "cycles", "memory"
@@ -26,7 +26,7 @@ _OTHER_FIRMWARE = (
 def judge(found: dict[str, Any], board_id: str) -> Iterator[Measurement]:
     """Lines about ``found`` of ``on_board/identity.py``."""
     yield Measurement(
-        BOARD, "firmware", f"MicroPython {found['version']}, {found['machine']}", "", Condition.NOTE
+        BOARD, "firmware", f"MicroPython {found['version']}, {found['machine']}", "", Level.NOTE
     )
     yield judged(
         BOARD,
@@ -89,7 +89,7 @@ def _clocks(freq: list[int], clocks: dict[str, int]) -> Iterator[Measurement]:
 def _flash(found: dict[str, Any] | None) -> Iterator[Measurement]:
     if found is None:
         yield Measurement(
-            BOARD, "flash speed", "left out: no room for a file of 4 KB", "", Condition.NOTE,
+            BOARD, "flash speed", "left out: no room for a file of 4 KB", "", Level.NOTE,
             "remove motions: 'armtempo remove'",
         )  # fmt: skip
         return

@@ -54,7 +54,7 @@ def make(joints: Sequence[dict[str, Any]], forward: bool) -> TestMotion:
     splines = [JointSpline(_DEGREE, 1, bspline.fit(end, _DEGREE), times) for end in ends]
     angles = [_fixed(spline.angle_points_deg, STEP_FRACTION_BITS) for spline in splines]
     axis = _fixed(times * TICK_HZ, TICK_FRACTION_BITS)
-    record = motion_record.pack(_DEGREE, angles, [axis], 1, 0, 0)
+    record = motion_record.pack(_DEGREE, angles, [axis], 1, motion_record.NO_RAMPS, 0)
     steps = [_crossings_s(spline, *end, duration_s) for spline, end in zip(splines, ends, strict=True)]
     return TestMotion([end[0] for end in ends], record, steps)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from armtempo.basics.errors import InputError
-from armtempo.diagnosis.item import Condition
+from armtempo.diagnosis.finding import Level
 from armtempo.formats.atomic_file import replace_text, why
 from armtempo.report.drawing import PAGE_COLOUR, inline_svg
 from armtempo.report.html_page import BAD, GOOD, OPEN, Page
@@ -17,7 +17,7 @@ from armtempo.selftest.pulse_part import CYCLES_PER_US, PULSES, SAFETY
 from armtempo.selftest.result import SelfTest
 
 JSON, HTML = "selftest.json", "selftest.html"
-_KINDS = {Condition.GOOD: GOOD, Condition.WRONG: BAD, Condition.NOTE: OPEN}
+_KINDS = {Level.GOOD: GOOD, Level.ERROR: BAD, Level.NOTE: OPEN}
 
 
 def check_free(folder: Path, force: bool) -> None:

@@ -78,7 +78,7 @@ def judge(
         "never seen" if values["directions"] is None else str(values["directions"])[1:-1],
         str(levels)[1:-1],
         values["directions"] in (levels, None),
-        "look for a short at the DIR pins (board/docs/hardware.md)",
+        "look for a short at the DIR pins, see 'armtempo help hardware'",
     )
 
 

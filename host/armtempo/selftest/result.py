@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from armtempo.diagnosis.item import Condition
+from armtempo.diagnosis.finding import Level
 
 
 @dataclass(frozen=True)
@@ -17,19 +17,19 @@ class Measurement:
     what: str
     measured: str
     expected: str = ""
-    verdict: Condition = Condition.NOTE
+    verdict: Level = Level.NOTE
     cure: str = ""
 
 
 def judged(part: str, what: str, measured: str, expected: str, is_good: bool, cure: str) -> Measurement:
     """A line with a verdict; ``cure`` is for one that is wrong."""
-    verdict = Condition.GOOD if is_good else Condition.WRONG
+    verdict = Level.GOOD if is_good else Level.ERROR
     return Measurement(part, what, measured, expected, verdict, "" if is_good else cure)
 
 
 def left_out(part: str, reason: str, cure: str) -> Measurement:
     """A part that was not done, and why."""
-    return Measurement(part, "left out", reason, "", Condition.NOTE, cure)
+    return Measurement(part, "left out", reason, "", Level.NOTE, cure)
 
 
 @dataclass
@@ -49,11 +49,11 @@ class SelfTest:
     @property
     def failed(self) -> list[Measurement]:
         """The lines that are wrong."""
-        return [line for line in self.lines if line.verdict is Condition.WRONG]
+        return [line for line in self.lines if line.verdict is Level.ERROR]
 
     def to_json(self) -> dict[str, Any]:
         """What ``selftest.json`` and ``--json`` have."""
-        lines = [{**asdict(line), "verdict": line.verdict.value} for line in self.lines]
+        lines = [{**asdict(line), "verdict": line.verdict.word} for line in self.lines]
         return {
             "selftest": 1,
             "board_id": self.board_id,

@@ -164,12 +164,15 @@ def _within_corridor(demand: Demand, motion: FreeMotion) -> FreeMotion:
         reached = tool_deviation_mm(demand, motion)
         if reached <= demand.corridor_mm:
             return motion
+        if demand.stops:  # nearer to the spline it would not rest there
+            break
         part = _INSIDE * demand.corridor_mm / reached
         points = middle + part * (motion.angle_points_deg - middle)
         motion = replace(motion, angle_points_deg=points).stretched(demand.limits)
     raise PlanError(
         f"no path was proven to stay within corridor_mm = {demand.corridor_mm:g}",
-        "widen the corridor, or set it to 0 for the spline itself",
+        "widen the corridor, or "
+        + ("take out stops" if demand.stops else "set it to 0 for the spline itself"),
     )
 
 

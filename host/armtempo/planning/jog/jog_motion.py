@@ -17,6 +17,7 @@ from armtempo.kinematics.geometry import Geometry
 from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint
 from armtempo.planning import brake_time, point_to_point, room_check
+from armtempo.planning.brake_time import BrakeTimes
 from armtempo.planning.jog import jog_law
 from armtempo.planning.jog.jog_law import DEGREE, WayLaw, WayLimits
 from armtempo.planning.jog.jog_line import AXES, FollowedLine, ToolLine
@@ -69,8 +70,8 @@ class JogMotion:
     """A jog that is planned."""
 
     trajectory: Trajectory
-    brake_s: float
-    """From anywhere on it the arm can come to rest in this time."""
+    brakes: BrakeTimes
+    """How long it takes to come to rest."""
     ends: str
     """Why it ends before it was to, in words; "" if it does not."""
 
@@ -115,7 +116,7 @@ def plan(name: str, arm: Arm, here_deg: Sequence[float], move: JogMove, speed: f
         raise InputError("a jog moves a joint or the tool, one of both", "name a joint, or an axis")
     trajectory, ends = _in_room(name, arm, start, move, speed)
     limits = [joint.limits for joint in arm.driven]
-    return JogMotion(trajectory, brake_time.brake_time_s(trajectory, limits), ends)
+    return JogMotion(trajectory, brake_time.of_motion(trajectory, limits), ends)
 
 
 def _in_room(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tuple[Trajectory, str]:

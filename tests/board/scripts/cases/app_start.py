@@ -178,7 +178,7 @@ def case_no_pieces_are_held_where_memory_is_not_short():
 def case_a_damaged_motion_is_listed_and_refused():
     arm = stand_in.arm()
     root = folder_with(arm)
-    for name, data in (("cut", b"ATM1"), ("empty", b""), ("noise", bytes(20000))):
+    for name, data in (("cut", b"ATM2"), ("empty", b""), ("noise", bytes(20000))):
         with open(root + "/" + name + ".atm", "wb") as file:
             file.write(data)
     _, host, hello = started(root)

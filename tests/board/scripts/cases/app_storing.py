@@ -21,7 +21,8 @@ def case_upload_out_of_order():
     assert host.ask("put_data", (0,), record[:20]) == ("ok", (50,), b"")
     assert host.ask("put_data", (40,), record[40:100]) == ("ok", (100,), b"")
     assert host.ask("put_commit", (wire.record_crc(record),)) == ("error", "bad_offset", 255, 100)
-    assert host.ask("put_data", (100,), record[100:]) == ("ok", (len(record),), b"")
+    assert host.ask("put_data", (100,), record[100:300]) == ("ok", (300,), b"")
+    assert host.ask("put_data", (300,), record[300:]) == ("ok", (len(record),), b"")
     assert host.ask("put_data", (len(record),), b"x") == ("error", "bad_offset", 255, len(record))
     assert host.ask("put_commit", (wire.record_crc(record),)) == ("ok", (), b"")
     assert host.ask("put_commit", (wire.record_crc(record),))[1] == "bad_offset"

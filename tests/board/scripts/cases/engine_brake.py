@@ -5,7 +5,8 @@
 import random
 
 import cases
-from brake_motion import BRAKE_TICKS, path, record
+from armtempo_shared import motion
+from brake_motion import BRAKE_TICKS, RAMPS, path, record
 from engine_rig import FEWER, TICK_HZ, Rig, arm
 
 SEED = 20262
@@ -20,7 +21,7 @@ def joints():
 def case_whole_motion():  # not emulated
     """Without braking it ends at the last points."""
     rig = Rig(joints(), planned=False)
-    begin(rig, BRAKE_TICKS)
+    begin(rig)
     rig.run_to(3 * TICK_HZ)
     assert rig.engine.fault == 0
     expected = path(10.0)
@@ -28,9 +29,9 @@ def case_whole_motion():  # not emulated
     assert rig.commanded() == [rig.arm.motors[n].position for n in range(3)]
 
 
-def begin(rig, brake_ticks):
+def begin(rig, ramps=RAMPS):
     rig.trusting()
-    rig.engine.load(record(brake_ticks))
+    rig.engine.load(record(ramps))
     rig.engine.start()
 
 
@@ -39,7 +40,7 @@ def case_anywhere():  # slow
     random.seed(SEED)
     for number in range(15 // FEWER):
         rig = Rig(joints(), planned=False)
-        begin(rig, BRAKE_TICKS)
+        begin(rig)
         rig.run_to(random.randrange(-TICK_HZ // 50, TICK_HZ))
         asked = rig.board.now - rig.zero()
         rig.engine.brake()
@@ -62,7 +63,7 @@ def case_anywhere():  # slow
 def case_too_late():  # not emulated
     """Asked for when the motion is nearly over, it ends as planned."""
     rig = Rig(joints(), planned=False)
-    begin(rig, BRAKE_TICKS)
+    begin(rig)
     end = rig.engine.rates.duration_ticks
     rig.run_to(end - TICK_HZ // 25)
     rig.engine.brake()
@@ -71,10 +72,28 @@ def case_too_late():  # not emulated
     assert [abs(a - b) <= 0.5 for a, b in zip(rig.commanded(), path(10.0))] == [True] * 3
 
 
+def case_never_longer_than_the_motion():  # not emulated
+    """Where braking would take longer than the rest of the motion, it ends as planned; earlier, it is braked."""
+    for asked in (TICK_HZ // 2, TICK_HZ - TICK_HZ // 5):
+        rig = Rig(joints(), planned=False)
+        begin(rig)
+        end = rig.engine.rates.duration_ticks
+        rig.run_to(asked)
+        left_ms = rig.engine.rest_ms()
+        rig.engine.brake()
+        assert abs(rig.engine.rest_ms() - left_ms) <= 1
+        assert (rig.engine.rates.duration_ticks == end) == (asked + TICK_HZ // 13 + BRAKE_TICKS > end)
+        now = rig.board.now - rig.zero()
+        assert abs(rig.engine.rates.duration_ticks - now - 84000 * left_ms) <= 84000, (asked, left_ms)
+        rig.run_to(3 * TICK_HZ)
+        assert rig.engine.rest_ms() == 1
+        assert rig.engine.rates.duration_ticks <= end
+
+
 def case_not_planned_for():  # not emulated
     """A motion without a braking time is frozen."""
     rig = Rig(joints(), planned=False)
-    begin(rig, 0)
+    begin(rig, motion.NO_RAMPS)
     rig.run_to(TICK_HZ // 2)
     rig.engine.brake()
     assert not rig.engine.moving

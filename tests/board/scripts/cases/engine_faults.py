@@ -126,7 +126,7 @@ def tap():
 class Tapped:
     """A motion that is looked at while somebody taps the E-stop."""
 
-    brake_ticks = 0
+    can_brake = False
     joints = MOTION.joints
 
     @property

@@ -8,6 +8,7 @@ many motions are tried.
 # all cases: slow on CPython
 
 import random
+import struct
 import sys
 
 import cases
@@ -15,7 +16,8 @@ from armtempo_board.errors import Refused
 from armtempo_shared import codes
 from armtempo_shared.limits import LONGEST_RUN_TICKS
 from armtempo_shared.messages import NO_JOINT, RESUME
-from brake_motion import BRAKE_TICKS, record
+from armtempo_shared.motion import NO_RAMPS, RAMP_ENTRIES, RAMP_UNIT_TICKS
+from brake_motion import BRAKE_TICKS, RAMPS, record
 from engine_rig import FEWER, TICK_HZ, Rig, arm
 
 SEED = 20263
@@ -53,6 +55,19 @@ def joints():
     return rows
 
 
+def some_ramps():
+    """Lengths up to BRAKE_TICKS that are all different."""
+    return [[random.randrange(300, longest) for longest in lengths] for lengths in RAMPS]
+
+
+def length_by_table(motion, to_rest, duration, at):
+    """How long a change takes that begins at a time of the motion, in ticks."""
+    ramps = struct.unpack_from("<32H", motion.data, 16 if to_rest else 80)
+    place = (RAMP_ENTRIES - 1) * min(at / duration, 1.0)
+    first = min(int(place), RAMP_ENTRIES - 2)
+    return RAMP_UNIT_TICKS * (ramps[first] + (ramps[first + 1] - ramps[first]) * (place - first))
+
+
 def some_motion():
     """Three joints by chance, at rest at both ends."""
     segments = random.randrange(4, 9)
@@ -67,7 +82,7 @@ def some_motion():
         inner = [(random.random() - 0.5) * size for _ in range(segments - 5)] if segments > 5 else []
         last = (random.random() - 0.5) * size
         angles.append([0.0] * 5 + inner + [last] * (segments - len(inner)))
-    return record(BRAKE_TICKS, angles, times)
+    return record(some_ramps(), angles, times)
 
 
 def begin(motion, rate=1000):
@@ -82,12 +97,15 @@ def begin(motion, rate=1000):
     def watched(from_ticks, to):
         override = rig.engine.rates.override
         before = override.rate
+        start = from_ticks + (override.steady_ticks() - from_ticks) % 1000
+        passed = motion_ticks(rig.laws, start)
+        end = override.ramp_end_ticks(from_ticks, to)
         ramp(from_ticks, to)
-        length = override._ramp_ticks
-        start = override._real_ticks - length
-        passed = override._motion_ticks - (before + to) * (length // 2000)
-        assert start >= from_ticks
-        rig.laws.append((start, passed, length, before, to))
+        assert override.steady_ticks() == end
+        longer = end - start - length_by_table(motion, to == 0, override._duration_ticks, passed)
+        near = RAMP_UNIT_TICKS * (1 + 725 * 31 * 2 / 4096)  # two places of 4096
+        assert -near < longer <= 8000 + near, longer
+        rig.laws.append((start, passed, end - start, before, to))
 
     rig.engine.rates.override.ramp = watched
     rig.engine.start()
@@ -178,7 +196,7 @@ def some_leg(rig, start, end):
         ends = [(place, (random.random() - 0.5) * size) for place in places]
         first, last = [[place + by * speed for by in (1, 0, -1 / 33, 0, 1)] for place, speed in ends]
         angles.append(first + [random.random() * size for _ in range(4)] + last)
-    motion = record(BRAKE_TICKS, angles, times)
+    motion = record(some_ramps(), angles, times)
     try:
         check_splines(motion, rig.engine.drives, rig.engine.limits)
     except Refused:  # too abrupt
@@ -230,7 +248,7 @@ def case_step_at_the_start():
             points = [start] * 5 + [start + way * (part + 1) / segments for part in range(segments)]
             at_rest = [0.0] * len(points)
             times = [(number - 2) / 20 for number in range(len(points))]
-            motion = record(BRAKE_TICKS, [points, at_rest, at_rest], times)
+            motion = record(some_ramps(), [points, at_rest, at_rest], times)
             found = []
             for rate in (1000, 700):
                 rig, recorders = begin(motion, rate)
@@ -278,7 +296,7 @@ def case_wrong_steps():  # slow
     """A step that is not in the record is found out however the motion ends, and makes its joint unknown."""
     for rates in ((), (700,), (0, RESUME), (BRAKE,), (500, BRAKE), (0, BRAKE)):
         for wrong in (0, 1):
-            rig, _ = begin(record(BRAKE_TICKS))
+            rig, _ = begin(record())
             rig.run_to(TICK_HZ // 4)
             rig.engine.drives[1]._base += wrong
             for rate in rates:
@@ -293,7 +311,7 @@ def case_wrong_steps():  # slow
 
 def case_long_pause():  # not emulated
     """A pause longer than the counter's round, then on; and one that is too long ends the run."""
-    motion = record(BRAKE_TICKS)
+    motion = record()
     plain, recorders = begin(motion)
     plain.run_to(4 * TICK_HZ)
     expected = [recorder.steps for recorder in recorders]
@@ -317,12 +335,12 @@ def case_long_pause():  # not emulated
 
 def case_refused():  # not emulated
     """What cannot change its speed says so, and goes on."""
-    rig, _ = begin(record(0))
+    rig, _ = begin(record(NO_RAMPS))
     for rate in (0, 500, RESUME):
         assert refusal(rig, rate) == codes.FIXED_SPEED
     rig.run_to(3 * TICK_HZ)
     assert refusal(rig, 500) == codes.NOT_MOVING
-    motion = record(BRAKE_TICKS)
+    motion = record()
     rig = Rig(joints(), planned=False)
     rig.trusting()
     rig.engine.load(motion)

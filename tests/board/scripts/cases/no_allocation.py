@@ -20,7 +20,7 @@ from armtempo_board.motion import motion_check  # noqa: F401  they are forgotten
 from armtempo_board.motion.engine import Engine
 from armtempo_board.motion.workspace import Workspace
 from armtempo_shared import armrecord  # noqa: F401
-from brake_motion import BRAKE_TICKS, record
+from brake_motion import record
 
 STEP_TICKS = 30_000
 BUFFER = array("i", [0] * 10)
@@ -92,7 +92,7 @@ def run(joints, brake_at):
     stm.BLOCKS["TIM1"][isr.CNT] = 0
     engine = Engine(HEAD, joints, WORKSPACE)
     engine.home(7, [0, 0, 0])
-    motion = record(BRAKE_TICKS)
+    motion = record()
     engine.load(motion)
     streams = [Streams(joint.ring) for joint in engine.drives]
     now = stm.BLOCKS["TIM2"][isr.CNT] - (1 << 32)
@@ -106,6 +106,7 @@ def run(joints, brake_at):
             brake_at = 0
         else:
             locked(engine.service)
+            assert not engine.moving or 0 < locked(engine.rest_ms) < 2000
         while locked(engine.next_sample, BUFFER):
             samples += 1
         assert now < 200_000_000

@@ -50,6 +50,9 @@ class Still:
 
     freeze = brake
 
+    def rest_ms(self):
+        return 1000
+
 
 class Port:
     """Gives one prepared frame after the other, one every 20 turns; takes everything and counts it."""

@@ -70,7 +70,9 @@ def motion_of(arm, segments):
     """All joints go 20 steps up, slowly, and stay."""
     points = [min(max(i - 4, 0), 2) * 10 << 28 for i in range(segments + 5)]
     times = [(i - 2) * 8_400_000 << 16 for i in range(segments + 5)]
-    return motion.pack(5, [points] * arm[5], [times] * arm[5], 1, 84_000, wire.record_crc(arm))
+    return motion.pack(
+        5, [points] * arm[5], [times] * arm[5], 1, ((6,) * motion.RAMP_ENTRIES,) * 2, wire.record_crc(arm)
+    )
 
 
 def change(host, rates, segments, outputs):

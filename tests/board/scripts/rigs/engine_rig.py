@@ -45,8 +45,7 @@ class Steps:
 class Motion:
     """What the engine is given instead of a motion; each joint's ``Steps``."""
 
-    brake_ticks = 0
-    ramps = True
+    can_brake = False
 
     def __init__(self, duration_ticks, *joints):
         self.duration = duration_ticks

@@ -230,6 +230,9 @@ class Engine:
     def brake(self):
         self.calls.append("brake")
 
+    def rest_ms(self):
+        return 1234
+
     def change_rate(self, rate):
         self.calls.append("rate")
         self.rates.wanted = rate
@@ -402,4 +405,4 @@ def record(arm_record, joints=2, segments=3):
     """A motion record for that arm; its numbers mean nothing."""
     angles = [list(range(segments + 5)) for _ in range(joints)]
     crc = armrecord.unpack(arm_record)[2]
-    return motion.pack(5, angles, angles, 1, 84000, crc)
+    return motion.pack(5, angles, angles, 1, ((6,) * motion.RAMP_ENTRIES,) * 2, crc)
