@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 from armtempo.kinematics.chain import chains_mm
 from armtempo.model.arm import Arm
-from armtempo.model.room import KeepOut, Room
+from armtempo.model.room import ArmRoom, KeepOut
 from armtempo.planning import point_to_point, room_check
 from armtempo.splines.trajectory import Trajectory
 
@@ -43,7 +43,7 @@ def random_room(seed: int) -> tuple[Arm, Trajectory]:
             boxes.append(KeepOut(f"box {number}", tuple(centre - half), tuple(centre + half)))
         radius = float(rng.choice([0.0, 0.01, 0.04])) * reach
         joints = tuple(replace(joint, radius_mm=radius) for joint in arm.joints)
-        arm = replace(arm, joints=joints, room=Room(tuple(boxes)))
+        arm = replace(arm, joints=joints, room=ArmRoom(tuple(boxes)))
         if not room_check.posture_touches(arm, start):
             return arm, point_to_point.straight("random", start, end, arm)
     raise AssertionError("no posture is free")
@@ -80,7 +80,7 @@ def dense_least(arm: Arm, trajectory: Trajectory, count: int) -> float:
 def _least(arm: Arm, points: np.ndarray) -> float:
     """Of points (N, 3, P) from all boxes; they count as 0 inside."""
     found = np.inf
-    for box in (arm.room or Room()).keep_out:
+    for box in (arm.room or ArmRoom()).keep_out:
         low, high = np.array(box.low_mm)[:, None], np.array(box.high_mm)[:, None]
         away = np.maximum(np.maximum(low - points, points - high), 0.0)
         found = min(found, float(np.linalg.norm(away, axis=1).min()))

@@ -13,7 +13,7 @@ from armtempo.formats import toml_table
 from armtempo.kinematics.chain import outline_mm
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
-from armtempo.model.room import FAR_MM, KeepOut, Room, read
+from armtempo.model.room import FAR_MM, ArmRoom, KeepOut, read
 from armtempo.planning import planner, point_to_point, room_check
 from armtempo.planning.capsules import box_distance, segment_distance
 from armtempo.planning.jog import jog_motion
@@ -28,7 +28,7 @@ FEEDER = KeepOut("feeder", (-50.0, 150.0, -FAR_MM), (50.0, 400.0, FAR_MM))
 OVER = r"over: the link of joint . is .* mm inside of feeder \(at .* s, between P0 and P1\)"
 
 
-def thick(arm: Arm, radius_mm: float, room: Room | None) -> Arm:
+def thick(arm: Arm, radius_mm: float, room: ArmRoom | None) -> Arm:
     """The arm with links of this radius in a room."""
     return replace(arm, room=room, joints=tuple(replace(joint, radius_mm=radius_mm) for joint in arm.joints))
 
@@ -109,13 +109,13 @@ def test_a_plan_names_link_obstacle_depth_time_and_via_points() -> None:
     with pytest.raises(
         PlanError, match=r"over: the link of joint . is .* mm inside of feeder \(at .* s, between P0 and P1\)"
     ):
-        planner.plan(thick(PAPER, 20.0, Room((FEEDER,))), job)
+        planner.plan(thick(PAPER, 20.0, ArmRoom((FEEDER,))), job)
 
 
 @pytest.mark.slow
 def test_goto_and_jog_keep_to_the_room_and_lead_out_of_it() -> None:
     start = np.array([20.0, -60.0, 40.0])
-    arm = thick(PAPER, 20.0, Room((FEEDER,)))
+    arm = thick(PAPER, 20.0, ArmRoom((FEEDER,)))
     with pytest.raises(PlanError, match="inside of feeder"):
         goto.motion(arm, start, np.array([160.0, -60.0, 40.0]), goto.MovePace())
     jog = jog_motion.plan("jog", arm, start, JogMove(np.inf, joint=0))
@@ -129,7 +129,7 @@ def test_goto_and_jog_keep_to_the_room_and_lead_out_of_it() -> None:
 
 
 def test_check_names_postures_that_touch() -> None:
-    arm = thick(PAPER, 20.0, Room(high_mm=(FAR_MM, FAR_MM, 200.0)))
+    arm = thick(PAPER, 20.0, ArmRoom(high_mm=(FAR_MM, FAR_MM, 200.0)))
     assert any("the ceiling" in finding.what and "home" in finding.what for finding in check_arm(arm))
     assert not any(finding.where == "room" for finding in check_arm(PAPER))
 
@@ -172,5 +172,5 @@ def test_an_arm_file_has_radii_and_room(tmp_path: Path) -> None:
         text.replace("d_mm", "radius_mm = 12\nd_mm", 1) + "\n[room]\nfloor_mm = -5\n", encoding="utf-8"
     )
     arm = Arm.load(file)
-    assert arm.room == Room(low_mm=(-FAR_MM, -FAR_MM, -5.0))
+    assert arm.room == ArmRoom(low_mm=(-FAR_MM, -FAR_MM, -5.0))
     assert arm.joints[0].radius_mm == 12.0

@@ -19,7 +19,7 @@ from armtempo.model import posture as named
 from armtempo.model.outputs import Input, Output
 from armtempo.model.parts import DrivenJoint, Driver, Joint, Limits, Motor, Safety
 from armtempo.model.posture import ArmPosture
-from armtempo.model.room import Room
+from armtempo.model.room import ArmRoom
 from armtempo.model.tool_pose import Pose
 
 _REACHES_MM = 1e-6
@@ -45,7 +45,7 @@ class Arm:
     inputs: tuple[Input, ...] = field(default=(), metadata=json_codec.ADDED)
     postures: tuple[ArmPosture, ...] = field(default=(), metadata=json_codec.ADDED)
     """In the order of the file; the board knows nothing of them."""
-    room: Room | None = field(default=None, metadata=json_codec.ADDED)
+    room: ArmRoom | None = field(default=None, metadata=json_codec.ADDED)
     """Where it may move; the board knows nothing of it."""
     homing: tuple[tuple[str, ...], ...] = field(default=(), metadata=json_codec.ADDED)
     """Names of the joints that are homed first, together those of an entry; the others follow one by one."""

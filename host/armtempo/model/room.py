@@ -34,7 +34,7 @@ class KeepOut:
 
 @checked_fields
 @dataclass(frozen=True)
-class Room:
+class ArmRoom:
     """Boxes to keep out of, and walls: the least and largest x, y and z, FAR_MM away where there is none."""
 
     keep_out: tuple[KeepOut, ...] = ()
@@ -55,7 +55,7 @@ class Room:
         return (*self.keep_out, *walls)
 
 
-def read(table: Table | None) -> Room | None:
+def read(table: Table | None) -> ArmRoom | None:
     """The room of an arm file's table; None where there is none. InputError for what is not allowed."""
     if table is None:
         return None
@@ -77,4 +77,4 @@ def read(table: Table | None) -> Room | None:
         box.done()
         boxes.append(found)
     table.done()
-    return Room(tuple(boxes), tuple(low), tuple(high))
+    return ArmRoom(tuple(boxes), tuple(low), tuple(high))

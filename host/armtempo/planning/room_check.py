@@ -20,7 +20,7 @@ from armtempo.basics.progress import alive
 from armtempo.kinematics.chain import all_angles_deg, outline_mm
 from armtempo.kinematics.geometry import Geometry
 from armtempo.model.arm import Arm
-from armtempo.model.room import KeepOut, Room
+from armtempo.model.room import ArmRoom, KeepOut
 from armtempo.planning.capsules import box_distance, segment_distance
 from armtempo.splines import extremes
 from armtempo.splines.trajectory import Trajectory
@@ -59,7 +59,7 @@ class Bodies:
     @cached_property
     def obstacles(self) -> tuple[KeepOut, ...]:
         """Boxes and walls."""
-        return (self.arm.room or Room()).obstacles
+        return (self.arm.room or ArmRoom()).obstacles
 
     @cached_property
     def names(self) -> list[str]:

@@ -10,7 +10,7 @@ from armtempo.basics.arrays import Array
 from armtempo.kinematics import Geometry, all_frames, forward
 from armtempo.kinematics.chain import outline_mm
 from armtempo.model.arm import Arm
-from armtempo.model.room import FAR_MM, Room
+from armtempo.model.room import FAR_MM, ArmRoom
 from armtempo.report.plots import new_figure
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def _draw_room(axis: Axes, arm: Arm, seen: tuple[int, int]) -> None:
     """The boxes to keep out of, and the walls as lines."""
     from matplotlib.patches import Rectangle
 
-    room = arm.room or Room()
+    room = arm.room or ArmRoom()
     for box in room.keep_out:
         low, high = np.array(box.low_mm)[list(seen)], np.array(box.high_mm)[list(seen)]
         axis.add_patch(Rectangle(tuple(low), *(high - low), color=HIGH, alpha=0.25, zorder=0))
