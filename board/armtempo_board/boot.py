@@ -6,8 +6,12 @@ pyb.Pin("A15", pyb.Pin.OUT_PP, value=0)  # STEP 1, low before all else: a JTAG p
 pyb.usb_mode("VCP")
 
 try:
+    import armtempo_archive  # noqa: F401  finds the program where it is no part of the firmware
+except Exception:  # it is, or its archive is not, or not wholly, deployed
+    pass
+try:
     from armtempo_board import keep_watchdog_fed
 
     keep_watchdog_fed()
-except ImportError:  # the program is not, or not wholly, deployed
+except Exception:  # the same of the program
     pass

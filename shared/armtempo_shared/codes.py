@@ -41,6 +41,7 @@ LEG_ELSEWHERE = 34
 NO_SUCH_PIN = 35
 NO_SEQUENCE_ROOM = 36
 OTHER_VERSION = 37
+NEEDS_FIRMWARE = 38
 # faults: they stop the motion and stay until cleared
 ESTOP = 40
 LIMIT_SWITCH = 41

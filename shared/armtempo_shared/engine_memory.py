@@ -1,9 +1,9 @@
 """How much memory the engine for an arm takes on the board: one formula for both sides.
 
-The board takes the memory of its engines once, when its program starts, and states in hello how much that is
-(``engine_room``), and for how many joints' objects there is heap besides (``engine_joints``). It consists of blocks,
-because a heap has few large ones. For each joint the engine takes from it a ring of edge times. What the step
-generators work in lies in ``PROCESSOR_WORDS`` besides, as far as it has room there, and the rest in these blocks too.
+The board states in hello how many bytes of its heap an engine can have (``engine_room``), its objects and its memory.
+The memory consists of blocks, because a heap has few large ones. For each joint the engine takes from it a ring of edge
+times. What the step generators work in lies in ``PROCESSOR_WORDS`` besides, as far as it has room there, and the rest
+in these blocks too.
 """
 
 LASTING_MS = (12, 6, 3, 2)
@@ -26,7 +26,7 @@ _BLOCK_WORDS = 1026  # for a ring of 1024 entries, or two of 512
 LARGEST_WORDS = 6 * GENERATOR_WORDS - PROCESSOR_WORDS + 1025 + 513 + 257 + 129 + 2 * 65 + 11
 """For arms whose joints' highest step rates sum up to 240 000 steps/s; some have rings of SHORT_MS then.
 
-Where there is so much, there is heap for outputs and inputs too. The last words are left over at the ends of blocks.
+The last words are left over at the ends of blocks.
 """
 
 
@@ -49,8 +49,22 @@ def words(rates: "list[int]") -> int:
 
 
 def object_bytes(joints: int) -> int:
-    """Bytes of heap that the engine's objects take besides: measured, see board/docs/memory.md."""
+    """Bytes of heap that the engine's objects take: measured, see board/docs/memory.md."""
     return 1760 + 1184 * joints
+
+
+LARGEST_BYTES = 4 * LARGEST_WORDS + object_bytes(6)
+"""The room in which every arm fits."""
+
+
+def needed_bytes(rates: "list[int]") -> int:
+    """Bytes of heap that the engine takes at least for joints of these highest step rates, with its objects."""
+    return 4 * words(rates) + object_bytes(len(rates))
+
+
+def room_words(joints: int, room_bytes: int) -> int:
+    """Words that a room leaves for an engine's memory beside the objects of so many joints."""
+    return min(max((room_bytes - object_bytes(joints)) // 4, 0), LARGEST_WORDS)
 
 
 def ahead_bytes(joints: int) -> int:
@@ -61,33 +75,27 @@ def ahead_bytes(joints: int) -> int:
     return (4 * GENERATOR_WORDS + 880) * joints
 
 
-def output_bytes(outputs: int, inputs: int) -> int:
-    """Bytes that outputs and inputs take of the engine's room, with their code: measured, see board/docs/memory.md."""
-    return 2200 + 144 * outputs + 48 * inputs if outputs or inputs else 0
-
-
-def blocks(room_words: int) -> "list[int]":
+def blocks(memory_words: int) -> "list[int]":
     """The blocks, in words, of a memory of that many words."""
-    return [min(_BLOCK_WORDS, room_words - begin) for begin in range(0, room_words, _BLOCK_WORDS)]
+    return [min(_BLOCK_WORDS, memory_words - begin) for begin in range(0, memory_words, _BLOCK_WORDS)]
 
 
-def lasting_ms(rates: "list[int]", room_words: int) -> int:
-    """How long the rings can last in a room of that many words, one of LASTING_MS; 0 where the engine does not fit."""
+def lasting_ms(rates: "list[int]", memory_words: int) -> int:
+    """How long the rings can last in that many words, one of LASTING_MS; 0 where the engine does not fit."""
     for lasts_ms in LASTING_MS:
-        if _find_place(rates, room_words, lasts_ms):
+        if _find_place(rates, memory_words, lasts_ms):
             return lasts_ms
     return 0
 
 
-def fits(rates: "list[int]", room_words: int, beside_bytes: int = 0) -> bool:
-    """Whether the engine fits; ``beside_bytes``: what outputs and inputs take of a smaller room than the largest."""
-    left = room_words if room_words >= LARGEST_WORDS else room_words - beside_bytes // 4
-    return lasting_ms(rates, left) > 0
+def fits(rates: "list[int]", room_bytes: int) -> bool:
+    """Whether the engine fits into a room of so many bytes."""
+    return lasting_ms(rates, room_words(len(rates), room_bytes)) > 0
 
 
-def _find_place(rates: "list[int]", room_words: int, lasts_ms: int) -> bool:
+def _find_place(rates: "list[int]", memory_words: int, lasts_ms: int) -> bool:
     """Whether all parts of the engine find theirs, each in the first block with room."""
-    free = blocks(room_words)
+    free = blocks(memory_words)
     for part in _parts(rates, lasts_ms):
         for number, left in enumerate(free):
             if left >= part:

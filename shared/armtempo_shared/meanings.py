@@ -114,6 +114,12 @@ _ROWS = (
         "the sequence on the board is of another version of armtempo",
         "plan it again and store it with 'armtempo upload --force'",
     ),
+    (
+        "needs_firmware",
+        "the program as files on MicroPython's own firmware can do one motion at a time, and nothing more; nothing has "
+        "moved",
+        "put the program into the firmware: 'armtempo flash'",
+    ),
     ("estop", "the E-stop input tripped", "release it, then 'armtempo clear' and home"),
     ("limit_switch", "a limit switch tripped", "'armtempo clear', then move the arm away from it"),
     (
@@ -178,7 +184,9 @@ COMMANDS: "dict[str, str]" = {
     "hello": "Begins a session; `session` is a number that differs between hosts, so that the board knows a "
     "new one. Refused with `protocol` where the versions differ. Answer: who the board is; `joints` and "
     "`arm_crc` are 0 without an arm record; `boot` differs after every start of the program; "
-    "`engine_room`, `engine_joints`: bytes of heap (beside the chip's backup SRAM) and joints that an engine can have; "
+    "`engine_room`: bytes of heap (beside the chip's backup SRAM) that an engine and its objects can have; "
+    "`features`: what the program can do beyond one motion at a time, 1 sequences, 2 outputs and inputs, "
+    "4 held motions, 8 other speeds; "
     "`arm_problem`: code of "
     "what is wrong with the stored arm record, 0 where it is in force or there is none; `arm_value`: its value; the "
     "tail is the unique id in hex and the firmware.",

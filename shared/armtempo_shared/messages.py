@@ -1,6 +1,6 @@
 """Constants of the wire protocol; its messages are in ``table.py``, its frames in ``wire.py``."""
 
-PROTOCOL_VERSION = 4
+PROTOCOL_VERSION = 5
 """Never 3: MicroPython takes that byte, which each ``hello`` has, for Ctrl-C."""
 SYNC = 0xA5
 MAX_PAYLOAD = 256
@@ -24,6 +24,8 @@ RESUME = 0xFFFF
 START_HOMING = 1  # flag of start: a limit switch ends the motion without a fault
 START_HELD = 2  # flag of start: the motion brakes unless the host says hold again and again
 
+FEATURES = ("sequences", "outputs", "jog", "speed")
+"""What a program may be able to do beyond one motion at a time; bits of ``features`` in the answer to hello."""
 UNCONFIGURED, UNHOMED, IDLE, MOVING, BRAKING, FAULT = 0, 1, 2, 3, 4, 5
 STATES = ("unconfigured", "unhomed", "idle", "moving", "braking", "fault")
 """Names of the states by their number."""

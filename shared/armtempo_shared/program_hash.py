@@ -3,21 +3,13 @@
 import os
 from binascii import crc32
 
-STAMP = "program.txt"
-"""File in the board package, written last by a deployment: the hash of the sources, 8 hex digits.
-
-Where it is missing the hash is taken from the source files that are there."""
 _PIECE = 512
 
 
 def program_crc(board: str, shared: str) -> int:
-    """The hash of the program, by the files of its two packages; that of the stamp where there is one."""
+    """The hash of the program, by the files of its two packages. A deployed program has another function here."""
     board, shared = [path[: path.rindex("/")] for path in (board, shared)]
-    try:
-        with open(board + "/" + STAMP) as file:
-            return int(file.read().strip(), 16)
-    except (OSError, ValueError):
-        return sources_crc(board, shared)
+    return sources_crc(board, shared)
 
 
 def sources_crc(board: str, shared: str) -> int:

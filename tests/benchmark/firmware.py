@@ -210,7 +210,6 @@ def flash(folder: Path, with_library: bool, arm_file: Path) -> Path:
             path.removeprefix(f"{program_files.ROOT}/"): data
             for path, data in program_files.library(STM32F4).items()
         }
-        files[program_files.STAMP_PATH.removeprefix(f"{program_files.ROOT}/")] = program_files.stamp()
     tree = folder / ("files" if with_library else "no-files")
     for name, data in files.items():
         (tree / name).parent.mkdir(parents=True, exist_ok=True)

@@ -111,7 +111,7 @@ def flash(folder: Path, elf: Path, with_library: bool) -> Path:
     tree = folder / ("files" if with_library else "no-files")
     files = program_files.start_files()
     if with_library:
-        files |= program_files.library(firmware.STM32F4) | {program_files.STAMP_PATH: program_files.stamp()}
+        files |= program_files.library(firmware.STM32F4)
     for path, data in files.items():
         local = tree / path.removeprefix(f"{program_files.ROOT}/")
         local.parent.mkdir(parents=True, exist_ok=True)

@@ -24,6 +24,7 @@ from armtempo.deploy import program_files
 from armtempo.deploy.firmware import frozen
 from armtempo.deploy.package import STM32F4
 from armtempo_shared import armrecord, engine_memory, wire
+from armtempo_shared.limits import MAX_MOTION_BYTES
 
 from tests.benchmark import firmware
 from tests.board import motions
@@ -33,6 +34,7 @@ ARMS = tuple((joints, rate) for joints in (1, 3, 6) for rate in (5_000, 25_000, 
 ARMS += ((1, 240_000), (2, 120_000), (3, 60_000), (6, 40_000))
 LIMIT_S = 300.0
 _STAGE = 0x8000
+_BLOCK = 512
 _MOST_ARMS = 10  # whose frames the emulated flash has room for; more come from sending them again
 _PIECE = 200
 OWN = 2_400
@@ -75,10 +77,14 @@ class Session:
 
     def run(self, arm: bytes, motion: bytes) -> None:
         """The arm gets its record, and the motion is begun and frozen."""
-        joints = arm[5]
         self.upload(wire.ARM_RECORD_NAME, arm)
         self.stage("configured")
         self.upload("go", motion)
+        self.start(arm, motion)
+
+    def start(self, arm: bytes, motion: bytes) -> None:
+        """The motion that is stored is begun and frozen."""
+        joints = arm[5]
         self.command("home", ((1 << joints) - 1,), bytes(4 * joints))
         self.command("list", (0,))
         self.stage("uploaded")
@@ -129,20 +135,25 @@ def build(micropython: Path, folder: Path, manifest: Path | None) -> Path:
     return firmware.build(micropython, folder, manifest, files=files)
 
 
-def drive(elf: Path, with_library: bool, session: Session, limit_s: float = LIMIT_S) -> Outcome:
-    """Start the program on a firmware with an empty store, and let it have the session."""
+def drive(elf: Path, with_library: bool, *sessions: Session, limit_s: float = LIMIT_S) -> list[Outcome]:
+    """Start the program on a firmware with an empty store, and let it have a session; again for each further one."""
     with tempfile.TemporaryDirectory() as name:
-        tree = Path(name) / "tree"
-        for path, data in _files(with_library).items():
-            (tree / path).parent.mkdir(parents=True, exist_ok=True)
-            (tree / path).write_bytes(data)
-        (tree / "frames").write_bytes(session.data)
-        (tree / "rounds").write_text(str(session.rounds))
-        image = firmware.make_image(tree)
         (Path(name) / "disk").write_bytes(bytes(512 * _DISK_BLOCKS))
-        cut = Path(name) / "cut"
-        cut.write_bytes(struct.pack("<i", -OWN))
-        said = firmware.emulate(elf, image, cut, *_SEMIHOSTING, limit_s=limit_s)
+        return [_drive(elf, with_library, session, Path(name), limit_s) for session in sessions]
+
+
+def _drive(elf: Path, with_library: bool, session: Session, folder: Path, limit_s: float) -> Outcome:
+    """Start the program on a firmware, with the store in the folder's ``disk``, and let it have the session."""
+    tree = folder / "tree"
+    for path, data in _files(with_library).items():
+        (tree / path).parent.mkdir(parents=True, exist_ok=True)
+        (tree / path).write_bytes(data)
+    (tree / "frames").write_bytes(session.data)
+    (tree / "rounds").write_text(str(session.rounds))
+    image = firmware.make_image(tree)
+    cut = folder / "cut"
+    cut.write_bytes(struct.pack("<i", -OWN))
+    said = firmware.emulate(elf, image, cut, *_SEMIHOSTING, limit_s=limit_s)
     return _outcome(said)
 
 
@@ -150,7 +161,6 @@ def _files(with_library: bool) -> dict[str, bytes]:
     files = dict(program_files.start_files())
     if with_library:
         files |= program_files.library(STM32F4)
-        files[program_files.STAMP_PATH] = program_files.stamp()
     found = {path.removeprefix(f"{program_files.ROOT}/"): data for path, data in files.items()}
     found["main.py"] = (
         found["main.py"]
@@ -186,11 +196,26 @@ def table(elf: Path, with_library: bool) -> None:
         arm = arm_record([rate] * joints)
         session = Session()
         session.command("hello", (wire.PROTOCOL_VERSION, 1))
-        session.run(arm, motion_record(arm, 40))
-        outcome = drive(elf, with_library, session)
-        needed = 4 * engine_memory.words([rate] * joints)
-        cells = "  ".join(f"{name} {used} / {free}" for name, used, free in outcome.stages)
-        print(f"{joints} x {rate:>6}: needs {needed:>5}; {cells}; {outcome.refusals}", flush=True)
+        motion = motion_record(arm, 40)
+        session.run(arm, motion)
+        again = Session()
+        again.command("hello", (wire.PROTOCOL_VERSION, 1))
+        again.start(arm, motion)
+        print(f"{joints} x {rate:>6}: needs {engine_memory.needed_bytes([rate] * joints):>5}")
+        for outcome in drive(elf, with_library, session, again):
+            cells = "  ".join(f"{name} {used} / {free}" for name, used, free in outcome.stages)
+            print(f"    {cells}; {outcome.refusals}", flush=True)
+
+
+def blocks(with_library: bool) -> None:
+    """Print the blocks of the flash that are in use beside MicroPython's own after each stage."""
+    files = {**program_files.start_files(), **(program_files.library(STM32F4) if with_library else {})}
+    folders = 1 + with_library
+    sizes = {"deployed": [len(data) for data in files.values()], "the largest motion": [MAX_MOTION_BYTES]}
+    sizes["an arm"] = [len(arm_record([25_000] * 3))]
+    found = {stage: sum(-(-size // _BLOCK) for size in each) for stage, each in sizes.items()}
+    found["deployed"] += folders
+    print("blocks of the flash: " + ", ".join(f"{stage} {count}" for stage, count in found.items()))
 
 
 def changes(elf: Path, with_library: bool, count: int, seed: int = 12) -> None:
@@ -206,7 +231,7 @@ def changes(elf: Path, with_library: bool, count: int, seed: int = 12) -> None:
         session.run(arm, motion_record(arm, rng.randrange(5, 16)))
         session.command("remove", (), b"go")
         session.stage("changed")
-    outcome = drive(elf, with_library, session, limit_s=3600.0)
+    (outcome,) = drive(elf, with_library, session, limit_s=3600.0)
     told = [(used, free) for name, used, free in outcome.stages if name == "changed"]
     memory = sum(code in ("no_memory", "failed") for _, code, _ in outcome.refusals)
     for number, code, _ in outcome.refusals:
@@ -225,6 +250,7 @@ def main(micropython: Path, count: int) -> None:
             elf = build(micropython, folder, manifest)
             print(f"{title}: in use / largest free block, bytes")
             table(elf, manifest is None)
+            blocks(manifest is None)
             if count > 1:
                 changes(elf, manifest is None, count)
 

@@ -34,10 +34,7 @@ HEAP = 103_400
 
 def measure() -> dict[str, int]:
     """Bytes in use at each stage, and ``machine code``."""
-    library = {
-        path.removeprefix(f"{program_files.ROOT}/"): data
-        for path, data in program_files.library(STM32F4).items()
-    }
+    library = {f"lib/{path}": data for path, data in program_files.compiled(STM32F4).items()}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for path, data in library.items():

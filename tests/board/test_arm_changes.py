@@ -36,8 +36,9 @@ def test_what_fits() -> None:
     for _ in range(300):
         rates = [rng.randrange(1, 240_001) for _ in range(rng.randrange(1, 7))]
         needed = engine_memory.words(rates)
-        assert not engine_memory.fits(rates, needed - 1)
-        assert engine_memory.fits(rates, needed + 1026 * 3)
+        assert not engine_memory.lasting_ms(rates, needed - 1)
+        assert engine_memory.lasting_ms(rates, needed + 1026 * 3)
+        assert not engine_memory.fits(rates, engine_memory.needed_bytes(rates) - 4)
     assert sum(engine_memory.blocks(5000)) == 5000
     assert engine_memory.blocks(0) == []
 
@@ -46,4 +47,4 @@ def test_what_fits() -> None:
 def test_the_largest_memory_holds_what_the_board_can_step(joints: int) -> None:
     """The sum of the rates at its limit, with the little room that the host gives each joint."""
     rate = limits.MAX_STEP_RATE_SUM // joints
-    assert engine_memory.fits([rate + rate // 100 + 1] * joints, engine_memory.LARGEST_WORDS)
+    assert engine_memory.fits([rate + rate // 100 + 1] * joints, engine_memory.LARGEST_BYTES)

@@ -8,9 +8,9 @@ import pytest
 
 from tests.board import heap_use
 
-PEAK = 80_800
-MOTION = 63_800
-MACHINE_CODE = 29_650
+PEAK = 85_500
+MOTION = 68_000
+MACHINE_CODE = 31_000
 
 
 @pytest.mark.slow

@@ -19,7 +19,7 @@ from armtempo_shared.program_hash import sources_crc
 pytestmark = pytest.mark.xdist_group("compact program")  # which takes seconds to make
 
 CORTEX_M4 = 6 | 3 << 8 | 7 << 10
-BOARD = Survey("STM32F4DISC with STM32F407", (1, 29, 0), CORTEX_M4, 95_000, 189, 512, False, None, {})
+BOARD = Survey("STM32F4DISC with STM32F407", (1, 29, 0), CORTEX_M4, 95_000, 180, 512, False, None, {})
 
 
 def quiet(text: str) -> None: ...
@@ -29,7 +29,6 @@ def test_modules_are_what_the_board_imports() -> None:
     names = set(program_files.modules())
     assert {"armtempo_board/app/app.py", "armtempo_board/__init__.py", "armtempo_shared/motion.py"} <= names
     assert not {"armtempo_board/main.py", "armtempo_shared/wire.py", "armtempo_shared/meanings.py"} & names
-    assert program_files.stamp() == f"{own_crc():08x}\n".encode()
 
 
 def test_the_hash_covers_names_and_contents_in_all_packages(tmp_path: Path) -> None:
@@ -59,15 +58,18 @@ def test_the_hash_covers_names_and_contents_in_all_packages(tmp_path: Path) -> N
 def test_compiled_files_fit_the_smallest_board() -> None:
     told: list[str] = []
     library = changes.choose(BOARD, False, told.append)
-    assert {path.rsplit(".", 1)[1] for path in library} == {"mpy"}
     assert "too small for the sources" in told[0]
-    assert all(data[:2] == b"M\x06" for data in library.values())
+    assert library["/flash/lib/armtempo_archive.mpy"][:2] == b"M\x06"
+    blocks = sum(-(-len(data) // 512) for data in (*library.values(), *program_files.start_files().values()))
+    largest, usual, arm_and_folders = 33, 3 * 4, 4
+    assert blocks + largest + usual + arm_and_folders <= BOARD.free_blocks
+    assert blocks <= 126, "board/docs/memory.md"
 
 
 @pytest.mark.slow
 def test_the_program_fits_again_where_it_is_and_the_flash_is_full() -> None:
     library = changes.choose(BOARD, True, quiet)
-    on_it = {**library, program_files.STAMP_PATH: program_files.stamp(), **program_files.start_files()}
+    on_it = {**library, **program_files.start_files()}
     files = {path: (len(data), changes.digest(data)) for path, data in on_it.items()}
     assert changes.choose(replace(BOARD, files=files, free_blocks=0), True, quiet) == library
     another = {**files, "/flash/main.py": (600, "")}  # it will be kept aside
@@ -82,7 +84,7 @@ def test_sources_go_where_there_is_room() -> None:
     assert "/flash/lib/armtempo_board/app/app.py" in library
     told: list[str] = []
     library = changes.choose(replace(BOARD, free_blocks=2000), False, told.append)
-    assert "/flash/lib/armtempo_board/core.mpy" in library
+    assert list(library) == ["/flash/lib/armtempo_archive.mpy", "/flash/lib/armtempo.z"]
     assert "memory is too small for the sources" in told[0]
 
 
@@ -93,15 +95,14 @@ def test_only_what_differs_is_written() -> None:
         "/flash/lib/armtempo_board/b.py": (1, changes.digest(b"old")),
         "/flash/lib/armtempo_board/gone.py": (1, ""),
         "/flash/boot.py": (1, ""),
-        program_files.STAMP_PATH: (9, ""),
     }
     change = changes.difference(replace(BOARD, files=files), library)
     assert change.write == {"/flash/lib/armtempo_board/b.py": b"b"}
     assert change.remove == ["/flash/lib/armtempo_board/gone.py"]
 
 
-def test_completeness_needs_stamp_and_start_files() -> None:
-    whole = {program_files.STAMP_PATH: program_files.stamp(), **program_files.start_files()}
+def test_completeness_needs_the_start_files() -> None:
+    whole = program_files.start_files()
     files = {path: (len(data), changes.digest(data)) for path, data in whole.items()}
     assert changes.is_complete(replace(BOARD, files=files))
     for path in files:
@@ -113,7 +114,7 @@ def test_completeness_needs_stamp_and_start_files() -> None:
     [
         ({"machine": "PYBD-SF6W with STM32F767IIK"}, "is a PYBD"),
         ({"machine": "PYBv1.1 with STM32F405RG"}, "64 pins, and none of the ports D and E"),
-        ({"version": (1, 12, 0)}, "MicroPython 1.12.0; install 1.20"),
+        ({"version": (1, 12, 0)}, "MicroPython 1.12.0; install 1.23"),
         ({"sd_card": True}, "SD card"),
         ({"free_heap": 20_000}, "20000 bytes of free memory"),
         ({"firmware_crc": own_crc() ^ 1}, "a new firmware is due"),
@@ -131,13 +132,21 @@ def test_program_in_the_firmware_leaves_no_library() -> None:
     changes.check_suitable(frozen)
     assert changes.choose(frozen, False, told.append) == {}
     assert "part of the board's firmware" in told[0]
-    assert list(changes.last_files(frozen)) == ["/flash/boot.py", "/flash/main.py"]
 
 
 @pytest.mark.slow
 def test_full_flash_is_refused() -> None:
-    with pytest.raises(LinkError, match="has room for 20"):
-        changes.choose(replace(BOARD, free_blocks=20), True, quiet)
+    full = replace(BOARD, free_blocks=20)
+    with pytest.raises(LinkError, match="has room for 20; nothing of it is in use") as refused:
+        changes.choose(full, True, quiet)
+    assert "remove" not in refused.value.hint
+    mine = replace(full, others={"/flash/notes.txt": 700, "/flash/armtempo/a.atm": 60_000})
+    with pytest.raises(
+        LinkError, match=r"what takes it: /flash/armtempo/a.atm \(118 blocks\), /flash/notes"
+    ) as refused:
+        changes.choose(mine, True, quiet)
+    assert "armtempo remove" in refused.value.hint
+    assert "mpremote rm" in refused.value.hint
 
 
 def test_a_board_under_cpython_takes_no_compiled_files() -> None:

@@ -9,7 +9,7 @@ from armtempo.link.board_messages import Hello
 from armtempo.robot import engine_room
 from armtempo.robot.engine_room import AS_FILES, IN_FIRMWARE, Room
 from armtempo_shared import engine_memory, limits
-from armtempo_shared.engine_memory import SHORT_MS
+from armtempo_shared.engine_memory import SHORT_MS, room_words
 
 PAPER = Arm.paper()
 
@@ -19,7 +19,7 @@ def board(room: Room) -> Hello:
     return Hello(
         protocol=1, joints=0, encoders=0, state="unconfigured", tick_hz=84_000_000, max_rate=240_000,
         max_rate_sum=240_000, free_flash=0, free_heap=0, arm_crc=0, program_crc=0, boot=1,
-        engine_room=room.size, engine_joints=room.joints, arm_problem=0, arm_value=0, board_id="1",
+        engine_room=room.size, features=0, arm_problem=0, arm_value=0, board_id="1",
     )  # fmt: skip
 
 
@@ -29,7 +29,7 @@ def six_joints() -> Arm:
 
 def test_an_arm_that_fits_is_told_with_its_bytes() -> None:
     line = engine_room.of_arm(PAPER, board(AS_FILES))
-    needed = 4 * engine_memory.words([round(rate) for rate in engine_room.encode.step_rates(PAPER)])
+    needed = engine_memory.needed_bytes(engine_room.encode.step_rates(PAPER))
     assert line == f"memory on the board: {needed} bytes for 3 joints of {AS_FILES.size}"
     assert "fits with the program as files or in the firmware" in engine_room.of_arm(PAPER)
 
@@ -38,8 +38,8 @@ def test_an_arm_with_more_joints_is_sent_to_the_firmware() -> None:
     arm = six_joints()
     with pytest.raises(InputError) as refused:
         engine_room.check(arm, board(AS_FILES))
-    assert "drives 6 joints; the board has memory for 3" in refused.value.problem
-    assert "armtempo firmware" in refused.value.hint
+    assert f"the board has {AS_FILES.size}" in refused.value.problem
+    assert "armtempo flash" in refused.value.hint
     assert "too much, or put the program into the board's firmware" in engine_room.of_arm(
         arm, board(AS_FILES)
     )
@@ -48,31 +48,31 @@ def test_an_arm_with_more_joints_is_sent_to_the_firmware() -> None:
 
 
 def test_a_room_that_is_too_small_is_told_in_bytes() -> None:
-    small = Room(1_600, 3)
+    small = Room(6_000)
     with pytest.raises(InputError) as refused:
         engine_room.check(PAPER, board(small))
-    assert "the board has 1600" in refused.value.problem
+    assert "the board has 6000" in refused.value.problem
     assert "lower its top speeds" in refused.value.hint
 
 
-def test_no_way_out_is_promised_that_is_none() -> None:
-    """On the firmware itself there is no other firmware to go to."""
+def test_no_way_out_is_promised_that_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(engine_room, "IN_FIRMWARE", AS_FILES)
     with pytest.raises(InputError) as refused:
-        engine_room.check(six_joints(), board(Room(IN_FIRMWARE.size, 3)))
-    assert "armtempo firmware" not in refused.value.hint
+        engine_room.check(six_joints(), board(AS_FILES))
+    assert "armtempo flash" not in refused.value.hint
 
 
 def test_a_board_tells_what_the_firmware_would_give() -> None:
     lines = engine_room.of_board(board(AS_FILES))
     assert len(lines) == 2
-    assert "1 x 240000 steps/s, 2 x 120000 steps/s, 3 x 62000 steps/s" in lines[0]
+    assert "1 x 240000 steps/s, 2 x 62000 steps/s, 3 x 30000 steps/s" in lines[0]
     assert "6 x 40000 steps/s" in lines[1]
     assert "sequences" in lines[1]
     assert len(engine_room.of_board(board(IN_FIRMWARE))) == 1
 
 
 def test_the_words_name_the_highest_rate_that_fits() -> None:
-    room = Room(5_000, 3)
+    room = Room(8_500)
     (rate,) = [
         int(part.split()[2]) for part in room.words().split(": ")[1].split(", ") if part.startswith("3 x")
     ]
@@ -83,14 +83,15 @@ def test_the_words_name_the_highest_rate_that_fits() -> None:
 def test_rings_last_as_long_as_there_is_memory_for() -> None:
     for rates, in_firmware, as_files in (
         ([5_000] * 3, 12, 12),
-        ([20_000] * 3, 12, 6),
-        ([60_000] * 3, 12, 2),
+        ([20_000] * 3, 12, 3),
+        ([30_000] * 3, 12, 2),
+        ([60_000] * 3, 12, 0),
         ([80_000] * 3, 12, 0),
         ([20_000] * 6, 6, 0),
         ([40_000] * 6, 3, 0),
     ):
-        assert engine_memory.lasting_ms(rates, IN_FIRMWARE.size // 4) == in_firmware
-        assert engine_memory.lasting_ms(rates, AS_FILES.size // 4) == as_files
+        assert engine_memory.lasting_ms(rates, room_words(len(rates), IN_FIRMWARE.size)) == in_firmware
+        assert engine_memory.lasting_ms(rates, room_words(len(rates), AS_FILES.size)) == as_files
     for lasts_ms in engine_memory.LASTING_MS:
         for rate in (5_000, 60_000, 240_000):
             entries = engine_memory.ring_words(rate, lasts_ms) - 1
@@ -124,13 +125,5 @@ def test_every_arm_fits_the_largest_memory() -> None:
     assert len(arms) > 200
     most = max(map(engine_memory.words, arms))
     assert most == engine_memory.words([1, 1, *slowest[1:]])
-    assert all(engine_memory.fits(rates, engine_memory.LARGEST_WORDS) for rates in arms)
-    assert not all(engine_memory.fits(rates, engine_memory.LARGEST_WORDS - 1) for rates in arms)
-
-
-def test_outputs_and_inputs_take_of_a_smaller_memory_only() -> None:
-    rates = [40_000] * 6
-    outputs = engine_memory.output_bytes(8, 8)
-    assert engine_memory.fits(rates, engine_memory.LARGEST_WORDS, outputs)
-    assert engine_memory.fits(rates, engine_memory.LARGEST_WORDS - 1)
-    assert not engine_memory.fits(rates, engine_memory.LARGEST_WORDS - 1, outputs)
+    assert all(engine_memory.lasting_ms(rates, engine_memory.LARGEST_WORDS) for rates in arms)
+    assert not all(engine_memory.lasting_ms(rates, engine_memory.LARGEST_WORDS - 1) for rates in arms)

@@ -7,11 +7,12 @@ import sys
 from pathlib import Path
 
 import pytest
-from armtempo.basics.errors import LinkError, MissingPackageError
+from armtempo.basics.errors import BoardError, LinkError, MissingPackageError
 from armtempo.deploy import deploy, package, remote
 from armtempo.deploy.firmware import frozen
-from armtempo.link import open_board
+from armtempo.link import Client, open_board
 from armtempo.simulator import LaunchOptions, VirtualBoard, edgelog, launch
+from armtempo_shared.messages import START_HELD
 
 from tests import interpreters
 from tests.system import commandline
@@ -60,12 +61,11 @@ def mpremote(port: str, *arguments: str) -> str:
     return done.stdout
 
 
-@pytest.mark.parametrize("name", INTERPRETERS)
-def test_from_an_empty_board_and_back(tmp_path: Path, name: str) -> None:
+def test_sources_on_an_empty_board_and_back(tmp_path: Path) -> None:
     flash = tmp_path / "flash"
     flash.mkdir()
     (flash / "main.py").write_text("print('somebody else')\n")
-    with board(name, flash) as found:
+    with board("cpython", flash) as found:
         port = found.port
         assert "armtempo deploy" in armtempo("status", "--port", port, cwd=tmp_path, code=1)
         assert "kept as /flash/main.py.before-armtempo" in armtempo("deploy", "--port", port, cwd=tmp_path)
@@ -74,7 +74,7 @@ def test_from_an_empty_board_and_back(tmp_path: Path, name: str) -> None:
         assert "up to date" in again
         assert "memory for an arm:" in again
         assert "bytes for 3 joints of" in again
-        damaged = next((flash / "lib" / "armtempo_board").rglob("program.*py"))
+        damaged = next((flash / "lib").rglob("program.py"))
         damaged.write_bytes(b"")
         assert "1 files of the library written" in armtempo("deploy", "--port", port, cwd=tmp_path)
         armtempo("home", "--arm", "paper", "--port", port, cwd=tmp_path)
@@ -85,8 +85,55 @@ def test_from_an_empty_board_and_back(tmp_path: Path, name: str) -> None:
         assert "armtempo deploy" in armtempo("status", "--port", port, cwd=tmp_path, code=1)
     assert (flash / "main.py").read_text() == "print('somebody else')\n"
     assert not (flash / "boot.py").exists()
-    assert not (flash / "lib" / "armtempo_board").exists(), "its packages are gone too"
+    assert not (flash / "lib").exists(), "its packages are gone too"
     assert (flash / "armtempo" / "small.atm").exists()
+
+
+def fill(link: Client, data: bytes) -> list[str]:
+    """Store a motion under one name after the other, until the board refuses; the names."""
+    for number in range(100):
+        try:
+            link.upload(f"more{number}", data)
+        except BoardError:
+            return [f"more{before}" for before in range(number)]
+    raise AssertionError("the flash never was full")
+
+
+@pytest.mark.slow
+def test_on_a_stock_flash_as_it_comes(tmp_path: Path) -> None:
+    """All that fits, refusals by name, a power cycle, and at the end the flash as it was."""
+    flash = tmp_path / "flash"
+    with board(INTERPRETERS[-1], flash) as found:
+        before = {path.name: path.read_bytes() for path in flash.iterdir()}
+        assert {"boot.py", "main.py", "README.txt", "pybcdc.inf"} == set(before)
+        armtempo("deploy", "--mpy", "--port", found.port, cwd=tmp_path)
+        file = small_plan(tmp_path / "small.json")
+        armtempo("home", "--arm", "paper", "--port", found.port, cwd=tmp_path)
+        armtempo("upload", file, "--default", "--port", found.port, cwd=tmp_path)
+        with open_board(found.port) as link:
+            assert not link.info.features
+            for command, values in (("speed", (500,)), ("hold", ()), ("output", (0, 1)), ("inputs", ())):
+                with pytest.raises(BoardError, match="armtempo flash"):
+                    link.session.command(command, values)
+            with pytest.raises(BoardError, match="armtempo flash"):
+                link.session.command("start", (START_HELD, 0), "small")
+            data = (flash / "armtempo" / "small.atm").read_bytes()
+            more = fill(link, data)
+            assert len(more) > 3
+            with pytest.raises(BoardError, match="room"):
+                link.upload("small", data)
+            assert link.fetch("small") == data
+            for name in more:
+                link.remove(name)
+        slow = armtempo("run", file, "--speed", "50", "--port", found.port, cwd=tmp_path, code=1)
+        assert "another speed" in slow
+        assert "armtempo flash" in slow
+    with board(INTERPRETERS[-1], flash) as found:
+        armtempo("home", "--arm", "paper", "--port", found.port, cwd=tmp_path)
+        assert "complete" in armtempo("run", file, "--port", found.port, cwd=tmp_path)
+        armtempo("undeploy", "--port", found.port, cwd=tmp_path)
+    shutil.rmtree(flash / "armtempo")
+    assert {path.name: path.read_bytes() for path in flash.iterdir()} == before
 
 
 @pytest.mark.parametrize("cut", [30, 110])

@@ -23,7 +23,7 @@ from armtempo_board.app.events import Events
 from armtempo_board.link.serial_link import SerialLink
 
 _EXTRA_SERVICES_PER_TURN = const(3)  # of the engine, while something moves
-_SPARE_BYTES = const(1024)  # kept for telling of a failure: a traceback, and its end for the host
+_SPARE_BYTES = const(512)  # kept for telling of a failure: a traceback, and its end for the host
 _MOST_FAILURES = const(10)  # turns of the loop that fail one after the other; then the program gives up
 
 

@@ -11,7 +11,7 @@ from armtempo_shared import codes
 from armtempo_shared.messages import ARM_RECORD_NAME
 from pyb import Pin, Timer
 
-from armtempo_board import heap
+from armtempo_board import features, heap
 from armtempo_board.app.arm_state import NEVER_MS
 from armtempo_board.buffers import COMMANDED
 from armtempo_board.errors import Refused
@@ -86,7 +86,7 @@ def _judged(board: "ArmState", data: bytes) -> "Record":
     """An arm record that can be taken, unpacked; else Refused."""
     from armtempo_board.motion import arm_check  # here, so that it can be forgotten
 
-    return arm_check.checked(data, board.workspace.words, board.workspace.joints)
+    return arm_check.checked(data, board.workspace.room)
 
 
 def _take(board: "ArmState", record: "Record") -> None:
@@ -99,7 +99,7 @@ def _take(board: "ArmState", record: "Record") -> None:
         known = board.engine.known
         steps = [board.engine.commanded(joint) for joint in range(board.joints)]
     _drop_engine(board)
-    _share_room(board, len(outputs), len(inputs))
+    _share_room(board, len(joints))
     heap.forget("room", "engine_memory")
     board.make_engine(head, joints)
     board.all_but_limits = all_but_limits
@@ -110,7 +110,7 @@ def _take(board: "ArmState", record: "Record") -> None:
     board.arm_crc = crc
     board.raw = array("i", [0] * (COMMANDED + 2 * board.joints))
     board.samples.configure(board.joints)
-    if outputs or inputs:
+    if features.OUTPUTS and (outputs or inputs):
         from armtempo_board.app import output_setup  # here, so that it can be forgotten
 
         output_setup.attach(board, outputs, inputs)
@@ -124,17 +124,17 @@ def _facts(record: "Record") -> "tuple[int, int]":
     return armrecord.without_limits(head, joints), head["flags"] & armrecord.FLAG_STOP_ON_LINK_LOSS
 
 
-def _share_room(board: "ArmState", outputs: int, inputs: int) -> None:
+def _share_room(board: "ArmState", joints: int) -> None:
     from armtempo_board.app import room  # here, so that it can be forgotten
 
-    room.share(board.workspace, outputs, inputs)
+    room.share(board.workspace, joints)
 
 
 def _drop_engine(board: "ArmState") -> None:
     """Before another takes its place: the heap is to be as it was without one."""
     if board.engine:
         board.engine.close()
-    if board.outputs:
+    if features.OUTPUTS and board.outputs:
         drop_outputs(board)
     board.engine = None
     board.joints = board.arm_crc = 0

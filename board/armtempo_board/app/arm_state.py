@@ -10,7 +10,7 @@ from armtempo_shared import codes
 from armtempo_shared.messages import NO_JOINT
 from micropython import const
 
-from armtempo_board import heap
+from armtempo_board import features, heap
 from armtempo_board.app.sample_buffer import SampleBuffer
 from armtempo_board.buffers import COMMANDED, pack_offsets, sample_to_wire
 from armtempo_board.errors import Refused
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _BYTES_PER_JOINT = const(8)  # in a sample on the wire
 _BOOT_BYTES = const(4)
-MOTION_CODE_BYTES = const(10_300)
+MOTION_CODE_BYTES = const(12_500)
 """The large pieces of the code that only a motion needs."""
 NEVER_MS = const((1 << 30) - 1)
 
@@ -100,12 +100,8 @@ class ArmState:
     # what it knows
 
     def engine_room(self) -> int:
-        """Bytes of memory that an engine can have (``armtempo_shared.engine_memory``)."""
-        return int(4 * self.workspace.words)
-
-    def engine_joints(self) -> int:
-        """Joints that an engine can have."""
-        return int(self.workspace.joints)
+        """Bytes that an engine can have (``armtempo_shared.engine_memory``)."""
+        return int(self.workspace.room)
 
     def check_ready(self) -> None:
         """Refuses while a fault is pending or no arm is configured."""
@@ -116,7 +112,9 @@ class ArmState:
 
     def moving(self) -> bool:
         """Whether steps may still come; a sequence has more to come while it waits."""
-        return self.engine is not None and (self.engine.moving or self.sequence is not None)
+        return self.engine is not None and (
+            self.engine.moving or (features.SEQUENCES and self.sequence is not None)
+        )
 
     def known(self) -> int:
         """One bit per joint: its position is known."""

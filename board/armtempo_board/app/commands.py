@@ -20,6 +20,7 @@ from armtempo_shared.messages import (
 )
 from micropython import const
 
+from armtempo_board import features
 from armtempo_board.buffers import u32
 from armtempo_board.errors import Refused
 
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from armtempo_board.app.controller import Controller
     from armtempo_board.link.serial_link import SerialLink
 
-_WHILE_MOVING = ("hello", "status", "stop", "hold", "speed", "samples")
+_WHILE_MOVING = ("hello", "status", "stop", "samples", "hold", "speed")  # as far as the program has them
 _STORE = range(0x10, 0x20)  # numbers of the commands in store_commands.py,
 _DRIVERS = const(0x29)  # and of one more
 _BYTES_PER_POSITION = const(4)
@@ -41,6 +42,7 @@ _HANDLER = const(0)
 _FIELDS = const(1)
 _ANSWER = const(2)
 _TAIL = const(3)
+_UNKNOWN = codes.UNKNOWN_COMMAND if features.ALL else codes.NEEDS_FIRMWARE
 
 
 class Commands:
@@ -59,8 +61,9 @@ class Commands:
         self._numbers = bytes(ROWS)
         self._while_moving: "dict[int, Any]" = {}
         for number, (name, fields, values, tail) in ROWS.items():
-            if name in _WHILE_MOVING:
-                self._while_moving[number] = getattr(type(self), name), fields, values, tail
+            handler = getattr(type(self), name, None)
+            if handler and name in _WHILE_MOVING:
+                self._while_moving[number] = handler, fields, values, tail
             if name == "hello":
                 self._hello_number = number
         self._ticks_at = _ANSWER_AT + offset("A", "status", "ticks")
@@ -84,10 +87,12 @@ class Commands:
         row = self._while_moving.get(number) or self.controller.rows.get(number)
         if row is None:
             if number not in self._numbers:
-                return self._refuse(number, codes.UNKNOWN_COMMAND)
+                return self._refuse(number, _UNKNOWN)
             if self.controller.moving():
                 return self._refuse(number, codes.BUSY if self.greeted else codes.NO_SESSION)
             row = self._row(number)
+            if row[_HANDLER] is None:
+                return self._refuse(number, _UNKNOWN)
         length = self.link.reader.length()
         fixed = calcsize(row[_FIELDS])
         if length < fixed or (length > fixed and not row[_TAIL]):
@@ -111,7 +116,7 @@ class Commands:
 
         name, fields, values, tail = ROWS[number]
         return (
-            name if number in _STORE or number == _DRIVERS else getattr(type(self), name),
+            name if number in _STORE or number == _DRIVERS else getattr(type(self), name, None),
             fields,
             values,
             tail,
@@ -179,7 +184,7 @@ class Commands:
             controller.program_crc,
             controller.boot,
             controller.engine_room(),
-            controller.engine_joints(),
+            features.BITS,
             controller.arm_problem,
             controller.arm_value,
         )
@@ -190,7 +195,8 @@ class Commands:
         self._session = session
         self.link.forget()
         self.controller.samples.skip()
-        self.controller.forget_speed()
+        if features.SPEED:
+            self.controller.forget_speed()
         self.controller.forget_store()
 
     def status(self, row: tuple, length: int) -> int:
@@ -250,19 +256,23 @@ class Commands:
         self.controller.stop(self.link.reader.data[PAYLOAD_AT])
         return 0
 
-    def speed(self, row: tuple, length: int) -> None:
-        """Another speed: of what moves, or of the next run."""
-        (rate,) = self.fields(row)
-        if not (rate in (0, RESUME) or SLOWEST_PERMILLE <= rate <= PERMILLE):
-            raise Refused(codes.MALFORMED)
-        self.controller.change_speed(rate)
+    if features.SPEED:
 
-    def hold(self, row: tuple, length: int) -> int:
-        """A held run is still wanted."""
-        if not self.controller.moving():
-            raise Refused(codes.NOT_MOVING)
-        self.controller.hold()
-        return 0
+        def speed(self, row: tuple, length: int) -> None:
+            """Another speed: of what moves, or of the next run."""
+            (rate,) = self.fields(row)
+            if not (rate in (0, RESUME) or SLOWEST_PERMILLE <= rate <= PERMILLE):
+                raise Refused(codes.MALFORMED)
+            self.controller.change_speed(rate)
+
+    if features.JOG:
+
+        def hold(self, row: tuple, length: int) -> int:
+            """A held run is still wanted."""
+            if not self.controller.moving():
+                raise Refused(codes.NOT_MOVING)
+            self.controller.hold()
+            return 0
 
     def clear(self, row: tuple, length: int) -> None:
         """Clear the pending fault."""

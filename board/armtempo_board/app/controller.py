@@ -16,8 +16,8 @@ from armtempo_shared.limits import HOLD_TIMEOUT_MS
 from armtempo_shared.messages import RESUME, SAMPLE_BRAKING, START_HELD, START_HOMING
 from micropython import const
 
-from armtempo_board import heap
-from armtempo_board.app.arm_state import ArmState
+from armtempo_board import features, heap
+from armtempo_board.app.arm_state import MOTION_CODE_BYTES, ArmState
 from armtempo_board.errors import Refused
 
 TYPE_CHECKING = False
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from armtempo_board.storage.motion_file import MotionFile
 
 _PERMILLE = const(1000)
-_PIECES_BYTES = (2_416, 2_192, 1_648, 1_584, 1_360, 1_088, 1_008, 512)
 
 
 class Controller(ArmState):
@@ -56,7 +55,7 @@ class Controller(ArmState):
         """Keep steps and samples coming; notice the end of a run, or that the host was silent for too long."""
         self.engine.service()
         self._collect()
-        if self.outputs:
+        if features.OUTPUTS and self.outputs:
             if self.fault():
                 self.outputs.safe()
             self.inputs.poll(time.ticks_ms())
@@ -66,9 +65,13 @@ class Controller(ArmState):
             elif silent_ms > self.silence_ms and self._by_host and not self._braking:
                 self.pending = codes.LINK_LOST
                 self.stop(0)
-            elif self._held and time.ticks_diff(time.ticks_ms(), self._hold_ms) > HOLD_TIMEOUT_MS:
+            elif (
+                features.JOG
+                and self._held
+                and time.ticks_diff(time.ticks_ms(), self._hold_ms) > HOLD_TIMEOUT_MS
+            ):
                 self.stop(0)
-        if self.sequence:
+        if features.SEQUENCES and self.sequence:
             if self.engine.moving:
                 self.sequence.prepare()
             else:
@@ -86,7 +89,7 @@ class Controller(ArmState):
     def _end(self) -> None:
         self._collect()
         self._withdraw_assumed()
-        if not self.sequence:  # its next motion comes at once
+        if not features.SEQUENCES or not self.sequence:  # its next motion comes at once
             heap.collect_often()
         self.running = False
         self._braking = False
@@ -96,7 +99,7 @@ class Controller(ArmState):
     def fail(self) -> None:
         """The program has failed: freeze, and INTERNAL is the pending fault."""
         self.pending = codes.INTERNAL
-        if self.outputs:
+        if features.OUTPUTS and self.outputs:
             self.outputs.safe()
         if self.engine:
             self.engine.freeze()
@@ -104,9 +107,9 @@ class Controller(ArmState):
 
     def halt(self) -> None:
         """Freeze what still moves, outputs to their safe values; the position stays known."""
-        if self.sequence:
+        if features.SEQUENCES and self.sequence:
             self.sequence.stopping = True
-        if self.outputs:
+        if features.OUTPUTS and self.outputs:
             self.outputs.safe()
         if self.engine and self.engine.moving:
             self.engine.freeze()
@@ -157,13 +160,18 @@ class Controller(ArmState):
         host.
         """
         self.check_ready()
+        if flags & START_HELD and not features.JOG:
+            raise Refused(codes.NEEDS_FIRMWARE)
         homing = bool(flags & START_HOMING)
         unknown = self.everyone() & ~self.known()
         if unknown and not homing:
             raise Refused(codes.UNHOMED, _lowest(unknown))
         self._by_host = crc is not None
-        rate, self._next_rate = self._next_rate if self._by_host else _PERMILLE, _PERMILLE
-        if self._is_sequence(name):
+        rate = _PERMILLE
+        if features.SPEED and self._by_host:
+            rate = self._next_rate
+            self.forget_speed()
+        if features.SEQUENCES and self._is_sequence(name):
             self._new_sequence(name, crc, rate, flags)
             self.sequence.begin()
             return
@@ -175,7 +183,7 @@ class Controller(ArmState):
             from armtempo_board.app import sequence_start  # here, so that it can be forgotten
 
             self.sequence = sequence_start.sequencer(self, name, crc, rate, flags)
-        except (MemoryError, ImportError):  # compiled files are without it
+        except MemoryError:
             raise Refused(codes.NO_SEQUENCE_ROOM)
 
     def _is_sequence(self, name: str) -> bool:
@@ -197,7 +205,7 @@ class Controller(ArmState):
         """Keep pieces for the code that a motion needs, before anything that its start needs can lie in them."""
         self.tidy()
         if self.workspace.is_short:
-            heap.hold(*_PIECES_BYTES)
+            heap.hold(MOTION_CODE_BYTES)
 
     def begin_motion(self, name: str, crc: "int | None", rate: int, flags: int = 0, unknown: int = 0) -> None:
         """Start a stored motion at ``rate`` thousandths of its speed, or refuse.
@@ -230,8 +238,9 @@ class Controller(ArmState):
         heap.tidy()
         heap.collect_often(0)
         self.running = True
-        self._held = flags & START_HELD
-        self.hold()
+        if features.JOG:
+            self._held = flags & START_HELD
+            self.hold()
         self.engine.start()
 
     def _withdraw_assumed(self) -> None:
@@ -241,7 +250,7 @@ class Controller(ArmState):
 
     def stop(self, now: int) -> None:
         """Brake along the path; freeze where ``now``, or where the motion has no way to. A sequence ends there."""
-        if self.sequence:
+        if features.SEQUENCES and self.sequence:
             self.sequence.stopping = True
             if not self.engine.moving:
                 return
@@ -252,18 +261,20 @@ class Controller(ArmState):
         else:
             self.engine.brake()
 
-    def change_speed(self, rate: int) -> None:
-        """Change the rate of what moves, or of a host's next run: thousandths; 0: pause, RESUME: as before."""
-        if self.moving():
-            (self.sequence or self.engine).change_rate(rate)
-        elif rate in (0, RESUME):
-            raise Refused(codes.NOT_MOVING)
-        else:
-            self._next_rate = rate
+    if features.SPEED:
 
-    def forget_speed(self) -> None:
-        """A new host: what another one wanted for its next run is no longer meant."""
-        self._next_rate = _PERMILLE
+        def change_speed(self, rate: int) -> None:
+            """``rate`` thousandths (0: pause, RESUME: as before) for what moves, or for a host's next run."""
+            if self.moving():
+                (self.sequence or self.engine).change_rate(rate)
+            elif rate in (0, RESUME):
+                raise Refused(codes.NOT_MOVING)
+            else:
+                self._next_rate = rate
+
+        def forget_speed(self) -> None:
+            """The next run begins as planned again: what a host wanted for it is used up, or that host is gone."""
+            self._next_rate = _PERMILLE
 
     def hold(self) -> None:
         """A held run is still wanted."""

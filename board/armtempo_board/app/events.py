@@ -5,6 +5,8 @@ from struct import calcsize, pack_into
 from armtempo_shared.messages import MAX_PAYLOAD
 from micropython import const
 
+from armtempo_board import features
+
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from armtempo_board.app.controller import Controller
@@ -48,7 +50,7 @@ class Events:
 
     def push(self) -> bool:
         """Hand the link what is waiting and has room, one sample at most; whether there was one."""
-        if self._controller.sequence:
+        if features.SEQUENCES and self._controller.sequence:
             self._controller.sequence.tell(self._link)
         if self._push_sample():
             return True

@@ -13,7 +13,7 @@ from armtempo_board.stepgen import step_generator  # isort: skip  # noqa: F401  
 from armtempo_board.motion import engine  # isort: skip  # noqa: F401  and what is deep without that
 
 import armtempo_board
-from armtempo_board import heap
+from armtempo_board import features, heap
 from armtempo_board.app.app import App
 from armtempo_board.app.button import Button
 from armtempo_board.app.leds import Leds
@@ -89,7 +89,7 @@ def _serve_panel(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
     pressed = (
         button.pressed()
     )  # a press while something moves does nothing, then or later; a sequence it stops
-    if pressed and controller.sequence:
+    if features.SEQUENCES and pressed and controller.sequence:
         controller.stop(0)
     if controller.moving():
         return

@@ -7,14 +7,13 @@ and what these need while they are at work: docs/memory.md.
 import gc
 
 from armtempo_shared import engine_memory
-from armtempo_shared.limits import MAX_JOINTS
 
 from armtempo_board import heap
 from armtempo_board.hardware import backup_sram
 from armtempo_board.motion.workspace import Workspace
 
-_RESERVE = 27_000  # bytes of heap for the rest
-_USUAL_JOINTS = 3  # there is heap for their objects before there is memory for larger rings
+_RESERVE = 27_600  # bytes of heap for the rest; about 1 000 of them are to spare (docs/memory.md)
+_USUAL_JOINTS = 3
 _MOST_SAMPLES = 4096  # bytes of the sample buffer at most,
 _LEAST_SAMPLES = 768  # and at least;
 _SAMPLES_SHARE = 48  # between them, this part of the free heap
@@ -27,37 +26,29 @@ def workspace() -> "Workspace":
     heap.forget("registers")
     gc.collect()
     free = _free()
-    if not free:
-        return Workspace(engine_memory.LARGEST_WORDS, MAX_JOINTS, address)
-    room = max(free - _RESERVE - (0 if address else 4 * engine_memory.PROCESSOR_WORDS), 0)
-    words = max(room - engine_memory.object_bytes(_USUAL_JOINTS), 0) // 4
-    words = min(words, engine_memory.LARGEST_WORDS)
-    joints = 0
-    while joints < MAX_JOINTS and 4 * words + engine_memory.object_bytes(joints + 1) <= room:
-        joints += 1
-    while True:
-        try:
-            return Workspace(words, joints, address)
-        except MemoryError:  # the heap has no such blocks
-            if not words:
-                raise
-            words = max(words - _STEP_WORDS, 0)
-            gc.collect()
+    room = engine_memory.LARGEST_BYTES
+    if free:
+        beside = _RESERVE + (0 if address else 4 * engine_memory.PROCESSOR_WORDS)
+        room = min(max(free - beside, 0), room)
+    made = Workspace(room, address)
+    share(made, _USUAL_JOINTS)
+    return made
 
 
-def share(workspace: "Workspace", outputs: int, inputs: int) -> None:
-    """Where memory is short, leave heap for that many outputs and inputs, out of the engine's, which nobody uses now.
+def share(workspace: "Workspace", joints: int) -> None:
+    """Make the memory for an engine of that many joints, whose objects take of the room too; nobody uses it now.
 
     What the heap no longer has in one piece, the engine goes without, until the program starts again.
     """
-    words = workspace.words
-    if workspace.is_short:
-        words = max(words - engine_memory.output_bytes(outputs, inputs) // 4, 0)
+    words = engine_memory.room_words(joints, workspace.room)
     while workspace.memory.size != words:
         try:
             workspace.make_memory(words)
         except MemoryError:
+            if not words:
+                raise
             words = max(words - _STEP_WORDS, 0)
+            gc.collect()
 
 
 def sample_bytes() -> int:

@@ -8,6 +8,7 @@ from armtempo_shared import codes
 from armtempo_shared.messages import ARM_RECORD_NAME, MAX_PAYLOAD
 from micropython import const
 
+from armtempo_board import features
 from armtempo_board.errors import Refused
 from armtempo_board.motion import endpoints
 
@@ -64,7 +65,7 @@ def list(commands: "Caller", row: tuple, length: int) -> int:
     name = names[index]
     crc = duration = joints = is_sequence = 0
     try:
-        is_sequence = store.is_sequence(name)
+        is_sequence = features.SEQUENCES and store.is_sequence(name)
         if is_sequence:
             crc = store.sequence(name).crc
         else:

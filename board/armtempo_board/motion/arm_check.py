@@ -5,6 +5,7 @@ from armtempo_shared.limits import MAX_ENCODERS
 from armtempo_shared.messages import NO_JOINT
 from micropython import const
 
+from armtempo_board import features
 from armtempo_board.errors import Refused
 from armtempo_board.hardware import pins
 
@@ -16,10 +17,10 @@ if TYPE_CHECKING:
     Record = tuple[dict[str, int], Rows, int, Rows, Rows]
 
 
-def checked(data: bytes, room_words: int, most_joints: int) -> "Record":
+def checked(data: bytes, room_bytes: int) -> "Record":
     """(head, joints, crc32, outputs, inputs) of an arm record, as ``armrecord`` unpacks them.
 
-    ``room_words``, ``most_joints``: what an engine can have. Refused: BAD_RECORD where it is damaged, of another
+    ``room_bytes``: what an engine can have. Refused: BAD_RECORD where it is damaged, of another
     version, or names what the board does not have; PIN_TAKEN where an output, input or polled switch has what is taken;
     NO_ROOM with the bytes needed.
     """
@@ -33,11 +34,12 @@ def checked(data: bytes, room_words: int, most_joints: int) -> "Record":
         if not _is_fit(row) or row["channel"] in [other["channel"] for other in joints[:number]]:
             raise Refused(codes.BAD_RECORD, number)
     outputs, inputs = armrecord.unpack_outputs(data)
+    if (outputs or inputs) and not features.OUTPUTS:
+        raise Refused(codes.NEEDS_FIRMWARE)
     _check_pins(head, joints, outputs, inputs)
     rates = [row["max_rate"] for row in joints]
-    beside = engine_memory.output_bytes(len(outputs), len(inputs))
-    if len(rates) > most_joints or not engine_memory.fits(rates, room_words, beside):
-        raise Refused(codes.NO_ROOM, NO_JOINT, 4 * engine_memory.words(rates) + beside)
+    if not engine_memory.fits(rates, room_bytes):
+        raise Refused(codes.NO_ROOM, NO_JOINT, engine_memory.needed_bytes(rates))
     return head, joints, crc, outputs, inputs
 
 

@@ -24,7 +24,7 @@ from armtempo_shared.limits import LONGEST_RUN_TICKS
 from armtempo_shared.messages import NO_JOINT
 from micropython import const
 
-from armtempo_board import heap
+from armtempo_board import features, heap
 from armtempo_board.errors import Refused
 from armtempo_board.hardware import isr
 from armtempo_board.motion.engine_parts import EngineParts
@@ -278,16 +278,19 @@ class Engine(EngineParts):
             ahead_kiticks = max(joint.ahead_kiticks(), ahead_kiticks)
         return ahead_kiticks
 
-    def change_rate(self, rate: int) -> None:
-        """Let the motion's own time go on at another rate, in thousandths; 0: pause, RESUME: as before it.
+    if features.SPEED:
 
-        Each change takes as long as the record says, with acceleration and jerk as in ``brake``. It begins as braking
-        does; one that comes while the rate is changing waits until that has ended, and only the last one counts.
-        """
-        if not self.moving:
-            raise Refused(codes.NOT_MOVING)
-        self.rates.want(rate)
-        self._change_rate()
+        def change_rate(self, rate: int) -> None:
+            """Let the motion's own time go on at another rate, in thousandths; 0: pause, RESUME: as before it.
+
+            Each change takes as long as the record says, with acceleration and jerk as in ``brake``. It begins as
+            braking does; one that comes while the rate is changing waits until that has ended, and only the last
+            one counts.
+            """
+            if not self.moving:
+                raise Refused(codes.NOT_MOVING)
+            self.rates.want(rate)
+            self._change_rate()
 
     def _change_rate(self) -> None:
         """Begin the ramp to the rate that is wanted, or wait until the last one lies behind."""

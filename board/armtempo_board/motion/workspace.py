@@ -12,24 +12,23 @@ if TYPE_CHECKING:
 
 
 class Workspace:
-    """``words`` of memory for rings and step generators, ``joints`` at most: see ``armtempo_shared.engine_memory``.
+    """``room``: bytes for an engine, see ``armtempo_shared.engine_memory``; ``memory`` is made by ``make_memory``.
 
     ``address``: where its PROCESSOR_WORDS are; 0: in the heap. The interrupts' callbacks belong to it, so they never
     hold what an engine had before.
     """
 
-    def __init__(self, words: int, joints: int, address: int = 0) -> None:
+    def __init__(self, room: int, address: int = 0) -> None:
         from armtempo_shared.engine_memory import (  # here, so that it can be forgotten
-            LARGEST_WORDS,
+            LARGEST_BYTES,
             PROCESSOR_WORDS,
         )
 
-        self.joints = joints
-        self.words = words  # as many as can be; ``memory`` has less while outputs and inputs need heap
-        self.is_short = words < LARGEST_WORDS  # the heap does not have enough for every arm
+        self.room = room
+        self.is_short = room < LARGEST_BYTES  # the heap does not have enough for every arm
         self._own = None if address else Memory([PROCESSOR_WORDS]).take(PROCESSOR_WORDS)
         self._address = address or uctypes.addressof(self._own)
-        self.make_memory(words)
+        self.memory = Memory([])
         self.sampler = Sampler()
         self.feeder = RingFeeder(self.sampler.block)
 

@@ -17,6 +17,7 @@ from armtempo_shared.messages import ARM_RECORD_NAME
 from armtempo_shared.motion import MotionError
 from micropython import const
 
+from armtempo_board import features
 from armtempo_board.errors import Refused
 from armtempo_board.storage.motion_file import MotionFile, stated_crc
 
@@ -324,7 +325,7 @@ class Store:
 
     def _check_kind(self, file_name: str) -> None:
         """Refuses what is neither a motion nor a sequence."""
-        if not self._is_sequence(file_name):
+        if not features.SEQUENCES or not self._is_sequence(file_name):
             self._motion(file_name)
             return
         from armtempo_shared import sequence_check  # here, so that it can be forgotten
@@ -356,7 +357,9 @@ class Store:
         try:
             return self._guard(MotionFile, self._path(file_name), size)  # type: ignore[no-any-return]
         except MotionError:
-            raise Refused(codes.IS_SEQUENCE if self._is_sequence(file_name) else codes.BAD_RECORD)
+            if not self._is_sequence(file_name):
+                raise Refused(codes.BAD_RECORD)
+            raise Refused(codes.IS_SEQUENCE if features.SEQUENCES else codes.NEEDS_FIRMWARE)
 
     def _is_whole(self, file_name: str) -> bool:
         """Whether a ``.new`` file is a whole record, of the kind that the file's name says."""

@@ -12,11 +12,14 @@ from armtempo.deploy import program_files
 from armtempo.deploy.remote import Survey
 from armtempo.link.program_version import own_crc
 
-LEAST_RELEASE = (1, 20)
+LEAST_RELEASE = (1, 23)
+"""The first whose compiled files are those of today; it has ``deflate`` and ``vfs``, too."""
 LEAST_HEAP = 83_500
 """Bytes that must be free before anything of the program is loaded: see board/docs/memory.md."""
 _SOURCES_HEAP = 160_000
 """The same for sources, which the board compiles."""
+_MOST_NAMED = 4
+_MOTIONS = "/flash/armtempo/"
 _RESERVE_BLOCKS = 8
 """For folders, the arm's record and a motion, where the program comes for the first time."""
 
@@ -101,11 +104,9 @@ def choose(found: Survey, mpy: bool, tell: Tell) -> dict[str, bytes]:
         library = program_files.library(found.mpy)
     if not _fits(found, library):
         raise LinkError(
-            (
-                f"the program needs {_needed(found, library)} blocks of flash, the board has room for "
-                f"{_room(found)}; remove motions ('armtempo remove') or other files"
-            ),
-            "remove motions ('armtempo remove') or other files",
+            f"the program needs {_needed(found, library)} blocks of flash, the board has room for {_room(found)}; "
+            f"{_taken(found)}",
+            _way_out(found),
         )
     return library
 
@@ -115,20 +116,12 @@ def difference(found: Survey, library: Mapping[str, bytes]) -> Change:
     write = {
         path: data for path, data in library.items() if found.files.get(path, (0, ""))[1] != digest(data)
     }
-    return Change(
-        write, [path for path in ours(found) if path not in library and path != program_files.STAMP_PATH]
-    )
+    return Change(write, [path for path in ours(found) if path not in library])
 
 
 def is_complete(found: Survey) -> bool:
-    """Whether stamp and start files are the ones of this program."""
-    return not difference(found, last_files(found)).write
-
-
-def last_files(found: Survey) -> dict[str, bytes]:
-    """What is written last, in this order; the stamp only where the library lies in files."""
-    stamp = {program_files.STAMP_PATH: program_files.stamp()} if found.firmware_crc is None else {}
-    return {**stamp, **program_files.start_files()}
+    """Whether the start files, which are written last, are the ones of this program."""
+    return not difference(found, program_files.start_files()).write
 
 
 def ours(found: Survey) -> list[str]:
@@ -153,12 +146,25 @@ def _fits(found: Survey, library: Mapping[str, bytes]) -> bool:
 
 
 def _needed(found: Survey, library: Mapping[str, bytes]) -> int:
-    sizes = [
-        len(data)
-        for data in (*library.values(), *program_files.start_files().values(), program_files.stamp())
-    ]
+    sizes = [len(data) for data in (*library.values(), *program_files.start_files().values())]
     reserve = 0 if ours(found) else _RESERVE_BLOCKS
     return sum(-(-size // found.block_size) for size in sizes) + reserve
+
+
+def _taken(found: Survey) -> str:
+    """What else takes room in the flash, the largest first."""
+    blocks = {name: -(-size // found.block_size) for name, size in found.others.items()}
+    largest = sorted(blocks, key=lambda name: -blocks[name])[:_MOST_NAMED]
+    named = ", ".join(f"{name} ({blocks[name]} blocks)" for name in largest)
+    return f"what takes it: {named}" if named else "nothing of it is in use: the file system is too small"
+
+
+def _way_out(found: Survey) -> str:
+    motions = any(name.startswith(_MOTIONS) for name in found.others)
+    ways = ["remove motions ('armtempo remove')"] if motions else []
+    if any(not name.startswith(_MOTIONS) for name in found.others):
+        ways.append("remove files that nobody needs ('mpremote rm :FILE')")
+    return ", or ".join([*ways, "put the program into the firmware ('armtempo flash')"])
 
 
 def _room(found: Survey) -> int:

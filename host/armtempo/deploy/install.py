@@ -24,7 +24,6 @@ from armtempo.deploy.changes import (
     choose,
     difference,
     is_complete,
-    last_files,
     ours,
 )
 from armtempo.deploy.remote import RECOVERY, Remote, Survey, each, rename
@@ -99,11 +98,11 @@ def _install(
 ) -> None:
     if change.write or change.remove or not is_complete(found):
         _keep_aside(remote, found, tell)
-        gone = each("os.remove", [f"{program_files.ROOT}/main.py", program_files.STAMP_PATH, *change.remove])
+        gone = each("os.remove", [f"{program_files.ROOT}/main.py", *change.remove])
         remote.run(gone, each("os.rmdir", _folders(change.remove)))
         _write(remote, change.write, progress)
         _verify(remote, library)
-        _write(remote, last_files(found), progress)
+        _write(remote, program_files.start_files(), progress)
         tell(f"{len(change.write)} files of the library written, {len(change.remove)} removed")
     else:
         tell("the program on the board is up to date")
@@ -124,7 +123,7 @@ def undeploy(port: str, tell: Tell = LOG.info) -> None:
     for path in aside:
         remote.run(rename(path, path.removesuffix(KEPT_ASIDE)))
         tell(f"{path.removesuffix(KEPT_ASIDE)} is the one from before again")
-    remote.run(each("os.rmdir", _folders(files)))
+    remote.run(each("os.rmdir", [*_folders(files), program_files.LIBRARY]))
     remote.run(["reset"])
     _await_port(port)
     tell(f"{len(files)} files of the library removed; stored motions are kept")

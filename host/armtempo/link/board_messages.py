@@ -8,6 +8,7 @@ from typing import Any
 
 from armtempo_shared import wire
 from armtempo_shared.limits import TICK_HZ
+from armtempo_shared.messages import FEATURES
 from armtempo_shared.sequence import ENDINGS
 
 from armtempo.basics.virtual_id import is_virtual
@@ -31,13 +32,17 @@ class Hello:
     program_crc: int
     boot: int
     engine_room: int
-    """Bytes of heap that the engine for an arm can have (``armtempo_shared.engine_memory``)."""
-    engine_joints: int
-    """Joints that an engine can have."""
+    """Bytes of heap that the engine for an arm can have, with its objects (``armtempo_shared.engine_memory``)."""
+    features: int
+    """Bits of what the program can do beyond one motion at a time, by ``messages.FEATURES``."""
     arm_problem: int
     """Code of what is wrong with the stored arm record; 0 where it is in force or there is none."""
     arm_value: int
     board_id: str
+
+    def can(self, feature: str) -> bool:
+        """Whether the program can do one of ``messages.FEATURES``; in the firmware it can do all."""
+        return bool(self.features >> FEATURES.index(feature) & 1)
 
     @property
     def virtual(self) -> bool:

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armtempo_shared import limits, wire
-from armtempo_shared.messages import MAX_PAYLOAD, PERMILLE
+from armtempo_shared.messages import MAX_PAYLOAD, PERMILLE, START_HELD
 
 from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
 from armtempo.basics.progress import Progress
 from armtempo.link import board_messages
+from armtempo.link.refusal import refusal
 from armtempo.link.session import ANSWER_TIMEOUT_S, Session
 
 FLASH_TIMEOUT_S = 30.0
@@ -93,6 +94,11 @@ class Client:
         fields[3] = board_messages.state_name(values[3])
         self._info = board_messages.Hello(*fields)
         return self._info
+
+    def need(self, feature: str, what: str) -> None:
+        """BoardError that names ``what``, where the program on the board cannot do one of ``messages.FEATURES``."""
+        if not self.info.can(feature):
+            raise refusal(what, wire.ERROR_CODES["needs_firmware"])
 
     def _greet_again(self) -> None:
         before = self._info
@@ -202,6 +208,8 @@ class Client:
 
     def sequence(self) -> board_messages.SequenceState:
         """Where the sequence stands, or where the last one since the board's start ended."""
+        if not self.info.can("sequences"):
+            return board_messages.SequenceState("none", 0, 0, 0, 0, "")
         try:
             (ending, code, step, row, cycle), name = self.session.command("sequence")
         except BoardError as error:
@@ -233,7 +241,10 @@ class Client:
     def start(self, name: str, crc: int, flags: int = 0) -> Started:
         """Start a stored motion at ``rate``; ``crc`` is the record's own checksum, ``flags`` of START_HOMING and
         START_HELD."""
+        if flags & START_HELD:
+            self.need("jog", "moving by hand")
         if self.rate != PERMILLE:
+            self.need("speed", "another speed than planned")
             self.session.command("speed", (self.rate,))
         (run, duration), _ = self.session.command(
             "start", (flags, crc), name, silence_timeout_s=FLASH_TIMEOUT_S, answer_timeout_s=FLASH_TIMEOUT_S
@@ -246,6 +257,9 @@ class Client:
 
     def speed(self, rate: int) -> None:
         """Let what moves go on at ``rate`` thousandths of its planned speed; 0: pause, RESUME: as before it."""
+        if rate == PERMILLE and not self.info.can("speed"):
+            return
+        self.need("speed", "another speed than planned")
         self.session.command("speed", (rate,))
 
     def hold(self, answer_timeout_s: float = ANSWER_TIMEOUT_S) -> None:
@@ -262,6 +276,7 @@ class Client:
 
     def set_output(self, number: int, value: int) -> None:
         """Set an output of the arm record (from 0) to a value of 0 to 65535, also while something moves."""
+        self.need("outputs", "outputs")
         try:
             self.session.command("output", (number, value))
         except BoardError as error:
@@ -276,6 +291,8 @@ class Client:
     def levels(self) -> board_messages.Levels:
         """What the inputs of the arm record are now, debounced, and what its outputs are set to; none of an arm that
         has none, whose board does not know this command."""
+        if not self.info.can("outputs"):
+            return board_messages.Levels(0, ())
         try:
             (inputs,), tail = self.session.command("inputs")
         except BoardError as error:

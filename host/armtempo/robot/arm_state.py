@@ -27,6 +27,8 @@ def configure(client: Client, arm: Arm, replace: bool) -> None:
         return
     if client.info.arm_crc and not replace:
         raise _other_arm(arm, client.fetch(wire.ARM_RECORD_NAME), data)
+    if arm.outputs or arm.inputs:
+        client.need("outputs", f"the outputs and inputs of arm {arm.name!r}")
     engine_room.check(arm, client.info)
     client.upload(wire.ARM_RECORD_NAME, data)
     client.hello()

@@ -14,33 +14,32 @@ from armtempo.records import encode
 
 @dataclass(frozen=True)
 class Room:
-    """Memory for engines: ``size`` bytes of heap, and heap for the objects of that many ``joints``.
+    """Heap for an engine and its objects: ``size`` bytes.
 
     Beside it the board has memory for step generators, the same on every chip (``engine_memory.PROCESSOR_WORDS``).
     """
 
     size: int
-    joints: int
 
     @classmethod
     def of_board(cls, info: Hello) -> Room:
         """What a board states."""
-        return cls(info.engine_room, info.engine_joints)
+        return cls(info.engine_room)
 
-    def holds(self, rates: list[int], beside: int = 0) -> bool:
-        """Whether an engine for joints of these highest step rates (steps/s) fits, and ``beside`` bytes."""
-        return len(rates) <= self.joints and engine_memory.fits(rates, self.size // 4, beside)
+    def holds(self, rates: list[int]) -> bool:
+        """Whether an engine for joints of these highest step rates (steps/s) fits."""
+        return engine_memory.fits(rates, self.size)
 
     def holds_arm(self, arm: Arm) -> bool:
-        """Whether the engine for an arm fits, with its outputs and inputs."""
-        return self.holds(encode.step_rates(arm), _beside(arm))
+        """Whether the engine for an arm fits."""
+        return self.holds(encode.step_rates(arm))
 
     def words(self) -> str:
         """What fits: bytes, joints, steps/s."""
         return f"{self.size} bytes: {', '.join(self._fitting()) or 'no arm fits'}"
 
     def _fitting(self) -> list[str]:
-        found = [(joints, self._highest_rate(joints)) for joints in range(1, self.joints + 1)]
+        found = [(joints, self._highest_rate(joints)) for joints in range(1, limits.MAX_JOINTS + 1)]
         return [f"{joints} x {rate} steps/s" for joints, rate in found if rate]
 
     def _highest_rate(self, joints: int) -> int:
@@ -51,13 +50,13 @@ class Room:
         return 0
 
 
-AS_FILES = Room(4_648, 3)
-IN_FIRMWARE = Room(4 * engine_memory.LARGEST_WORDS, limits.MAX_JOINTS)
+AS_FILES = Room(8_000)
+IN_FIRMWARE = Room(engine_memory.LARGEST_BYTES)
 """The program as compiled files on MicroPython's own firmware for the STM32F4DISC, and built into it.
 
 Measured: ``python -m tests.benchmark.room MICROPYTHON``.
 """
-_BUILD = "see 'armtempo firmware --help'"
+_BUILD = "'armtempo flash'"
 
 
 def check(arm: Arm, info: Hello) -> None:
@@ -65,30 +64,20 @@ def check(arm: Arm, info: Hello) -> None:
     rates, room = encode.step_rates(arm), Room.of_board(info)
     if room.holds_arm(arm):
         return
-    if len(rates) > room.joints:
-        raise InputError(
-            f"arm {arm.name!r} drives {len(rates)} joints; the board has memory for {room.joints}",
-            f"drive fewer joints{_or_firmware(arm, room)}",
-        )
     raise InputError(
-        f"arm {arm.name!r} needs {4 * engine_memory.words(rates)} bytes for its engine{_and_beside(arm)}; the board "
-        f"has {room.size}",
+        f"arm {arm.name!r} needs {engine_memory.needed_bytes(rates)} bytes for its engine; the board has {room.size}",
         f"lower its top speeds (its joints step up to {', '.join(map(str, rates))} steps/s; slower ones have "
-        f"smaller rings), drive fewer joints{_or_firmware(arm, room)}",
+        f"smaller rings), drive fewer joints{_or_firmware(arm)}",
     )
 
 
 def of_arm(arm: Arm, info: Hello | None = None) -> str:
     """In a line: the memory that an arm needs, and whether a board has it; without one, where it fits."""
     rates = encode.step_rates(arm)
-    needs = f"memory on the board: {4 * engine_memory.words(rates)} bytes for {len(rates)} joints{_and_beside(arm)}"
+    needs = f"memory on the board: {engine_memory.needed_bytes(rates)} bytes for {len(rates)} joints"
     if info is not None:
         room = Room.of_board(info)
-        return (
-            f"{needs} of {room.size}"
-            if room.holds_arm(arm)
-            else f"{needs}, too much{_or_firmware(arm, room)}"
-        )
+        return f"{needs} of {room.size}" if room.holds_arm(arm) else f"{needs}, too much{_or_firmware(arm)}"
     if AS_FILES.holds_arm(arm):
         return f"{needs}: fits with the program as files or in the firmware"
     if IN_FIRMWARE.holds_arm(arm):
@@ -107,17 +96,8 @@ def of_board(info: Hello) -> list[str]:
     return lines
 
 
-def _or_firmware(arm: Arm, room: Room) -> str:
+def _or_firmware(arm: Arm) -> str:
     """The firmware as a way out, where it is one."""
-    if room.size >= IN_FIRMWARE.size or not IN_FIRMWARE.holds_arm(arm):
+    if not IN_FIRMWARE.holds_arm(arm):
         return ""
     return f", or put the program into the board's firmware, where this arm fits ({_BUILD})"
-
-
-def _beside(arm: Arm) -> int:
-    """Bytes for the arm's outputs and inputs."""
-    return engine_memory.output_bytes(len(arm.outputs), len(arm.inputs))
-
-
-def _and_beside(arm: Arm) -> str:
-    return f", and {_beside(arm)} for its outputs and inputs" if _beside(arm) else ""

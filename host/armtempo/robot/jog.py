@@ -85,6 +85,7 @@ class HeldJog:
     def __enter__(self) -> Self:
         """Upload and start it; BoardError where the board refuses."""
         client = self._client
+        client.need("jog", "moving by hand")
         encoded = _encoded(self.motion, self.arm)
         client.upload(encoded.name, encoded.data)
         self._reopen, client.session.reopen = (

@@ -44,6 +44,7 @@ def store(
     Motions of an earlier sequence of this name that nobody needs any more are removed. Raises LinkError where the
     board keeps something else under one of the names, unless ``replace``.
     """
+    client.need("sequences", f"sequence {encoded.plan.name!r}")
     kept = {entry.name: entry for entry in client.stored()}
     old = kept.get(encoded.plan.name)
     legs = _legs_of(client, old) if old and old.sequence else {}

@@ -66,8 +66,7 @@ class LaunchOptions:
     deployed: bool = False
     """Run the program in the flash (``armtempo deploy`` puts it there) instead of the installed one."""
     flash_blocks: int | None = None
-    """Size of the flash; None: the chip's, and with ``deployed`` more, as compiled files for this machine's
-    processor are larger than for the chip's."""
+    """Size of the flash; None: the chip's."""
     button_s: float = 0.0
     """How long the user button is held from power-up on: safe mode from 0.6 to 1.2, a fresh file system from
     1.2 to 1.8."""

@@ -23,7 +23,6 @@ _CHOOSE_INTERPRETER = (
 _MOUNT_PTYS = "in a container or chroot, mount them: mount -t devpts devpts /dev/pts"
 _MAIN = Path(__file__).with_name("main.py")
 _HEAP = "4M"
-_DEPLOYED_BLOCKS = 288
 _START_S = 60.0
 _STOP_S = 1.0
 
@@ -166,12 +165,11 @@ def launch(options: LaunchOptions | None = None) -> VirtualBoard:
 def _process_options(wanted: LaunchOptions, flash: Path, up: Path) -> ProcessOptions:
     """What the process is told; ``up`` is the file that it makes when it has started."""
     sources = program_folders()
-    blocks = _DEPLOYED_BLOCKS if wanted.deployed else None
     return ProcessOptions(
         flash=str(flash),
         sources=sources,
         program=[] if wanted.deployed else sources,
-        flash_blocks=wanted.flash_blocks or blocks,
+        flash_blocks=wanted.flash_blocks,
         speed=0.0 if wanted.virtual_time else 1.0,
         edge_log=_absolute(wanted.edge_log),
         unique_id=unique_id(wanted.seed),

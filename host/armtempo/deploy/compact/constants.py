@@ -23,6 +23,7 @@ def fold(trees: Mapping[str, ast.Module], whole: Collection[str]) -> None:
         taken_out: Collection[str] = () if module in whole else values[module]
         folder = _Folder(tree, trees, values, values[module], taken_out)
         tree.body = visit_all(folder, tree.body)
+        _Decided().visit(tree)
 
 
 def constants(trees: Mapping[str, ast.Module]) -> dict[str, dict[str, Value]]:
@@ -158,3 +159,38 @@ class _Folder(Scoped):
                 if isinstance(argument, ast.arg):
                     argument.annotation = None
         return super().visit_FunctionDef(node)
+
+
+class _Decided(ast.NodeTransformer):
+    """Takes out what constants decide; what nothing mentions any more is left out later."""
+
+    def visit_BoolOp(self, node: ast.BoolOp) -> ast.AST:
+        """What is decided by its first constant."""
+        self.generic_visit(node)
+        decides = isinstance(node.op, ast.Or)
+        while len(node.values) > 1 and isinstance(first := node.values[0], ast.Constant):
+            if bool(first.value) == decides:
+                return first
+            del node.values[0]
+        return node.values[0] if len(node.values) == 1 else node
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
+        """``not`` a constant."""
+        self.generic_visit(node)
+        if isinstance(node.op, ast.Not) and isinstance(node.operand, ast.Constant):
+            return ast.Constant(not node.operand.value)
+        return node
+
+    def visit_If(self, node: ast.If) -> ast.AST | list[ast.stmt]:
+        """The branch that is taken."""
+        self.generic_visit(node)
+        return (
+            (node.body if node.test.value else node.orelse) if isinstance(node.test, ast.Constant) else node
+        )
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
+        """The same within an expression."""
+        self.generic_visit(node)
+        return (
+            (node.body if node.test.value else node.orelse) if isinstance(node.test, ast.Constant) else node
+        )

@@ -49,11 +49,14 @@ class Disk:
 
 
 def mount(folder, blocks):
-    """Mount the host's file "disk" there; its content is lost."""
+    """Mount the host's file "disk" there; where it is empty it gets a file system."""
     disk = Disk(b"disk", blocks)
-    os.VfsFat.mkfs(disk)
     os.chdir("/")
     os.umount("/flash")
-    os.mount(disk, folder)
+    try:
+        os.mount(disk, folder)
+    except OSError:
+        os.VfsFat.mkfs(disk)
+        os.mount(disk, folder)
     os.mount(pyb.Flash(start=0), "/flash")
     os.chdir("/flash")

@@ -8,7 +8,7 @@ import stand_in
 from app_rig import connected, flash, start, state  # isort: skip  it puts the stand-ins into place
 
 from armtempo_board.app.app import App
-from armtempo_shared import armrecord, engine_memory
+from armtempo_shared import armrecord
 from pin_rows import GRIPPER, PART, PUMP
 
 DOOR = {"pin": 0x32, "active_high": 1, "debounce_ms": 0}
@@ -172,20 +172,6 @@ def case_a_record_of_another_version_is_refused():
     data += armrecord.crc32(data).to_bytes(4, "little")
     assert host.upload("/arm", data)[-1][:2] == ("error", "bad_record")
     assert host.ask("inputs")[0] == "ok"
-
-
-def case_what_has_no_room_is_refused():
-    """Outputs and inputs come out of the engine's memory."""
-    _, host = wired()
-    most = stand_in.Workspace.words
-    stand_in.Workspace.words = engine_memory.words([1, 1]) + engine_memory.output_bytes(8, 7) // 4
-    eight = [dict(PUMP, pin=0x30 + number) for number in range(8)]
-    inputs = [dict(PART, pin=0x20 + number) for number in (0, 1, 2, 3, 4, 5, 8, 9)]
-    answer = host.upload("/arm", stand_in.arm(outputs=eight, inputs=inputs))[-1]
-    stand_in.Workspace.words = most
-    assert answer[:2] == ("error", "no_room")
-    assert host.ask("inputs")[0] == "ok"
-    assert host.upload("/arm", stand_in.arm(outputs=eight, inputs=inputs))[-1][0] == "ok"
 
 
 cases.run(globals())

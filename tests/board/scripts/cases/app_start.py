@@ -92,9 +92,8 @@ def case_what_the_board_has_not_is_named():
 class Cramped:
     """A board with less memory for engines."""
 
-    words = engine_memory.words([1])
+    room = engine_memory.needed_bytes([1])
     is_short = True
-    joints = 6
 
 
 def case_a_record_that_no_longer_fits_is_named():
@@ -106,7 +105,7 @@ def case_a_record_that_no_longer_fits_is_named():
         _, host, hello = started(root)
     finally:
         room.workspace = before
-    needed = 4 * engine_memory.words([1, 1])
+    needed = engine_memory.needed_bytes([1, 1])
     assert (wire.ERRORS[hello[PROBLEM]][0], hello[VALUE]) == ("no_room", needed)
     small = stand_in.arm(joints=1)
     assert host.upload("/arm", small)[-1] == ("ok", (), b"")

@@ -21,6 +21,13 @@ SEED = 5
 LARGE = 3 * 1026
 
 
+def workspace(words, address):
+    """With a memory of so many words."""
+    made = Workspace(engine_memory.LARGEST_BYTES, address)
+    made.make_memory(words)
+    return made
+
+
 def begin_of(part):
     """Its place in the backup SRAM, in words; -1 where it is not there."""
     word = (uctypes.addressof(part) - stm.BKPSRAM) // 4
@@ -38,7 +45,7 @@ def parts_of(generator):
 def case_the_backup_sram_is_found():
     bare_board.start()
     assert backup_sram.find() == stm.BKPSRAM
-    assert Workspace(LARGE, 6, stm.BKPSRAM).memory.take_for_processor(engine_memory.PROCESSOR_WORDS)
+    assert workspace(LARGE, stm.BKPSRAM).memory.take_for_processor(engine_memory.PROCESSOR_WORDS)
 
 
 def case_a_memory_that_keeps_nothing_is_not_used():
@@ -49,7 +56,7 @@ def case_a_memory_that_keeps_nothing_is_not_used():
         registers.BACKUP_SRAM = rows[:missing] + rows[missing + 1 :]
         assert backup_sram.find() == 0
     registers.BACKUP_SRAM = rows
-    memory = Workspace(LARGE, 6).memory
+    memory = workspace(LARGE, 0).memory
     part = memory.take_for_processor(engine_memory.PROCESSOR_WORDS)
     assert begin_of(part) == -1
     assert memory.take(1026) is not None, "it is no part of the blocks"
@@ -81,11 +88,11 @@ def case_an_engine_takes_what_the_formula_counts():
     for _ in range(12):
         rates = [random.randrange(1, 240_001) for _ in range(random.randrange(1, 7))]
         words = engine_memory.words(rates)
-        while not engine_memory.fits(rates, words):
+        while not engine_memory.lasting_ms(rates, words):
             words += 1
-        workspace = Workspace(words, 6, address)
-        rings = workspace.rings(rates)
-        generators = [StepGenerator(workspace.memory) for _ in rates]
+        made = workspace(words, address)
+        rings = made.rings(rates)
+        generators = [StepGenerator(made.memory) for _ in rates]
         assert [begin_of(ring) for ring in rings] == [-1] * len(rings)
         spans = [(begin_of(part), 4 * words_of(part)) for each in generators for part in parts_of(each)]
         assert sum([size for _, size in spans]) == 4 * len(rates) * sum(engine_memory.GENERATOR_PARTS)
@@ -108,24 +115,30 @@ def case_without_it_there_is_less_for_arms():
     room._free = lambda: 40_000
     try:
         bare_board.start()
-        with_it = room.workspace().words
+        with_it = room.workspace().room
         backup_sram.find, find = lambda: 0, backup_sram.find
-        without = room.workspace().words
+        without = room.workspace().room
         backup_sram.find = find
     finally:
         room._free = before
-    assert with_it - without == engine_memory.PROCESSOR_WORDS
+    assert with_it - without == 4 * engine_memory.PROCESSOR_WORDS
 
 
-def case_outputs_take_of_the_engines_memory_only_where_it_is_short():
+def case_fewer_joints_leave_more_for_rings_where_memory_is_short():
     bare_board.start()
-    taken = engine_memory.output_bytes(2, 1) // 4
-    for words, left in ((engine_memory.LARGEST_WORDS, engine_memory.LARGEST_WORDS), (LARGE, LARGE - taken)):
-        workspace = Workspace(words, 6, stm.BKPSRAM)
-        room.share(workspace, 2, 1)
-        assert workspace.memory.size == left
-        room.share(workspace, 0, 0)
-        assert workspace.memory.size == words
+    before = room._free
+    for free, is_short in ((200_000, False), (room._RESERVE + 8_000, True)):
+        room._free = lambda: free  # noqa: B023
+        try:
+            made = room.workspace()
+        finally:
+            room._free = before
+        sizes = []
+        for joints in (3, 1, 3):
+            room.share(made, joints)
+            sizes.append(made.memory.size)
+        more = 2 * (engine_memory.object_bytes(2) - engine_memory.object_bytes(1)) // 4
+        assert (sizes[1] - sizes[0], sizes[2] - sizes[0]) == ((more, 0) if is_short else (0, 0))
 
 
 class Collector:

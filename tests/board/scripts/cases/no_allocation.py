@@ -19,12 +19,13 @@ from armtempo_board.hardware import isr, registers  # noqa: F401  they are forgo
 from armtempo_board.motion import motion_check  # noqa: F401  they are forgotten again: not counted
 from armtempo_board.motion.engine import Engine
 from armtempo_board.motion.workspace import Workspace
-from armtempo_shared import armrecord  # noqa: F401
+from armtempo_shared import armrecord, engine_memory  # noqa: F401
 from brake_motion import record
 
 STEP_TICKS = 30_000
 BUFFER = array("i", [0] * 10)
-WORKSPACE = Workspace(12 * 1026, 6)
+WORKSPACE = Workspace(engine_memory.LARGEST_BYTES)
+WORKSPACE.make_memory(12 * 1026)
 
 
 def compare_of(ring):

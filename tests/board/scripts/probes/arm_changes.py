@@ -81,7 +81,7 @@ def change(host, rates, segments, outputs):
     before = host.hello()[1]
     answer = host.upload("/arm", arm)[-1]
     if answer[0] == "error":
-        needed = 4 * engine_memory.words(rates) + engine_memory.output_bytes(outputs, outputs)
+        needed = engine_memory.needed_bytes(rates)
         assert answer[1] == "no_room" and answer[3] == needed, answer
         assert host.hello()[1][9] == before[9], "the old arm stays in force"
         return False

@@ -273,8 +273,11 @@ class Rig:
     @staticmethod
     def _workspace():
         from armtempo_board.motion.workspace import Workspace
+        from armtempo_shared.engine_memory import LARGEST_BYTES
 
-        return Workspace(12 * 1026, 6)
+        made = Workspace(LARGEST_BYTES)
+        made.make_memory(12 * 1026)
+        return made
 
     # a world for the board
 

@@ -93,7 +93,7 @@ def install():
     room = Module()
     room.workspace = Workspace
     room.sample_bytes = lambda: 4096
-    room.share = lambda workspace, outputs, inputs: None
+    room.share = lambda workspace, joints: None
     ends = Module()
     ends.duration_ticks = lambda motion: 84000
     ends.start_offset = lambda motion, joint, position: 7 - position
@@ -121,9 +121,8 @@ def install():
 class Workspace:
     """Says only how large it is."""
 
-    words = engine_memory.LARGEST_WORDS
+    room = engine_memory.LARGEST_BYTES
     is_short = False
-    joints = 6
 
 
 class Rates:
