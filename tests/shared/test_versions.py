@@ -30,7 +30,7 @@ def test_versions_are_those_of_files_that_exist() -> None:
         "sequence run": 1,
         "claim": 1,
         "arm record": 2,
-        "protocol": 4,
+        "protocol": 5,
     }
 
 
