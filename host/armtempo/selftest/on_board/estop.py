@@ -1,6 +1,7 @@
 """How long the outputs go on after an E-stop: its interrupt, triggered by software (EXTI_SWIER, RM0090 12.3.5)."""
 
 _ESTOP_LINE = 15
+_STARVE_US = 40_000
 _PUPDR_SHIFT = 2 * _ESTOP_LINE
 
 
@@ -26,6 +27,20 @@ def trial(engine, wait_us, bit, idle_us):
     return took if engine.block[isr.FROZEN] else -1
 
 
+def starve(engine, motion, start_steps, idle_us):
+    """The fault after the interrupt that fills the rings was held off (TIM6 stopped) in a motion."""
+    load(engine, motion, start_steps)
+    engine.start()
+    then = time.ticks_us()
+    while engine.moving:
+        serve(engine, idle_us)
+        if time.ticks_diff(time.ticks_us(), then) > _STARVE_US:
+            mem32[stm.TIM6] = 0
+    fault = engine.fault
+    engine.clear()
+    return fault
+
+
 def measure(record, motion, start_steps, waits_us, idle_us):
     """Cycles of each trial, the writing of the register taken off; the fault of each."""
     from binascii import unhexlify
@@ -47,11 +62,12 @@ def measure(record, motion, start_steps, waits_us, idle_us):
             faults.append(engine.fault)
             engine.clear()
             feed()
+        starved = starve(engine, motion, start_steps, idle_us)
     finally:
         engine.freeze()
         off = enable()
         engine.close()
-    return {"cycles": took, "faults": faults, "enable": off}
+    return {"cycles": took, "faults": faults, "starved": starved, "enable": off}
 
 
 def trial_cost():

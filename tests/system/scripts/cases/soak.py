@@ -311,7 +311,7 @@ class Soak:
             set_level(ESTOP, 1 - PRESSED)
             return "estop"
         machine_state.board.lost_ticks = LOST_MS * TICKS_PER_MS
-        yield from world.wait(LOST_MS)
+        yield from world.wait(LOST_MS + 20)  # its first answers come before it has looked at the queues
         if (yield from world.status())["fault"]:
             return "underrun"
         yield from world.answer("stop", (0,))
