@@ -219,6 +219,8 @@ class Soak:
         """A sequence from its start to its end."""
         world, numbers = self.world, self.numbers
         rows = some_rows(numbers)
+        while len(rows) > sequence.MAX_ROWS - 2:  # a walk that found its way back late
+            rows = some_rows(numbers)
         if numbers.randrange(0, 3):
             rows = for_ever(rows)
         if not self.legs or numbers.randrange(0, 12) == 0:
