@@ -24,7 +24,7 @@ ARM = Arm.paper()
 HOME_DEG = np.array(ARM.home_deg)
 HOME_STEPS = [round(angle * joint.steps_per_deg) for angle, joint in zip(HOME_DEG, ARM.driven, strict=True)]
 AWAY_DEG = ([3.0, 2.0, -2.0], [-1.0, 1.0, 2.0])
-FEWER = {"micropython": 6, "cpython": 10, "micropython-arm": 12}
+FEWER = {"micropython": 8, "cpython": 10, "micropython-arm": 12}
 """What the moments are divided by; each interpreter has others."""
 QUICKEST = "micropython" if "micropython" in interpreters.AVAILABLE else "cpython"
 

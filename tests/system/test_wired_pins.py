@@ -25,7 +25,7 @@ ESTOP = "estop_fitted = true"
 TICKS_PER_US = 84
 
 
-@scripted.each(scripted.cases(SCRIPT))
+@scripted.each(scripted.together(scripted.cases(SCRIPT)))
 def test_case(case: scripted.Case, tmp_path: Path) -> None:
     case.run(str(tmp_path), heap="")
 
