@@ -20,7 +20,7 @@ MADE_FROM_PARTS = {"MissingPackageError"}
 class ErrorMessage:
     """One place where an error is made; ``problem`` and ``hint`` are source text, as in an f-string.
 
-    ``hint`` is None where none is given.
+    ``hint`` is None if none is given.
     """
 
     file: str

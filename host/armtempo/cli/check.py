@@ -34,7 +34,7 @@ def check(
 ) -> None:
     """Hold an arm file, and a job if named, against common sense: what looks wrong, and what to do about it.
 
-    Steps, step rates, resolution at the tool, torque, encoders, ranges, wiring. Exit code 1 where there are
+    Steps, step rates, resolution at the tool, torque, encoders, ranges, wiring. Exit code 1 if there are
     errors; warnings and notes leave it 0.
     """
     _check_picture(picture, force)
@@ -50,7 +50,7 @@ def check(
 
 
 def _check_picture(picture: Path | None, force: bool) -> None:
-    """Raise InputError where the picture cannot be written as asked."""
+    """Raise InputError if the picture cannot be written as asked."""
     if picture is None:
         return
     if picture.suffix not in (".png", ".svg"):

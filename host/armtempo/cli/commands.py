@@ -116,7 +116,7 @@ GROUPS: dict[str, dict[str, Entry]] = {
         "speed": Entry("speed:speed", "Let what moves go on at PERCENT of its planned speed.", "speed 50"),
         "pause": Entry(
             "speed:pause",
-            "Let what moves come to rest on its path; 'armtempo resume' goes on, 'armtempo stop' ends it.",
+            "Let what moves come to rest on its path; 'armtempo resume' continues, 'armtempo stop' ends it.",
             "pause",
         ),
         "resume": Entry("speed:resume", "Go on along the path at the speed before the pause.", "resume"),

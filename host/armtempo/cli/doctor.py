@@ -26,7 +26,7 @@ def doctor(arm_path: Path | None, port: str | None, as_json: bool) -> None:
     """Examine Python, packages, ports, permissions, project, arm file and board, and say what to do.
 
     Nothing is changed and nothing moves. Without a port it looks at the one board that is plugged in, if there is one.
-    Exit code 1 where something is wrong.
+    Exit code 1 if something is wrong.
     """
     parts = {
         "machine": machine.examine_machine(),

@@ -159,7 +159,7 @@ def import_urdf(urdf: Path, out: Path, base: str | None, tip: str | None, force:
 
     URDF: the robot's description, a .urdf or .xacro file.
 
-    The rows are held against the URDF's own forward kinematics at 1000 random postures before anything is
+    The rows are checked against the URDF's own forward kinematics at 1000 random postures before anything is
     written. Motors, which a URDF does not describe, are left as comments to fill in. Needs the extra 'urdf'.
     """
     if out.exists() and not force:

@@ -46,7 +46,7 @@ def teach(
 
     JOB.toml: a job file that collects via points and plans at once: by the keys of 'armtempo jog' and p for a point,
     or --by-hand. --posture NAME writes one posture into the arm file, whose comments and layout stay, and moves
-    nothing; then 'armtempo goto NAME' brings the arm there, and a job may pass it: [[via]] posture = "NAME".
+    nothing; then 'armtempo goto NAME' moves the arm there, and a job may pass it: [[via]] posture = "NAME".
     """
     if (job_file is None) == (name is None) or (name is not None and by_hand):
         raise InputError(
@@ -182,7 +182,7 @@ class TaughtPoints:
 
 
 def check_free(file: Path, replace_old: bool) -> None:
-    """InputError where the job file is there already, before anything moves."""
+    """InputError if the job file is there already, before anything moves."""
     if file.exists() and not replace_old:
         raise InputError(f"{file} exists, so it is kept", "choose another name, or replace it with --replace")
     if not file.parent.is_dir():

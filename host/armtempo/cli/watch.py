@@ -24,7 +24,7 @@ _STATE_S = 0.5
 def watch(given: BoardOptions) -> None:
     """Show samples, states and what happens, as another armtempo program that has the port hears it.
 
-    Where no program has it, the board is asked for its state. Ctrl-C ends it; a motion under way goes on.
+    Where no program has it, the board is asked for its state. Ctrl-C ends it; a motion under way continues.
     """
     given = chosen.any_port(given)
     with chosen.shared_or_own(given, any_program=True) as board:
@@ -82,7 +82,7 @@ def monitor(file: Path | None, given: BoardOptions) -> None:
     """Show decoded traffic.
 
     FILE: what '--log-traffic FILE' recorded; without it, what another armtempo program that has the port says
-    and hears, else the board is asked once a second. Ctrl-C ends it; a motion under way goes on.
+    and hears, else the board is asked once a second. Ctrl-C ends it; a motion under way continues.
     With --json each line is a document.
     """
     say = _print_json if given.as_json else _print

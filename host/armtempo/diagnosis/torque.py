@@ -15,7 +15,7 @@ _ENOUGH = 1.5
 def margin(joint: DrivenJoint) -> float | None:
     """Torque of a joint's motor over what gravity and its acceleration limit ask at its speed limit.
 
-    None where the arm file says nothing of the torque; infinite where nothing is asked. Torque falls with speed
+    None if the arm file says nothing of the torque; infinite if nothing is asked. Torque falls with speed
     as in the virtual arm: to 0.71 of the holding torque at the corner speed.
     """
     model, motor, limits = joint.model, joint.motor, joint.limits

@@ -28,7 +28,7 @@ class Solution:
     """Joint angles that bring the tool to a pose."""
 
     angles_deg: Array
-    """(joints,): of all joints of the arm; NaN where the pose is out of reach of this branch."""
+    """(joints,): of all joints of the arm; NaN if the pose is out of reach of this branch."""
     branch: str
     """Which of the arm's configurations it is; empty for one that was found numerically."""
     rejections: tuple[str, ...]

@@ -64,7 +64,7 @@ class Motor:
     gear_ratio: float
     """Motor revolutions per joint revolution."""
     direction: int = 1
-    """1, or -1 where the DIR signal is inverted."""
+    """1, or -1 if the DIR signal is inverted."""
 
     def __post_init__(self) -> None:
         """InputError for figures that no motor has."""

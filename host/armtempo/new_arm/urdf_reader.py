@@ -71,7 +71,7 @@ class Chain:
 def read(path: Path, base: str | None = None, tip: str | None = None) -> Chain:
     """The chain from link ``base`` (None: the root) to link ``tip`` (None: see ``urdf_tip.choose``).
 
-    Raises MissingPackageError without yourdfpy, InputError where the file is no URDF, the chain is not one, or
+    Raises MissingPackageError without yourdfpy, InputError if the file is no URDF, the chain is not one, or
     a joint in it is of a kind that an arm file cannot describe: with every reason.
     """
     urdf = _reader()

@@ -230,7 +230,7 @@ def check_via(arm: Arm, job: Job, via_deg: Array) -> None:
 
 
 def check_ranges(arm: Arm, angle_points_deg: Array, degree: int) -> None:
-    """Raises PlanError where the path, also between the via points, leaves a joint's range."""
+    """Raises PlanError if the path, also between the via points, leaves a joint's range."""
     low, high = extremes.range_of(np.moveaxis(bspline.polynomials(angle_points_deg, degree), 2, 0))
     for joint, lowest, highest in zip(arm.driven, low, high, strict=True):
         least, most = joint.range_deg
@@ -244,7 +244,7 @@ def check_ranges(arm: Arm, angle_points_deg: Array, degree: int) -> None:
 
 
 def check_reached(arm: Arm, reached: tuple[Extremes, ...]) -> None:
-    """The check that every plan passes: PlanError where a limit or the board's step rate is exceeded."""
+    """The check that every plan passes: PlanError if a limit or the board's step rate is exceeded."""
     rates = 0.0
     for joint, extreme in zip(arm.driven, reached, strict=True):
         if not np.all(extreme.values <= np.array(joint.limits.values) * (1 + TOLERANCE)):
@@ -272,7 +272,7 @@ def check_time(trajectory: Trajectory) -> None:
 
 
 def check_held(trajectory: Trajectory, arm: Arm) -> None:
-    """Raises PlanError where a control point exceeds the integers of the board's evaluator."""
+    """Raises PlanError if a control point exceeds the integers of the board's evaluator."""
     for joint_spline, joint in zip(trajectory.joints, arm.driven, strict=True):
         where = f"trajectory {trajectory.name!r}, {joint.name}"
         _check_times(where, joint_spline)

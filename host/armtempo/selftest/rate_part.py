@@ -39,7 +39,7 @@ def highest(keeps_up: Callable[[int], bool | None], count: int) -> int | None:
 
 
 def judge(rate: int | None, count: int) -> Iterator[Measurement]:
-    """The line about the rate that was found for so many joints."""
+    """The line about the rate that was found for that many joints."""
     if rate is None:
         return
     joints = "1 joint" if count == 1 else f"{count} joints, each"

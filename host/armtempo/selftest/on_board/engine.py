@@ -17,7 +17,7 @@ _RANGE = 1 << 24  # steps; with the drivers off a joint can go anywhere
 def make_engine(record, estop=False, rates=None):
     """(engine, rows of its joints); it steps the pins of this arm and no others.
 
-    ``estop``: its interrupt stops it. ``rates``: of so many joints, in the place of the arm's.
+    ``estop``: its interrupt stops it. ``rates``: of that many joints, in the place of the arm's.
     """
     from armtempo_board.app import room
     from armtempo_board.motion.engine import Engine

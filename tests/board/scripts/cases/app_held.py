@@ -35,7 +35,7 @@ def case_it_brakes_once_in_silence_and_ends_without_a_fault():
     assert app.controller.engine.calls[-1] == "brake"
     calls = len(app.controller.engine.calls)
     host.turn(1000)
-    assert host.ask("hold") == ("ok", (), b"")  # too late: it goes on braking
+    assert host.ask("hold") == ("ok", (), b"")  # too late: it continues braking
     host.turn(1000)
     assert len(app.controller.engine.calls) == calls
     assert state(host) == "braking"
