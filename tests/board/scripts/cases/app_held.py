@@ -1,6 +1,6 @@
 """Held motions, which brake in silence; drivers off and on."""
 
-# all cases: slow on CPython
+# all cases: slow on CPython, not emulated
 
 import sys
 
@@ -82,7 +82,7 @@ def case_a_lost_link_may_also_be_a_fault():
     assert app.controller.fault() == codes.LINK_LOST
 
 
-def case_hold_allocates_nothing():
+def case_hold_allocates_nothing():  # emulated
     if sys.implementation.name != "micropython":
         return
     import micropython
