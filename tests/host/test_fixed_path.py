@@ -16,7 +16,7 @@ from armtempo.planning.time_parameterization import Group
 from armtempo.splines import bspline
 
 from tests.host import problems
-from tests.host.feeding import FEEDING, LIMITS
+from tests.host.problems import FEEDING, LIMITS
 
 PROBLEMS = {problem.name: problem for problem in problems.load()}
 

@@ -16,8 +16,7 @@ from armtempo.robot import stored_motion
 from armtempo.robot.stop_request import StopRequest
 from armtempo_shared import wire
 
-from tests.host.linked import ARM, follow, random_motion, ready, started
-from tests.inprocess import FAULTS, Noise, Pipe, connect
+from tests.inprocess import ARM, FAULTS, Noise, Pipe, connect, follow, random_motion, ready, started
 
 
 @pytest.mark.slow

@@ -19,7 +19,7 @@ from armtempo.planning.lower_bounds import Floor
 from armtempo_shared.limits import MAX_STEP_RATE
 
 from tests.host import problems
-from tests.host.feeding import dense
+from tests.host.problems import dense
 
 ARM = Arm.paper()
 JOB = Job.paper(ARM)

@@ -12,8 +12,7 @@ from armtempo_shared import wire
 from armtempo_shared.limits import MAX_MOTION_BYTES
 from armtempo_shared.meanings import VALUES
 
-from tests.host.linked import ready
-from tests.inprocess import Pipe
+from tests.inprocess import Pipe, ready
 
 NUMBERS = sorted(VALUES.keys() - {"too_fast", "too_long", "pin_taken"})
 """Names of codes whose number is said as the table of meanings has it."""
