@@ -117,23 +117,7 @@ def test_case_with_the_compact_program(
     play(case, flashes, tmp_path, compact)
 
 
-# a short soak; 'python -m tests.benchmark.soak' runs a long one
-
-
-LEGS = {"cpython": 5, "micropython": 20}
-"""At least so many motions."""
-SEED = 20268
-
-
-@pytest.fixture(scope="module")
-def flash(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("soak") / "flash"
-    soak.make_flash(folder)
-    return folder
-
-
-@pytest.mark.xdist_group("soak")  # whose flash takes seconds to make
-@pytest.mark.parametrize("name", [name for name in interpreters.AVAILABLE if name in LEGS])
-def test_every_motion_makes_the_steps_of_its_record(name: str, flash: Path, tmp_path: Path) -> None:
-    copied = shutil.copytree(flash, tmp_path / "flash")
-    print(soak.run(name, copied, LEGS[name], SEED))
+def test_every_motion_of_a_soak_makes_the_steps_of_its_record(tmp_path: Path) -> None:
+    """A short one; ``python -m tests.benchmark.soak`` runs a long one."""
+    soak.make_flash(tmp_path / "flash")
+    print(soak.run(QUICKEST, tmp_path / "flash", 20, seed=20268))
