@@ -418,4 +418,4 @@ def test_what_looks_wrong_about_a_job(tmp_path: Path, via: str, level: str, said
 def test_a_job_is_not_looked_at_before_its_arm_is_right(tmp_path: Path) -> None:
     path = changed(tmp_path, ("channel = 2, steps", "channel = 1, steps"))
     _, found = check(path, changed_job(tmp_path))
-    assert found[-1].what == "not looked at"
+    assert found[-1].what == "not checked"

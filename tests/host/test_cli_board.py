@@ -213,7 +213,7 @@ def test_a_typing_error_names_the_file_that_is_meant(run: Run, tmp_path: Path) -
     (tmp_path / "first.json").write_text("{}", encoding="utf-8")
     for wrong in ("first.jsn", "firts.json"):
         said = run("run", wrong, code=2).output
-        assert f"{wrong}: there is no such file; did you mean 'first.json'?" in said
+        assert f"{wrong}: no such file; did you mean 'first.json'?" in said
 
 
 def test_angles_without_commas_are_shown_with_them(run: Run) -> None:

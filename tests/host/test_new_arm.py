@@ -210,7 +210,7 @@ def test_what_was_answered_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     folder = tmp_path / "x"
     left = interview(folder, monkeypatch, ["own", "1", "", "axis"])
     assert left.exit_code == 130
-    assert f"go on with: armtempo new {folder} --resume" in left.output
+    assert f"continue with: armtempo new {folder} --resume" in left.output
     assert not folder.exists()
     done = interview(folder, monkeypatch, ["", "44", *[""] * 9, ""], "--resume")
     assert done.exit_code == 0, done.output

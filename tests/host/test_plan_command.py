@@ -80,7 +80,7 @@ def test_an_arm_that_ships_is_taken_by_its_name() -> None:
     Path("ar4.toml").write_text('name = "lift"\nvia_deg = [[0,0,0,0,0,0],[10,5,5,0,5,0]]\niterations = 5\n')
     result = run("--job", "ar4.toml", "--arm", "ar4")
     assert result.exit_code == 0, result.output
-    assert "arm: AR4-MK3 (as it ships with armtempo)" in result.stdout
+    assert "arm: AR4-MK3 (ships with armtempo)" in result.stdout
     assert Plan.load("lift.json").arm == Arm.load("ar4")
 
 

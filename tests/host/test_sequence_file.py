@@ -237,7 +237,7 @@ def test_goto_leads_to_where_a_motion_begins(tmp_path: Path) -> None:
         (['goto = "a"\nrun = "job.toml"'], "says goto and run"),
         (['goto = "a"\nwait_s = 1'], "says goto and wait_s"),
         (['goto = "a"\ntimeout_s = 1'], "timeout_s = 1 is not allowed; give left out beside goto"),
-        (['run = "none.toml"'], "none.toml: there is no such file"),
+        (['run = "none.toml"'], "none.toml: no such file"),
         (['output = "griper"\nto = 1'], r"step\[1\].*no output 'griper'.*gripper"),
         (['output = "gripper"'], "to is missing"),
         (['output = "gripper"\nto = 200'], r"step\[1\].*cannot take 200"),
@@ -284,7 +284,7 @@ def test_sequences_that_call_each_other_are_refused(tmp_path: Path) -> None:
     [
         ('start = "c"', "start = 'c': there is no such posture"),
         ('begin = "a"', "begin: unknown key"),
-        ("[posture.home]\nangles_deg = [0, 0, 0]", "posture.home is there already"),
+        ("[posture.home]\nangles_deg = [0, 0, 0]", "posture.home already exists"),
         ("[posture.d]\nangles_deg = [0, 0]", r"posture.d.angles_deg"),
         ("[posture.d]\nangels_deg = [0, 0, 0]", "exactly one of angles_deg"),
     ],

@@ -37,7 +37,7 @@ def findings(arm: Arm) -> list[Finding]:
 
 
 def ends(arm: Arm) -> Iterator[End]:
-    """The arm with each driven joint at each end of its range, the others at home."""
+    """The arm with each driven joint at each end of its range, the others at their home angles."""
     for index, joint in zip(arm.driven_indices, arm.driven, strict=True):
         for angle_deg in joint.range_deg:
             angles = np.array(arm.all_home_deg)

@@ -26,7 +26,7 @@ def findings(arm: Arm, path: Path) -> list[Finding]:
         checks.check_job(arm, job)
         via_deg, notes = planner.via_angles(arm, job)
     except ArmtempoError as refused:
-        text = "correct that; the rest of the job was not looked at"
+        text = "correct that; the rest of the job was not checked"
         return [*suspected, error("job", str(refused), text)]
     told = [note("job", text, "change the pose, or accept it") for text in notes]
     return [*suspected, *told, *_steps(arm, via_deg), *_room(arm, via_deg)]

@@ -95,5 +95,5 @@ def _has_switch(joint: Joint) -> bool:
 
 
 def _unused(joint: Joint) -> Finding:
-    text = "has switches but no motor: they are not looked at"
+    text = "has switches but no motor: they are not checked"
     return warning(joint.name, text, "give it a motor, or leave its [switches] out")

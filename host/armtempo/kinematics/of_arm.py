@@ -51,7 +51,7 @@ def forward(arm: Arm | Path | str, angles_deg: ArrayLike) -> Array:
     """The tool's pose, Eq. (1): (..., 4, 4), lengths in mm, in the frame of the base.
 
     ``arm``: or its file or name. ``angles_deg``: of all joints, (..., joints), or of the driven ones, (..., J), with
-    the others at home. Raises InputError for another number of angles.
+    the others at their home angles. Raises InputError for another number of angles.
     """
     arm = Arm.shape(arm)
     return forward_rad(Geometry.of(arm), np.radians(spread_deg(arm, angles_deg)))

@@ -203,7 +203,7 @@ class Client:
         self.session.command("rename", (len(old.encode()),), old + new, silence_timeout_s=FLASH_TIMEOUT_S)
 
     def set_default(self, name: str) -> None:
-        """Choose what the board's button starts; "" for nothing."""
+        """Choose the default that the board's button starts; "" for nothing."""
         self.session.command("set_default", (), name, silence_timeout_s=FLASH_TIMEOUT_S)
 
     def sequence(self) -> board_messages.SequenceState:

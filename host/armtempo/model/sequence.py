@@ -110,7 +110,7 @@ def _postures(top: Table, arm: Arm) -> dict[str, ArmPosture]:
         return found
     for name in own.names():
         if name in found:
-            raise InputError(f"{top.file}: posture.{name} is there already", "choose another name")
+            raise InputError(f"{top.file}: posture.{name} already exists", "choose another name")
         found[name] = read_posture(own, name, arm)
     return found
 

@@ -116,7 +116,7 @@ def _check_text(path: Path) -> None:
     try:
         root = ElementTree.fromstring(path.read_bytes())
     except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file", "check the path") from None
+        raise InputError(f"{path}: no such file", "check the path") from None
     except OSError as error:
         raise InputError(
             f"{path}: cannot be read: {why(error)}", "make it readable, or give a copy"

@@ -208,7 +208,7 @@ class _Compiler:
         if isinstance(source, Plan):
             if source.arm != self.arm:
                 raise InputError(
-                    f"{where}run: it was planned for another arm than {self.arm.name!r}", "plan it again"
+                    f"{where}run: it was planned for a different arm than {self.arm.name!r}", "plan it again"
                 )
             return source.trajectory
         found = planner.plan(self.arm, source, self.progress).trajectory

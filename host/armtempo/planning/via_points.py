@@ -86,7 +86,7 @@ class _Setup:
         return cls(arm, solver, Ranges(low, high), np.array(solver.home_rad), driven, not solver.refusals)
 
     def moved(self, angles: Array) -> Array:
-        """The posture with the driven joints at ``angles`` and the others at home."""
+        """The posture with the driven joints at ``angles`` and the others at their home angles."""
         return np.where(self.driven, angles, self.home)
 
     def miss(self, target: Pose, angles: Array) -> Miss:

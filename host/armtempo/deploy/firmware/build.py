@@ -33,7 +33,7 @@ def build(micropython: Path, board: str, out: Path, progress: Progress) -> image
     checkout.check_submodules(found, definition)
     toolchain.check(with_mpy_cross=not toolchain.has_mpy_cross(found.folder))
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise InputError(f"{out} is there already", "name a new folder with --out")
+        raise InputError(f"{out} already exists", "name a new folder with --out")
     built = _make(found, definition, progress)
     made = image.Image(
         definition.name,

@@ -38,7 +38,7 @@ class Effort:
     """How much work is put into a free path."""
 
     pieces: int | None
-    """Segments between any two via points; None: as many as pay, more where more time passes."""
+    """Segments between any two via points; None: as many as shorten the motion, more where more time passes."""
     most: int
     """Segments that the record can hold."""
     starts: int

@@ -130,9 +130,7 @@ def line(start: Array, end: Array, turn: Array, where: str) -> ToolPiece:
         return ToolPiece(start, length, way / length, np.zeros(3), turn / length)
     turned_deg = float(np.degrees(np.linalg.norm(turn)))
     if turned_deg <= _STILL_DEG:
-        raise PlanError(
-            f"{where}: the tool is there already", "leave line out, or move one of the via points"
-        )
+        raise PlanError(f"{where}: the tool is at this point already", "leave line out, or move one of the via points")
     return ToolPiece(start, turned_deg, np.zeros(3), np.zeros(3), turn / turned_deg)
 
 
