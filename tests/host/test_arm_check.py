@@ -166,7 +166,7 @@ FOUND = [
             ("home_deg = -60.0", "home_deg = -60\nswitches = { high = 1, high_deg = 12 }"),
         ],
         "error",
-        "switches: input 1 is to trip at low and at high level",
+        "switches: input 1 is set to trip both at low and at high level",
     ),
     (
         "switches crossed",
@@ -216,7 +216,7 @@ FOUND = [
         "note",
         "ranges: from home, the arm goes below its base plane with joint 2 at 10 (271 mm)",
     ),
-    ("ends meet", [], "note", "ranges: from home, links meet each other with"),
+    ("ends meet", [], "note", "ranges: from home, links collide with"),
     (
         "a wide range",
         [("-10.0, 190.0", "-190.0, 190.0")],

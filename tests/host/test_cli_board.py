@@ -87,8 +87,8 @@ def test_store_commands(run: Run, file: str) -> None:
     run("remove", "small-2")
     assert "small" not in run("list").output
     assert "no trajectory of this name" in run("remove", "small", code=1).output
-    assert "is no name for the board" in run("upload", file, "--name", "a b", code=2).output
-    assert "'a b' is no name for a motion on the board" in run("rename", "x", "a b", code=2).output
+    assert "is not a valid name on the board" in run("upload", file, "--name", "a b", code=2).output
+    assert "'a b' is not a valid name of a motion on the board" in run("rename", "x", "a b", code=2).output
 
 
 @pytest.mark.slow

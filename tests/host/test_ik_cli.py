@@ -238,7 +238,7 @@ def test_numerical_finds_the_eight_too() -> None:
             "--position goes alone or with one of",
         ),
         ((*POSITION, "--rpy", "0", "0", "0", "--pitch", "0"), "--position goes alone or with one of"),
-        ((*POSITION, "--roll", "0", "--yaw", "0"), "roll and yaw without pitch leave too much open"),
+        ((*POSITION, "--roll", "0", "--yaw", "0"), "roll and yaw without pitch do not define an orientation"),
         (
             (*POSITION, "--approach", "0", "0", "0"),
             "--approach: the approach has length 0",
@@ -246,7 +246,7 @@ def test_numerical_finds_the_eight_too() -> None:
         ((*POSITION, "--pitch", "nan"), "a finite number"),
         ((*POSITION, "--tolerance-mm", "0"), "--tolerance-mm"),
         ((*POSITION, "--tolerance-deg", "181"), "--tolerance-deg"),
-        (("--matrix", "1 2 3"), "--matrix: 3 numbers are no pose\nhint: give 12 (3 rows of a matrix), 16"),
+        (("--matrix", "1 2 3"), "--matrix: 3 numbers are not a pose\nhint: give 12 (3 rows of a matrix), 16"),
         (("--matrix", "1 0 0 0 0 1 0 0 0 0 x 0"), "--matrix: 'x' is not a number"),
         (("--matrix", "2 0 0 0 0 1 0 0 0 0 1 0"), "--matrix: the 3 x 3 part is not a rotation"),
         ((*POSITION, "--quaternion", "1", "1", "0", "0"), "--quaternion: this quaternion has length 1.41421"),

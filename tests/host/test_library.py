@@ -200,7 +200,7 @@ def test_names_and_files_will_do_for_arm_and_job(tmp_path: Path) -> None:
     [
         (
             {"name": "two words"},
-            r"'two words': the board keeps no such name; give at most 24 of the characters",
+            r"'two words': not a valid name on the board; give at most 24 of the characters",
         ),
         ({"name": "x", "timing": "x"}, r"timing 'x' is not allowed; give 'shared' or 'per-joint'"),
         ({"name": "x", "population": 2}, "population 2 must be a whole number from 4"),

@@ -285,7 +285,7 @@ def test_every_column_is_explained(folder: Path) -> None:
         (lambda path: [(path / "trajectory.json").unlink(), (path / MOTION).write_bytes(b"x")], MOTION),
         (lambda path: describe(path, name=None), "'name' is missing"),
         (lambda path: describe(path, started=None), "'started' is missing"),
-        (lambda path: describe(path, joints=[]), "run.json tells of 0 joints, trajectory.json of 3"),
+        (lambda path: describe(path, joints=[]), "run.json lists 0 joints, trajectory.json has 3"),
         (lambda path: describe(path, joints=[{"name": "a"}]), "is missing or wrong"),
         (lambda path: [file.write_text("") for file in path.glob("samples-*")], "no sample"),
     ],

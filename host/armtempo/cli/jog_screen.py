@@ -102,7 +102,7 @@ class JogScreen:
         self, board: Board, keys: Keys, more: dict[str, Callable[[], str]] | None = None, told: str = ""
     ) -> None:
         if board.arm is None:
-            raise InputError("no arm is known to move", "say which with home(arm) or configure(arm)")
+            raise InputError("no arm is set", "set it with home(arm) or configure(arm)")
         self.choice = JogChoice()
         self._arm = board.arm
         self._board = board

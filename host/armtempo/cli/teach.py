@@ -184,7 +184,7 @@ class TaughtPoints:
 def check_free(file: Path, replace_old: bool) -> None:
     """InputError where the job file already exists, before anything moves."""
     if file.exists() and not replace_old:
-        raise InputError(f"{file} exists, so it is kept", "choose another name, or replace it with --replace")
+        raise InputError(f"{file} already exists", "choose another name, or replace it with --replace")
     if not file.parent.is_dir():
         raise InputError(f"{file.parent}: there is no such folder", "make it, or choose another place")
 

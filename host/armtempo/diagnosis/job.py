@@ -59,8 +59,6 @@ def _steps(arm: Arm, via_deg: Array) -> list[Finding]:
         if 0.0 < way_deg * joint.steps_per_deg < 1.0:
             text = f"{joint.name} is to move by {way_deg:.2g} deg, less than a step"
             found.append(
-                warning(
-                    "job", text, "check the unit: angles are degrees; it will stand still or make one step"
-                )
+                warning("job", text, "check the unit: angles are degrees; it will not move, or make one step")
             )
     return found

@@ -42,7 +42,7 @@ def parse(text: str, file: str) -> Table:
     except (ValueError, RecursionError) as error:  # not all of tomllib's are its own: numbers of 5000 digits
         raise InputError(
             f"{file}: not valid TOML: {error}",
-            "correct that place; strings stand in quotes, tables in [brackets]",
+            "correct that place; strings are written in quotes, tables in [brackets]",
         ) from None
 
 

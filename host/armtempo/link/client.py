@@ -79,7 +79,7 @@ class Client:
     def info(self) -> board_messages.Hello:
         """The board's answer to ``hello``; LinkError before it."""
         if self._info is None:
-            raise LinkError("the board has not been greeted yet", "call hello() first")
+            raise LinkError("no hello has been exchanged yet", "call hello() first")
         return self._info
 
     def hello(self) -> board_messages.Hello:
@@ -113,8 +113,8 @@ class Client:
                 "plug the right board in, or run the command again for this one",
             )
         raise OtherBoardError(
-            f"the board on {where} has started anew: positions are unknown",
-            "bring the arm to its home posture and run 'armtempo home'",
+            f"the board on {where} has restarted: positions are unknown",
+            "move the arm to its home posture and run 'armtempo home'",
         )
 
     def status(self) -> board_messages.Status:

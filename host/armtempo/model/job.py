@@ -103,7 +103,7 @@ class Job:
     def _check(self) -> None:
         """InputError for settings that no planner knows or the board cannot keep."""
         if not is_name(self.name):
-            raise InputError(f"job {self.name!r}: the board keeps no such name", f"give {NAME_RULE}")
+            raise InputError(f"job {self.name!r}: not a valid name on the board", f"give {NAME_RULE}")
         for key, allowed in (
             ("timing", TIMINGS),
             ("path", PATHS),

@@ -98,7 +98,7 @@ class _Setup:
 def resolve(arm: Arm, job: Job) -> Resolved:
     """Turn every pose of ``job`` into angles, in order, each nearest to the one before.
 
-    Raises InputError for a via point that is no pose or has the wrong number of angles, PlanError with all
+    Raises InputError for a via point that is not a pose or has the wrong number of angles, PlanError with all
     reasons for a pose that no solution reaches.
     """
     setup = _Setup.of(arm)

@@ -70,7 +70,7 @@ def posture_deg(client: Client, arm: Arm) -> Array:
     if unknown:
         raise LinkError(
             f"the position of {', '.join(unknown)} is unknown",
-            "bring the arm to its home posture and run 'armtempo home'",
+            "move the arm to its home posture and run 'armtempo home'",
         )
     return np.array(status.positions.commanded_steps, dtype=float) / _steps_per_deg(arm)
 

@@ -72,7 +72,7 @@ def test_the_only_firmware_here_is_taken(
     assert outcome("flash")[0] == 0  # of the zip file
     Path("armtempo-firmware-STM32F4DISC.zip").write_bytes(b"PK cut")
     code, said = outcome("flash")
-    assert (code, "is no whole zip file" in said) == (2, True)
+    assert (code, "is not a complete zip file" in said) == (2, True)
     Path("armtempo-firmware-STM32F4DISC.zip").unlink()
     code, said = outcome("flash")
     assert (code, "no firmware is named" in said) == (2, True)
@@ -277,9 +277,9 @@ def test_a_folder_that_is_no_firmware_is_refused(
 ) -> None:
     tools(st_flash=STLINK, st_info=ST_INFO)
     for damage, words in (
-        (lambda: (built / "firmware1.bin").unlink(), "is not whole: firmware1.bin"),
+        (lambda: (built / "firmware1.bin").unlink(), "is incomplete: firmware1.bin"),
         (lambda: (built / image.ABOUT).write_text(json.dumps({"pieces": []})), "cannot be read"),
-        (lambda: (built / image.ABOUT).unlink(), "holds no firmware"),
+        (lambda: (built / image.ABOUT).unlink(), "contains no firmware"),
     ):
         damage()
         code, said = outcome("flash", "--image", built)

@@ -92,7 +92,7 @@ def _run(command: list[str], step: Callable[[str], None]) -> None:
     if said := toolchain.run(command, step):
         raise ToolError(
             f"MicroPython's build failed:\n  {said}",
-            f"see the whole of it with {' '.join(command)}; with another version of MicroPython or of the compiler "
+            f"for the whole output run {' '.join(command)}; with another version of MicroPython or of the compiler "
             f"than {checkout.RELEASE} and gcc 12 to 14, try those",
         )
 
