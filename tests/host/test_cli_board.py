@@ -172,13 +172,13 @@ def test_arm_is_not_replaced_silently(run: Run, file: str, tmp_path: Path) -> No
     other.write_text(shipped.arm_path().read_text().replace("pulse_us = 2.0", "pulse_us = 3.0"))
     run("home")
     refused = run("home", "--arm", str(other), code=1).output
-    assert "set up for another arm" in refused
+    assert "set up for a different arm" in refused
     assert "driver timing" in refused
     assert "armtempo configure" in refused
     assert "idle" in run("status").output
     run("home", "--arm", str(other), "--replace-arm")
-    assert "set up for another arm" in run("home", code=1).output
-    assert "planned for another arm" in run("run", file, "--arm", str(other), code=2).output
+    assert "set up for a different arm" in run("home", code=1).output
+    assert "planned for a different arm" in run("run", file, "--arm", str(other), code=2).output
 
 
 @pytest.mark.slow

@@ -51,7 +51,7 @@ def test_json_is_one_document_and_quiet_leaves_it_alone() -> None:
     for joint in found["joints"]:
         assert joint["floor_s"] <= joint["duration_s"] <= found["duration_s"]
         assert all(value <= joint["limits"][name] * (1 + 1e-9) for name, value in joint["extremes"].items())
-    assert "no arm and no job are named" in run("--iterations", "5").stderr
+    assert "no arm and no job given" in run("--iterations", "5").stderr
 
 
 COARSE_JOINT_2 = ("microsteps = 8, gear_ratio = 20.0", "microsteps = 1, gear_ratio = 0.5")

@@ -255,7 +255,7 @@ def test_goto_leads_to_where_a_motion_begins(tmp_path: Path) -> None:
         (["repeat = 2", 'end = "repeat"'], "nothing is repeated"),
         (["repeat = 2"] * 5 + ["wait_s = 1"] + ['end = "repeat"'] * 5, "at most 4 within each other"),
         (['call = "seq.toml"'], "calls itself: seq.toml calls seq.toml"),
-        (['call = "job.toml"'], "no sequence"),
+        (['call = "job.toml"'], "is not a sequence"),
         (
             ['goto = "b"', 'run = "job.toml"'],
             r"step\[2\]\.run: job begins at 1, -60, 40°, but the arm is at b",
@@ -308,7 +308,7 @@ def test_the_file_of_a_plan_holds_all_of_it(tmp_path: Path) -> None:
     assert encoded_sequence.of_plan(again).data == encoded_sequence.of_plan(plan).data
     assert again.total == plan.total
     plan.save(path)  # an earlier plan of the same sequence gives way
-    with pytest.raises(InputError, match="exists and has other content"):
+    with pytest.raises(InputError, match="exists with other content"):
         replace(plan, name="other").save(path)
     content = json.loads(path.read_text())
     content["sequence"]["rows"][0]["number"] = 7
@@ -334,7 +334,7 @@ def test_a_trajectory_file_is_no_sequence_and_the_other_way_round(tmp_path: Path
 def test_a_plan_of_another_arm_is_no_leg(tmp_path: Path) -> None:
     motion = armtempo.plan(Arm.paper(), Job.load(written(tmp_path, "wait_s = 1").parent / "job.toml", ARM))
     motion.save(tmp_path / "j.json")
-    with pytest.raises(ArmtempoError, match="another arm"):
+    with pytest.raises(ArmtempoError, match="a different arm"):
         planned(tmp_path, 'goto = "a"', 'run = "j.json"')
 
 

@@ -40,7 +40,7 @@ def test_a_motion_has_to_be_named_where_the_button_starts_none(tmp_path: Path) -
     client.set_default("")
     with pytest.raises(InputError) as caught:
         Board(client, "pipe").fetch(None, tmp_path)
-    assert caught.value.problem.startswith("no motion was named")
+    assert caught.value.problem.startswith("no motion given")
     assert "armtempo fetch NAME" in caught.value.hint
 
 

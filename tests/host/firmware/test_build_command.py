@@ -34,7 +34,11 @@ def test_the_command_says_how_to_get_a_checkout(tools: Callable[..., Path], tmp_
             {f"{STM32F4DISC}/mpconfigboard.mk": f"{BOARD_MAKE}MICROPY_PY_LWIP = 1\n"},
             "lacks submodules (lib/lwip)",
         ),
-        ("STM32F4DISC", {"py/mpconfig.h": "#define MICROPY_VERSION_MAJOR 1\n"}, "is no checkout"),
+        (
+            "STM32F4DISC",
+            {"py/mpconfig.h": "#define MICROPY_VERSION_MAJOR 1\n"},
+            "is not a MicroPython checkout",
+        ),
     ],
 )
 def test_a_checkout_that_does_not_suit(
