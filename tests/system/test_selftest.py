@@ -6,6 +6,7 @@ import json
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -148,7 +149,7 @@ def test_what_is_wrong_is_named(
 
 
 def test_with_drivers_on_nothing_is_done(tmp_path: Path) -> None:
-    """The drivers hold a homed arm: it is refused, and the arm is held and homed as before."""
+    """The drivers hold a homed arm: it is refused, and the arm is held and homed as before; so without the firmware."""
     with board(tmp_path) as port, connect(port) as used:
         used.home(boards.ARM)
         used.goto(np.array(boards.ARM.home_deg) + 1.0)
@@ -156,6 +157,9 @@ def test_with_drivers_on_nothing_is_done(tmp_path: Path) -> None:
         with pytest.raises(LinkError, match="drivers are on"):
             used.selftest()
         assert (used.status().state, used.status().positions) == ("idle", steps)
+        used.client._info = replace(used.info, features=0)
+        with pytest.raises(LinkError, match=r"MicroPython's own firmware.*armtempo flash"):
+            used.selftest()
 
 
 def test_no_pulses_where_enable_cannot_be_inactive(tmp_path: Path) -> None:

@@ -17,6 +17,8 @@ from armtempo.selftest.prompt import RESET, Measured, PartError, Prompt, SilentE
 from armtempo.selftest.result import Measurement, SelfTest, judged, left_out
 
 DRIVERS = "drivers"
+_FEATURE = "sequences"
+"""Of the program in the firmware, with the modules that the parts import; as files it is without both."""
 UNIQUE_ID_DIGITS = 24
 _ARM_RECORD = "/flash/armtempo/arm.ata"
 _BACK_S = 60.0
@@ -59,6 +61,7 @@ def _same_room(before: int, after: int) -> Measurement:
 
 
 def _check_rest(client: Client) -> None:
+    client.need(_FEATURE, "the self-test")
     status = client.status()
     if status.moving:
         raise LinkError("the board is moving", "wait for the end of the motion, or 'armtempo stop'")
@@ -88,16 +91,8 @@ def _check_drivers(prompt: Prompt) -> None:
     From here on the end of the prompt is a reset, which switches drivers off that are on.
     """
     prompt.enter(soft_reset=False)
-    try:
-        found = _drivers(prompt)
-        on = found["active"] is not None and found["output"] and found["level"] == found["active"]
-    except PartError as error:
-        if "ImportError" not in error.problem:
-            raise
-        raise LinkError(
-            "the board program on this board is files, which the self-test cannot use",
-            "put MicroPython with the program in it on the board: 'armtempo flash'",
-        ) from None
+    found = _drivers(prompt)
+    on = found["active"] is not None and found["output"] and found["level"] == found["active"]
     if on:
         raise LinkError(
             "the drivers are on (ENABLE, PE12, is active)",
