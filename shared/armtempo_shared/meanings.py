@@ -60,8 +60,7 @@ _ROWS = (
     (
         "no_room",
         "the engine for this arm does not fit into the board's memory; nothing was changed",
-        "lower its top speeds, drive fewer joints, or put the program into the firmware (see 'armtempo firmware "
-        "--help')",
+        "lower its top speeds, drive fewer joints, or put the program into the firmware ('armtempo flash')",
     ),
     (
         "no_memory",
@@ -107,7 +106,7 @@ _ROWS = (
     (
         "no_sequence_room",
         "the board has no room to run a sequence of motions for this arm; nothing has moved",
-        "put the program into the firmware (see 'armtempo firmware --help'), or let the host run the steps (board.run)",
+        "put the program into the firmware ('armtempo flash'), or let the host run the steps (board.run)",
     ),
     (
         "other_version",

@@ -17,7 +17,6 @@ import re
 import tempfile
 import time
 import urllib.request
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
@@ -151,10 +150,8 @@ def processor_s(pid: int) -> float:
 def stops(page: Any, ear: Ear, times: int) -> list[float]:
     """Seconds from the key press to the board's answer."""
     found = []
-    for number in range(times):
-        button = page.locator('[aria-label$=" +"]').nth(number % 2)
-        button.hover()
-        page.mouse.down()
+    for _ in range(times):
+        panels.hold(page)
         moving(ear)
         begin_s = time.monotonic()
         page.keyboard.press("Escape")
@@ -165,8 +162,7 @@ def stops(page: Any, ear: Ear, times: int) -> list[float]:
         found.append(ear.stopped_s - begin_s)
         page.mouse.up()
         panels.wait_for(page, "idle")
-        if number % 10 == 9:
-            panels.home(page)
+        panels.home(page)
     return found
 
 
@@ -186,10 +182,7 @@ def watched(browser: Any, times: int) -> None:
         show("Escape to the board's answer", stops(page, ear, times))
         begin_s, before_s = time.monotonic(), processor_s(panel.process.pid)
         while time.monotonic() < begin_s + 20.0:
-            page.locator('[aria-label$=" +"]').first.hover()
-            page.mouse.down()
-            with suppress(AssertionError):
-                moving(ear)
+            panels.hold(page)
             page.wait_for_timeout(1500)
             page.mouse.up()
             panels.wait_for(page, "idle")

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
+from armtempo.model.arm import Arm
+from armtempo.planning import point_to_point
+from armtempo.records import encode
 
 from tests import interpreters, scripted
 
@@ -46,3 +50,49 @@ def test_the_loop_allocates_nothing_while_moving(name: str, tmp_path: Path) -> N
     assert taken > 195
     assert 0 < first < taken
     assert sent > 200 * 40
+
+
+# random and mutated frames through parser and handlers, a share of them on MicroPython
+
+
+SCRIPT = Path(__file__).parent / "scripts" / "cases" / "fuzz.py"
+FRAMES = {"cpython": 100_000, "micropython": 50_000, "micropython-arm": 10_000}
+SEED = 20261121
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", interpreters.EACH)
+def test_no_exception_no_wrong_check_no_motion(name: str) -> None:
+    """The script asserts all three (and names the seed in its arguments); every handler is reached."""
+    given, acted, bad, reached = interpreters.run(name, SCRIPT, str(FRAMES[name]), str(SEED)).split()
+    assert int(given) == FRAMES[name]
+    assert int(acted) > 0.3 * FRAMES[name]
+    assert int(bad) > 0.1 * FRAMES[name]
+    assert reached == "True"
+
+
+# replay without a host, from the REPL
+
+
+REPLAY_SCRIPT = Path(__file__).parent / "scripts" / "probes" / "replay.py"
+
+
+@pytest.mark.parametrize("name", interpreters.EACH)
+def test_replay_from_the_repl(name: str, tmp_path: Path) -> None:
+    """The first call takes the posture for the start and moves; the second finds the arm elsewhere."""
+    paper_arm = Arm.paper()
+    home_deg = np.array(paper_arm.home_deg)
+    trajectory = point_to_point.straight("go", home_deg, home_deg + np.array([2.0, 1.0, -2.0]), paper_arm)
+    (tmp_path / "armtempo").mkdir()
+    (tmp_path / "armtempo" / "arm.ata").write_bytes(encode.arm_record(paper_arm))
+    (tmp_path / "armtempo" / "go.atm").write_bytes(encode.motion_record(trajectory, paper_arm))
+    lines = interpreters.run(name, REPLAY_SCRIPT, str(tmp_path), "go", heap="4M").splitlines()
+    assert lines[0] == "taking the posture of the arm as the start of go"
+    assert lines[1] == f"done at steps {_steps(trajectory, paper_arm)}"
+    assert lines[2].split()[:4] == ["refused:", "wrong_start", "joint", "1"]
+    assert lines[3].split() == ["refused:", "not_found"]
+
+
+def _steps(trajectory, paper_arm):
+    end = trajectory(trajectory.duration_s)
+    return [round(angle * joint.steps_per_deg) for angle, joint in zip(end, paper_arm.driven, strict=True)]

@@ -7,14 +7,17 @@ import random
 from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import frexp
+from fractions import Fraction
+from itertools import pairwise
+from math import floor, frexp
+from pathlib import Path
 from types import ModuleType
 from unittest.mock import patch
 
 import pytest
 from armtempo_shared.motion import Motion
 
-from tests import inprocess
+from tests import inprocess, interpreters
 from tests.board import motions
 
 SEED = 20261124
@@ -190,3 +193,63 @@ def test_how_long_the_next_cubics_may_be_is_found_without_many_trials(
     assert 0.95 * rate * 0.7 < tried.steps < rate * 0.7, tried
     assert tried.rejected <= 0.12 * tried.fitted, tried
     assert tried.steps >= LEAST_STEPS[rate] * tried.fitted, tried
+
+
+# bezier points of spline segments, to the unit, under CPython
+
+
+BEZIER_SEED = 20261123
+BEZIER_CASES = 40
+STEP_BITS = 28
+
+
+@pytest.fixture(scope="module")
+def bezier() -> Iterator[ModuleType]:
+    with inprocess.board_modules():
+        yield importlib.import_module("armtempo_board.stepgen.bezier")
+
+
+def bezier_points(control: list[int]) -> list[Fraction]:
+    """Of the segment [0, 1] of a B-spline with whole knots: its polar form at (0, ..., 0, 1, ..., 1)."""
+    degree = len(control) - 1
+    found = []
+    for ones in range(degree + 1):
+        points = [Fraction(point) for point in control]
+        for level, at in enumerate([0] * (degree - ones) + [1] * ones, 1):
+            knots = range(level - degree, 1)
+            points = [
+                left + (right - left) * Fraction(at - knot, degree + 1 - level)
+                for knot, (left, right) in zip(knots, pairwise(points), strict=True)
+            ]
+        found += points
+    return found
+
+
+def test_points_of_quintics_are_rounded_to_the_nearest_unit(bezier: ModuleType) -> None:
+    random.seed(BEZIER_SEED)
+    for _ in range(BEZIER_CASES):
+        start = random.randrange(-(1 << 50), 1 << 50)
+        control = [start + random.randrange(-(1 << 48), 1 << 48) for _ in range(6)]
+        data = array("i", array("q", [0, *control]).tobytes())
+        piece = array("i", bytes(4 * 30))
+        bezier.from_control_points(data, 2, bezier.weights(5), piece)
+        for number, exact in enumerate(bezier_points(control)):
+            high, low = piece[bezier.HIGH + number], piece[bezier.LOW + number]
+            found = ((high - bezier.BIAS) << STEP_BITS) + low
+            assert found == floor(exact + Fraction(1, 2)), f"seed {BEZIER_SEED}: point {number} of {control}"
+
+
+# parts of a motion: whichever halves are kept and used again, each is that of the segment
+
+
+SCRIPT = Path(__file__).parent / "scripts" / "probes" / "halves.py"
+
+
+def test_parts_are_the_segments_halves_whatever_way_leads_to_them(interpreter: str, tmp_path: Path) -> None:
+    records = [motions.feeding(), motions.feeding(degree=3, refine=3)]
+    paths = [tmp_path / f"{number}.atm" for number in range(len(records))]
+    for path, record in zip(paths, records, strict=True):
+        path.write_bytes(record)
+    count, deepest = map(int, interpreters.run(interpreter, SCRIPT, *map(str, paths)).split())
+    assert count > 1000
+    assert deepest > 8

@@ -1,4 +1,4 @@
-"""The engine on simulated hardware, on every interpreter."""
+"""The engine on simulated hardware and the memory for it, on every interpreter."""
 
 from __future__ import annotations
 
@@ -39,3 +39,14 @@ def test_nothing_is_allocated_while_a_motion_runs(name: str) -> None:
         assert six < 42_000, six
     assert output[1].startswith("13 [3000, 700, 2]")
     assert len(output) == 3
+
+
+# the memory for engines, on every interpreter
+
+
+SCRIPT = Path(__file__).parent / "scripts" / "cases" / "memory.py"
+
+
+@scripted.each(scripted.cases(SCRIPT))
+def test_case_of_engine_memory(case: scripted.Case) -> None:
+    case.run()

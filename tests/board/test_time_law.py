@@ -38,7 +38,7 @@ def test_times_at_a_constant_rate(modules: tuple[ModuleType, ModuleType]) -> Non
         rate, scale = random.randrange(10, 1000), random.randrange(1, 22)
         high, time = random.randrange(1 << 20), random.randrange(1 << 28)
         override = overrides.Override()
-        override.begin(rate, 0, 1 << 38)
+        override.begin(rate, None, 1 << 38)
         words = array("i", bytes(4 * time_law.LAW_WORDS))
         law = overrides.JointLaw(words)
         real_high = law.take(override.law, BIAS + high) - BIAS

@@ -15,7 +15,7 @@ from armtempo.records import encoded_motion
 from armtempo.report import text_summary
 from armtempo.runs import run_folder
 from armtempo.runs.reader import RunData
-from armtempo.runs.results import results
+from armtempo.runs.replayed import results
 from armtempo.runs.run_folder import Repetition
 
 from tests.host import made_runs

@@ -37,19 +37,19 @@ SAID = {
     "lower refine, use shared timing or fewer via points, or split it",
     "no_room": "no: the engine for this arm does not fit into the board's memory; nothing was changed (joint 2) "
     "[bytes needed: 4711]; lower its top speeds, drive fewer joints, or put the program into the firmware "
-    "(see 'armtempo firmware --help')",
+    "('armtempo flash')",
     "pin_taken": "no: an output or input of the arm has a pin or timer that is taken (joint 2) [PE9: encoder 1]; give "
     "another pin ('armtempo check' names the arm file's key; 'armtempo help hardware' lists what is free)",
     "leg_missing": "no: the board does not have a motion that the sequence runs, or another one under its name "
-    "(joint 2) [number of the motion in the sequence, from 1: 4711]; upload the sequence again, which brings its "
-    "motions",
+    "(joint 2) [number of the motion in the sequence, from 1: 4711]; upload the sequence again, which uploads its "
+    "motions too",
     "leg_elsewhere": "no: a motion of the sequence begins elsewhere than the one before it ends (joint 2) [number of "
     "the step in the sequence: 4711]; plan the sequence again and upload it",
     "no_such_pin": "no: the sequence uses an output or an input that the arm on the board does not have (joint 2) "
     "[number of the step in the sequence: 4711]; plan the sequence again with the arm file that the board is set up "
     "for",
     "no_sequence_room": "no: the board has no room to run a sequence of motions for this arm; nothing has moved "
-    "(joint 2) [bytes that are missing: 4711]; put the program into the firmware (see 'armtempo firmware --help'), or "
+    "(joint 2) [bytes that are missing: 4711]; put the program into the firmware ('armtempo flash'), or "
     "let the host run the steps (board.run)",
     "too_abrupt": "no: the motion reverses too fast for the step generator (joint 2) [steps/s²: 4711]; lower the "
     "limits",

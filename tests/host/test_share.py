@@ -360,7 +360,9 @@ def test_a_hundred_thousand_random_requests_are_answered(owner: tuple[Owner, Por
         assert all(field.fits(value) for field, value in zip(fields, values, strict=False))
 
 
-def test_an_output_of_an_arm_that_has_none_is_said_to_be_missing() -> None:
+def test_an_output_of_an_arm_that_has_none_is_said_to_be_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Client, "info", SimpleNamespace(can=lambda feature: True))
+
     def refuse(what: str, *_: object, **__: object) -> None:
         raise refusal(what, wire.ERROR_CODES["unknown_command"])
 

@@ -55,6 +55,7 @@ def test_its_run_folder_is_whole(demo: tuple[Ended, Path]) -> None:
 def test_its_report_is_there(demo: tuple[Ended, Path]) -> None:
     done, folder = demo
     assert f"report: {Path('runs') / folder.name / PAGE}" in done.output
+    assert "armtempo panel --port sim" in done.output
     assert (folder / PAGE).read_text(encoding="utf-8").count("<figure") == len(FIGURES)
     for name in FIGURES:
         assert (folder / f"{name}.png").read_bytes().startswith(b"\x89PNG")

@@ -128,3 +128,21 @@ def test_from_the_command_line(tmp_path: Path) -> None:
         "s"
     ]
     said("plan", "s.toml", "--refine", "4", code=2)
+
+
+# ``armtempo demo --pick-and-place``: the shipped sequence, with the part sensor imitated
+
+
+def test_two_parts_are_placed(tmp_path: Path) -> None:
+    environment = {"ARMTEMPO_MICROPYTHON": interpreters.starter("cpython")}
+    done = commandline.run("demo", "--pick-and-place", folder=tmp_path, **environment)
+    assert done.exit_code == 0, done.errors
+    assert "cycle (step 2, 2 times):" in done.output
+    assert done.output.splitlines()[-1] == "finished after 2 whole cycles"
+    assert not list(tmp_path.iterdir())
+
+
+def test_it_is_for_a_virtual_board(tmp_path: Path) -> None:
+    done = commandline.run("demo", "--pick-and-place", "--port", "/dev/ttyACM0", folder=tmp_path)
+    assert done.exit_code == 2
+    done.said("this demo is for a virtual board")

@@ -10,7 +10,7 @@ import pytest
 from tests import interpreters
 from tests.system import soak
 
-LEGS = {"cpython": 20, "micropython": 60}
+LEGS = {"cpython": 10, "micropython": 30}
 """At least so many motions."""
 SEED = 20268
 

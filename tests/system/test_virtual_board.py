@@ -14,7 +14,7 @@ from armtempo.basics.errors import LinkError, RunFolderError
 from armtempo.link.connect import open_board
 from armtempo.simulator import LaunchOptions, edgelog, launch, launcher
 
-from tests import interpreters
+from tests import interpreters, scripted
 from tests.system import commandline
 
 
@@ -145,3 +145,16 @@ def test_command_prints_the_port_and_ends_with_ctrl_c(tmp_path: Path) -> None:
     assert (
         "Traceback" not in error
     )  # that its port is gone cannot be told: another program may have the number now
+
+
+# the simulated hardware behaves like the chip's, on every interpreter
+
+
+CASES = Path(__file__).parent / "scripts" / "cases"
+SCRIPTS = tuple(CASES / f"virtual_{name}.py" for name in ("hardware", "time", "flash"))
+
+
+@scripted.each([case for script in SCRIPTS for case in scripted.cases(script)])
+def test_case(case: scripted.Case, tmp_path: Path) -> None:
+    (tmp_path / "flash").mkdir()
+    case.run(str(tmp_path), heap="")

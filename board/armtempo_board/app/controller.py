@@ -171,6 +171,8 @@ class Controller(ArmState):
         if features.SPEED and self._by_host:
             rate = self._next_rate
             self.forget_speed()
+        if not name:  # there is no default
+            raise Refused(codes.NOT_FOUND)
         if features.SEQUENCES and self._is_sequence(name):
             self._new_sequence(name, crc, rate, flags)
             self.sequence.begin()

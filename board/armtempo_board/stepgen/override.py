@@ -68,7 +68,7 @@ class Override:
         """Real time, in Ki ticks, at which a ramp to rest would end that begins at a real time; allocates nothing."""
         since = max(from_kiticks - self._real_kiticks, 0)
         at = self._motion_kiticks + since // PERMILLE * self.rate + since % PERMILLE * self.rate // PERMILLE
-        units = self._motion.ramp_units(at >> (self._shift - 10), self._parts, True)
+        units: int = self._motion.ramp_units(at >> (self._shift - 10), self._parts, True)
         return self._real_kiticks + since + (units << (_UNIT_BITS - 10))
 
     def _thousands(self, from_ticks: int) -> int:
@@ -78,7 +78,7 @@ class Override:
     def _ramp_ticks(self, at_ticks: int, rate: int) -> int:
         """Length of a ramp that begins at a time of the motion, rounded up to the grid."""
         grid = time_law.RAMP_GRID_TICKS
-        units = self._motion.ramp_units(at_ticks >> self._shift, self._parts, rate == 0)
+        units: int = self._motion.ramp_units(at_ticks >> self._shift, self._parts, rate == 0)
         return min(-(-(units << _UNIT_BITS) // grid), time_law.LONGEST_RAMP_TICKS // grid) * grid
 
     def ramp(self, from_ticks: int, rate: int) -> None:

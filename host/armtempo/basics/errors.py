@@ -16,7 +16,9 @@
         ├── NoProgramError         MicroPython's prompt answers instead of the board program
         ├── DisturbedError         pieces of messages arrive, too few of them whole
         ├── OtherBoardError        another board answers than before, or the same one started anew
-        └── BoardError             the board refused a command or a fault ended a motion; carries the code
+        ├── BoardError             the board refused a command or a fault ended a motion; carries the code
+        ├── PartError              a part of the self-test raised an exception on the board
+        └── SilentError            the board does not answer in a part of the self-test
 
 Every error says what is wrong and where (``problem``) and what to do next (``hint``). Beside the tree stands
 Stopped, a KeyboardInterrupt: a motion was brought to rest because a stop was asked for.

@@ -1,17 +1,26 @@
-"""``armtempo fk``: where the tool and every frame stand for given joint angles."""
+"""``armtempo fk``: where the tool and every frame are for given joint angles, as a table or as JSON values."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import click
+import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.cli import chosen, options, posture, results
-from armtempo.kinematics import frame_listing
+from armtempo.formats.text_table import aligned
 from armtempo.kinematics.chain import spread_deg
+from armtempo.kinematics.forward import all_frames
+from armtempo.kinematics.geometry import Geometry
+from armtempo.kinematics.listing import tool_values
 from armtempo.kinematics.pose_file import numbers
+from armtempo.kinematics.ranges import Ranges
+from armtempo.kinematics.rejection import out_of_range
 from armtempo.model.arm import Arm
+from armtempo.model.pose import to_quaternion, to_rpy_deg
 
 
 @click.command("fk", context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
@@ -40,9 +49,9 @@ def fk(
         arm = chosen.arm_or_paper(arm_path, for_shape=True)
         angles_deg = _angles(where, arm)
     if as_json:
-        results.show_json(frame_listing.values(arm, angles_deg))
+        results.show_json(_values(arm, angles_deg))
     else:
-        click.echo("\n".join(frame_listing.lines(arm, angles_deg)))
+        click.echo("\n".join(_lines(arm, angles_deg)))
 
 
 def _angles(where: tuple[str, ...], arm: Arm) -> Array:
@@ -50,3 +59,46 @@ def _angles(where: tuple[str, ...], arm: Arm) -> Array:
     if not where:
         return spread_deg(arm, arm.all_home_deg)
     return spread_deg(arm, numbers(" ".join(where), "the angles"))
+
+
+def _lines(arm: Arm, angles_deg: Array) -> Iterator[str]:
+    """The table for the angles of all joints, (joints,): one row a frame, then the tool's pose."""
+    frames = all_frames(Geometry.of(arm), np.radians(angles_deg).tolist())
+    yield f"{arm.name} at {' '.join(_number(angle) for angle in angles_deg)} deg"
+    rows = [["frame", "x", "y", "z", "roll", "pitch", "yaw"], ["", "mm", "mm", "mm", "deg", "deg", "deg"]]
+    for name, frame in zip(_names(arm), frames, strict=True):
+        rows.append([name, *(_number(value) for value in (*frame[:3, 3], *to_rpy_deg(frame)))])
+    yield from aligned(rows, (8, *(12,) * 6))
+    yield "tool as a matrix, lengths in mm:"
+    for row in frames[-1]:
+        yield "".join(f"{round(value, 6) + 0.0:14.6f}" for value in row)
+    yield "tool as a quaternion w x y z: " + " ".join(f"{value:.8f}" for value in to_quaternion(frames[-1]))
+    for reason in _outside(arm, angles_deg):
+        yield f"note: {reason}"
+
+
+def _values(arm: Arm, angles_deg: Array) -> dict[str, Any]:
+    """The same as JSON values."""
+    frames = all_frames(Geometry.of(arm), np.radians(angles_deg).tolist())
+    return {
+        "arm": arm.name,
+        "angles_deg": angles_deg.tolist(),
+        "tool": {**tool_values(frames[-1]), "quaternion": list(to_quaternion(frames[-1]))},
+        "frames": [
+            {"name": name, **tool_values(frame)} for name, frame in zip(_names(arm), frames, strict=True)
+        ],
+        "out_of_range": _outside(arm, angles_deg),
+    }
+
+
+def _names(arm: Arm) -> list[str]:
+    names = ["base", *(joint.name for joint in arm.joints)]
+    return [*names[:-1], f"{names[-1]} (tool)"]
+
+
+def _outside(arm: Arm, angles_deg: Array) -> list[str]:
+    return [each.text for each in out_of_range(Ranges.of(arm), np.radians(angles_deg).tolist())]
+
+
+def _number(value: float) -> str:
+    return f"{round(value, 4) + 0.0:.4f}"

@@ -19,7 +19,7 @@ from armtempo.model.plan import Plan
 from armtempo.model.sequence import is_sequence
 from armtempo.planning import checks
 from armtempo.planning.free.corridor_curve import unit_of
-from armtempo.report import corridor_plot, drawing, json_summary
+from armtempo.report import corridor_plot, drawing, text_summary
 from armtempo.robot import engine_room
 
 
@@ -152,7 +152,7 @@ def _lines(file: Path, plan: Plan) -> list[str]:
 
 
 def _json(file: Path, plan: Plan) -> dict[str, Any]:
-    return {"file": str(file), **json_summary.of_plan(plan)}
+    return {"file": str(file), **text_summary.values(plan)}
 
 
 def _write_curve(arm: Arm, job: Job, target: Path, force: bool, as_json: bool) -> None:

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from armtempo.basics.errors import InputError
+from armtempo.basics.errors import InputError, PlanError
 from armtempo.diagnosis import drives, encoders, geometry, resolution, torque, units, wiring
 from armtempo.diagnosis.finding import Finding, Level, error, note
 from armtempo.model.arm import STILL_DEG, Arm
+from armtempo.model.posture import HOME
 
 
 def check(arm_file: Path, job_file: Path | None = None) -> tuple[Arm | None, list[Finding]]:
@@ -43,6 +44,7 @@ def check_arm(arm: Arm) -> list[Finding]:
         if not any(finding.level is Level.ERROR for finding in found):
             found += drives.record_findings(arm)
             found += _postures(arm)
+            found += _room(arm)
     return _sorted(found)
 
 
@@ -55,6 +57,25 @@ def _postures(arm: Arm) -> list[Finding]:
     except InputError as refused:
         return [error("posture", refused.problem, refused.hint)]
     return []
+
+
+def _room(arm: Arm) -> list[Finding]:
+    """What touches in the home posture and the others of the file."""
+    from armtempo.planning import room_check, via_points  # here, as above
+
+    found = []
+    for posture in (arm.posture(HOME), *arm.postures):
+        try:
+            angles = via_points.posture_deg(arm, posture)
+        except PlanError:
+            continue  # said above
+        found += [
+            error(
+                "room", f"posture {posture.name}: {touch.words}", "correct the posture, [room] or radius_mm"
+            )
+            for touch in room_check.posture_touches(arm, angles)
+        ]
+    return found
 
 
 def _sorted(found: list[Finding]) -> list[Finding]:

@@ -14,11 +14,12 @@ from armtempo.basics.errors import InputError
 from armtempo.formats import json_codec, toml_table
 from armtempo.formats.spelling import did_you_mean
 from armtempo.formats.toml_table import Table
-from armtempo.model import boards, outputs_file, parts_file, pin_use, pose_table, shipped
+from armtempo.model import boards, outputs_file, parts_file, pin_use, pose_table, room, shipped
 from armtempo.model import posture as named
 from armtempo.model.outputs import Input, Output
 from armtempo.model.parts import DrivenJoint, Driver, Joint, Limits, Motor, Safety
 from armtempo.model.posture import ArmPosture
+from armtempo.model.room import ArmRoom
 from armtempo.model.tool_pose import Pose
 
 _REACHES_MM = 1e-6
@@ -44,6 +45,8 @@ class Arm:
     inputs: tuple[Input, ...] = field(default=(), metadata=json_codec.ADDED)
     postures: tuple[ArmPosture, ...] = field(default=(), metadata=json_codec.ADDED)
     """In the order of the file; the board knows nothing of them."""
+    room: ArmRoom | None = field(default=None, metadata=json_codec.ADDED)
+    """Where it may move; the board knows nothing of it."""
     homing: tuple[tuple[str, ...], ...] = field(default=(), metadata=json_codec.ADDED)
     """Names of the joints that are homed first, together those of an entry; the others follow one by one."""
 
@@ -115,9 +118,10 @@ class Arm:
         board = top.choice("board", tuple(boards.BOARDS), boards.DEFAULT)
         outputs, inputs = outputs_file.outputs(top), outputs_file.inputs(top)
         postures = top.table("posture")
+        around = room.read(top.table("room"))
         homing = parts_file.homing(top, [joint.name for joint in joints])
         top.done()
-        arm = cls(name, joints, driver, safety, top.file, board, outputs, inputs, homing=homing)
+        arm = cls(name, joints, driver, safety, top.file, board, outputs, inputs, room=around, homing=homing)
         if not postures:
             return arm
         return replace(arm, postures=tuple(read_posture(postures, name, arm) for name in postures.names()))

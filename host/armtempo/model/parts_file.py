@@ -109,6 +109,7 @@ def joint(table: Table, number: int) -> Joint:
         switches=_switches(table.table("switches")),
         model=_model(table.table("model")),
         parallel_linkage=linkage,
+        radius_mm=table.number("radius_mm", 0.0, least=0.0, most=MAX_LENGTH_MM),
     )
     table.done()
     return found

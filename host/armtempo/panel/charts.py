@@ -21,10 +21,9 @@ class CurveChart:
     def __init__(self, arm: Arm, title: str, order: int) -> None:
         self._arm, self._order = arm, order
         options = {
-            "title": {"text": title, "left": 0, "textStyle": {"fontSize": 13}},
             "animation": False,
-            "grid": {"left": 55, "right": 15, "top": 50, "bottom": 25},
-            "legend": {"top": 20, "left": 50},
+            "grid": {"left": 55, "right": 15, "top": 30, "bottom": 25},
+            "legend": {"top": 2, "right": 5},
             "tooltip": {"trigger": "axis"},
             "xAxis": {
                 "type": "value",
@@ -35,6 +34,7 @@ class CurveChart:
             "yAxis": {"type": "value", "scale": True, "splitLine": _GRID},
             "series": [],
         }
+        ui.label(title).classes("text-caption")
         self.chart = ui.echart(options, renderer="svg").classes("armtempo-chart")
 
     def show(self, times_s: Array, values: Array, reference: Array | None = None) -> None:

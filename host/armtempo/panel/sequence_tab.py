@@ -122,9 +122,12 @@ class SequenceTab:
 
         def run() -> None:
             plan = self._planned()
+            board = operator.board
             operator.take_sequence(
-                operator.board.run_sequence(plan, operator.take_sequence, replace=True, out=operator.runs)
+                board.run_sequence(plan, operator.take_sequence, replace=True, out=operator.runs)
             )
+            if (recorded := board.last_sequence) is not None:
+                pipeline.report(recorded)
 
         self._page.do(words.RUN, run)
 

@@ -16,7 +16,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.model.tool_pose import Pose
-from armtempo.planning import checks, through_plan
+from armtempo.planning import checks, room_check, through_plan
 from armtempo.planning.free import free_plan
 from armtempo.splines import extremes
 
@@ -43,6 +43,7 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     checks.check_time(trajectory)
     reached = extremes.of_joints(trajectory.joints)
     checks.check_reached(arm, reached)
+    room_check.check(arm, trajectory, np.array([each.speed_deg_s for each in reached]), through=True)
     return Plan(arm, job, via, (*notes, *planned.notes), trajectory, planned.searches, reached, versions())
 
 

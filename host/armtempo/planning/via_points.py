@@ -126,7 +126,7 @@ def resolve(arm: Arm, job: Job) -> Resolved:
         postures.append(posture)
         if setup.closed_form:
             before, branch = branch, _branch(setup, posture, branch)
-            if before and Pose in (type(via), type(job.via[number - 1])):
+            if before and number not in led and Pose in (type(via), type(job.via[number - 1])):
                 notes += _branch_note(before, branch, choice, number)
     return Resolved(np.degrees(np.array(postures)[:, setup.driven]), tuple(notes))
 

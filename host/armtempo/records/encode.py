@@ -21,7 +21,7 @@ from armtempo.planning.brake_time import BrakeTimes
 from armtempo.records import output_rows
 from armtempo.splines.trajectory import Trajectory
 
-_NOT_IDENTITY = ("name", "range_deg", "home_deg", "limits", "model")
+_NOT_IDENTITY = ("name", "range_deg", "home_deg", "limits", "model", "radius_mm")
 """Of a joint: what may change while it stays where it is. (Driver and safety have fields of their own.)"""
 _TICKS_PER_US = limits.TICK_HZ / 1e6
 

@@ -10,6 +10,7 @@ from armtempo.basics.arrays import Array
 from armtempo.kinematics import Geometry, all_frames, forward
 from armtempo.kinematics.chain import outline_mm
 from armtempo.model.arm import Arm
+from armtempo.model.room import FAR_MM, ArmRoom
 from armtempo.report.plots import new_figure
 
 if TYPE_CHECKING:
@@ -49,11 +50,28 @@ def arm_picture(arm: Arm) -> Figure:
 def _home(axis: Axes, arm: Arm, title: str, seen: tuple[int, int], size: float) -> None:
     """The home posture; ``seen``: which of x, y, z go to the right and up."""
     _draw(axis, arm, np.array(arm.all_home_deg), np.eye(3)[list(seen)], HOME, size)
+    _draw_room(axis, arm, seen)
     if seen[1] == 2:
         axis.axhline(0.0, color=GROUND, linewidth=0.8, zorder=0)
     axis.set_xlabel(f"{'xyz'[seen[0]]} (mm)")
     axis.set_ylabel(f"{'xyz'[seen[1]]} (mm)")
     _frame(axis, title)
+
+
+def _draw_room(axis: Axes, arm: Arm, seen: tuple[int, int]) -> None:
+    """The boxes to keep out of, and the walls as lines."""
+    from matplotlib.patches import Rectangle
+
+    room = arm.room or ArmRoom()
+    for box in room.keep_out:
+        low, high = np.array(box.low_mm)[list(seen)], np.array(box.high_mm)[list(seen)]
+        axis.add_patch(Rectangle(tuple(low), *(high - low), color=HIGH, alpha=0.25, zorder=0))
+        axis.update_datalim([low, high])
+        axis.annotate(box.name, tuple(low), fontsize=7, color=HIGH)
+    for place, draw in zip(seen, (axis.axvline, axis.axhline), strict=True):
+        for end in (room.low_mm[place], room.high_mm[place]):
+            if abs(end) < FAR_MM:
+                draw(end, color=HIGH, linewidth=1.0, zorder=0)
 
 
 def _joint(axis: Axes, arm: Arm, index: int, size: float) -> None:

@@ -1,8 +1,9 @@
-"""Plans and runs in a few lines of text."""
+"""Plans and runs in a few lines of text; plans as JSON values too, with units in the keys."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 from armtempo_shared import motion
 from armtempo_shared.limits import MAX_MOTION_BYTES
@@ -12,7 +13,7 @@ from armtempo.formats.text_table import aligned
 from armtempo.model.job import AUTO, GRADIENT
 from armtempo.model.plan import Plan, Search
 from armtempo.planning import checks, path_deviation
-from armtempo.runs.results import JointResult
+from armtempo.runs.replayed import JointResult
 
 _HEAD = (
     ("joint", "time", "floor", "over", "speed", "acceleration", "jerk"),
@@ -128,3 +129,32 @@ def _separation(plan: Plan) -> list[str]:
         apart,
         f'so the tool strays up to {stray:.1f} mm from its path; timing = "shared" keeps it there',
     ]
+
+
+_QUANTITIES = ("speed_deg_s", "acceleration_deg_s2", "jerk_deg_s3")
+
+
+def values(plan: Plan) -> dict[str, Any]:
+    """Motion time, and of each driven joint its time, lower bound, extremes and limits."""
+    return {
+        "name": plan.job.name,
+        "arm": plan.arm.name,
+        "duration_s": plan.trajectory.duration_s,
+        "timing": plan.job.timing,
+        "seed": plan.job.seed,
+        "record_bytes": record_bytes(plan),
+        "joints": [_joint_values(plan, joint) for joint in range(len(plan.extremes))],
+        "notes": list(plan.notes),
+    }
+
+
+def _joint_values(plan: Plan, joint: int) -> dict[str, Any]:
+    driven = plan.arm.driven[joint]
+    floors = [search.floor_s for search in plan.searches if joint in search.joints]
+    return {
+        "name": driven.name,
+        "duration_s": plan.trajectory.joints[joint].duration_s,
+        "floor_s": floors[0] if floors else None,
+        "extremes": dict(zip(_QUANTITIES, map(float, plan.extremes[joint].values), strict=True)),
+        "limits": dict(zip(_QUANTITIES, driven.limits.values, strict=True)),
+    }

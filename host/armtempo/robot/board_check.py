@@ -44,4 +44,4 @@ def _room(state: BoardState) -> Finding:
     text = f"{state.free_heap} bytes of heap, {state.free_flash} of flash"
     if state.free_heap >= _LEAST_HEAP:
         return good("free", text)
-    return note("free", text, "a firmware that has the program: see 'armtempo firmware --help'")
+    return note("free", text, "a firmware that has the program: 'armtempo flash'")

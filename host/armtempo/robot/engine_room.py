@@ -50,7 +50,7 @@ class Room:
         return 0
 
 
-AS_FILES = Room(8_200)
+AS_FILES = Room(8_000)
 IN_FIRMWARE = Room(engine_memory.LARGEST_BYTES)
 """The program as compiled files on MicroPython's own firmware for the STM32F4DISC, and built into it.
 

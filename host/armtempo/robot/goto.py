@@ -13,7 +13,7 @@ from armtempo.basics.progress import Progress
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.model.arm import Arm
-from armtempo.planning import point_to_point
+from armtempo.planning import point_to_point, room_check
 from armtempo.records import encoded_motion
 from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.robot import arm_state
@@ -43,7 +43,7 @@ def go_to(
     """Move straight to a posture (J,); nothing happens if it is there.
 
     Raises LinkError where the position is unknown, BoardError where the board refuses or a fault ends the move,
-    PlanError where the tool cannot go there in a line.
+    PlanError where the arm would leave its room, or the tool cannot go there in a line.
     """
     if not arm_state.is_at(client, arm, target_deg):
         here = arm_state.posture_deg(client, arm)
@@ -55,7 +55,9 @@ def motion(arm: Arm, here_deg: Array, target_deg: Array, pace: MovePace) -> Traj
     """The motion from one posture (J,) to another; errors as in ``go_to``."""
     name = TEMPORARY + "goto"
     if not pace.line:
-        return point_to_point.straight(name, here_deg, target_deg, arm, pace.speed)
+        found = point_to_point.straight(name, here_deg, target_deg, arm, pace.speed)
+        room_check.check(arm, found)
+        return found
     from armtempo.planning.line import line_move  # here, because it loads the whole planner
 
     target = point_to_point.posture(target_deg, arm)

@@ -13,7 +13,7 @@ from armtempo.basics.arguments import checked
 from armtempo.model.plan import Plan
 from armtempo.report import run_report
 from armtempo.runs import reader, replayed
-from armtempo.runs.results import JointResult, results
+from armtempo.runs.replayed import JointResult, results
 from armtempo.runs.run_folder import COMPLETE, Repetition
 from armtempo.splines.trajectory import Trajectory
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from armtempo_shared import sequence, wire
-from armtempo_shared.sequence import SequenceData, SequenceError
+from armtempo_shared.sequence import ACTIVE, FAULT_THEN, NEXT_THEN, SequenceData, SequenceError
 
 from armtempo.basics.errors import InputError
 from armtempo.link import Client
@@ -16,7 +16,7 @@ from armtempo.link.board_messages import Event, RowBegun, Sample, SequenceState
 from armtempo.model import arm_json
 from armtempo.model.arm import Arm
 from armtempo.model.sequence_plan import SequencePlan
-from armtempo.records import encoded_sequence, sequence_words
+from armtempo.records import encoded_sequence
 from armtempo.runs import run_folder, sequence_folder
 from armtempo.runs.sequence_folder import SequenceFolder
 
@@ -53,7 +53,7 @@ class SequenceContent:
         if self.plan is not None:
             return tuple(row.words for row in self.plan.rows)
         names = [output.name for output in self.arm.outputs], [one.name for one in self.arm.inputs]
-        return sequence_words.of_record(self.record, *names)
+        return row_words(self.record, *names)
 
 
 def of_plan(plan: SequencePlan) -> SequenceContent:
@@ -130,3 +130,33 @@ class _FolderRecorder(Recorder):
     def end(self, state: SequenceState) -> None:
         code = wire.ERRORS[state.code][0] if state.code in wire.ERRORS else str(state.code or "")
         self._folder.end(state, code, self._client.counters())
+
+
+_THEN = {NEXT_THEN: "next", FAULT_THEN: "fault"}
+
+
+def row_words(record: SequenceData, outputs: Sequence[str], inputs: Sequence[str]) -> tuple[str, ...]:
+    """One text a row; ``outputs``, ``inputs``: their names by their number, as the arm has them."""
+    return tuple(_words(record, record.row(index), outputs, inputs) for index in range(record.rows))
+
+
+def _words(record: SequenceData, row: tuple[int, ...], outputs: Sequence[str], inputs: Sequence[str]) -> str:
+    op, number, value, amount, _ = row
+    if op == sequence.MOVE:
+        return f"run {record.motion(number)[0]}"
+    if op == sequence.OUTPUT:
+        return f"output {_name(outputs, number)} to {value} of 65535"
+    if op == sequence.WAIT:
+        return f"wait {amount / 1000:g} s"
+    if op == sequence.WAIT_INPUT:
+        limit = f", at most {amount / 1000:g} s, then {_THEN.get(value & ~ACTIVE, 'stop')}" if amount else ""
+        return f"wait for input {_name(inputs, number)}{'' if value & ACTIVE else ' not'}{limit}"
+    if op == sequence.REPEAT:
+        return f"repeat {amount} times" if amount else "repeat for ever"
+    if op == sequence.COUNT:
+        return f"count {record.counter(number).decode(errors='replace')}"
+    return "end of repeat"
+
+
+def _name(names: Sequence[str], number: int) -> str:
+    return names[number] if number < len(names) else str(number + 1)

@@ -1,6 +1,8 @@
-"""What a run folder says was replayed: the plan, else the motion that the board had; and the arm."""
+"""What a run folder says was replayed: the plan, else the motion that the board had; the arm; how each joint ended."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 from armtempo.basics.errors import InputError, RunFolderError
 from armtempo.formats.atomic_file import why
@@ -39,3 +41,31 @@ def arm_of(run: RunData) -> Arm | None:
     """The arm of a motion without a plan; None where the folder does not say. InputError where it is damaged."""
     path = run.path / ARM
     return arm_json.load(path) if path.is_file() else None
+
+
+@dataclass(frozen=True)
+class JointResult:
+    """How one joint ended."""
+
+    name: str
+    steps_sent: int
+    """Step pulses from start to end, signed."""
+    angle_deg: float
+    """Where it ended: by its encoder, without one by the steps."""
+    error_deg: float
+    """That less where the trajectory ends."""
+
+
+def results(run: RunData, trajectory: Trajectory) -> tuple[JointResult, ...]:
+    """The joints of the last repetition; empty where run.json does not say how that ended."""
+    last = run.entries[-1] if run.entries else None
+    steps, counts = (last.commanded_steps, last.counts) if last else ((), ())
+    start_deg, end_deg = trajectory(0.0), trajectory(trajectory.duration_s)
+    found = []
+    for joint, scale in enumerate(run.joints[: len(steps)]):
+        angle_deg = steps[joint] / scale.steps_per_deg
+        if scale.counts_per_deg:
+            angle_deg = counts[joint] / scale.counts_per_deg
+        sent = steps[joint] - round(start_deg[joint] * scale.steps_per_deg)
+        found.append(JointResult(scale.name, sent, angle_deg, float(angle_deg - end_deg[joint])))
+    return tuple(found)

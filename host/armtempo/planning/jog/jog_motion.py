@@ -11,9 +11,12 @@ import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, PlanError
+from armtempo.kinematics.chain import all_angles_deg
+from armtempo.kinematics.forward import forward
+from armtempo.kinematics.geometry import Geometry
 from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint
-from armtempo.planning import brake_time, point_to_point
+from armtempo.planning import brake_time, point_to_point, room_check
 from armtempo.planning.brake_time import BrakeTimes
 from armtempo.planning.jog import jog_law
 from armtempo.planning.jog.jog_law import DEGREE, WayLaw, WayLimits
@@ -33,6 +36,8 @@ LINE_PARTS = (8, 16, 32, 64)
 _SHORTER = 0.98
 _TRIES = 6
 _INSIDE_STEPS = 1e-6
+_SHORTENED, _NEARER = 8, 0.9
+"""A jog that would leave the room is made shorter so often, each time to this part of the way to where it would."""
 
 
 @dataclass(frozen=True)
@@ -97,8 +102,8 @@ def move_of(
 def plan(name: str, arm: Arm, here_deg: Sequence[float], move: JogMove, speed: float = SPEED) -> JogMotion:
     """The jog from rest at ``here_deg`` (J,), at ``speed`` of the arm's speed limits.
 
-    It ends at the end of a range at the latest, and a line of the tool where the arm cannot follow it. Raises
-    InputError for a move that is none, or where there is no way to go.
+    It ends at the end of a range at the latest, before it would leave the arm's room, and a line of the tool where the
+    arm cannot follow it. Raises InputError for a move that is none, or where there is no way to go.
     """
     start = np.array(here_deg, dtype=float)
     if not SLOWEST <= speed <= 1.0:
@@ -109,14 +114,38 @@ def plan(name: str, arm: Arm, here_deg: Sequence[float], move: JogMove, speed: f
         raise InputError("a jog by 0 moves nothing", "say how far, in degrees or mm")
     if (move.joint is None) == (not move.axis):
         raise InputError("a jog moves a joint or the tool, one of both", "name a joint, or an axis")
-    found = (
-        _joint(name, arm, start, move, speed)
-        if move.joint is not None
-        else _tool(name, arm, start, move, speed)
-    )
-    trajectory, ends = found
+    trajectory, ends = _in_room(name, arm, start, move, speed)
     limits = [joint.limits for joint in arm.driven]
     return JogMotion(trajectory, brake_time.of_motion(trajectory, limits), ends)
+
+
+def _in_room(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tuple[Trajectory, str]:
+    """The jog as far as the arm stays in its room, and why it ends before it was to."""
+    why = ""
+    for _ in range(_SHORTENED):
+        way = _joint if move.joint is not None else _tool
+        trajectory, ends = way(name, arm, start, move, speed)
+        touch = room_check.touch_of(arm, trajectory)
+        if touch is None:
+            return trajectory, why or ends
+        why = f"{touch.link} would touch {touch.other}"
+        part = _NEARER * _passed(arm, trajectory, touch.time_s, move)
+        if part <= 0.0:
+            break
+        move = replace(move, by=math.copysign(part, move.by))
+    raise InputError(f"the arm cannot jog that way: {why}", "jog it the other way, or another joint")
+
+
+def _passed(arm: Arm, trajectory: Trajectory, time_s: float, move: JogMove) -> float:
+    """How far a jog has come at a time, in its unit."""
+    first, there = trajectory(np.array([0.0, time_s]))
+    if move.joint is not None:
+        return float(abs(there[move.joint] - first[move.joint]))
+    poses = forward(Geometry.of(arm), np.radians(all_angles_deg(arm, np.stack([first, there]))))
+    if not move.about:
+        return float(np.linalg.norm(poses[1, :3, 3] - poses[0, :3, 3]))
+    cosine = 0.5 * (np.trace(poses[0, :3, :3].T @ poses[1, :3, :3]) - 1.0)
+    return math.degrees(math.acos(min(1.0, max(-1.0, cosine))))
 
 
 def number_of_joint(arm: Arm, joint: int | str) -> int:

@@ -85,19 +85,23 @@ class Followed:
         return angles
 
 
-def follow(course: Course, start_deg: Array) -> Followed:
+def follow(course: Course, start_deg: Array, end_deg: Array | None = None) -> Followed:
     """The postures from ``start_deg`` (J,) on, which is at its start.
 
-    Raises PlanError, naming the place, where a joint leaves its range or cannot follow.
+    An arm that can take many postures at a place goes over evenly to ``end_deg``, where that is given. Raises
+    PlanError, naming the place, where a joint leaves its range or cannot follow.
     """
     tool = Tool(course.arm, list(range(len(course.arm.driven))), start_deg)
     length, step = course.path.length, 1.0 / STEPS
+    evenly = end_deg is not None and _is_loose(course, tool)
     places, postures = [0.0], [np.asarray(start_deg, dtype=float)]
     while places[-1] < 1.0:
         step = min(step, 1.0 - places[-1])
         place = places[-1] + step if 1.0 - places[-1] - step > 1e-9 else 1.0
         ways = np.array([place * length])
         near = _ahead(places, postures, place)
+        if evenly and end_deg is not None:
+            near = postures[0] + place * (end_deg - postures[0])
         angles, missed = _corrected(course, tool, ways, near[None])
         if missed[0] <= _ON_IT and np.max(np.abs(angles[0] - postures[-1])) <= _MOST_STEP_DEG:
             _check_range(course, float(ways[0]), angles[0])

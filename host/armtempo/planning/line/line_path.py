@@ -91,7 +91,8 @@ def led_stretches(arm: Arm, job: Job, via_deg: Array) -> dict[int, Led]:
 
 
 def _followed(arm: Arm, job: Job, stretch: Stretch, via_deg: Array) -> Followed:
-    found = follow(cut.course(arm, job, stretch, via_deg[stretch.first]), via_deg[stretch.first])
+    first_deg, last_deg = via_deg[stretch.first], via_deg[stretch.last]
+    found = follow(cut.course(arm, job, stretch, first_deg), first_deg, last_deg)
     off = np.abs(found.end_deg - via_deg[stretch.last])
     worst = int(np.argmax(off))
     if off[worst] > _SAME_DEG:

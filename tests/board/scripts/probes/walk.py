@@ -1,8 +1,8 @@
 """Check motion records and walk every joint of them; runs on all interpreters.
 
-Arguments: pulse ticks, gap ticks, room, start and length of braking in ticks (0 0: none), then records. Prints
-what the check says of each, and writes its steps beside it (.steps), little endian int32 each: joint,
-direction, time of it or of the one before in 1024 ticks, rising edge, falling edge.
+Arguments: pulse ticks, gap ticks, room, start and length of braking in ticks (0 0: none; the length whole
+in RAMP_UNIT_TICKS), then records. Prints what the check says of each, and writes its steps next to it (.steps), little
+endian int32 each: joint, direction, time of it or of the one before in 1024 ticks, rising edge, falling edge.
 """
 
 import struct
@@ -18,13 +18,25 @@ from armtempo_board.motion import rate_check
 from armtempo_board.stepgen.override import Override
 from armtempo_board.stepgen.step_generator import StepGenerator
 from armtempo_shared import engine_memory
-from armtempo_shared.motion import Motion
+from armtempo_shared.motion import RAMP_UNIT_TICKS, Motion
 
 MASK = 1023
 OVERRIDE = Override()
 NEVER = 1 << 28
 checking.MAX_STEP_RATE = 333_000  # the evaluator is tried beyond what the program's loop keeps up with
 rate_check.MAX_STEP_RATE_SUM = 1_000_000
+
+
+class SameRamps:
+    """A motion, as far as ``Override`` asks one, whose ramps all last as long."""
+
+    def __init__(self, ticks):
+        self._units = ticks // RAMP_UNIT_TICKS
+
+    def ramp_units(self, _at, _parts, _to_rest):
+        return self._units
+
+
 FREE = {"min_steps": -50000000, "max_steps": 50000000, "max_rate": 336330}
 
 
@@ -36,7 +48,7 @@ def walk(motion, joint, generator, out, pulse, gap, room, start, length):
     generator.load(motion, joint, first_position(motion, joint), pulse, gap)
     head = 0
     braked = not length
-    OVERRIDE.begin(1000, length, 1 << 38)
+    OVERRIDE.begin(1000, SameRamps(length), 1 << 38)
     start_kiticks = start >> 10
     lock, unlock = heap_lock, heap_unlock
     while generator.waits() or not generator.ended:

@@ -246,7 +246,7 @@ def case_compiled_files_refuse_it(world):  # compiled
     crc = store(THERE_AND_BACK)
     yield from world.home(HOME)
     refused = yield from world.refused("start", (0, crc), "seq")
-    assert refused == "no_sequence_room" and not watch.leads
+    assert refused == "needs_firmware" and not watch.leads
     name, crc = MOTIONS[LEGS[0, 1]]
     yield from world.ask("start", (0, crc), name)
     yield from world.still()

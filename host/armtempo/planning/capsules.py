@@ -1,0 +1,72 @@
+"""Distances of line segments from boxes and from each other, exactly, for many at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from armtempo.basics.arrays import Array
+
+
+def box_distance(start: Array, end: Array, low: Sequence[float], high: Sequence[float]) -> Array:
+    """Distance of segments (N, 3) to (N, 3) from a box: (N,); negative where it is inside.
+
+    Along a segment the squared distance is convex, and a parabola between the places where it crosses the plane of a
+    face, so its least is at a crossing or an apex. Inside, minus the way out at the deepest of these places counts.
+    """
+    way = end - start
+    ends = np.array([low, high], dtype=float)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        crossings = (ends[None] - start[:, None]) / way[:, None]
+    crossings = np.where(np.isfinite(crossings), crossings, 0.0).reshape(len(start), 6)
+    bounds = np.sort(
+        np.clip(np.column_stack([crossings, np.zeros(len(start)), np.ones(len(start))]), 0.0, 1.0)
+    )
+    middle = 0.5 * (bounds[:, 1:] + bounds[:, :-1])
+    points = start[:, None] + middle[:, :, None] * way[:, None]
+    face = np.where(points < ends[0], ends[0], np.where(points > ends[1], ends[1], np.nan))
+    outside = np.isfinite(face)
+    gap = np.where(outside, start[:, None] - np.where(outside, face, 0.0), 0.0)
+    slope = np.where(outside, way[:, None], 0.0)
+    square = np.sum(slope**2, axis=2)
+    apex = np.divide(-np.sum(gap * slope, axis=2), square, out=middle.copy(), where=square > 0.0)
+    apex = np.clip(apex, bounds[:, :-1], bounds[:, 1:])
+    places = np.concatenate([bounds, apex], axis=1)
+    points = start[:, None] + places[:, :, None] * way[:, None]
+    beyond = np.maximum(np.maximum(ends[0] - points, points - ends[1]), -np.inf)
+    away = np.linalg.norm(np.maximum(beyond, 0.0), axis=2)
+    inside = np.minimum(beyond.max(axis=2), 0.0)
+    return np.asarray((away + inside).min(axis=1))
+
+
+def segment_distance(start: Array, end: Array, other_start: Array, other_end: Array) -> Array:
+    """Distance between segments, all (N, 3): (N,)."""
+    best = np.full(len(start), np.inf)
+    way, other = end - start, other_end - other_start
+    gap = start - other_start
+    a, b, c = (np.sum(one * two, axis=1) for one, two in ((way, way), (way, other), (other, other)))
+    d, e = np.sum(way * gap, axis=1), np.sum(other * gap, axis=1)
+    determinant = a * c - b * b
+    inner = determinant > 1e-12 * np.maximum(a * c, 1e-300)
+    s = np.divide(b * e - c * d, determinant, out=np.zeros_like(a), where=inner)
+    t = np.divide(a * e - b * d, determinant, out=np.zeros_like(a), where=inner)
+    inner &= (s >= 0.0) & (s <= 1.0) & (t >= 0.0) & (t <= 1.0)
+    apart = np.linalg.norm(gap + s[:, None] * way - t[:, None] * other, axis=1)
+    best = np.where(inner, apart, best)
+    for point, base, along in (
+        (start, other_start, other),
+        (end, other_start, other),
+        (other_start, start, way),
+        (other_end, start, way),
+    ):
+        best = np.minimum(best, _point_distance(point, base, along))
+    return np.asarray(best)
+
+
+def _point_distance(point: Array, start: Array, way: Array) -> Array:
+    """Distance of points (N, 3) from segments: (N,)."""
+    square = np.sum(way**2, axis=1)
+    part = np.sum((point - start) * way, axis=1)
+    part = np.clip(np.divide(part, square, out=np.zeros_like(part), where=square > 0.0), 0.0, 1.0)
+    return np.asarray(np.linalg.norm(point - start - part[:, None] * way, axis=1))

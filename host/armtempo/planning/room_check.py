@@ -1,0 +1,227 @@
+"""Whether an arm keeps to its room over a whole motion, proven: its links are capsules that touch nothing.
+
+At a time in the middle of a stretch the distances of all links from all obstacles, and from each other, are computed
+exactly. Until either end of the stretch no point of a link moves farther than the speeds of the joints before it times
+their reach to it, times half the stretch. Where that might touch something, the stretch is halved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import PlanError
+from armtempo.basics.progress import alive
+from armtempo.kinematics.chain import all_angles_deg, outline_mm
+from armtempo.kinematics.geometry import Geometry
+from armtempo.model.arm import Arm
+from armtempo.model.room import ArmRoom, KeepOut
+from armtempo.planning.capsules import box_distance, segment_distance
+from armtempo.splines import extremes
+from armtempo.splines.trajectory import Trajectory
+
+_STRETCH_S = 0.25
+"""Stretches of time at first."""
+_CLOSE_MM = 0.01
+"""What comes nearer than this counts as touching: nearer, the proof gives up."""
+_MOST = 4000
+"""Stretches looked at at once."""
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Two things that touch."""
+
+    link: str
+    other: str
+    """The obstacle, or another link."""
+    depth_mm: float
+    time_s: float
+
+    @property
+    def words(self) -> str:
+        """What touches what."""
+        depth = f"is {self.depth_mm:.1f} mm inside of" if self.depth_mm > _CLOSE_MM else "touches"
+        return f"{self.link} {depth} {self.other}"
+
+
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """The links of an arm: two segments for each row of the table, along its d and its a."""
+
+    arm: Arm
+
+    @cached_property
+    def obstacles(self) -> tuple[KeepOut, ...]:
+        """Boxes and walls."""
+        return (self.arm.room or ArmRoom()).obstacles
+
+    @cached_property
+    def names(self) -> list[str]:
+        """Of each segment, (2 joints,)."""
+        return [f"the link of {joint.name}" for joint in self.arm.joints for _ in range(2)]
+
+    @cached_property
+    def radius_mm(self) -> Array:
+        """Of each segment, (2 joints,)."""
+        return np.repeat([joint.radius_mm for joint in self.arm.joints], 2)
+
+    @cached_property
+    def turned(self) -> Array:
+        """Degrees that each row turns by at most for a degree of each driven joint: (joints, J)."""
+        identity = np.eye(len(self.arm.joints))[:, list(self.arm.driven_indices)]
+        return np.asarray(np.abs(np.array(Geometry.of(self.arm).turns(list(identity)))))
+
+    @cached_property
+    def reach_mm(self) -> Array:
+        """How far a segment is from the axis of a row at most, (2 joints, joints); 0 where that does not move it."""
+        lengths = np.array([(abs(joint.d_mm), abs(joint.a_mm)) for joint in self.arm.joints]).ravel()
+        found = np.zeros((len(lengths), len(self.arm.joints)))
+        for segment in range(len(lengths)):
+            for row in range(len(self.arm.joints)):
+                if segment > 2 * row:  # the d of a row is its own axis
+                    found[segment, row] = lengths[2 * row + 1 : segment + 1].sum()
+        return found
+
+    @cached_property
+    def moves(self) -> NDArray[np.intp]:
+        """Segments that some joint moves."""
+        return np.flatnonzero((self.reach_mm @ self.turned).any(axis=1))
+
+    @cached_property
+    def pairs(self) -> list[tuple[int, int]]:
+        """Segments that must not touch each other: at least two rows apart, both thick, and apart at home."""
+        if not self.radius_mm.any():
+            return []
+        found = []
+        home = outline_mm(self.arm, np.array(self.arm.all_home_deg, dtype=float))[None]
+        for one in range(len(self.radius_mm)):
+            for other in range(one + 1, len(self.radius_mm)):
+                between = self.turned[one // 2 + 1 : other // 2 + 1].any()
+                if other // 2 - one // 2 < 2 or not between or not self.radius_mm[[one, other]].all():
+                    continue
+                apart = segment_distance(home[:, one], home[:, one + 1], home[:, other], home[:, other + 1])[
+                    0
+                ]
+                if apart > self.radius_mm[one] + self.radius_mm[other]:
+                    found.append((one, other))
+        return found
+
+    def distances(self, driven_deg: Array) -> Array:
+        """Of postures (N, J): moving segments from obstacles, then pairs from each other; less their radii, (N, M)."""
+        points = outline_mm(self.arm, all_angles_deg(self.arm, driven_deg))
+        found = [
+            box_distance(points[:, segment], points[:, segment + 1], box.low_mm, box.high_mm)
+            - self.radius_mm[segment]
+            for segment in self.moves
+            for box in self.obstacles
+        ]
+        for one, other in self.pairs:
+            apart = segment_distance(
+                points[:, one], points[:, one + 1], points[:, other], points[:, other + 1]
+            )
+            found.append(apart - self.radius_mm[one] - self.radius_mm[other])
+        return np.stack(found, axis=1)
+
+    @cached_property
+    def named(self) -> list[tuple[str, str]]:
+        """What each of the distances is between."""
+        found = [(self.names[segment], box.name) for segment in self.moves for box in self.obstacles]
+        return found + [(self.names[one], self.names[other]) for one, other in self.pairs]
+
+    def speeds_mm_s(self, speeds_deg_s: Array) -> Array:
+        """How fast each of the distances can shrink at speeds of the driven joints, (J,): (M,)."""
+        rows = self.turned @ np.radians(speeds_deg_s)
+        found = [float(self.reach_mm[segment] @ rows) for segment in self.moves for _ in self.obstacles]
+        for one, other in self.pairs:  # seen from the first, only the rows behind it move the other
+            after = np.arange(len(rows)) >= one // 2 + one % 2
+            found.append(float(self.reach_mm[other, after] @ rows[after]))
+        return np.array(found)
+
+
+def has_room(arm: Arm) -> bool:
+    """Whether there is anything that the arm may touch."""
+    return bool(arm.room and arm.room.obstacles) or sum(joint.radius_mm > 0.0 for joint in arm.joints) > 1
+
+
+def posture_touches(arm: Arm, driven_deg: Iterable[float]) -> list[Touch]:
+    """All that touches at a posture (J,)."""
+    bodies = Bodies(arm)
+    if not bodies.named:
+        return []
+    distances = bodies.distances(np.array([list(driven_deg)], dtype=float))[0]
+    return [
+        Touch(*bodies.named[number], -float(distances[number]), 0.0)
+        for number in np.flatnonzero(distances < _CLOSE_MM)
+    ]
+
+
+def first_touch(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array) -> Touch | None:
+    """What touches in a motion, None where it is proven that nothing does.
+
+    ``speeds_deg_s``: the joints' largest speeds in it, (J,). What touches at its start already may stay as deep: so an
+    arm can be moved out.
+    """
+    bodies = Bodies(arm)
+    if not bodies.named:
+        return None
+    start = bodies.distances(trajectory(np.zeros(1)))[0]
+    allowed = np.minimum(start - 2.0 * _CLOSE_MM, 0.0)
+    shrink = bodies.speeds_mm_s(speeds_deg_s)
+    count = max(1, int(np.ceil(trajectory.duration_s / _STRETCH_S)))
+    half = 0.5 * trajectory.duration_s / count
+    middles = half * (2.0 * np.arange(count) + 1.0)
+    touch = None
+    while len(middles):
+        alive()
+        still_open = []
+        for first in range(0, len(middles), _MOST):
+            part = middles[first : first + _MOST]
+            distances = bodies.distances(trajectory(part)) - allowed
+            clear = distances - half * shrink
+            close = distances < _CLOSE_MM
+            for number in np.flatnonzero(close.any(axis=1))[:1]:
+                what = int(np.argmin(distances[number]))
+                depth = -float(distances[number, what] + allowed[what])
+                found = Touch(*bodies.named[what], depth, float(part[number]))
+                touch = found if touch is None or found.time_s < touch.time_s else touch
+            still_open.append(part[(clear <= 0.0).any(axis=1) & ~close.any(axis=1)])
+        left = np.concatenate(still_open)
+        if touch is not None:
+            return touch
+        half *= 0.5
+        middles = np.sort(np.concatenate([left - half, left + half]))
+    return None
+
+
+def touch_of(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array | None = None) -> Touch | None:
+    """The same as ``first_touch``, at once for arms without a room, and for speeds that are not known yet."""
+    if not has_room(arm):
+        return None
+    if speeds_deg_s is None:
+        speeds_deg_s = np.array([each.speed_deg_s for each in extremes.of_joints(trajectory.joints)])
+    return first_touch(arm, trajectory, speeds_deg_s)
+
+
+def check(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array | None = None, through: bool = False) -> None:
+    """Raises PlanError where a motion leaves the room, naming what touches what, and when.
+
+    ``speeds_deg_s``: as for ``first_touch``, where they are known; ``through``: the message names via points too.
+    """
+    touch = touch_of(arm, trajectory, speeds_deg_s)
+    if touch is None:
+        return
+    via_times_s = trajectory.joints[0].via_times_s if through else ()
+    place = f"at {touch.time_s:.2f} s"
+    if len(via_times_s) > 2:
+        after = int(np.clip(np.searchsorted(via_times_s, touch.time_s), 1, len(via_times_s) - 1))
+        place += f", between P{after - 1} and P{after}"
+    raise PlanError(
+        f"{trajectory.name}: {touch.words} ({place})",
+        "add or move a via point, take another branch with posture_deg, or correct [room] in the arm file",
+    )

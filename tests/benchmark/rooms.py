@@ -1,0 +1,114 @@
+"""Random motions in random rooms, held against dense samples by code of its own.
+
+    python -m tests.benchmark.rooms [--first 0] [--count 1000]
+
+Straight motions of arms that ship, links of random radii, boxes and walls. Distances are taken at 1500 times of each
+motion between points on the links and the boxes; what moves less than that between samples is allowed for. Exits with 1
+where a motion is accepted that touches, or more than 2 % are refused that do not.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import replace
+
+import numpy as np
+from armtempo.kinematics.chain import chains_mm
+from armtempo.model.arm import Arm
+from armtempo.model.room import ArmRoom, KeepOut
+from armtempo.planning import point_to_point, room_check
+from armtempo.splines.trajectory import Trajectory
+
+ARMS = ("parol6", "ar4", "thor", "community", "moveo", "scara", "paper")
+_POINTS = 41
+"""Points on a link."""
+
+
+def random_room(seed: int) -> tuple[Arm, Trajectory]:
+    """An arm in a room, and a motion from a posture that touches nothing."""
+    rng = np.random.default_rng([seed, 32])
+    for _ in range(1000):
+        name = ARMS[int(rng.integers(len(ARMS)))]
+        arm = Arm.paper() if name == "paper" else Arm.of(name)
+        low, high = np.array([joint.range_deg for joint in arm.driven]).T
+        start, end = rng.uniform(low, high, (2, len(low)))
+        reach = sum(abs(joint.d_mm) + abs(joint.a_mm) for joint in arm.joints)
+        end = start + 0.4 * (end - start)
+        boxes = []
+        for number in range(int(rng.integers(1, 4))):
+            links = chains_mm(arm, start + rng.random() * (end - start))[2:]
+            centre = links[rng.integers(len(links))] + rng.normal(0.0, 0.1, 3) * reach
+            half = rng.uniform(0.01, 0.1, 3) * reach
+            boxes.append(KeepOut(f"box {number}", tuple(centre - half), tuple(centre + half)))
+        radius = float(rng.choice([0.0, 0.01, 0.04])) * reach
+        joints = tuple(replace(joint, radius_mm=radius) for joint in arm.joints)
+        arm = replace(arm, joints=joints, room=ArmRoom(tuple(boxes)))
+        if not room_check.posture_touches(arm, start):
+            return arm, point_to_point.straight("random", start, end, arm)
+    raise AssertionError("no posture is free")
+
+
+def dense_least(arm: Arm, trajectory: Trajectory, count: int) -> float:
+    """Least distance of the links from the boxes at so many times, less the radius."""
+    driven = trajectory(np.linspace(0.0, trajectory.duration_s, count))
+    angles = np.tile([joint.home_deg for joint in arm.joints], (count, 1)).astype(float)
+    angles[:, list(arm.driven_indices)] = driven
+    pose, part = np.tile(np.eye(4), (count, 1, 1)), np.linspace(0.0, 1.0, _POINTS)
+    least, moved = np.inf, False
+    for number, joint in enumerate(arm.joints):
+        turn = angles[:, number] - (angles[:, number - 1] if joint.parallel_linkage else 0.0)
+        theta, alpha = np.radians(turn + joint.theta_offset_deg), np.radians(joint.alpha_deg)
+        c, s, zero = np.cos(theta), np.sin(theta), np.zeros(count)
+        up = pose[:, :3, 3, None] + part * joint.d_mm * pose[:, :3, 2, None]
+        out_axis = np.einsum("nij,jn->ni", pose[:, :3, :3], np.array([c, s, zero]))
+        out = up[:, :, -1:] + part * joint.a_mm * out_axis[:, :, None]
+        if moved:
+            least = min(least, _least(arm, up) - joint.radius_mm)
+        moved = moved or joint.motor is not None
+        if moved:
+            least = min(least, _least(arm, out) - joint.radius_mm)
+        across = np.einsum("nij,jn->ni", pose[:, :3, :3], np.array([-s, c, zero]))
+        z = pose[:, :3, 2].copy()
+        pose[:, :3, 0] = out_axis
+        pose[:, :3, 1] = np.cos(alpha) * across + np.sin(alpha) * z
+        pose[:, :3, 2] = np.cos(alpha) * z - np.sin(alpha) * across
+        pose[:, :3, 3] = out[:, :, -1]
+    return least
+
+
+def _least(arm: Arm, points: np.ndarray) -> float:
+    """Of points (N, 3, P) from all boxes; they count as 0 inside."""
+    found = np.inf
+    for box in (arm.room or ArmRoom()).keep_out:
+        low, high = np.array(box.low_mm)[:, None], np.array(box.high_mm)[:, None]
+        away = np.maximum(np.maximum(low - points, points - high), 0.0)
+        found = min(found, float(np.linalg.norm(away, axis=1).min()))
+    return found
+
+
+def main() -> int:
+    """Check and count."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--count", type=int, default=1000)
+    options = parser.parse_args()
+    counts = {"free": 0, "touching": 0, "touching, but accepted": 0, "refused wrongly": 0}
+    for seed in range(options.first, options.first + options.count):
+        arm, trajectory = random_room(seed)
+        touch, least = room_check.touch_of(arm, trajectory), dense_least(arm, trajectory, 1500)
+        if touch is None:
+            kind = "free" if least > 0.0 else "touching, but accepted"
+        else:
+            kind = "touching" if least < 0.1 else "refused wrongly"
+        counts[kind] += 1
+        if kind not in ("free", "touching"):
+            print(
+                f"seed {seed}: {arm.name}: {kind}, least {least:.3f} mm, {touch and touch.words}", flush=True
+            )
+    print(", ".join(f"{count} {what}" for what, count in counts.items()))
+    return int(counts["touching, but accepted"] > 0 or counts["refused wrongly"] > 0.02 * options.count)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

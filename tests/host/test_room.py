@@ -1,0 +1,176 @@
+"""The room of an arm: distances, whole motions against dense samples of their own, and what is refused in words."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from armtempo.basics.errors import InputError, PlanError
+from armtempo.diagnosis.arm_check import check_arm
+from armtempo.formats import toml_table
+from armtempo.kinematics.chain import outline_mm
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
+from armtempo.model.room import FAR_MM, ArmRoom, KeepOut, read
+from armtempo.planning import planner, point_to_point, room_check
+from armtempo.planning.capsules import box_distance, segment_distance
+from armtempo.planning.jog import jog_motion
+from armtempo.planning.jog.jog_motion import JogMove
+from armtempo.robot import goto
+
+from tests.benchmark.rooms import dense_least, random_room
+from tests.host import small_arms
+
+PAPER = Arm.paper()
+FEEDER = KeepOut("feeder", (-50.0, 150.0, -FAR_MM), (50.0, 400.0, FAR_MM))
+OVER = r"over: the link of joint . is .* mm inside of feeder \(at .* s, between P0 and P1\)"
+
+
+def thick(arm: Arm, radius_mm: float, room: ArmRoom | None) -> Arm:
+    """The arm with links of this radius in a room."""
+    return replace(arm, room=room, joints=tuple(replace(joint, radius_mm=radius_mm) for joint in arm.joints))
+
+
+def test_distances_are_exact() -> None:
+    seed = 7
+    rng = np.random.default_rng(seed)
+    ends = rng.uniform(-3.0, 3.0, (4, 40, 3))
+    part = np.linspace(0.0, 1.0, 401)[:, None, None]
+    points = ends[0] + part * (ends[1] - ends[0])
+    low, high = (-1.0, -0.5, -FAR_MM), (1.0, 1.5, 0.3)
+    outside = np.maximum(np.maximum(np.array(low) - points, points - np.array(high)), 0.0)
+    sampled = np.linalg.norm(outside, axis=2).min(axis=0)
+    found = box_distance(ends[0], ends[1], low, high)
+    assert np.all(np.maximum(found, 0.0) <= sampled + 1e-12), f"seed {seed}"
+    assert np.abs(np.maximum(found, 0.0) - sampled).max() < 0.01
+    others = ends[2] + part * (ends[3] - ends[2])
+    pairs = np.array([np.linalg.norm(points - other, axis=2).min(axis=0) for other in others[::8]]).min(
+        axis=0
+    )
+    apart = segment_distance(*ends)
+    assert np.all(apart <= pairs + 1e-12)
+    assert np.abs(apart - pairs).max() < 0.06
+
+
+def test_inside_a_box_says_how_deep() -> None:
+    start, end = np.array([[0.0, 0.0, 0.4]]), np.array([[0.0, 0.0, 3.0]])
+    assert box_distance(start, end, (-1, -1, 0), (1, 1, 1))[0] == pytest.approx(-0.5, abs=0.15)
+
+
+@pytest.mark.slow
+def test_motions_in_random_rooms_agree_with_dense_samples() -> None:
+    refused = 0
+    for seed in range(10):
+        arm, trajectory = random_room(seed)
+        touch = room_check.touch_of(arm, trajectory)
+        least = dense_least(arm, trajectory, 200)
+        refused += touch is not None
+        if touch is None:
+            assert least > 0.0, f"seed {seed}: accepted, {least:.3f} mm"
+        else:
+            assert least < 1.0, f"seed {seed}: {touch.words}, but {least:.3f} mm apart"
+    assert 0 < refused < 10
+
+
+def test_links_do_not_touch_each_other() -> None:
+    """A planar arm folds its third link towards its first: accepted where all sampled points are apart."""
+    seed, refused = 5, 0
+    rng = np.random.default_rng(seed)
+    links = (
+        small_arms.joint(0.0, 100.0, 0.0),
+        small_arms.joint(0.0, 100.0, 0.0),
+        small_arms.joint(0.0, 100.0, 0.0),
+    )
+    arm = thick(small_arms.arm("fold", *links), 10.0, None)
+    assert (1, 5) in room_check.Bodies(arm).pairs
+    for _ in range(8):
+        end = np.array([20.0, *rng.uniform(95.0, 130.0, 2)])
+        trajectory = point_to_point.straight("fold", np.zeros(3), end, arm)
+        points = outline_mm(arm, trajectory(np.linspace(0.0, trajectory.duration_s, 120)))
+        third = (
+            points[:, 4, None] + np.linspace(0.0, 1.0, 41)[:, None] * (points[:, 6] - points[:, 4])[:, None]
+        )
+        first = (
+            points[:, 1, None] + np.linspace(0.0, 1.0, 41)[:, None] * (points[:, 2] - points[:, 1])[:, None]
+        )
+        apart = np.linalg.norm(first[:, :, None] - third[:, None], axis=3).min()
+        touch = room_check.touch_of(arm, trajectory)
+        refused += touch is not None
+        assert (apart > 20.0) if touch is None else (apart < 21.0), f"seed {seed}: {apart}, {touch}"
+    assert 0 < refused < 8
+
+
+@pytest.mark.slow
+def test_a_plan_names_link_obstacle_depth_time_and_via_points() -> None:
+    job = Job("over", via_deg=[[20, -60, 40], [90, -60, 40], [160, -60, 40]], refine=1, iterations=2)
+    assert planner.plan(PAPER, job)
+    with pytest.raises(
+        PlanError, match=r"over: the link of joint . is .* mm inside of feeder \(at .* s, between P0 and P1\)"
+    ):
+        planner.plan(thick(PAPER, 20.0, ArmRoom((FEEDER,))), job)
+
+
+@pytest.mark.slow
+def test_goto_and_jog_keep_to_the_room_and_lead_out_of_it() -> None:
+    start = np.array([20.0, -60.0, 40.0])
+    arm = thick(PAPER, 20.0, ArmRoom((FEEDER,)))
+    with pytest.raises(PlanError, match="inside of feeder"):
+        goto.motion(arm, start, np.array([160.0, -60.0, 40.0]), goto.MovePace())
+    jog = jog_motion.plan("jog", arm, start, JogMove(np.inf, joint=0))
+    assert "would touch feeder" in jog.ends
+    assert room_check.touch_of(arm, jog.trajectory) is None
+    assert start[0] + 5.0 < jog.end_deg[0] < 90.0
+    inside = np.array([90.0, -60.0, 40.0])
+    assert room_check.posture_touches(arm, inside)
+    out = point_to_point.straight("out", inside, start, arm)
+    assert room_check.touch_of(arm, out) is None
+
+
+def test_check_names_postures_that_touch() -> None:
+    arm = thick(PAPER, 20.0, ArmRoom(high_mm=(FAR_MM, FAR_MM, 200.0)))
+    assert any("the ceiling" in finding.what and "home" in finding.what for finding in check_arm(arm))
+    assert not any(finding.where == "room" for finding in check_arm(PAPER))
+
+
+FILE = """
+floor_mm = 0
+x_mm = [-100, 300]
+[[keep_out]]
+name = "feeder"
+low_mm = [1, 2, 3]
+high_mm = [4, 5, 6]
+"""
+
+
+def test_a_file_says_walls_and_boxes() -> None:
+    found = read(toml_table.parse(FILE, "arm.toml"))
+    assert found is not None
+    names = [obstacle.name for obstacle in found.obstacles]
+    assert names == ["feeder", "the wall at x = -100", "the wall at x = 300", "the floor"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("[4, 5, 6]", "[4, 5, 3]", "no corners"),
+        ("[-100, 300]", "[300, -100]", "smaller first"),
+        ("floor_mm = 0", "ceiling_mm = 0\nfloor_mm = 1", "above floor_mm"),
+        ("floor_mm", "flor_mm", "unknown key"),
+    ],
+)
+def test_what_a_room_may_not_say(old: str, new: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        read(toml_table.parse(FILE.replace(old, new), "arm.toml"))
+
+
+def test_an_arm_file_has_radii_and_room(tmp_path: Path) -> None:
+    text = Path(PAPER.source).read_text(encoding="utf-8")
+    file = tmp_path / "arm.toml"
+    file.write_text(
+        text.replace("d_mm", "radius_mm = 12\nd_mm", 1) + "\n[room]\nfloor_mm = -5\n", encoding="utf-8"
+    )
+    arm = Arm.load(file)
+    assert arm.room == ArmRoom(low_mm=(-FAR_MM, -FAR_MM, -5.0))
+    assert arm.joints[0].radius_mm == 12.0

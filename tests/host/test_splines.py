@@ -1,0 +1,185 @@
+"""Splines, the time axis, trajectories."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from armtempo.basics.errors import InputError
+from armtempo.splines import bspline, time_axis
+from armtempo.splines.trajectory import JointSpline, Trajectory
+
+from tests.host.feeding import FEEDING
+
+
+@pytest.mark.parametrize("degree", [3, 5])
+@pytest.mark.parametrize("count", [2, 3, 4, 7, 60])
+def test_passes_its_points_and_starts_and_ends_at_rest(degree: int, count: int) -> None:
+    points = np.random.default_rng(count).normal(0, 100, (count, 2))
+    pieces = bspline.polynomials(bspline.fit(points, degree), degree)
+    assert pieces.shape == (count - 1, degree + 1, 2)
+    assert pieces[:, 0] == pytest.approx(points[:-1], abs=1e-11)
+    assert pieces[-1].sum(axis=0) == pytest.approx(points[-1], abs=1e-11)
+    for order in range(1, (degree + 1) // 2):
+        derived = bspline.derivative(pieces, order)
+        assert derived[0, 0] == pytest.approx(0, abs=1e-10)
+        assert derived[-1].sum(axis=0) == pytest.approx(0, abs=1e-10)
+
+
+@pytest.mark.parametrize("degree", [3, 5])
+def test_is_smooth_at_the_points(degree: int) -> None:
+    pieces = bspline.polynomials(bspline.fit(FEEDING, degree), degree)
+    for order in range(degree):
+        derived = bspline.derivative(pieces, order)
+        assert derived[1:, 0] == pytest.approx(derived[:-1].sum(axis=1), abs=1e-9)
+
+
+def test_one_joint_alone_is_the_same_as_among_others() -> None:
+    together = bspline.fit(FEEDING, 5)
+    assert bspline.fit(FEEDING[:, 1], 5) == pytest.approx(together[:, 1], abs=1e-12)
+
+
+@pytest.mark.parametrize("degree", [3, 5])
+@pytest.mark.parametrize("parts", [1, 2, 3, 8])
+def test_subdivided_is_the_same_curve(degree: int, parts: int) -> None:
+    pieces = bspline.polynomials(bspline.fit(FEEDING, degree), degree)
+    finer = bspline.subdivide(pieces, parts)
+    v = np.linspace(0, 1, 7)
+    for segment in range(len(finer)):
+        u = (segment % parts + v) / parts
+        expected = np.polynomial.polynomial.polyval(u, pieces[segment // parts])
+        assert np.polynomial.polynomial.polyval(v, finer[segment]) == pytest.approx(expected, abs=1e-10)
+
+
+@pytest.mark.parametrize("points", [[1.0], [], [1.0, np.nan], [1.0, np.inf]])
+def test_refuses_what_is_no_path(points: list[float]) -> None:
+    with pytest.raises(InputError, match="two points"):
+        bspline.fit(points, 5)
+
+
+def test_refuses_other_degrees() -> None:
+    with pytest.raises(InputError, match="degree 4"):
+        bspline.fit([0.0, 1.0], 4)
+
+
+# the time axis: ends, order of time, refinement, inversion
+
+
+DEGREES = pytest.mark.parametrize("degree", [3, 5])
+
+
+@DEGREES
+@pytest.mark.parametrize("count", [1, 2, 6, 30])
+def test_runs_forward_from_zero_to_the_sum(degree: int, count: int) -> None:
+    intervals = 10.0 ** np.random.default_rng(count).uniform(-3, 1, count)
+    points = time_axis.control_points(intervals, degree)
+    pieces = bspline.polynomials(points, degree)
+    assert pieces[0, 0] == pytest.approx(0, abs=1e-12)
+    assert pieces[-1].sum() == pytest.approx(intervals.sum(), rel=1e-13)
+    slope = np.einsum(
+        "gp,mp->mg", np.linspace(0, 1, 50)[:, None] ** np.arange(degree), bspline.derivative(pieces)
+    )
+    assert np.all(np.diff(points) > 0)
+    assert np.all(slope > 0)
+
+
+def test_mirrors_its_control_points_at_both_ends() -> None:
+    points = time_axis.control_points([1.0, 2.0, 4.0], 5)
+    assert points.tolist() == [-3.0, -1.0, 0.0, 1.0, 3.0, 7.0, 11.0, 13.0]
+
+
+@DEGREES
+def test_maps_are_the_same_axis(degree: int) -> None:
+    intervals = np.array([0.3, 1.0, 0.2, 2.0])
+    points = time_axis.control_points(intervals, degree)
+    assert intervals @ time_axis.step_map(4, degree) == pytest.approx(points, abs=1e-14)
+    assert np.diff(points) @ time_axis.free_map(4, degree) == pytest.approx(points, abs=1e-14)
+
+
+@DEGREES
+@pytest.mark.parametrize("parts", [2, 3, 5])
+def test_refined_is_the_same_time_law(degree: int, parts: int) -> None:
+    differences = np.random.default_rng(parts).uniform(0.1, 3, 4 + degree - 1)
+    coarse = bspline.polynomials(differences @ time_axis.free_map(4, degree), degree)
+    finer = time_axis.refined(differences, parts, degree)
+    fine = bspline.polynomials(finer @ time_axis.free_map(4 * parts, degree), degree)
+    assert np.all(finer > 0)
+    assert fine == pytest.approx(bspline.subdivide(coarse, parts), abs=1e-12)
+
+
+@DEGREES
+def test_parameter_inverts_time(degree: int) -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        intervals = 10.0 ** rng.uniform(-3, 1, 8)
+        pieces = bspline.polynomials(time_axis.control_points(intervals, degree), degree)
+        time = rng.uniform(0, intervals.sum(), (5, 40))
+        segment, u = time_axis.parameter(pieces, time)
+        assert np.all((u >= 0) & (u <= 1))
+        assert bspline.evaluate(pieces, segment, u) == pytest.approx(time, abs=1e-13 * intervals.sum())
+
+
+# trajectories: Eqs. (17) to (19) against differences, ends, rest, and the paper's printed figures
+
+
+TABLE_6 = (1.514, 0.498, 1.638, 0.713, 0.257, 1.413)
+
+
+def made(via: np.ndarray, intervals: object, degree: int = 5) -> JointSpline:
+    """The spline of one joint."""
+    axis = time_axis.control_points(np.asarray(intervals, dtype=float), degree)
+    return JointSpline(degree, 1, bspline.fit(via, degree), axis)
+
+
+@pytest.mark.parametrize("degree", [3, 5])
+def test_each_order_is_the_derivative_of_the_one_before(degree: int) -> None:
+    joint = made(FEEDING[:, 1], TABLE_6, degree)
+    time = np.linspace(0.01, joint.duration_s - 0.01, 997)
+    step = 1e-5
+    for order in range(3):
+        rise = (joint(time + step, order) - joint(time - step, order)) / (2 * step)
+        scale = np.abs(joint(time, order + 1)).max()
+        near_knot = np.min(np.abs(time[:, None] - joint.via_times_s), axis=1) < 2 * step
+        assert rise[~near_knot] == pytest.approx(joint(time, order + 1)[~near_knot], abs=1e-6 * scale)
+
+
+def test_passes_the_via_points_and_rests_at_the_ends() -> None:
+    joint = made(FEEDING[:, 2], TABLE_6)
+    assert joint.duration_s == pytest.approx(6.033, abs=1e-12)
+    assert joint(joint.via_times_s) == pytest.approx(FEEDING[:, 2], abs=1e-9)
+    for order in (1, 2):
+        assert joint([0.0, joint.duration_s], order) == pytest.approx([0, 0], abs=1e-9)
+
+
+def test_rests_outside_its_time() -> None:
+    joint = made(FEEDING[:, 0], TABLE_6, 3)
+    outside = np.array([-5.0, -1e-9, joint.duration_s + 1e-9, 99.0])
+    assert joint(outside) == pytest.approx([0, 0, 180, 180], abs=1e-9)
+    for order in (1, 2, 3):
+        assert not joint(outside, order).any()
+
+
+def test_keeps_the_shape_of_the_times() -> None:
+    joint = made(FEEDING[:, 0], TABLE_6)
+    trajectory = Trajectory("two", (joint, made(FEEDING[:, 1], np.full(6, 2.0))), False)
+    assert joint(1.0).shape == ()
+    assert joint(np.zeros((2, 3)), 2).shape == (2, 3)
+    assert trajectory(np.zeros((2, 3)), 1).shape == (2, 3, 2)
+    assert trajectory.duration_s == pytest.approx(12)
+    assert trajectory(12.0) == pytest.approx([180, -38], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("degree", "intervals", "figures"),
+    [
+        (5, [2.0] * 6, (29.1186, 15.7580, 54.773)),
+        (3, [2.0] * 6, (27.596, 19.3077, None)),
+        (5, TABLE_6, (49.99, 47.33, 150.06)),
+    ],
+)
+def test_figures_of_joint_1(degree: int, intervals: list[float], figures: tuple[float | None, ...]) -> None:
+    """Section 2.3 (29.12 and 15.76) and Tables 5 and 6 of the paper."""
+    joint = made(FEEDING[:, 0], intervals, degree)
+    time = np.linspace(0, joint.duration_s, 20_001)
+    for order, figure in enumerate(figures, 1):
+        if figure is not None:
+            assert np.abs(joint(time, order)).max() == pytest.approx(figure, rel=1.5e-4)
