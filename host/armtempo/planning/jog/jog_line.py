@@ -19,6 +19,7 @@ from armtempo.kinematics.forward import forward
 from armtempo.kinematics.solver import PoseSolver
 from armtempo.model.arm import Arm
 from armtempo.model.tool_pose import APPROACH, PITCH, ROLL, WHOLE, YAW, Pose
+from armtempo.planning.line.tool_path import rotations
 
 TOLERANCE_MM, TOLERANCE_DEG = 0.02, 0.02
 """A posture this near to the line is on it."""
@@ -83,7 +84,7 @@ class ToolLine:
         """The tool's pose after that many mm or deg, (4, 4)."""
         pose = self._pose.copy()
         if self.about:
-            pose[:3, :3] = _turn(self.direction, math.radians(way)) @ pose[:3, :3]
+            pose[:3, :3] = rotations(math.radians(way) * self.direction[None])[0] @ pose[:3, :3]
         else:
             pose[:3, 3] += way * self.direction
         return pose
@@ -245,10 +246,3 @@ def _short(reason: str) -> str:
     """Why a posture was not found, without the figures of the one that comes near."""
     first = reason.partition(";")[0]
     return "the arm reaches no further" if first.startswith("the arm does not reach") else first
-
-
-def _turn(axis: Array, angle_rad: float) -> Array:
-    """Rotation about a unit vector (Rodrigues)."""
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + math.sin(angle_rad) * cross + (1.0 - math.cos(angle_rad)) * (cross @ cross))
