@@ -36,7 +36,7 @@ def is_curve(curve: Curve) -> bool:
     """Whether pairs are a motor's torque over its speed, or none at all."""
     speeds, torques = [pair[0] for pair in curve], [pair[1] for pair in curve]
     increasing = all(after > before for before, after in pairwise(speeds))
-    return not curve or (len(curve) > 1 and speeds[0] == 0.0 and increasing and min(torques) >= 0.0)
+    return len(curve) == 0 or (len(curve) > 1 and speeds[0] == 0.0 and increasing and min(torques) >= 0.0)
 
 
 def _check(part: Motor | Encoder, ranges: Mapping[str, Range]) -> None:
