@@ -104,12 +104,12 @@ def load(path: Path | str, arm: Arm | None = None, altered: bool = False) -> Pla
     """The plan of a trajectory file.
 
     ``altered``: also of one that was altered after it had been written. Raises InputError where the file is none,
-    damaged or altered, or was planned for another arm than ``arm``.
+    damaged or altered, or was planned for a different arm than ``arm``.
     """
     found = Plan.load(path, altered)
     if arm is not None and encode.arm_record(arm) != encode.arm_record(found.arm):
         raise InputError(
-            f"{path} was planned for another arm than {arm.name!r} ({arm.source})",
+            f"{path} was planned for a different arm than {arm.name!r} ({arm.source})",
             "plan it again with this arm",
         )
     return found

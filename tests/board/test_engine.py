@@ -21,7 +21,10 @@ def test_case(case: scripted.Case) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif("micropython" not in interpreters.AVAILABLE, reason="needs MicroPython")
+@pytest.mark.skipif(
+    "micropython" not in interpreters.AVAILABLE,
+    reason="no MicroPython here: CI ends at the start, and the summary says so",
+)
 def test_more_changes_of_speed() -> None:
     """Where it is quickest, on more motions; the other interpreters have a few of them above."""
     named = ["case_stops", "case_whole_path"]

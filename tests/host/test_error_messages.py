@@ -107,7 +107,7 @@ def test_an_error_is_shown_on_two_lines() -> None:
     assert result.exit_code == 2
     first, second = result.stderr.splitlines()
     assert first == "armtempo: WHERE and --switches exclude each other"
-    assert second.startswith("hint: give WHERE ")
+    assert second.startswith("hint: give the present posture as WHERE")
 
 
 def test_files_and_memory_have_a_next_step(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

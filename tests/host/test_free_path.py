@@ -170,7 +170,7 @@ def test_a_corridor_too_narrow_to_prove_is_the_spline_in_bounded_memory(
 @pytest.mark.parametrize("width", [2.0, 20.0])
 def test_a_corridor_of_the_tool_that_the_stops_leave_no_room_in_is_refused(width: float) -> None:
     """The spline through the via points does not rest there, and a motion that is drawn to it would not either."""
-    with pytest.raises(PlanError, match=rf"no path was proven to stay within corridor_mm = {width:g}\b"):
+    with pytest.raises(PlanError, match=rf"no path could be proven to stay within corridor_mm = {width:g}\b"):
         planner.plan(ARM, replace(FEED, corridor_mm=width, stops=(Stop(3),)))
 
 

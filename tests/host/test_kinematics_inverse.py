@@ -166,7 +166,7 @@ def test_rounded_poses_are_put_right_and_the_first_wrong_one_is_named() -> None:
     wrong = np.stack([pose, 2.0 * pose])
     with pytest.raises(armtempo.InputError, match="pose 2"):
         armtempo.inverse_many(arm, wrong)
-    with pytest.raises(armtempo.InputError, match="no list of poses"):
+    with pytest.raises(armtempo.InputError, match="are not a list of poses"):
         armtempo.inverse_many(arm, pose)
     with pytest.raises(armtempo.InputError, match="no closed-form"):
         armtempo.inverse_many("community", [pose])

@@ -151,7 +151,7 @@ def test_arcs_go_through_their_point() -> None:
     ("change", "message"),
     [
         ({"via": (START, moved(400, 0, 0))}, "P0 to P1, at .* of 400.0 mm"),
-        ({"via": (START, moved(0, 0, 0))}, "the tool is there already"),
+        ({"via": (START, moved(0, 0, 0))}, "the tool is at this point already"),
         ({"ways": (ToolWay(1, True, blend_mm=80.0), ToolWay(2, True))}, "more than half"),
         ({"via": FLIPPED}, "joint 4 at -90 degrees, not 90"),
         ({"ways": (ToolWay(1, True, HALF),)}, "one line"),

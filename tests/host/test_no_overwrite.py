@@ -61,8 +61,6 @@ OVER = {
 @pytest.mark.slow
 @pytest.mark.parametrize(("arguments", "target"), OVER.values(), ids=list(OVER))
 def test_other_content_needs_force(arguments: tuple[str, ...], target: str) -> None:
-    if target in arguments:
-        pytest.skip("its own input")
     before = Path(target).read_bytes()
     done = run(*arguments, target)
     assert done.exit_code == 2, done.output

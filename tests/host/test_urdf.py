@@ -172,7 +172,7 @@ REFUSED = [
             "choose another chain with --base and --tip",
         ],
     ),
-    ("is_not_there", [], ["there is no such file"]),
+    ("is_not_there", [], ["no such file"]),
 ]
 
 

@@ -40,14 +40,14 @@ def test_a_motion_has_to_be_named_where_the_button_starts_none(tmp_path: Path) -
     client.set_default("")
     with pytest.raises(InputError) as caught:
         Board(client, "pipe").fetch(None, tmp_path)
-    assert caught.value.problem.startswith("no motion was named")
+    assert caught.value.problem.startswith("no motion given")
     assert "armtempo fetch NAME" in caught.value.hint
 
 
 def test_a_sound_link_is_called_so(tmp_path: Path) -> None:
     client, _ = ready(Pipe(tmp_path / "flash"))
     found = board_state.read(client, "pipe")
-    assert "link      sound: no message arrived damaged, no sample was lost" in state.lines(found)
+    assert "link      OK: no damaged messages, no lost samples" in state.lines(found)
     worse = state.lines(replace(found, frames_bad=3, samples_lost=2))
     assert "link      messages damaged 3 times, 2 samples lost: check cable and plugs" in worse
 

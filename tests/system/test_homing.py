@@ -48,7 +48,7 @@ def unhomed(found: Arm, real: Arm | None = None) -> Iterator[tuple[Client, StopR
 def test_homing_run_finds_where_the_arm_stands(tmp_path: Path, angle: float) -> None:
     found = switched_arm(tmp_path, angle)
     with unhomed(found) as (board, stop):
-        arm_state.home(board, found, np.array([30.0, -60.0, 40.0]))  # wrong: the arm stands at 0
+        arm_state.home(board, found, np.array([30.0, -60.0, 40.0]))  # wrong: it is at 0
         homing.home_to_switches(board, found, stop)
         stands_deg = arm_state.posture_deg(board, found)
     assert stands_deg == pytest.approx([0.0, -60.0, 40.0], abs=0.03)

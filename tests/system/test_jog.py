@@ -222,21 +222,21 @@ def test_keys_move_the_arm_in_steps_and_while_held(tmp_path: Path) -> None:
         screen.press("z")
         screen.wait_for("tool along z, step 10 mm")
         screen.press("k")
-        screen.wait_for("'k' is no key here")
+        screen.wait_for("the key 'k' does nothing here")
         screen.press("1h")
         screen.wait_for("joint 1, held")
         screen.press("+")
         screen.wait_for("hold the key down")
         before = screen.shown
         limit_s = time.monotonic() + commandline.SLOW_S
-        while "moving; released, it rests within" not in screen.shown and time.monotonic() < limit_s:
+        while "moving; after release at rest within" not in screen.shown and time.monotonic() < limit_s:
             screen.press("+")
             screen.look(0.05)
         assert "moving; released" in screen.shown, before
         screen.look(2.0)
         screen.press("q")
         assert screen.end() == 0, screen.shown
-        assert "the arm stands at" in screen.shown
+        assert "position:" in screen.shown
         joint_1, joint_2, _ = where(port)
         assert 0.0 < joint_1 < 190.0
         assert joint_2 == pytest.approx(-49.0, abs=0.02)
@@ -262,7 +262,7 @@ def test_teach_collects_points_into_a_job_that_plans(tmp_path: Path) -> None:
         screen.press("p")
         screen.wait_for("point 1 taken: 0, -60, 39.99")
         screen.press("p")
-        screen.wait_for("not taken: the arm stands where")
+        screen.wait_for("not taken: the arm is at")
         screen.press("s+")
         screen.wait_for("| 10.01 -60.00")
         screen.press("pu")
@@ -272,7 +272,7 @@ def test_teach_collects_points_into_a_job_that_plans(tmp_path: Path) -> None:
         screen.press("q")
         assert screen.end() == 0, screen.shown
         assert "written: shelf.toml, 2 via points" in screen.shown
-        assert Terminal(*arguments, folder=tmp_path).end() == 2  # it is there already
+        assert Terminal(*arguments, folder=tmp_path).end() == 2  # it already exists
         hand = Terminal(*arguments, "--replace", "--by-hand", folder=tmp_path)
         hand.wait_for("hold the arm")
         hand.press("\n")

@@ -297,7 +297,7 @@ def test_what_the_page_quotes_of_messages_is_said() -> None:
         "there is no port",
         "is in use",
         "no permission to open",
-        "set up for another arm",
+        "set up for a different arm",
         "connect an STM32F405",
     ):
         assert words in PAGE

@@ -70,7 +70,7 @@ class Two:
         done = run(*command, "--port", self.port)
         assert (done.exit_code == 0) == wanted, f"{what} by {host}: {done.output}"
         if not mine and not wanted:
-            assert "set up for another arm" in done.output
+            assert "set up for a different arm" in done.output
         if wanted:
             self.follow(what, host)
 

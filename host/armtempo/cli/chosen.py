@@ -53,7 +53,7 @@ def arm_file(path: Path | None) -> Path:
     """The file of the same, or the paper's arm's, which is said aloud."""
     setting = ProjectSettings().get(ARM, path)
     if not setting:
-        tell(f"no arm is named; this is for the one that ships with armtempo, {shipped.PAPER!r}")
+        tell(f"no arm given; using the one that ships with armtempo, {shipped.PAPER!r}")
     return shipped.find(setting.value or shipped.PAPER).path
 
 
@@ -70,7 +70,7 @@ def arm_or_paper(path: Path | None, for_shape: bool = False) -> Arm:
     found = named_arm(path, for_shape)
     if found is None:
         found = Arm.paper()
-        tell(f"no arm is named; this is for the one that ships with armtempo, {found.name!r}")
+        tell(f"no arm given; using the one that ships with armtempo, {found.name!r}")
     return found
 
 
@@ -100,7 +100,7 @@ def arm_and_job(arm_path: Path | None, job_path: Path | None) -> tuple[Arm, Job]
             raise nothing_set(ARM, f"job {job.value} ({job.source}) is for which arm?")
         loaded = load_arm(arm_path)
         return loaded, load_job(job_path, loaded)
-    tell("no arm and no job are named; these are the feeding job and the arm that ship with armtempo")
+    tell("no arm and no job given; using the feeding job and the arm that ship with armtempo")
     return Arm.paper(), Job.paper()
 
 
@@ -129,7 +129,7 @@ def words(arm: Arm) -> str:
 def source_words(name: str, source: str) -> str:
     """An arm's name and file; the one that ships with armtempo needs no path."""
     ships = Path(source).is_relative_to(Path(__file__).parents[1]) if source else False
-    where = "as it ships with armtempo" if ships else source
+    where = "ships with armtempo" if ships else source
     return f"{name} ({where})" if where else name
 
 
@@ -149,7 +149,7 @@ def is_file(what: str) -> bool:
     beside = [str(path.with_name(one.name)) for one in path.parent.glob("*.json")]
     near = did_you_mean(what, beside)
     raise InputError(
-        f"{what}: there is no such file{near}",
+        f"{what}: no such file{near}",
         "check the path; 'armtempo plan' makes one, 'armtempo list' shows the board's",
     )
 
@@ -167,12 +167,12 @@ def load_sequence_plan(path: Path, arm_path: Path | None, name: str | None = Non
     from armtempo.records.encode import arm_record
 
     if name is not None:
-        raise InputError("--name: a sequence keeps the name in its file", "change it there and plan it again")
+        raise InputError("--name: the name of a sequence is in its file", "change it there and plan it again")
     found = SequencePlan.load(path)
     named = named_arm(arm_path)
     if named is not None and arm_record(named) != arm_record(found.arm):
         raise InputError(
-            f"{path} was planned for another arm than {named.name!r} ({named.source})",
+            f"{path} was planned for a different arm than {named.name!r} ({named.source})",
             "plan it again with this arm",
         )
     return found

@@ -58,7 +58,7 @@ SHELLS = ("bash", "zsh", "fish")
 @click.command("completion")
 @click.argument("shell", type=click.Choice(SHELLS))
 def completion(shell: str) -> None:
-    """Print a script that lets SHELL complete commands and options.
+    """Print a completion script for SHELL.
 
     \b
     bash: armtempo completion bash >> ~/.bashrc

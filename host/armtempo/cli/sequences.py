@@ -45,7 +45,7 @@ def refuse_job_options(options: dict[str, Any]) -> None:
     given = sorted(name for name, value in options.items() if value not in (None, False))
     if given:
         raise InputError(
-            f"--{given[0].replace('_', '-')}: a sequence has no such setting",
+            f"--{given[0].replace('_', '-')}: not for a sequence",
             "give it in the job files that the sequence runs",
         )
 

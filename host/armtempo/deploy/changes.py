@@ -77,7 +77,7 @@ def check_version(firmware_crc: int | None) -> None:
     """LinkError where a board's firmware has another version of the program; None: it has none."""
     if firmware_crc not in (None, own_crc()):
         raise LinkError(
-            f"a new firmware is due: the board's has another version of the program in it ({firmware_crc:08x}, "
+            f"the firmware must be updated: it contains another version of the program ({firmware_crc:08x}, "
             f"here {own_crc():08x}), and files in the flash do not replace it",
             "flash one of this version: 'armtempo flash'; or MicroPython's own, then deploy again",
         )

@@ -208,7 +208,9 @@ def _verify(remote: Remote, library: Mapping[str, bytes]) -> None:
     """LinkError where a file that is read back differs from what was written."""
     wrong = difference(remote.survey(), library)
     if wrong.write:
-        raise LinkError(f"{', '.join(wrong.write)}: reads back otherwise than written", "deploy again")
+        raise LinkError(
+            f"{', '.join(wrong.write)}: reads back different from what was written", "deploy again"
+        )
 
 
 def _await_port(port: str) -> None:

@@ -26,7 +26,7 @@ def read(path: Path | str) -> Table:
     try:
         text = Path(path).read_text(encoding="utf-8-sig")  # some editors begin a file with a mark
     except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file", "check the path") from None
+        raise InputError(f"{path}: no such file", "check the path") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
             f"{path}: cannot be read: {why(error)}",
@@ -42,7 +42,7 @@ def parse(text: str, file: str) -> Table:
     except (ValueError, RecursionError) as error:  # not all of tomllib's are its own: numbers of 5000 digits
         raise InputError(
             f"{file}: not valid TOML: {error}",
-            "correct that place; strings stand in quotes, tables in [brackets]",
+            "correct that place; strings are written in quotes, tables in [brackets]",
         ) from None
 
 

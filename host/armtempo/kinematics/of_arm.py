@@ -55,7 +55,7 @@ def forward(arm: Arm | Path | str, angles_deg: ArrayLike) -> Array:
     """The tool's pose, Eq. (1): (..., 4, 4), lengths in mm, in the frame of the base.
 
     ``arm``: or its file or name. ``angles_deg``: of all joints, (..., joints), or of the driven ones, (..., J), with
-    the others at home. Raises InputError for another number of angles.
+    the others at their home angles. Raises InputError for another number of angles.
     """
     arm = Arm.shape(arm)
     return forward_rad(Geometry.of(arm), np.radians(spread_deg(arm, angles_deg)))
@@ -72,7 +72,7 @@ def inverse(
     closed form's class has eight solutions, some perhaps rejected. Any other arm or pose gets what a numerical
     search finds with the joints that have a motor, perhaps nothing: of a pose that asks for fewer numbers than joints
     move the one that the search comes to first, else all, but at most 16 where one turns into the next, as at a
-    singular pose. Raises InputError for a matrix that is no pose.
+    singular pose. Raises InputError for a matrix that is not a pose.
     """
     solver = PoseSolver(Arm.shape(arm))
     near = solver.home_rad if near_deg is None else tuple(_posture(solver.arm, near_deg).tolist())

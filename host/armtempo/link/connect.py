@@ -100,7 +100,7 @@ def _check_owner(port: str, tell: Callable[[str], object]) -> PortClaim | None:
     if state is Ownership.ALIVE:
         raise PortInUseError(
             f"port {port} is in use by {claim.who}",
-            "wait for its end, or end it with 'armtempo stop'; 'armtempo status' and 'watch' look on meanwhile",
+            "wait for its end, or stop it with 'armtempo stop'; 'armtempo status' and 'watch' work meanwhile",
         )
     if state is Ownership.DEAD:
         tell(f"{claim.who} has ended without giving up {port}; what it had started may still move")
@@ -129,7 +129,7 @@ def _check_program(board: Client) -> None:
                 f"the board on {board.session.transport.name} runs version {board.info.program_crc:08x} of the board "
                 f"program, installed here is {own_crc():08x}"
             ),
-            "bring it up to date: 'armtempo flash' if the program is in its firmware, else 'armtempo deploy'",
+            "update it: 'armtempo flash' if the program is in its firmware, else 'armtempo deploy'",
         )
 
 

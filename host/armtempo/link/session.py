@@ -230,7 +230,7 @@ class Session:
         if not self.stopping():
             return reason
         return LinkError(
-            f"{reason.problem}; it could not be told to stop: what was moving may move on",
+            f"{reason.problem}; no stop could be sent: a motion may still be running",
             "see 'armtempo status' once it is back",
         )
 

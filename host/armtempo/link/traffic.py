@@ -159,7 +159,7 @@ class LogFile:
         if self._failed is not None and value is None:
             raise InputError(
                 f"{self._path}: the traffic log is cut short: {self._failed.strerror}",
-                "make room on the disk, or leave --log-traffic out",
+                "free disk space, or leave --log-traffic out",
             )
 
 

@@ -93,7 +93,7 @@ def _broken(port: str, error: Exception) -> LinkError:
     reason = "its cable was unplugged, or the board was reset" if unplugged else str(error)
     return LinkError(
         f"the connection to {port} broke: {reason}",
-        "plug it in again and close other programs on this port; then 'armtempo status' says where the arm stands",
+        "plug it in again and close other programs on this port; then 'armtempo status' shows the arm's position",
     )
 
 

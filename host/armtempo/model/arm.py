@@ -182,7 +182,7 @@ class Arm:
             names = [named.HOME, *(posture.name for posture in self.postures)]
             raise InputError(
                 f"arm {self.name!r} has no posture {name!r}{did_you_mean(name, names)}",
-                f"known: {', '.join(names)}; 'armtempo teach --posture {name}' adds where the arm stands",
+                f"known: {', '.join(names)}; 'armtempo teach --posture {name}' stores the arm's present position",
             )
         return found[0]
 

@@ -26,7 +26,7 @@ def save(path: Path, arm: Arm, name: str, angles_deg: list[float], replace: bool
     if problem := named.name_problem(name):
         raise InputError(f"posture {name!r}: {problem}", "choose another name")
     if problem := arm.angles_problem(angles_deg):
-        raise InputError(f"posture {name!r}: {problem}", "bring the arm into its ranges")
+        raise InputError(f"posture {name!r}: {problem}", "move the arm into its ranges")
     try:
         with path.open(encoding="utf-8", newline="") as file:
             text = file.read()
@@ -35,7 +35,7 @@ def save(path: Path, arm: Arm, name: str, angles_deg: list[float], replace: bool
     known = _parsed(text, path).get("posture", {})
     if name in known and not replace:
         raise InputError(
-            f"{path} has a posture {name!r}, so it is kept",
+            f"{path} already has a posture {name!r}",
             "choose another name, or replace it with --replace",
         )
     replace_text(path, with_posture(text, name, angles_deg, path), newline="")

@@ -27,7 +27,7 @@ class KeepOut:
             low < high for low, high in zip(self.low_mm, self.high_mm, strict=True)
         ):
             raise InputError(
-                f"keep-out box {self.name!r}: low_mm and high_mm are no corners of a box",
+                f"keep-out box {self.name!r}: low_mm and high_mm are not corners of a box",
                 "give x, y, z of both, each of low_mm below that of high_mm",
             )
 

@@ -163,7 +163,7 @@ class SequencePlan:
         arm_json.check(plan.arm, f"{path}: arm", _AGAIN)
         there = {MOVE: len(plan.legs), COUNT: len(plan.counters)}
         if any(not 0 <= row.number < there.get(row.op, row.number + 1) for row in plan.rows):
-            raise InputError(f"{path}: a row names a motion or counter that there is not", _AGAIN)
+            raise InputError(f"{path}: a row names a motion or counter that does not exist", _AGAIN)
         return plan
 
 
@@ -182,7 +182,7 @@ def check_size(rows: int, legs: int, counters: int, where: str) -> None:
     if counters > record.MAX_COUNTERS:
         raise InputError(
             f"{where}: {counters} counters; the board keeps {record.MAX_COUNTERS} for a sequence",
-            "count less",
+            "use fewer counters",
         )
     if rows > record.MAX_ROWS or legs > record.MAX_MOTIONS:
         raise InputError(

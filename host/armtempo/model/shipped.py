@@ -49,6 +49,6 @@ def find(given: Path | str) -> ArmFile:
     if named:
         return ArmFile(shipped[str(given)], True)
     raise InputError(
-        f"{given}: there is no such file, and no arm of that name ships with armtempo",
+        f"{given}: no such file, and no arm of that name ships with armtempo",
         f"check the path, or give one of those that do: {', '.join(shipped)}",
     )

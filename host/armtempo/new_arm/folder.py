@@ -87,7 +87,7 @@ def write(folder: Path, arm: ArmText, port: str) -> list[Path]:
 def check_free(folder: Path) -> None:
     """InputError where the folder is there and not empty."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError(f"{folder}: is there already and not empty", "choose another name")
+        raise InputError(f"{folder}: already exists and is not empty", "choose another name")
 
 
 def _put(folder: Path, files: dict[str, str]) -> None:

@@ -59,7 +59,7 @@ def fit(chain: Chain) -> Fit:
     assert best is not None  # there is at least one way to round
     raise PlanError(
         f"no Denavit-Hartenberg table of {chain.robot!r} keeps to its URDF: the best one is off by "
-        f"{best.position_mm:.3g} mm and {best.rotation_deg:.3g} deg at worst, which should not be; nothing was "
+        f"{best.position_mm:.3g} mm and {best.rotation_deg:.3g} deg at worst, which is an error; nothing was "
         "written",
         "choose another chain, or write the rows by hand",
     )

@@ -120,13 +120,13 @@ def _check_text(path: Path) -> None:
     try:
         root = ElementTree.fromstring(path.read_bytes())
     except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file", "check the path") from None
+        raise InputError(f"{path}: no such file", "check the path") from None
     except OSError as error:
         raise InputError(
             f"{path}: cannot be read: {why(error)}", "make it readable, or give a copy"
         ) from None
     except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise InputError(f"{path}: not valid XML: {error}", "mend the file there") from None
+        raise InputError(f"{path}: not valid XML: {error}", "correct the file there") from None
     if root.tag != "robot":
         raise InputError(f"{path}: its outermost element is <{root.tag}>, not <robot>", "give a URDF file")
     if root.get("name") is None:
@@ -181,7 +181,7 @@ def _refuse_wheels(path: Path, moving: list[Any]) -> None:
     endless = [joint.name for joint in moving if joint.type == "continuous"]
     if endless and (len(endless) == len(moving) or len(moving) <= _WHEEL_JOINTS):
         raise InputError(
-            f"{path}: {', '.join(map(repr, endless))} turn without end, as wheels do: this chain is no arm",
+            f"{path}: {', '.join(map(repr, endless))} turn without end, as wheels do: this chain is not an arm",
             "choose another chain with --base and --tip; a joint of an arm gets limits (type='revolute') in the URDF",
         )
 

@@ -251,7 +251,7 @@ def check_reached(arm: Arm, reached: tuple[Extremes, ...]) -> None:
             raise PlanError(
                 f"{joint.name}: no plan was found that keeps its limits {joint.limits.values}, the best one "
                 f"reaches {extreme.values}",
-                "angles and limits are too far apart in size to compute with",
+                "angles and limits are too different in magnitude to compute with",
             )
         rates += extreme.speed_deg_s * joint.steps_per_deg
     if rates > MAX_STEP_RATE_SUM:
@@ -267,7 +267,7 @@ def check_time(trajectory: Trajectory) -> None:
         if not np.all(np.diff(spline.time_points_s) > 0.0):
             raise PlanError(
                 f"trajectory {trajectory.name!r}: no time axis was found that increases everywhere",
-                "via points, limits and dwells are too far apart in size to compute with; bring them closer",
+                "via points, limits and dwells are too different in magnitude to compute with",
             )
 
 

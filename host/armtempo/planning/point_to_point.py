@@ -50,7 +50,7 @@ def posture(angles_deg: ArrayLike, arm: Arm) -> Array:
         found = np.asarray(angles_deg, dtype=float)
     except (TypeError, ValueError):
         raise InputError(
-            f"{angles_deg!r:.40} is no posture", "give an angle in degrees for each joint with a motor"
+            f"{angles_deg!r:.40} is not a posture", "give an angle in degrees for each joint with a motor"
         ) from None
     if found.shape != (len(arm.driven),):
         raise InputError(

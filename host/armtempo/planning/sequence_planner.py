@@ -33,8 +33,8 @@ _SAME_STEPS = 1 / 128
 def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> SequencePlan:
     """All motions of a sequence, equal ones once, and the rows that the board goes through.
 
-    Raises InputError, naming file and step, where a motion begins elsewhere than the one before it ends or nothing is
-    left to do; PlanError where a motion cannot be planned.
+    Raises InputError, naming file and step, where a motion begins elsewhere than the one before it ends or the
+    sequence has no effect; PlanError where a motion cannot be planned.
     """
     compiler = _Compiler(arm, progress)
     source = sequence.source or f"sequence {sequence.name!r}"
@@ -42,7 +42,7 @@ def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> Sequ
     start = compiler.posture(sequence.start, f"{source}: start: ") if sequence.start else _End(None, "")
     rows, _ = compiler.rows(sequence.steps, start.angles_deg, start.name)
     if not rows:
-        raise InputError(f"{source}: nothing is left to do", "add a step that moves, sets or waits")
+        raise InputError(f"{source}: the sequence has no effect", "add a step that moves, sets or waits")
     check_size(len(rows), len(compiler.legs), len(compiler.counters), source)
     legs = [replace(leg, name=f"{sequence.name}-{number}") for number, leg in enumerate(compiler.legs, 1)]
     return SequencePlan(
@@ -131,7 +131,7 @@ class _Compiler:
         target = None if isinstance(pose, Pose) else self._target(step)
         if here.angles_deg is None:
             raise InputError(
-                f"{step.where}goto: a line begins somewhere, and where the arm stands is not known",
+                f"{step.where}goto: a line needs a known start, and the arm's position is not known here",
                 "give the sequence a start, or put a goto without line before it",
             )
         if target and target.angles_deg == here.angles_deg:
@@ -208,7 +208,7 @@ class _Compiler:
         if isinstance(source, Plan):
             if source.arm != self.arm:
                 raise InputError(
-                    f"{where}run: it was planned for another arm than {self.arm.name!r}", "plan it again"
+                    f"{where}run: it was planned for a different arm than {self.arm.name!r}", "plan it again"
                 )
             return source.trajectory
         found = planner.plan(self.arm, source, self.progress).trajectory

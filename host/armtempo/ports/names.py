@@ -28,8 +28,8 @@ def sim_flash(port: str) -> Path | None:
         return None
     if port == SIM + ":":
         raise InputError(
-            f"port '{port}' names no folder",
-            "write sim:FOLDER to keep the flash there, or sim to keep it nowhere",
+            f"port '{port}' has no folder",
+            "write sim:FOLDER to keep the flash there, or sim for a temporary one",
         )
     from pathlib import Path  # here, because a stop does not wait for it
 

@@ -182,7 +182,7 @@ class _Connection:
             return _failed(LinkError("a request without an id", "give a whole number or a short text as id"))
         name = request.get("request")
         if not self._known and name != "hello":
-            return _failed(LinkError("nobody has said hello yet", "say hello with the token first"))
+            return _failed(LinkError("no hello yet", "say hello with the token first"))
         handler = self._handlers.get(name) if isinstance(name, str) else None
         if handler is None:
             return _failed(

@@ -132,7 +132,7 @@ def _joint(joint: DrivenJoint) -> dict[str, Any]:
     per_step = joint.counts_per_step
     if max(abs(per_step.numerator), per_step.denominator) >= 2**31:
         raise InputError(
-            f"{joint.name}: the ratio of encoder counts to steps is too odd for the board",
+            f"{joint.name}: the board cannot represent the ratio of encoder counts to steps",
             "check gear_ratio, microsteps and counts_per_rev in the arm file",
         )
     following = encoder.following_error_deg * joint.counts_per_deg if encoder else 0.0

@@ -65,7 +65,7 @@ def of_plan(plan: Plan, name: str | None = None) -> EncodedMotion:
     """
     if name is not None and not re.fullmatch(f"[A-Za-z0-9_-]{{1,{MAX_NAME}}}", name):
         raise InputError(
-            f"{name!r} is no name for the board",
+            f"{name!r} is not a valid name on the board",
             f"take 1 to {MAX_NAME} characters of a-z A-Z 0-9 - _",
         )
     board_name = name or re.sub(r"[^A-Za-z0-9_-]", "-", plan.job.name)[:MAX_NAME]

@@ -132,4 +132,6 @@ def _explain(figure: Figure, arm: Arm) -> None:
         Line2D([], [], color=HOME, linestyle="", marker="o", markerfacecolor="none", label="its axis")
     )
     figure.legend(handles=lines, loc="outside lower center", ncols=5, frameon=False)
-    figure.suptitle(f"{arm.name}: each joint seen along its axis, the others at home; lengths in mm")
+    figure.suptitle(
+        f"{arm.name}: each joint seen along its axis, the others at their home angles; lengths in mm"
+    )

@@ -38,8 +38,8 @@ def write(folders: Sequence[Path], path: Path) -> Path:
     readable, complaints = _read(folders)
     if len(readable) < 2:
         raise RunFolderError(
-            "fewer than two runs can be compared: " + "; ".join(complaints),
-            "name two runs or more that can be read",
+            "a comparison needs two readable runs: " + "; ".join(complaints),
+            "give two or more runs that can be read",
         )
     replace_text(path, render(readable, complaints))
     return path

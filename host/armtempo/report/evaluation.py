@@ -72,12 +72,12 @@ def evaluate(folder: Path) -> Evaluation:
     trajectory = plan.trajectory if plan else replayed.trajectory_of(run)
     if len(run.joints) != len(trajectory.joints):
         raise RunFolderError(
-            f"{folder}: run.json tells of {len(run.joints)} joints, trajectory.json of {len(trajectory.joints)}",
-            "put the trajectory.json of this run there, or run again",
+            f"{folder}: run.json lists {len(run.joints)} joints, trajectory.json has {len(trajectory.joints)}",
+            "put the trajectory.json has this run there, or run again",
         )
     usable = [repetition for repetition in run.repetitions if len(repetition.time_s)]
     if not usable:
-        raise RunFolderError(f"{folder}: holds no sample", "run it again")
+        raise RunFolderError(f"{folder}: contains no samples", "run it again")
     found = complaints(run)
     arm = plan.arm if plan else _arm(run, found)
     return Evaluation(run, trajectory, arm, plan, analysis.curves(usable, trajectory), tuple(found))

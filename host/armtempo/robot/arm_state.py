@@ -36,15 +36,15 @@ def configure(client: Client, arm: Arm, replace: bool) -> None:
 
 def _other_arm(arm: Arm, old: bytes, new: bytes) -> LinkError:
     return LinkError(
-        f"the board is set up for another arm than {arm.name!r} ({arm.source}): "
+        f"the board is set up for a different arm than {arm.name!r} ({arm.source}): "
         f"{arm_difference.describe(old, new)}",
-        f"name that arm's file with --arm; or, if this is the arm on the board "
+        f"give that arm's file with --arm; or, if this is the arm on the board "
         f"now, 'armtempo configure' or --replace-arm sets the board up for it, {arm_difference.consequence(old, new)}",
     )
 
 
 def home(client: Client, arm: Arm, angles_deg: ArrayLike | None = None) -> None:
-    """Declare that the arm stands at ``angles_deg`` (J,), or at the arm file's home posture.
+    """Declare the arm's position: ``angles_deg`` (J,), or the arm file's home posture.
 
     Raises InputError for a posture that does not fit the arm, BoardError where the board is moving.
     """
@@ -70,7 +70,7 @@ def posture_deg(client: Client, arm: Arm) -> Array:
     if unknown:
         raise LinkError(
             f"the position of {', '.join(unknown)} is unknown",
-            "bring the arm to its home posture and run 'armtempo home'",
+            "move the arm to its home posture and run 'armtempo home'",
         )
     return np.array(status.positions.commanded_steps, dtype=float) / _steps_per_deg(arm)
 

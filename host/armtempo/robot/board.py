@@ -181,8 +181,8 @@ class Board:
         """The name, where it can be one: InputError with what is meant else."""
         if not is_name(name):
             raise InputError(
-                f"{name!r} is no name for a motion on the board",
-                f"give the name of one that it keeps: {NAME_RULE}; armtempo.Plan.load reads a file",
+                f"{name!r} is not a valid name of a motion on the board",
+                f"give the name of a stored one: {NAME_RULE}; armtempo.Plan.load reads a file",
             )
         return name
 
@@ -328,7 +328,7 @@ class Board:
         recorded until then is ``last_run``.
         """
         if repeat < 1:
-            raise InputError(f"a run of {repeat} repetitions is none", "give repeat 1 or more")
+            raise InputError(f"repeat = {repeat} is not allowed", "give 1 or more")
         encoded = self._encoded(motion)
         seen = recording.ProgressWatcher(progress, repeat, watcher or Watcher())
         with self._stoppable(stop) as wanted:
@@ -473,7 +473,7 @@ class Board:
 
     def _known_arm(self) -> Arm:
         if self.arm is None:
-            raise InputError("no arm is known to move", "say which with home(arm) or configure(arm)")
+            raise InputError("no arm is set", "set it with home(arm) or configure(arm)")
         return self.arm
 
     def _configured_arm(self) -> Arm:
@@ -496,8 +496,8 @@ class Board:
             if entry.default:
                 return entry.name
         raise InputError(
-            "no motion was named, and no stored motion is set as the one that the board's button starts",
-            "say which motion's samples these are: armtempo fetch NAME; 'armtempo list' shows the names",
+            "no motion given, and no default motion is set for the board's button",
+            "give the motion's name: armtempo fetch NAME; 'armtempo list' shows the names",
         )
 
     def _bring_to_start(self, motion: EncodedMotion, stop: StopRequest) -> None:

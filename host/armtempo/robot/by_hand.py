@@ -31,7 +31,7 @@ class HandGuided:
         blind = [joint.name for joint in arm.driven if joint.encoder is None]
         if blind:
             raise InputError(
-                f"{', '.join(blind)}: no encoder, so nobody would know where the arm was moved by hand",
+                f"{', '.join(blind)}: no encoder, so moves by hand cannot be measured",
                 "teach with the keys instead: armtempo teach without --by-hand",
             )
         arm_state.posture_deg(client, arm)
@@ -70,5 +70,5 @@ class HandGuided:
             if value is None:
                 raise LinkError(
                     f"the arm was left beyond a range ({error.problem}), so its position is unknown",
-                    "bring it within its ranges by hand and run 'armtempo home'",
+                    "move it within its ranges by hand and run 'armtempo home'",
                 ) from error

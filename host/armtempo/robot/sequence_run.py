@@ -55,7 +55,7 @@ def store(
             entry = kept.get(one.name)
             if entry and entry.crc not in (0, one.crc, legs.get(one.name)):
                 raise LinkError(
-                    f"the board keeps something else as {one.name!r} (checksum {entry.crc:08x})",
+                    f"the board has something else as {one.name!r} (checksum {entry.crc:08x})",
                     "replace it with --force, or give the sequence another name",
                 )
     whole, done = sum(len(one.data) for one in records), 0
@@ -125,8 +125,8 @@ def _follow(
             if state.name != name or state.ending == "none":
                 last = f"; it was last heard of {where(before)}" if before and before.name == name else ""
                 raise OtherBoardError(
-                    f"the board has started anew during the sequence: positions are unknown{last}",
-                    "bring the arm to its home posture and run 'armtempo home'",
+                    f"the board has restarted during the sequence: positions are unknown{last}",
+                    "move the arm to its home posture and run 'armtempo home'",
                 )
             before = state
             _take_events(client, recorder)

@@ -149,7 +149,7 @@ def parsed(
             raise ValueError(f"column {name} is missing")
         values = np.array(table.get(name, []), dtype=float)
         if not np.all(np.abs(values) <= largest):
-            raise ValueError(f"column {name} holds what no run can give")
+            raise ValueError(f"column {name} has values that no run can have")
         return values
 
     def joint_columns(name: str) -> Array:

@@ -30,7 +30,7 @@ def trajectory_of(run: RunData) -> Trajectory:
         return decode.trajectory(path.read_bytes(), run.joints, str(run.meta["name"]))
     except OSError as error:
         raise RunFolderError(
-            f"{run.path}: neither a plan nor {MOTION} can be read ({why(error)}), so what was to move is not known",
+            f"{run.path}: neither a plan nor {MOTION} can be read ({why(error)}), so the planned motion is not known",
             "restore one of them from a copy, or run again",
         ) from error
     except InputError as error:

@@ -221,7 +221,7 @@ def writing(path: Path) -> Iterator[None]:
     except OSError as error:
         raise RunFolderError(
             f"{path}: cannot be written: {error.strerror}; what came before is kept",
-            "make room, then run again",
+            "free disk space, then run again",
         ) from None
 
 

@@ -76,7 +76,7 @@ class SequenceRun:
             row = np.array([int(line["row"] or _UNKNOWN) for line in lines], dtype=np.int64)
             motions = [int(entry["motion"]) for entry in meta["rows"]]
             if row.size and row.max() >= len(motions):
-                raise ValueError("a sample of a row that there is not")
+                raise ValueError("a sample of a row that does not exist")
         except OSError as error:
             raise RunFolderError(f"{folder}: cannot be read: {error.strerror}", _RESTORE) from error
         except (KeyError, TypeError, ValueError) as error:

@@ -91,7 +91,7 @@ def read(path: Path) -> list[PowerCycle]:
     data = path.read_bytes()
     if data[:4] != b"ATE1":
         raise RunFolderError(
-            f"{path} is no edge log of a virtual board",
+            f"{path} is not an edge log of a virtual board",
             "give a file that --edge-log of a virtual board wrote",
         )
     cycles: list[_Collector] = []

@@ -83,7 +83,7 @@ class VirtualBoard:
                 tail = self.log().strip().splitlines()[-1:] or ["it says nothing"]
                 raise LinkError(
                     f"the virtual board did not start: {tail[0]}",
-                    "start it again; where that fails too, report it with this line",
+                    "start it again; if that fails too, report it with this line",
                 )
             time.sleep(0.005)
 

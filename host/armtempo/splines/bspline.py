@@ -28,7 +28,7 @@ def basis(degree: int) -> Array:
     Raises InputError for a degree other than 3 or 5.
     """
     if degree not in BASIS:
-        raise InputError(f"splines of degree {degree} are not known", "choose 3 (cubic) or 5 (quintic)")
+        raise InputError(f"a spline of degree {degree} is not supported", "choose 3 (cubic) or 5 (quintic)")
     matrix = np.array(BASIS[degree], dtype=float) / FACTORIAL[degree]
     matrix.setflags(write=False)
     return matrix

@@ -33,7 +33,7 @@ def build(micropython: Path, board: str, out: Path, progress: Progress) -> image
     checkout.check_submodules(found, definition)
     toolchain.check(with_mpy_cross=not toolchain.has_mpy_cross(found.folder))
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise InputError(f"{out} is there already", "name a new folder with --out")
+        raise InputError(f"{out} already exists", "name a new folder with --out")
     built = _make(found, definition, progress)
     made = image.Image(
         definition.name,
@@ -92,7 +92,7 @@ def _run(command: list[str], step: Callable[[str], None]) -> None:
     if said := toolchain.run(command, step):
         raise ToolError(
             f"MicroPython's build failed:\n  {said}",
-            f"see the whole of it with {' '.join(command)}; with another version of MicroPython or of the compiler "
+            f"for the whole output run {' '.join(command)}; with another version of MicroPython or of the compiler "
             f"than {checkout.RELEASE} and gcc 12 to 14, try those",
         )
 

@@ -109,9 +109,9 @@ def plan(name: str, arm: Arm, here_deg: Sequence[float], move: JogMove, speed: f
             f"a speed of {speed:g} is not allowed", f"give a part of the limits, {SLOWEST:g} to 1"
         )
     if math.isnan(move.by) or move.by == 0.0:
-        raise InputError("a jog by 0 moves nothing", "say how far, in degrees or mm")
+        raise InputError("a jog by 0 moves nothing", "give a distance in degrees or mm")
     if (move.joint is None) == (not move.axis):
-        raise InputError("a jog moves a joint or the tool, one of both", "name a joint, or an axis")
+        raise InputError("a jog moves either a joint or the tool", "name a joint, or an axis")
     trajectory, ends = _in_room(name, arm, start, move, speed)
     limits = [joint.limits for joint in arm.driven]
     return JogMotion(trajectory, brake_time.of_motion(trajectory, limits), ends)

@@ -197,7 +197,7 @@ def _stuck(course: Course, tool: Tool, way: float, angles_deg: Array) -> PlanErr
         return PlanError(
             f"{place}: the arm comes to a singular posture{_which(course.arm, angles_deg)}, where its joints cannot "
             "follow the tool",
-            "move the line away from it, turn the tool otherwise, or leave line out between these via points",
+            "move the line away from it, turn the tool differently, or leave line out between these via points",
         )
     return PlanError(f"{place}: the arm reaches no further", "move the line nearer to the arm")
 

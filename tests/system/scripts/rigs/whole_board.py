@@ -217,7 +217,7 @@ class World(SilentPort):
         return found
 
     def home(self, steps):
-        """Declare where the arm stands."""
+        """Declare the arm's position."""
         tail = b"".join([value.to_bytes(4, "little") if value >= 0 else (value + (1 << 32)).to_bytes(4, "little")
                          for value in steps])  # fmt: skip
         yield from self.ask("home", ((1 << len(steps)) - 1,), tail)

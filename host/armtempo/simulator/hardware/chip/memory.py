@@ -46,7 +46,7 @@ raw, words = _memory(SIZE)
 raw_seen, seen = _memory(SIZE)
 base = uctypes.addressof(words)
 raw_backup, backup = _memory(4 * BACKUP_WORDS)
-"""The backup SRAM: no register, so it is not looked at when the program writes."""
+"""The backup SRAM: no register, so it is not checked when the program writes."""
 backup_base = uctypes.addressof(backup)
 
 objects = {}
