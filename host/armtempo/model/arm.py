@@ -60,6 +60,12 @@ class Arm:
                 f"arm {self.name!r}: board {self.board!r} is not known",
                 f"give one of {', '.join(boards.BOARDS)}",
             )
+        light = [joint.name for joint in self.joints if joint.motor is not None and joint.dynamics is None]
+        if light and any(joint.dynamics for joint in self.joints):
+            raise InputError(
+                f"{self.source or f'arm {self.name!r}'}: no dynamics of {', '.join(light)}, but of other joints",
+                "give each joint with a motor its dynamics, mass_kg = 0 for one without a mass; or none of them",
+            )
 
     @classmethod
     def of(cls, arm: Arm | Path | str) -> Arm:
