@@ -21,29 +21,30 @@ SAID = {
     "run 'armtempo deploy'",
     "fault_pending": "no: a fault is pending (joint 2) [code of the fault: 4711]; remove its cause, then "
     "'armtempo clear'",
-    "flash_full": "no: the flash has no room; what was stored is kept (joint 2) [bytes free: 4711]; "
+    "flash_full": "no: the flash is full; stored motions are kept (joint 2) [bytes free: 4711]; "
     "remove motions that are no longer needed: 'armtempo remove'",
     "bad_offset": "no: a piece of the upload is out of order (joint 2) [bytes received so far: 4711]; "
     "upload it again",
-    "wrong_joints": "no: the motion has another number of joints than the arm (joint 2) [joints of the motion: "
+    "wrong_joints": "no: the motion and the arm differ in the number of joints (joint 2) [joints of the motion: "
     "4711]; plan it for this arm",
     "time_order": "no: the time control points do not increase (joint 2) [number of the control point: 4711]; "
     "plan it again",
     "out_of_range": "no: the motion leaves the joint's range (joint 2) [position in steps: 4711]; check the via "
     "points or the range",
-    "wrong_start": "no: the arm does not stand where the motion begins (joint 2) [steps from there to the start: "
-    "4711]; bring it there: 'armtempo goto' with the motion's name or file",
+    "wrong_start": "no: the arm is not at the start of the motion (joint 2) [steps from there to the start: "
+    "4711]; move it there: 'armtempo goto' with the motion's name or file",
     "too_long": "no: the motion is longer or larger than the board can hold (joint 2) [its numbers reach 4711]; "
     "lower refine, use shared timing or fewer via points, or split it",
     "no_room": "no: the engine for this arm does not fit into the board's memory; nothing was changed (joint 2) "
     "[bytes needed: 4711]; lower its top speeds, drive fewer joints, or put the program into the firmware "
     "('armtempo flash')",
-    "pin_taken": "no: an output or input of the arm has a pin or timer that is taken (joint 2) [PE9: encoder 1]; give "
+    "pin_taken": "no: an output or input of the arm uses a pin or timer that is already in use (joint 2) [PE9: "
+    "encoder 1]; give "
     "another pin ('armtempo check' names the arm file's key; 'armtempo help hardware' lists what is free)",
-    "leg_missing": "no: the board does not have a motion that the sequence runs, or another one under its name "
+    "leg_missing": "no: a motion of the sequence is missing on the board, or differs from the planned one "
     "(joint 2) [number of the motion in the sequence, from 1: 4711]; upload the sequence again, which uploads its "
     "motions too",
-    "leg_elsewhere": "no: a motion of the sequence begins elsewhere than the one before it ends (joint 2) [number of "
+    "leg_elsewhere": "no: a motion of the sequence does not begin where the previous one ends (joint 2) [number of "
     "the step in the sequence: 4711]; plan the sequence again and upload it",
     "no_such_pin": "no: the sequence uses an output or an input that the arm on the board does not have (joint 2) "
     "[number of the step in the sequence: 4711]; plan the sequence again with the arm file that the board is set up "
