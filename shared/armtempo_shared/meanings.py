@@ -185,7 +185,7 @@ COMMANDS: "dict[str, str]" = {
     "`arm_crc` are 0 without an arm record; `boot` differs after every start of the program; "
     "`engine_room`: bytes of heap (beside the chip's backup SRAM) that an engine and its objects can have; "
     "`features`: what the program can do beyond one motion at a time, 1 sequences, 2 outputs and inputs, "
-    "4 held motions, 8 other speeds; "
+    "4 held motions, 8 other speeds; 128: both rates were measured on this board; "
     "`arm_problem`: code of "
     "what is wrong with the stored arm record, 0 where it is in force or there is none; `arm_value`: its value; the "
     "tail is the unique id in hex and the firmware.",
