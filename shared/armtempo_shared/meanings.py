@@ -54,7 +54,7 @@ _ROWS = (
     ("too_abrupt", "the motion reverses too fast for the step generator", "lower the limits"),
     (
         "no_session",
-        "the board has started anew, or was never greeted in this session",
+        "the board has restarted, or was never greeted in this session",
         "run the command again",
     ),
     (

@@ -103,7 +103,7 @@ def test_a_sound_board_passes(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "out" / "selftest.json").read_text()) == found
     assert "<svg" in (tmp_path / "out" / "selftest.html").read_text()
     again = commandline.run("selftest", "--out", "out", folder=tmp_path)
-    again.said("selftest.json is there already")
+    again.said("selftest.json already exists")
     assert again.exit_code == 2
 
 

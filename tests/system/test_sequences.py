@@ -119,7 +119,7 @@ def test_from_the_command_line(tmp_path: Path) -> None:
     assert [line.split()[0] for line in listed.splitlines() if line.startswith("s")] == ["s", "s-1", "s-2"]
     assert "finished after 2 whole cycles; parts 2" in said("run", "s.json")
     assert "finished after 2 whole cycles" in said("run", "s", "--arm", arm)
-    assert "--repeat: a sequence has no such thing" in said("run", "s.json", "--repeat", "2", code=2)
+    assert "--repeat: not for a sequence" in said("run", "s.json", "--repeat", "2", code=2)
     path.write_text(text.replace("goto = [0.5, -60, 40]", 'goto = "home"'))
     said("plan", "s.toml")
     assert "--force" in said("upload", "s.json", code=1)

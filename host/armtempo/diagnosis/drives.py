@@ -66,7 +66,7 @@ def _motor(joint: DrivenJoint) -> list[Finding]:
         found.append(
             warning(
                 joint.name,
-                f"steps_per_rev = {joint.motor.steps_per_rev} is no multiple of 4, as a stepper's full steps are",
+                f"steps_per_rev = {joint.motor.steps_per_rev} is not a multiple of 4, as a stepper's full steps are",
                 "give the motor's full steps a turn: 200 for 1.8 deg, 400 for 0.9 deg; microsteps have their own key",
             )
         )
@@ -74,7 +74,7 @@ def _motor(joint: DrivenJoint) -> list[Finding]:
         found.append(
             warning(
                 joint.name,
-                f"microsteps = {joint.motor.microsteps} is no setting that stepper drivers have",
+                f"microsteps = {joint.motor.microsteps} is not a setting of stepper drivers",
                 "look up the driver's switches: mostly 1, 2, 4, 8, 16, 32 and on",
             )
         )
@@ -99,7 +99,7 @@ def _rates(joint: DrivenJoint, driver: Driver) -> list[Finding]:
     if rate < _SLOW_STEPS_S:
         text = f"{at_limit} the motor makes only {rate:.2g} steps/s"
         found.append(
-            warning(joint.name, text, "check speed_deg_s, microsteps and gear_ratio for a slip of the unit")
+            warning(joint.name, text, "check speed_deg_s, microsteps and gear_ratio for a wrong unit")
         )
     if rpm > _FAST_RPM:
         text = f"{at_limit} the motor turns at {rpm:.0f} rpm; few steppers have torque left above {_FAST_RPM:.0f}"

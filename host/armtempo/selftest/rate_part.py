@@ -67,7 +67,7 @@ def to_state(found: Mapping[int, int | None]) -> tuple[int, int] | None:
 
 
 def judge(rate: int | None, count: int) -> Iterator[Measurement]:
-    """The line about the rate that was found for so many joints; a slower board is none that is wrong."""
+    """The line about the rate that was found for that many joints; a slower board is none that is wrong."""
     if rate is None:
         return
     expected = stated(count)

@@ -94,7 +94,7 @@ def _leave(client: Client, work: Callable[[Prompt], None]) -> None:
 
 
 def _check_drivers(prompt: Prompt) -> None:
-    """LinkError, and the program goes on as it was, unless ENABLE is inactive or the board has no arm.
+    """LinkError, and the program continues as it was, unless ENABLE is inactive or the board has no arm.
 
     From here on the end of the prompt is a reset, which switches drivers off that are on.
     """
@@ -233,7 +233,7 @@ def _arguments(moved: motion.TestMotion, found: SelfTest) -> dict[str, Any]:
 
 
 def _back(client: Client) -> None:
-    """Greet the program, which starts again after the reset; LinkError where it does not answer in time."""
+    """Greet the program, which starts again after the reset; LinkError if it does not answer in time."""
     limit_s = time.monotonic() + _BACK_S
     while True:
         time.sleep(_LOOK_S)
