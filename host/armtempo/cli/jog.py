@@ -79,7 +79,7 @@ def jog(
 
 
 def prepare(board: Board, arm: Arm, replace_arm: bool = False) -> None:
-    """Set the board up; LinkError where the position is unknown. A virtual arm that has just come stands at home."""
+    """Set the board up; LinkError if the position is unknown. A virtual arm that has just come stands at home."""
     board.configure(arm, replace=replace_arm)
     try:
         board.posture_deg()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
+from itertools import pairwise
 
 from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS
 
@@ -25,6 +26,17 @@ ENCODER: dict[str, Range] = {
     "following_error_deg": (0.0, 360.0),
 }
 """Least and largest value of each figure."""
+
+
+Curve = tuple[tuple[float, float], ...]
+CURVE = "pairs of rpm and Nm, at least two: speeds increasing from 0, no torque below 0"
+
+
+def is_curve(curve: Curve) -> bool:
+    """Whether pairs are a motor's torque over its speed, or none at all."""
+    speeds, torques = [pair[0] for pair in curve], [pair[1] for pair in curve]
+    increasing = all(after > before for before, after in pairwise(speeds))
+    return len(curve) == 0 or (len(curve) > 1 and speeds[0] == 0.0 and increasing and min(torques) >= 0.0)
 
 
 def _check(part: Motor | Encoder, ranges: Mapping[str, Range]) -> None:
@@ -64,11 +76,15 @@ class Motor:
     gear_ratio: float
     """Motor revolutions per joint revolution."""
     direction: int = 1
-    """1, or -1 where the DIR signal is inverted."""
+    """1, or -1 if the DIR signal is inverted."""
+    curve_rpm_nm: Curve = field(default=(), metadata=json_codec.ADDED)
+    """Speed of its shaft and torque that it holds there; empty: not known."""
 
     def __post_init__(self) -> None:
         """InputError for figures that no motor has."""
         _check(self, MOTOR)
+        if not is_curve(self.curve_rpm_nm):
+            raise InputError(f"Motor: curve_rpm_nm is {self.curve_rpm_nm}", f"give {CURVE}")
 
     @property
     def steps_per_deg(self) -> float:
@@ -141,6 +157,23 @@ class JointModel:
 
 @checked_fields
 @dataclass(frozen=True)
+class Dynamics:
+    """What a row of the table carries, and the friction of its joint."""
+
+    mass_kg: float
+    """Of the link with all that is fixed to it: motors, the tool and what it holds."""
+    centre_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Its centre of mass in the frame after the row."""
+    inertia_kg_m2: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    """About the centre of mass along the axes of that frame: xx, yy, zz, xy, xz, yz."""
+    friction_nm: float = 0.0
+    """At the joint, against its motion whatever the speed (Coulomb)."""
+    viscous_nm_s: float = 0.0
+    """At the joint, for a rad/s."""
+
+
+@checked_fields
+@dataclass(frozen=True)
 class Joint:
     """One Denavit-Hartenberg row (standard convention) and what moves it; ``motor`` None: not driven."""
 
@@ -161,6 +194,7 @@ class Joint:
     is counted from that link, so it stays when the previous joint turns. The row turns by the difference."""
     radius_mm: float = field(default=0.0, metadata=json_codec.ADDED)
     """Of the link about its d and its a; what it holds included."""
+    dynamics: Dynamics | None = field(default=None, metadata=json_codec.ADDED)
 
 
 @dataclass(frozen=True)

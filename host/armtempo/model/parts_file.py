@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
+from armtempo.basics.arguments import fits
 from armtempo.basics.errors import InputError
 from armtempo.formats.toml_table import Table
 from armtempo.model import outputs_file
 from armtempo.model.parts import (
+    CURVE,
     ENCODER,
     MOTOR,
+    Curve,
     Driver,
+    Dynamics,
     Encoder,
     Joint,
     JointModel,
@@ -19,6 +24,7 @@ from armtempo.model.parts import (
     Motor,
     Range,
     Safety,
+    is_curve,
 )
 
 MAX_ANGLE_DEG = 36_000.0
@@ -30,6 +36,7 @@ MAX_LENGTH_MM = 1e6
 _LIMITS = {"speed_deg_s": 1e5, "acceleration_deg_s2": 1e7, "jerk_deg_s3": 1e9}
 _LEAST_LIMIT = 0.001
 _LOCKED_DEG = 0.001
+_MOST_KG, _MOST_NM = 1e3, 1e4
 _MODEL = {
     "holding_torque_nm": (0.0, 1e3),
     "rotor_inertia_kg_m2": (0.0, 1.0),
@@ -110,9 +117,23 @@ def joint(table: Table, number: int) -> Joint:
         model=_model(table.table("model")),
         parallel_linkage=linkage,
         radius_mm=table.number("radius_mm", 0.0, least=0.0, most=MAX_LENGTH_MM),
+        dynamics=_dynamics(table.table("dynamics")),
     )
     table.done()
     return found
+
+
+def _dynamics(table: Table | None) -> Dynamics | None:
+    if table is None:
+        return None
+    mass = table.number("mass_kg", least=0.0, most=_MOST_KG)
+    x, y, z = table.numbers("centre_mm", 3, *[] if mass else [(0.0,) * 3])
+    xx, yy, zz, xy, xz, yz = table.numbers("inertia_kg_m2", 6, (0.0,) * 6)
+    friction, viscous = (
+        table.number(key, 0.0, least=0.0, most=_MOST_NM) for key in ("friction_nm", "viscous_nm_s")
+    )
+    table.done()
+    return Dynamics(mass, (x, y, z), (xx, yy, zz, xy, xz, yz), friction, viscous)
 
 
 def _home(table: Table, low: float, high: float) -> float:
@@ -154,12 +175,17 @@ def _number(table: Table, key: str, ranges: Mapping[str, Range], *default: float
 def _motor(table: Table | None) -> Motor | None:
     if table is None:
         return None
+    table.known("curve_rpm_nm")
+    curve: Any = table.array("curve_rpm_nm", CURVE) if table.has("curve_rpm_nm") else ()
+    if not fits(curve, Curve) or not is_curve(curve):
+        raise table.fail("curve_rpm_nm", CURVE)
     motor = Motor(
         channel=_whole(table, "channel", MOTOR),
         steps_per_rev=_whole(table, "steps_per_rev", MOTOR),
         microsteps=_whole(table, "microsteps", MOTOR),
         gear_ratio=_number(table, "gear_ratio", MOTOR),
         direction=table.choice("direction", (1, -1), 1),
+        curve_rpm_nm=tuple((float(rpm), float(nm)) for rpm, nm in curve),
     )
     table.done()
     return motor

@@ -50,7 +50,7 @@ class Question:
 
 
 def following(answers: Mapping[str, str]) -> Question | None:
-    """The question that comes after these answers; None where all is answered."""
+    """The question that comes after these answers; None if all is answered."""
     for question in _all(answers):
         if question.key not in answers:
             return question

@@ -15,7 +15,7 @@ _LEAST_FUNCTIONS = 100
 """Of a smaller module the blocks are fewer than what another module takes."""
 
 _FIRST_PERCENT = 25
-"""Of the functions, about so many in the first: so both files of the board program fill their blocks of the flash."""
+"""Of the functions, about this many in the first: so both files of the board program fill their blocks of the flash."""
 
 
 def halve(trees: dict[str, ast.Module], module: str, first: str) -> None:

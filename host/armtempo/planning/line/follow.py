@@ -73,9 +73,7 @@ class Followed:
         """The postures at any ways (N,) within it, exactly on it: (N, J)."""
         near = np.stack([np.interp(ways, self.ways, column) for column in self.angles_deg.T], axis=1)
         if _is_loose(self.course, self.tool):
-            from scipy.interpolate import (
-                CubicSpline,
-            )  # here, because loading it takes longer than most commands
+            from scipy.interpolate import CubicSpline  # loading it takes longer than most commands
 
             near = CubicSpline(self.ways, self.angles_deg)(ways)
         angles, missed = _corrected(self.course, self.tool, ways, near)
