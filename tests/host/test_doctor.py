@@ -30,6 +30,7 @@ STATE = BoardState(
     free_heap=40_000,
     max_rate=240_000,
     max_rate_sum=240_000,
+    rates_measured=False,
     room="5820 bytes: 3 x 5000 steps/s",
     arm_problem="",
     state="idle",

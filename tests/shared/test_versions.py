@@ -87,5 +87,5 @@ def test_flags_and_numbers_are_those_that_are_explained() -> None:
     assert f"`flags` {messages.START_HOMING}:" in meanings.COMMANDS["start"]
     assert f"`flags` {messages.SAMPLE_BRAKING}:" in meanings.EVENTS["sample"]
     for event in ("fault", "error"):
-        assert f"`joint` {messages.NO_JOINT} where" in meanings.EVENTS[event]
+        assert f"`joint` {messages.NO_JOINT} if" in meanings.EVENTS[event]
     assert messages.ARM_RECORD_NAME in meanings.COMMANDS["put_begin"]

@@ -88,11 +88,15 @@ def words(found: dict[str, Any], verdict: str) -> list[str]:
 
 def test_a_sound_board_passes(tmp_path: Path) -> None:
     with board(tmp_path) as port:
+        estimated = _status(port, tmp_path)
         code, found = selftest(port, tmp_path)
+        measured = _status(port, tmp_path)
     assert (code, words(found, "wrong")) == (0, []), found
+    assert "240000 all together, estimated; run 'armtempo selftest'" in estimated
+    assert "240000 all together, measured" in measured
     assert found["simulated"]
     assert all(rises(tmp_path, pin) > 300 for pin in STEPS)  # pulses there were
-    assert set(found["data"]["rates"]) == {"1", "3"}
+    assert found["data"]["rates"] == {"highest": {"1": 300_000, "3": 100_000}, "states": [240_000, 240_000]}
     parts = {one["part"] for one in found["lines"]}
     assert parts == {"drivers", "board", "cycles", "memory", "link", "pulses", "safety", "rates"}
     assert not is_enabled(tmp_path)
@@ -103,7 +107,9 @@ def test_a_sound_board_passes(tmp_path: Path) -> None:
     assert again.exit_code == 2
 
 
-@pytest.mark.parametrize("part", ["drivers", "identity", "cycles", "encoders", "pulses", "estop", "rates"])
+@pytest.mark.parametrize(
+    "part", ["drivers", "identity", "cycles", "encoders", "pulses", "estop", "rates", "keep"]
+)
 def test_what_is_sent_compiles_for_the_chip(part: str, tmp_path: Path) -> None:
     with_engine = part in ("encoders", "pulses", "estop", "rates")
     parts = ("common", "engine", part) if with_engine else ("common", part)
@@ -242,6 +248,10 @@ def test_drivers_stay_off_whatever_ends_it(tmp_path: Path, monkeypatch: pytest.M
             assert commandline.ended(process).exit_code == (130 if end is signal.SIGINT else -end)
     assert rises(tmp_path, STEPS[0]) > 0
     assert not is_enabled(tmp_path)
+
+
+def _status(port: str, folder: Path) -> str:
+    return commandline.run("status", "--port", port, folder=folder).output
 
 
 def _state(port: str) -> str:

@@ -58,7 +58,7 @@ _IN_FIRMWARE = (
     f"{_MOTION}.next_motion",
     *(f"{PACKAGES[0]}.hardware.{name}" for name in ("outputs", "digital_inputs")),
     *(f"{PACKAGES[0]}.app.output_{name}" for name in ("commands", "setup")),
-    f"{PACKAGES[0]}.storage.sequence_file",
+    *(f"{PACKAGES[0]}.storage.{name}" for name in ("sequence_file", "measured_rates")),
     *(f"{PACKAGES[1]}.sequence{name}" for name in ("", "_check")),
     *(f"{PACKAGES[0]}.app.sequence{name}" for name in ("_ahead", "_command", "_start", "r")),
 )

@@ -8,7 +8,7 @@ from typing import Any
 
 from armtempo_shared import wire
 from armtempo_shared.limits import TICK_HZ
-from armtempo_shared.messages import FEATURES
+from armtempo_shared.messages import FEATURES, RATES_MEASURED
 from armtempo_shared.sequence import ENDINGS
 
 from armtempo.basics.virtual_id import is_virtual
@@ -43,6 +43,11 @@ class Hello:
     def can(self, feature: str) -> bool:
         """Whether the program can do one of ``messages.FEATURES``; in the firmware it can do all."""
         return bool(self.features >> FEATURES.index(feature) & 1)
+
+    @property
+    def rates_measured(self) -> bool:
+        """Whether ``max_rate`` and ``max_rate_sum`` were measured by its self-test; else they are estimated."""
+        return bool(self.features & RATES_MEASURED)
 
     @property
     def virtual(self) -> bool:

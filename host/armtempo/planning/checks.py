@@ -30,6 +30,8 @@ from armtempo.splines import bspline, extremes
 from armtempo.splines.extremes import Extremes
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
+ESTIMATED = "(estimated; 'armtempo selftest' measures your board)"
+
 TOLERANCE = 1e-9
 """Allowance for rounding: largest excess over a limit, relative, and over a range, in degrees."""
 
@@ -66,7 +68,7 @@ def _check_step_rate(arm: Arm, joint: DrivenJoint, speed_deg_s: float) -> None:
     if rate > MAX_STEP_RATE:
         raise InputError(
             f"arm {arm.name!r}: {joint.name} at its speed limit of {speed_deg_s:g} deg/s needs {rate:.0f} "
-            f"steps/s, the board does {MAX_STEP_RATE} at most",
+            f"steps/s, the board does {MAX_STEP_RATE} at most {ESTIMATED}",
             "check the unit, lower the limit, or use fewer microsteps",
         )
 
@@ -256,7 +258,8 @@ def check_reached(arm: Arm, reached: tuple[Extremes, ...]) -> None:
         rates += extreme.speed_deg_s * joint.steps_per_deg
     if rates > MAX_STEP_RATE_SUM:
         raise PlanError(
-            f"the joints together could need {rates:.0f} steps/s, the board does {MAX_STEP_RATE_SUM} at most",
+            f"the joints together could need {rates:.0f} steps/s, the board does {MAX_STEP_RATE_SUM} at most "
+            f"{ESTIMATED}",
             "lower the speed limits or use fewer microsteps",
         )
 

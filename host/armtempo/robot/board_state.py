@@ -83,6 +83,8 @@ class BoardState:
     """Steps/s of one joint."""
     max_rate_sum: int
     """Steps/s of all joints together."""
+    rates_measured: bool
+    """Whether its self-test measured them; else they are estimated."""
     room: str
     """What engines its memory has room for, in words."""
     arm_problem: str
@@ -172,6 +174,7 @@ def read(client: Client, port: str) -> BoardState:
         free_heap=info.free_heap,
         max_rate=info.max_rate,
         max_rate_sum=info.max_rate_sum,
+        rates_measured=info.rates_measured,
         room=engine_room.Room.of_board(info).words(),
         arm_problem=_arm_problem(info),
         state=status.state,
