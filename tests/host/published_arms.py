@@ -6,7 +6,8 @@ import tomllib
 from pathlib import Path
 
 import numpy as np
-from armtempo.kinematics import Geometry, Ranges
+from armtempo.kinematics import Geometry, Ranges, forward
+from armtempo.kinematics.shape import Shape
 from armtempo.model.arm import Arm
 
 FOLDER = Path(__file__).parents[1] / "data" / "arms"
@@ -56,3 +57,25 @@ TABLE_2 = (
     (0.0, 168.3, 14.4, 0.0, 267.3, 180.0),
     (0.0, 168.3, 14.4, 180.0, 92.8, 0.0),
 )
+
+
+SHAPE = Shape.of(PAPER)
+
+
+def worst_error(geometry: Geometry, angles: np.ndarray, poses: np.ndarray) -> float:
+    """Largest element of forward(angles) - pose, lengths relative to the reach; NaN postures left out."""
+    difference = np.abs(forward(geometry, angles) - poses[:, None])
+    difference[..., :3, 3] /= geometry.reach
+    return float(np.nanmax(difference))
+
+
+def turned(difference: np.ndarray) -> np.ndarray:
+    """Size of an angle, whole turns taken off."""
+    return np.abs(np.remainder(difference + np.pi, 2 * np.pi) - np.pi)
+
+
+def with_wrist_at(planar: float, up: float, turn: float = 0.0) -> np.ndarray:
+    """A pose of the paper's arm with its wrist centre there and the tool pointing up."""
+    pose = np.eye(4)
+    pose[:3, 3] = planar * np.cos(turn), planar * np.sin(turn), SHAPE.height + up + 40.0
+    return pose

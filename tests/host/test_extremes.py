@@ -7,7 +7,7 @@ import pytest
 from armtempo.splines import bernstein, bspline, extremes, time_axis
 from armtempo.splines.trajectory import JointSpline
 
-from tests.host.feeding import dense
+from tests.host.problems import dense
 
 
 def random_joint(seed: int) -> JointSpline:

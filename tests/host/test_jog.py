@@ -76,7 +76,7 @@ def test_a_joint_goes_to_the_end_of_its_range_and_not_beyond() -> None:
             for sign in (1, -1):
                 try:
                     motion = jog_motion.plan("x", arm, here, JogMove(sign * INF, joint=number))
-                except InputError:  # home is there already
+                except InputError:  # it is at home already
                     assert here[number] in joint.range_deg
                     continue
                 assert "end of its range" in motion.ends

@@ -10,8 +10,7 @@ from armtempo.kinematics import BRANCHES, Branch, Geometry, Ranges, branch_of, c
 from armtempo.kinematics.choice import Choice
 from armtempo.model.arm import Arm
 
-from tests.host.poses import SHAPE, with_wrist_at
-from tests.host.published_arms import FILES, NAMED, PAPER, read
+from tests.host.published_arms import FILES, NAMED, PAPER, SHAPE, read, with_wrist_at
 
 ARM = Arm.paper()
 RANGES = Ranges.of(ARM)

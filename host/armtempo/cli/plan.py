@@ -41,8 +41,8 @@ def _refine(ctx: click.Context, param: click.Parameter, value: str | None) -> in
     "--output",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="Trajectory file to write; without it the job's name with .json. An existing FILE is only replaced where "
-    "it is an earlier plan of the same job for the same arm, by their names.",
+    help="Trajectory file to write; without it the job's name with .json. An existing FILE is only replaced if it "
+    "is an earlier plan of the same job for the same arm, by name.",
 )
 @options.force("any other FILE too")
 @click.option(
@@ -62,11 +62,9 @@ def _refine(ctx: click.Context, param: click.Parameter, value: str | None) -> in
     "--refine",
     callback=_refine,
     metavar="N|auto",
-    help="Instead of the job's segments between via points: 1 to 64, or as many as pay.",
+    help="Instead of the job's segments between via points: 1 to 64, or as many as shorten the motion.",
 )
-@click.option(
-    "--polish/--no-polish", default=None, help="Finish the search with a gradient solver, or do not."
-)
+@click.option("--polish/--no-polish", default=None, help="Whether a gradient solver finishes the search.")
 @click.option("--optimiser", metavar="NAME", help="Instead of the job's search algorithm.")
 @click.option("--population", type=click.IntRange(4), help="Instead of the job's population.")
 @click.option("--iterations", type=click.IntRange(1), help="Instead of the job's iterations.")
@@ -91,10 +89,10 @@ def plan(
     """Plan a job and write its trajectory file, or plan a sequence.
 
     FILE: a sequence file, or a job file, as with --job.
-    Where neither an arm nor a job is named, this plans the demo's job for the arm that ships with armtempo.
+    If neither an arm nor a job is given, this plans the demo's job for the arm that ships with armtempo.
     """
     if file is not None and job_path is not None:
-        raise InputError("FILE and --job are both given", "name one of them")
+        raise InputError("FILE and --job are both given", "give one of them")
     if file is not None and is_sequence(file):
         sequences.refuse_job_options({"split": split, "corridor_curve": corridor_curve, **changes})
         sequences.plan(file, arm_path, output, force, as_json)

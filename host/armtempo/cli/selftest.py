@@ -27,8 +27,8 @@ from armtempo.selftest.result import Measurement, SelfTest
 def selftest(given: BoardOptions, out: Path | None, force: bool) -> None:
     """Let the board measure itself: clocks, flash, memory, link, pulses, E-stop.
 
-    Nothing needs to be connected, and nothing moves: the drivers must be off, and stay so. The board is reset at the
-    end, so the arm's position is unknown then. Exit code 1 where anything is wrong.
+    Nothing needs to be connected, and nothing moves: the drivers must be off, and are kept off. The board is reset at
+    the end, so the arm's position is unknown then. Exit code 1 if anything is wrong.
     """
     if out is not None:
         page.check_free(out, force)

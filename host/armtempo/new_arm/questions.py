@@ -50,7 +50,7 @@ class Question:
 
 
 def following(answers: Mapping[str, str]) -> Question | None:
-    """The question that comes after these answers; None where all is answered."""
+    """The question that comes after these answers; None if all is answered."""
     for question in _all(answers):
         if question.key not in answers:
             return question
@@ -241,7 +241,7 @@ def _number(least: float, most: float, example: str) -> Reader:
         try:
             value = float(text)
         except ValueError:
-            raise WrongAnswerError(f"{text!r} is no number; write it as {example}") from None
+            raise WrongAnswerError(f"{text!r} is not a number; write it as {example}") from None
         if not least <= value <= most:
             raise WrongAnswerError(f"it must be from {least:g} to {most:g}, such as {example}")
         return value

@@ -38,4 +38,4 @@ class StartPosition:
             if start_deg is not None:
                 goto.go_to(self.client, arm, start_deg, stop)
         elif start_deg is not None and not arm_state.is_at(self.client, arm, start_deg):
-            raise LinkError(f"the arm does not stand where {name} begins", advice)
+            raise LinkError(f"the arm is not at the start of {name}", advice)

@@ -28,7 +28,7 @@ def basis(degree: int) -> Array:
     Raises InputError for a degree other than 3 or 5.
     """
     if degree not in BASIS:
-        raise InputError(f"splines of degree {degree} are not known", "choose 3 (cubic) or 5 (quintic)")
+        raise InputError(f"a spline of degree {degree} is not supported", "choose 3 (cubic) or 5 (quintic)")
     matrix = np.array(BASIS[degree], dtype=float) / FACTORIAL[degree]
     matrix.setflags(write=False)
     return matrix
@@ -40,8 +40,8 @@ def fit(points_deg: ArrayLike, degree: int, rests: Sequence[int] = ()) -> Array:
     ``points_deg``: (n + 1,) or (n + 1, J). Returns (n + degree,) or (n + degree, J). A banded solve of
     Eq. (13) or (14); the cubic rests in speed, the quintic also in acceleration. A quintic stands still at the points
     ``rests`` too, where it may go on in any direction, and only comes near to the two points before and after each;
-    they are at least DEGREE apart and from the ends. Raises
-    InputError for fewer than two points or values that are not finite.
+    they are at least ``degree`` apart and from the ends. Raises InputError for fewer than two points or values that
+    are not finite.
     """
     from scipy.linalg import solve_banded  # here, because loading it takes longer than most commands
 

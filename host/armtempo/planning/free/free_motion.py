@@ -315,6 +315,6 @@ def met(variables: MotionVariables, equalities: Equalities, x: Array, smooth: bo
     except np.linalg.LinAlgError:
         raise PlanError(
             "no motion was found that meets all via points, rests and dwells",
-            "raise refine, or set it to 'auto'; or bring times and angles closer together in size",
+            "raise refine, or set it to 'auto'; or use times and angles of more similar magnitude",
         ) from None
     return x + factor.solve(gradient, equalities.residual(x))
