@@ -470,7 +470,8 @@ class Board:
         arm = Arm.of(arm)
         self.configure(arm)
         self._start.home_virtual_arm(arm)
-        return MotorTest(self, arm, ask, tell).run()
+        with self._stoppable(None) as stop:
+            return MotorTest(self.client, arm, stop, ask, tell).run()
 
     def clear(self) -> None:
         """Clear a fault; BoardError while its cause is still there."""

@@ -8,21 +8,20 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from typing import TYPE_CHECKING
 
 from armtempo_shared import codes
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError, BoardError, InputError
 from armtempo.diagnosis.finding import Level
+from armtempo.link import Client
+from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint
-from armtempo.planning.jog.jog_motion import SLOWEST
+from armtempo.planning.jog.jog_motion import SLOWEST, move_of
+from armtempo.robot import arm_state, jog
+from armtempo.robot.stop_request import StopRequest
 from armtempo.selftest.result import Measurement, SelfTest, judged
 from armtempo.selftest.selftest import UNIQUE_ID_DIGITS
-
-if TYPE_CHECKING:
-    from armtempo.model.arm import Arm
-    from armtempo.robot.board import Board
 
 PART = "motors"
 ARM_FILE = "arm_file"
@@ -61,16 +60,21 @@ class MotorTest:
     """``ask``: a question to whoever stands there, True for yes; ``tell``: what to do now."""
 
     def __init__(
-        self, board: Board, arm: Arm, ask: Callable[[str], bool], tell: Callable[[str], object]
+        self,
+        client: Client,
+        arm: Arm,
+        stop: StopRequest,
+        ask: Callable[[str], bool],
+        tell: Callable[[str], object],
     ) -> None:
-        info = board.info
+        info = client.info
         self.found = SelfTest(info.board_id[:UNIQUE_ID_DIGITS], info.virtual, info.program_crc)
         self.found.data[ARM_FILE] = []
-        self._board, self._arm, self._ask, self._tell = board, arm, ask, tell
+        self._client, self._arm, self._stop, self._ask, self._tell = client, arm, stop, ask, tell
 
     def run(self) -> SelfTest:
         """All of it. Raises LinkError where a position is unknown, ArmtempoError without a yes; nothing moved then."""
-        posture_deg = self._board.posture_deg()
+        posture_deg = arm_state.posture_deg(self._client, self._arm)
         if not self._ask(question(self._arm, posture_deg)):
             raise ArmtempoError("the test with motors was not confirmed: nothing moved")
         try:
@@ -100,13 +104,17 @@ class MotorTest:
     def _moved(self, joint: DrivenJoint, by_deg: float) -> tuple[int, int]:
         """Steps and counts of a jog."""
         index = self._arm.driven.index(joint)
-        before = self._board.status().positions
-        self._board.jog(joint.name, by_deg, speed=_SPEED)
-        after = self._board.status().positions
+        before = self._client.status().positions
+        self._jog(joint, by_deg, _SPEED)
+        after = self._client.status().positions
         return (
             after.commanded_steps[index] - before.commanded_steps[index],
             after.counts[index] - before.counts[index],
         )
+
+    def _jog(self, joint: DrivenJoint, by_deg: float, speed: float) -> None:
+        move = move_of(self._arm, joint.name, None, by_deg, None)
+        jog.step(self._client, self._arm, move, speed, self._stop)
 
     def _switches(self, joint: DrivenJoint) -> None:
         for end, side, switch in (("low", -1, joint.switches.low), ("high", 1, joint.switches.high)):
@@ -127,7 +135,7 @@ class MotorTest:
         for by_deg in (-side * size_deg, side * size_deg) * _TRIES:
             try:
                 with suppress(InputError):  # it stands at the end of its range
-                    self._board.jog(joint.name, by_deg, speed=SLOWEST)
+                    self._jog(joint, by_deg, SLOWEST)
             except BoardError as error:
                 seen = error.code
                 self._released(what)
@@ -142,7 +150,7 @@ class MotorTest:
         self._tell(f"release {what}")
         while True:
             try:
-                return self._board.clear()
+                return self._client.clear()
             except BoardError:
                 if time.monotonic() > limit_s:
                     raise
