@@ -52,7 +52,7 @@ def test_a_sound_board_has_nothing_wrong() -> None:
 @pytest.mark.parametrize(
     ("change", "level", "words", "cure"),
     [
-        ({"program_current": False}, Level.ERROR, "another than", "armtempo deploy"),
+        ({"program_current": False}, Level.ERROR, "differs from", "armtempo deploy"),
         ({"fault": "estop"}, Level.ERROR, "estop", "armtempo clear"),
         (
             {"arm_problem": "not used: the record is damaged"},

@@ -232,7 +232,7 @@ def test_keys_move_the_arm_in_steps_and_while_held(tmp_path: Path) -> None:
         while "moving; after release at rest within" not in screen.shown and time.monotonic() < limit_s:
             screen.press("+")
             screen.look(0.05)
-        assert "moving; released" in screen.shown, before
+        assert "moving; after release" in screen.shown, before
         screen.look(2.0)
         screen.press("q")
         assert screen.end() == 0, screen.shown
@@ -266,7 +266,7 @@ def test_teach_collects_points_into_a_job_that_plans(tmp_path: Path) -> None:
         screen.press("s+")
         screen.wait_for("| 10.01 -60.00")
         screen.press("pu")
-        screen.wait_for("point 2 forgotten")
+        screen.wait_for("point 2 removed")
         screen.press("p")
         screen.wait_for("point 2 taken")
         screen.press("q")

@@ -157,7 +157,8 @@ def run_and_tell(
     shown.close()
     if end.ending == "timed_out":
         raise ArmtempoError(
-            f"an input did not come in time {where(end)}", "see why, 'armtempo goto' its start, run it again"
+            f"an input did not change in time {where(end)}",
+            "see why, 'armtempo goto' its start, run it again",
         )
     result = _as_json(end, board, recorded.path if recorded else None)
     results.show(as_json, result, [f"{end.ending} after {cycles(end)}{counted(board.counters)}"])

@@ -165,7 +165,7 @@ class TaughtPoints:
         if not self.points_deg:
             return "there is no point to remove"
         self.points_deg.pop()
-        return f"point {len(self.points_deg) + 1} forgotten"
+        return f"point {len(self.points_deg) + 1} removed"
 
     def save(self, file: Path) -> None:
         """Write the job; InputError for fewer than two points."""

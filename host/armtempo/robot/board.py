@@ -391,7 +391,7 @@ class Board:
             sequence.arm,
             None if sequence.start_deg is None else np.array(sequence.start_deg),
             f"sequence {sequence.name!r}",
-            "bring it there with 'armtempo goto' and the sequence's file",
+            "move it there with 'armtempo goto' and the sequence's file",
             stop,
         )
         return key
@@ -519,5 +519,5 @@ class Board:
     def _bring_to_start(self, motion: EncodedMotion, stop: StopRequest) -> None:
         """Store the motion; bring a virtual arm to its start, and refuse where a real one is elsewhere."""
         stored_motion.store(self.client, motion.name, motion.data)
-        advice = "bring it there with 'armtempo goto'"
+        advice = "move it there with 'armtempo goto'"
         self._start.take(motion.arm, motion.start_deg, repr(motion.name), advice, stop)
