@@ -66,9 +66,9 @@ def test_page_is_current() -> None:
 
 
 def test_every_message_and_code_has_its_words() -> None:
-    commands = {row[0] for row in rows("C") + rows("O") + rows("S")}
-    assert set(meanings.COMMANDS) == commands == {row[0] for row in rows("A") + rows("P") + rows("T")}
-    assert set(meanings.EVENTS) == {row[0] for row in rows("E") + rows("R")}
+    commands = {row[0] for row in [*rows("C"), *rows("O"), *rows("S")]}
+    assert set(meanings.COMMANDS) == commands == {row[0] for row in [*rows("A"), *rows("P"), *rows("T")]}
+    assert set(meanings.EVENTS) == {row[0] for row in [*rows("E"), *rows("R")]}
     numbers = {name: value for name, value in vars(codes).items() if name.isupper()}
     assert {name.upper(): code for name, code in meanings.ERROR_CODES.items()} == numbers
     assert len(set(numbers.values())) == len(numbers)
@@ -76,8 +76,8 @@ def test_every_message_and_code_has_its_words() -> None:
 
 
 def test_numbers_are_used_once_and_answers_match_their_commands() -> None:
-    commands, answers = rows("C") + rows("O") + rows("S"), rows("A") + rows("P") + rows("T")
-    others = rows("E") + rows("R")
+    commands, answers = [*rows("C"), *rows("O"), *rows("S")], [*rows("A"), *rows("P"), *rows("T")]
+    others = [*rows("E"), *rows("R")]
     numbers = [row[1] for row in commands + others]
     assert len(set(numbers)) == len(numbers)
     assert [row[:2] for row in commands] == [row[:2] for row in answers]

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _BYTES_PER_JOINT = const(8)  # in a sample on the wire
 _BOOT_BYTES = const(4)
-MOTION_CODE_BYTES = const(12_500)
+MOTION_CODE_BYTES = const(14_500)
 """The large pieces of the code that only a motion needs."""
 NEVER_MS = const((1 << 30) - 1)
 
