@@ -97,7 +97,7 @@ def _wide(arm: Arm) -> list[Finding]:
 def _gap_mm(points: Array, shortest: float) -> float:
     """Smallest distance between two lines of the outline that are not neighbours; infinite if there are none.
 
-    Lines shorter than ``shortest`` are left out: what stands before and behind them is near in any posture.
+    Lines shorter than ``shortest`` are left out: what is before and after them is near in any posture.
     """
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     links = [(points[i], points[i + 1]) for i in np.flatnonzero(lengths > max(shortest, _BELOW_MM))]
