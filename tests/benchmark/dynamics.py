@@ -3,7 +3,7 @@
     python -m tests.benchmark.dynamics [--count 1000]
 
 The test's URDFs with random masses, centres of mass and inertias in every link. Prints the largest difference of any
-joint's torque, as a part of the largest torque; exits with 1 where it exceeds 1e-9. pinocchio: pip install pin.
+joint's torque, as a part of the largest torque; exits with 1 if it exceeds 1e-9. pinocchio: pip install pin.
 """
 
 from __future__ import annotations

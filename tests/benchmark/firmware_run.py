@@ -181,7 +181,7 @@ def unwatched(arm: Arm) -> Arm:
 
 
 def run(elf: Path, image: Path) -> dict[str, Heap]:
-    """Drive a board through the shipped motion by the host's own link; AssertionError where it does not end well."""
+    """Drive a board through the shipped motion by the host's own link; AssertionError if it does not end well."""
     arm = unwatched(Arm.paper())
     plan = planner.plan(arm, replace(Job.paper(arm), population=5, iterations=20))
     with running(elf, image) as (port, said), tempfile.TemporaryDirectory() as runs:

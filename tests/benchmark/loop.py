@@ -205,7 +205,7 @@ def _lift_limits(folder: Path) -> None:
     lifted = 0
     for path in folder.rglob("*.py"):
         text = path.read_text()
-        for limit in ("MAX_STEP_RATE", "MAX_STEP_RATE_SUM", MAX_STEP_RATE, MAX_STEP_RATE_SUM):
+        for limit in ("step_rates.one", "step_rates.together", MAX_STEP_RATE, MAX_STEP_RATE_SUM):
             lifted += text.count(f"{limit} + {limit} // 100")
             text = text.replace(f"{limit} + {limit} // 100", "10_000_000")
         path.write_text(text)

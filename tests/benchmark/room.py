@@ -95,7 +95,7 @@ class Session:
 
 
 def arm_record(rates: list[int]) -> bytes:
-    """An arm of so many joints; encoders and switches stand still in the emulator."""
+    """An arm of that many joints; encoders and switches stand still in the emulator."""
     rows = [row(channel=n, max_rate=rate, counts_num=0, counts_den=1) for n, rate in enumerate(rates)]
     return armrecord.pack({**HEAD, "identity": 1}, rows)
 
@@ -219,7 +219,7 @@ def blocks(with_library: bool) -> None:
 
 
 def changes(elf: Path, with_library: bool, count: int, seed: int = 12) -> None:
-    """Print what is left after so many random arms."""
+    """Print what is left after that many random arms."""
     rng = random.Random(seed)
     session = Session(rounds=-(-count // _MOST_ARMS))
     session.command("hello", (wire.PROTOCOL_VERSION, 1))

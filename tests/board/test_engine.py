@@ -50,6 +50,6 @@ def test_nothing_is_allocated_while_a_motion_runs(name: str) -> None:
 SCRIPT = Path(__file__).parent / "scripts" / "cases" / "memory.py"
 
 
-@scripted.each(scripted.cases(SCRIPT))
+@scripted.each(scripted.together(scripted.cases(SCRIPT)))
 def test_case_of_engine_memory(case: scripted.Case) -> None:
     case.run()

@@ -74,7 +74,7 @@ def test_braking_near_an_end_is_quick() -> None:
 
 
 def test_the_worst_change_of_rate_needs_the_whole_brake_time() -> None:
-    """In a motion of 0.7 s, where it matters how far the motion goes on meanwhile."""
+    """In a motion of 0.7 s, where it matters how far the motion continues meanwhile."""
     arm = Arm.paper()
     motion = point_to_point.straight("go", [0.0, -60.0, 40.0], [1.0, -60.0, 40.0], arm)
     limits = [joint.limits for joint in arm.driven]

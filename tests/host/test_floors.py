@@ -14,7 +14,7 @@ from armtempo.planning.dual_bound import Cells, Multipliers
 from armtempo.splines import bspline
 
 from tests.host import problems
-from tests.host.feeding import FEEDING, LIMITS
+from tests.host.problems import FEEDING, LIMITS
 
 
 def test_joint_1_from_rest_to_rest() -> None:

@@ -87,7 +87,7 @@ def test_a_file_of_poses_is_followed_from_posture_to_posture(tmp_path: Path) -> 
     )
     answers = solutions("--poses", file)
     chosen = [answer["solutions"][answer["chosen"] - 1]["angles_deg"] for answer in answers]
-    # Joint 6 goes on past half a turn, because each pose follows the one before.
+    # Joint 6 continues past half a turn, because each pose follows the one before.
     np.testing.assert_allclose(chosen, np.degrees(path), atol=1e-6)
 
 

@@ -11,8 +11,16 @@ from armtempo.kinematics.inverse import CHUNK
 from armtempo.kinematics.moved_tool import moved_tool_deg
 from armtempo.kinematics.solutions import OK, WRIST_STRAIGHT
 
-from tests.host.poses import turned, worst_error
-from tests.host.published_arms import EQ_16, NAMED, PAPER, PAPER_FULL_SIZE, TABLE_2, drawn
+from tests.host.published_arms import (
+    EQ_16,
+    NAMED,
+    PAPER,
+    PAPER_FULL_SIZE,
+    TABLE_2,
+    drawn,
+    turned,
+    worst_error,
+)
 
 ACCURACY = 1e-9
 

@@ -175,7 +175,7 @@ def test_a_run_on_the_virtual_board(plan: armtempo.Plan, arm: armtempo.Arm, tmp_
 def test_a_second_run_of_the_same_board_starts_where_it_should(
     plan: armtempo.Plan, arm: armtempo.Arm, tmp_path: Path
 ) -> None:
-    """The virtual arm goes back by itself; what it is told of its position stays true."""
+    """The virtual arm goes back by itself; what it is told about its position stays true."""
     with armtempo.connect("sim", arm) as board:
         for _ in range(2):
             run = board.run(plan, out=tmp_path)

@@ -74,7 +74,7 @@ def test_a_line_and_an_arc_keep_speed_tolerance_and_rests(plan: Plan, tmp_path: 
 
 
 def test_faults_of_a_line_are_seen(plan: Plan) -> None:
-    """The check itself: a plan held against a line nearby, and against a lower speed."""
+    """The check itself: a plan checked against a line nearby, and against a lower speed."""
     ways = (replace(plan.job.ways[0], speed_mm_s=79.0), plan.job.ways[1])
     assert line_faults(replace(plan, job=replace(plan.job, ways=ways)))
     ways = (replace(plan.job.ways[0], tolerance_mm=0.01), plan.job.ways[1])

@@ -16,8 +16,7 @@ from armtempo.robot import stored_motion
 from armtempo.robot.stop_request import StopRequest
 from armtempo_shared import wire
 
-from tests.host.linked import random_motion, ready
-from tests.inprocess import Pipe, connect
+from tests.inprocess import Pipe, connect, random_motion, ready
 
 
 def prepared(pipe: Pipe) -> tuple[Client, MotionKey]:

@@ -46,7 +46,7 @@ def panel(running: Panels) -> Panel:
 
 @pytest.fixture
 def window(chromium: Any) -> Iterator[Any]:
-    """A window of its own, closed at the end: a page that stays open goes on drawing."""
+    """A window of its own, closed at the end: a page that stays open continues drawing."""
     made = chromium.new_context(viewport=panels.SMALL)
     yield made
     made.close()

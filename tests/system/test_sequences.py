@@ -77,15 +77,15 @@ def test_whatever_ends_it_leaves_a_board_that_says_where(tmp_path: Path) -> None
         assert board.output("gripper").state == "open"  # its safe state
     with launch(LaunchOptions(arm=ARM)) as process, armtempo.connect(process.port, ARM) as board:
         board.home(ARM)
-        with pytest.raises(BoardError, match="an input did not come in time") as caught:
+        with pytest.raises(BoardError, match="an input of a sequence did not change in time") as caught:
             board.run_sequence(plan)
         assert "in step 3 after 0 whole cycles" in str(caught.value)
         with pytest.raises(BoardError, match="a fault is pending"):
             board.run_sequence("small")
         board.clear()
-        with pytest.raises(BoardError, match="does not stand where the motion begins"):
+        with pytest.raises(BoardError, match="is not at the start of the motion"):
             board.run_sequence("small")
-        with pytest.raises(LinkError, match="does not stand where sequence 'small' begins"):
+        with pytest.raises(LinkError, match="is not at the start of sequence 'small'"):
             board.run_sequence(plan)
         board.goto(plan)
         stop = armtempo.StopRequest()

@@ -154,7 +154,7 @@ CASES = Path(__file__).parent / "scripts" / "cases"
 SCRIPTS = tuple(CASES / f"virtual_{name}.py" for name in ("hardware", "time", "flash"))
 
 
-@scripted.each([case for script in SCRIPTS for case in scripted.cases(script)])
+@scripted.each(scripted.together(scripted.cases(*SCRIPTS)))
 def test_case(case: scripted.Case, tmp_path: Path) -> None:
     (tmp_path / "flash").mkdir()
     case.run(str(tmp_path), heap="")

@@ -50,7 +50,7 @@ def check(
 
 
 def _check_picture(picture: Path | None, force: bool) -> None:
-    """Raise InputError where the picture cannot be written as asked."""
+    """Raise InputError if the picture cannot be written as asked."""
     if picture is None:
         return
     if picture.suffix not in (".png", ".svg"):

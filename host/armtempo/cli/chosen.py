@@ -50,7 +50,7 @@ def named_arm(path: Path | None, for_shape: bool = False) -> Arm | None:
 
 
 def arm_file(path: Path | None) -> Path:
-    """The file of the same, or the paper's arm's, which is said aloud."""
+    """The file of the same, or the paper's arm's, which is printed."""
     setting = ProjectSettings().get(ARM, path)
     if not setting:
         tell(f"no arm given; using the one that ships with armtempo, {shipped.PAPER!r}")
@@ -58,7 +58,7 @@ def arm_file(path: Path | None) -> Path:
 
 
 def load_arm(path: Path | None) -> Arm:
-    """The same; InputError where none is named."""
+    """The same; InputError if none is named."""
     found = named_arm(path)
     if found is None:
         raise nothing_set(ARM, "which arm?")
@@ -66,7 +66,7 @@ def load_arm(path: Path | None) -> Arm:
 
 
 def arm_or_paper(path: Path | None, for_shape: bool = False) -> Arm:
-    """The same, for commands that move nothing: without one the paper's arm, which is said aloud."""
+    """The same, for commands that move nothing: without one the paper's arm, which is printed."""
     found = named_arm(path, for_shape)
     if found is None:
         found = Arm.paper()
@@ -75,7 +75,7 @@ def arm_or_paper(path: Path | None, for_shape: bool = False) -> Arm:
 
 
 def load_job(path: Path | None, arm: Arm) -> Job:
-    """The job of ``--job``, of the variable or of the project folder; InputError where none is named."""
+    """The job of ``--job``, of the variable or of the project folder; InputError if none is named."""
     setting = ProjectSettings().get(JOB, path)
     if not setting:
         raise nothing_set(JOB, "which job?")
@@ -91,7 +91,7 @@ def job_file(path: Path | None) -> Path | None:
 def arm_and_job(arm_path: Path | None, job_path: Path | None) -> tuple[Arm, Job]:
     """What to plan: both as they are named, or, where neither is, the demo's.
 
-    InputError where only one of them is named: a job is never planned for an arm that nobody has named.
+    InputError if only one of them is named: a job is never planned for an arm that nobody has named.
     """
     settings = ProjectSettings()
     arm, job = settings.get(ARM, arm_path), settings.get(JOB, job_path)
@@ -107,7 +107,7 @@ def arm_and_job(arm_path: Path | None, job_path: Path | None) -> tuple[Arm, Job]
 def arm_of_board(board: Board, named: Arm | None) -> Arm:
     """The arm that is named; else the one that ships with armtempo, if the board is set up for just that.
 
-    InputError where neither is.
+    InputError if neither is.
     """
     if named is not None:
         return named
@@ -182,7 +182,7 @@ def load_sequence_plan(path: Path, arm_path: Path | None, name: str | None = Non
 
 
 def port(given: str | None, others: bool = False) -> str:
-    """The port of ``--port``, of the variable or of the project folder, else the one that can be meant, said aloud.
+    """The port of ``--port``, of the variable or of the project folder, else the one that can be meant, printed.
 
     ``others``: one that another armtempo program has open will do too.
     """
@@ -226,7 +226,7 @@ def board(
 def shared_or_own(
     given: BoardOptions, arm: Arm | None = None, any_program: bool = False, sink: Sink | None = None
 ) -> SharedBoard | Board:
-    """The board through another program that has its port, which is said aloud, else over the port itself.
+    """The board through another program that has its port, which is printed, else over the port itself.
 
     ``given`` names a port. A program that opens it just now answers for it soon; one that ends gives it up.
     """

@@ -51,7 +51,7 @@ def firmware(
 ) -> None:
     """Build a MicroPython firmware with the board program in it.
 
-    Needs make, gcc and arm-none-eabi-gcc; what is missing is named with the command that brings it.
+    Needs make, gcc and arm-none-eabi-gcc; what is missing is named with the command that installs it.
     """
     if program is not None:
         frozen.write(program)

@@ -102,9 +102,9 @@ class KeysAndGamepad:
 
 @contextmanager
 def beside(keys: Keys, joints: int) -> Iterator[Keys]:
-    """``keys`` with the first gamepad that is connected, for an arm of so many ``joints``.
+    """``keys`` with the first gamepad that is connected, for an arm of that many ``joints``.
 
-    Raises MissingPackageError without pygame, InputError where there is no gamepad.
+    Raises MissingPackageError without pygame, InputError if there is no gamepad.
     """
     pygame = _pygame()
     state = GamepadState(joints)

@@ -116,7 +116,7 @@ def _within(pose: Pose, tolerance_mm: float | None, tolerance_deg: float | None)
 
 
 def _poses(given: _Given) -> list[Pose]:
-    """The poses of the options; InputError where they do not make exactly one of the three forms."""
+    """The poses of the options; InputError if they do not make exactly one of the three forms."""
     if sum(form is not None for form in (given.matrix, given.position, given.poses)) != 1:
         raise InputError("no pose is given, or more than one", "give one of --matrix, --position and --poses")
     angles = {
@@ -187,7 +187,7 @@ def _print_json(solver: PoseSolver, found: Iterable[Listing]) -> None:
 
 
 def _fail(without: list[int]) -> None:
-    """End with exit code 1 where poses are left without a solution."""
+    """End with exit code 1 if poses are left without a solution."""
     if without:
         which = ", ".join(map(str, without))
         raise PlanError(

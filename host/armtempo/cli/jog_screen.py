@@ -59,7 +59,7 @@ class JogChoice:
 
     @property
     def tool_axis(self) -> str | None:
-        """As the library calls it; None where a joint moves."""
+        """As the library calls it; None if a joint moves."""
         return None if self.joint is not None else f"tool-{self.axis}" if self.in_tool else self.axis
 
     def press(self, key: str, joints: int) -> bool:
@@ -113,7 +113,7 @@ class JogScreen:
         self._ended_by = ""
 
     def loop(self) -> None:
-        """Read keys until q, Ctrl-C or the end of the input. LinkError where the board cannot be reached."""
+        """Read keys until q, Ctrl-C or the end of the input. LinkError if the board cannot be reached."""
         self._show()
         while True:
             key = self._ended_by or self._keys.read(_IDLE_S)

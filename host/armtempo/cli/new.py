@@ -138,7 +138,7 @@ def hold(folder: Path, resume: bool) -> Answers:
 
 
 def _kept(draft: Path) -> Answers:
-    """The answers of a draft, as far as they can be taken; InputError where there are none."""
+    """The answers of a draft, as far as they can be taken; InputError if there are none."""
     try:
         found = json.loads(draft.read_text(encoding="utf-8"))
         given = {str(key): str(value) for key, value in found.items()}

@@ -105,7 +105,7 @@ class NamedPosture:
 
     @classmethod
     def of(cls, text: str, arm_path: Path | None, altered: bool) -> NamedPosture:
-        """The posture that ``text`` names; InputError where its trajectory file or the arm cannot be read."""
+        """The posture that ``text`` names; InputError if its trajectory file or the arm cannot be read."""
         if text.endswith(".json") and is_sequence_plan(Path(text)):
             sequence = chosen.load_sequence_plan(Path(text), arm_path)
             return cls(text, sequence.arm, None, sequence)
@@ -120,7 +120,7 @@ class NamedPosture:
         return cls(text, arm, None)
 
     def angles_deg(self, arm: Arm, job_path: Path | None) -> Array:
-        """Angles in degrees (J,); InputError where the text is not a posture, or does not fit the arm."""
+        """Angles in degrees (J,); InputError if the text is not a posture, or does not fit the arm."""
         if self.sequence is not None:
             return point_to_point.posture(self.sequence.start_deg or arm.home_deg, arm)
         if self.plan is not None:
@@ -161,7 +161,7 @@ def words(angles_deg: Array, arm: Arm) -> str:
 
 
 def via_deg(text: str, arm: Arm, job: Job) -> Array:
-    """The angles of a via point of a job, degrees (J,); InputError where the job has no such point."""
+    """The angles of a via point of a job, degrees (J,); InputError if the job has no such point."""
     points_deg, _ = planner.via_angles(arm, job)
     index = int(text[1:])
     if index >= len(points_deg):

@@ -64,7 +64,7 @@ def run(
 
 
 def only_for_motions(repeat: int, live: bool) -> None:
-    """InputError for what a sequence has not: repetitions of its own, a plot."""
+    """InputError for what a sequence does not have: repetitions of its own, a plot."""
     for name, given in (("--repeat", repeat != 1), ("--live", live)):
         if given:
             raise InputError(f"{name}: not for a sequence", "leave it out; repeat is a step of the sequence")
@@ -83,7 +83,7 @@ def run_and_tell(
     live: bool = False,
     as_json: bool = False,
 ) -> Run:
-    """Run a motion, or the stored one of that name, and print what happens and what became of each joint.
+    """Run a motion, or the stored one of that name, and print what happens and the outcome for each joint.
 
     ``as_json``: the result as JSON, what happens on the other stream.
     """

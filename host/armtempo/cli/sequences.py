@@ -41,7 +41,7 @@ def plan(file: Path, arm_path: Path | None, output: Path | None, force: bool, as
 
 
 def refuse_job_options(options: dict[str, Any]) -> None:
-    """InputError where an option changes the job, and there is none."""
+    """InputError if an option changes the job, and there is none."""
     given = sorted(name for name, value in options.items() if value not in (None, False))
     if given:
         raise InputError(
@@ -73,7 +73,7 @@ def _share(share: Share) -> dict[str, Any]:
 
 
 def _duration_s(planned: SequencePlan, row: SequenceRow) -> float | None:
-    """What a row takes; None where it takes no time of its own."""
+    """What a row takes; None if it takes no time of its own."""
     if row.op == MOVE:
         return float(planned.legs[row.number].duration_s)
     return row.amount / 1000 if row.op == WAIT else None
@@ -136,7 +136,7 @@ def run_and_tell(
 ) -> SequenceState:
     """Run a sequence into a run folder below ``out`` (None: nowhere), print where it stands and how it ended.
 
-    ``as_json``: the end as JSON. Exit code 1 where an input did not come.
+    ``as_json``: the end as JSON. Exit code 1 if an input did not come.
     """
     say = results.teller(as_json)
     shown = Shown(sequence if not isinstance(sequence, str) else None, say)
@@ -157,7 +157,8 @@ def run_and_tell(
     shown.close()
     if end.ending == "timed_out":
         raise ArmtempoError(
-            f"an input did not come in time {where(end)}", "see why, 'armtempo goto' its start, run it again"
+            f"an input did not change in time {where(end)}",
+            "see why, 'armtempo goto' its start, run it again",
         )
     result = _as_json(end, board, recorded.path if recorded else None)
     results.show(as_json, result, [f"{end.ending} after {cycles(end)}{counted(board.counters)}"])

@@ -51,7 +51,7 @@ def _change(given: BoardOptions, asked: _Asked) -> None:
 
 
 def _ask(given: BoardOptions, asked: _Asked) -> str | None:
-    """Ask for it; through which program, None where over the port itself."""
+    """Ask for it; through which program, None if over the port itself."""
     with chosen.shared_or_own(given) as board:
         if asked.what == "speed" and not isinstance(board, SharedBoard) and not board.status().moving:
             raise LinkError("nothing moves", "'armtempo run --speed' begins at a lower speed")

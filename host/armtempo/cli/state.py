@@ -55,10 +55,14 @@ def lines(state: BoardState) -> list[str]:
         f"program   {state.program_crc:08x}, protocol {state.protocol}{current}",
         f"arm       {_arm(state)}",
         f"free      {state.free_flash} bytes of flash, {state.free_heap} of heap",
-        f"fastest   {state.max_rate} steps/s one joint, {state.max_rate_sum} all together",
+        f"fastest   {state.max_rate} steps/s one joint, {state.max_rate_sum} all together, {_measured(state)}",
         f"engine    {state.room}",
         *motion_lines(state),
     ]
+
+
+def _measured(state: BoardState) -> str:
+    return "measured" if state.rates_measured else "estimated; run 'armtempo selftest'"
 
 
 def motion_lines(state: BoardState) -> list[str]:

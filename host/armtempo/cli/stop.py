@@ -64,7 +64,7 @@ def _tell(given: BoardOptions, answer: StopAnswer, now: bool) -> None:
 
 
 def _rest(shared: SharedBoard) -> BoardState | None:
-    """Where the arm comes to rest; None where the other program gives up the port before."""
+    """Where the arm comes to rest; None if the other program gives up the port before."""
     try:
         found = shared.state()
         if found.moving and found.rest_s:

@@ -165,7 +165,7 @@ class TaughtPoints:
         if not self.points_deg:
             return "there is no point to remove"
         self.points_deg.pop()
-        return f"point {len(self.points_deg) + 1} forgotten"
+        return f"point {len(self.points_deg) + 1} removed"
 
     def save(self, file: Path) -> None:
         """Write the job; InputError for fewer than two points."""
@@ -182,7 +182,7 @@ class TaughtPoints:
 
 
 def check_free(file: Path, replace_old: bool) -> None:
-    """InputError where the job file already exists, before anything moves."""
+    """InputError if the job file already exists, before anything moves."""
     if file.exists() and not replace_old:
         raise InputError(f"{file} already exists", "choose another name, or replace it with --replace")
     if not file.parent.is_dir():

@@ -136,7 +136,7 @@ class Wired:
 
 @contextmanager
 def _board(given: BoardOptions) -> Iterator[Wired]:
-    """Raises LinkError where the board is set up for a different arm than the one that is named."""
+    """Raises LinkError if the board is set up for a different arm than the one that is named."""
     given = chosen.any_port(given)
     named = chosen.named_arm(given.arm_path)
     with chosen.shared_or_own(given, named) as found:

@@ -14,7 +14,7 @@ from armtempo.model.posture import HOME
 
 
 def check(arm_file: Path, job_file: Path | None = None) -> tuple[Arm | None, list[Finding]]:
-    """The arm of the file, None where it cannot be read, and all findings on it and on the job.
+    """The arm of the file, None if it cannot be read, and all findings on it and on the job.
 
     What the readers refuse is a finding too.
     """

@@ -8,6 +8,7 @@ from armtempo.basics.errors import ArmtempoError
 from armtempo.diagnosis.finding import Finding, error, warning
 from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint, Driver
+from armtempo.planning.checks import ESTIMATED
 from armtempo.records import encode
 
 _MICROSTEPS = {*(1 << n for n in range(9)), 5, 10, 20, 25, 40, 50, 100, 125, 200, 250}
@@ -38,7 +39,8 @@ def findings(arm: Arm) -> list[Finding]:
         found.append(
             warning(
                 "all joints",
-                f"all at their speed limits together need {rates:.0f} steps/s, the board makes {MAX_STEP_RATE_SUM}",
+                f"all at their speed limits together need {rates:.0f} steps/s, the board makes {MAX_STEP_RATE_SUM} "
+                f"{ESTIMATED}",
                 "use fewer microsteps or lower speed limits; else a plan that needs more is refused",
             )
         )
@@ -85,7 +87,7 @@ def _rates(joint: DrivenJoint, driver: Driver) -> list[Finding]:
     rpm = motor_rpm(joint)
     found = []
     if rate > MAX_STEP_RATE:
-        text = f"{at_limit} it needs {rate:.0f} steps/s, the board makes at most {MAX_STEP_RATE}"
+        text = f"{at_limit} it needs {rate:.0f} steps/s, the board makes at most {MAX_STEP_RATE} {ESTIMATED}"
         found.append(
             error(joint.name, text, "lower speed_deg_s or use fewer microsteps; check the gear ratio")
         )

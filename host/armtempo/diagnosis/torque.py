@@ -21,7 +21,7 @@ _HEAVY_KG = 50.0
 def margin(joint: DrivenJoint) -> float | None:
     """Torque of a joint's motor over what gravity and its acceleration limit ask at its speed limit.
 
-    By ``joint.model``; None where the arm file says nothing of the torque; infinite where nothing is asked.
+    By ``joint.model``; None if the arm file says nothing of the torque; infinite if nothing is asked.
     """
     model, motor, limits = joint.model, joint.motor, joint.limits
     held = float(held_nm(joint, math.radians(limits.speed_deg_s) * motor.gear_ratio))

@@ -14,7 +14,7 @@ def replace_text(path: Path, text: str, newline: str | None = None) -> None:
     """Write a file aside and put it in place of the old one, so that it is never half there.
 
     ``newline``: as of ``open``; "" leaves the ends of lines as they are. A link stays one; a pipe or a device, such as
-    /dev/stdout, is written to. Raises InputError where it cannot be written; what was there before stays.
+    /dev/stdout, is written to. Raises InputError if it cannot be written; what was there before stays.
     """
     try:
         if path.exists() and not path.is_file():

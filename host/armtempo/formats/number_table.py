@@ -16,7 +16,7 @@ _SEPARATORS = (";", "\t", ",")
 
 @dataclass(frozen=True)
 class NumberTable:
-    """The cells of a table; ``header`` is None where the first line is all numbers."""
+    """The cells of a table; ``header`` is None if the first line is all numbers."""
 
     path: Path
     header: list[str] | None
@@ -43,7 +43,7 @@ class NumberTable:
 
 
 def read(path: Path) -> NumberTable:
-    """The table in a text file; empty lines are left out. InputError where it cannot be read."""
+    """The table in a text file; empty lines are left out. InputError if it cannot be read."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:

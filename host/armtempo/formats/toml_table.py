@@ -21,7 +21,7 @@ _REQUIRED: Any = object()
 def read(path: Path | str) -> Table:
     """The top table of a TOML file.
 
-    Raises InputError where the file is missing, unreadable or not TOML.
+    Raises InputError if the file is missing, unreadable or not TOML.
     """
     try:
         text = Path(path).read_text(encoding="utf-8-sig")  # some editors begin a file with a mark
@@ -36,7 +36,7 @@ def read(path: Path | str) -> Table:
 
 
 def parse(text: str, file: str) -> Table:
-    """The top table of TOML text; ``file`` names it in messages. Raises InputError where it is not TOML."""
+    """The top table of TOML text; ``file`` names it in messages. Raises InputError if it is not TOML."""
     try:
         return Table(tomllib.loads(text), file)
     except (ValueError, RecursionError) as error:  # not all of tomllib's are its own: numbers of 5000 digits
@@ -160,7 +160,7 @@ class Table:
         return value
 
     def table(self, key: str) -> Table | None:
-        """A table inside this one, or None where it is not given."""
+        """A table inside this one, or None if it is not given."""
         value = self._get(key, None, "a table")
         if value is None:
             return None

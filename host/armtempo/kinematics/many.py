@@ -27,7 +27,7 @@ class ManySolutions:
     """Joint angles that bring the tool to each of N poses."""
 
     angles_deg: Array
-    """(N, 8, joints): whole turns added to lie in the ranges, nearest to the posture to stay near to; NaN where out of
+    """(N, 8, joints): whole turns added to lie in the ranges, nearest to the posture to stay near to; NaN if out of
     reach."""
     usable: NDArray[np.bool_]
     """(N, 8): within reach and all ranges, and not equal to an earlier one."""

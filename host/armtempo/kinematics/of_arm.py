@@ -24,7 +24,7 @@ from armtempo.model.pose import checked as checked_pose
 from armtempo.model.tool_pose import WHOLE, Pose
 
 _FAR_DEG, _FAR = 5.0, 50.0
-"""No tolerance brings a joint back that is outside its range by more than that, or by so many times the tolerance."""
+"""No tolerance brings a joint back that is outside its range by more than that, or by this many times the tolerance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class Solution:
     """Joint angles that bring the tool to a pose."""
 
     angles_deg: Array
-    """(joints,): of all joints of the arm; NaN where the pose is out of reach of this branch."""
+    """(joints,): of all joints of the arm; NaN if the pose is out of reach of this branch."""
     branch: str
     """Which of the arm's configurations it is; empty for one that was found numerically."""
     rejections: tuple[str, ...]
@@ -84,7 +84,7 @@ def inverse(
 
 
 def _exact(solver: PoseSolver, target: Pose, near: tuple[float, ...]) -> list[Solution]:
-    """The eight of the closed form; empty where it does not serve, or a posture within the tolerance may be usable."""
+    """The eight of the closed form; empty if it does not serve, or a posture within the tolerance may be usable."""
     if target.fixed != WHOLE or solver.refusals:
         return []
     choice = choose(solver.geometry, target.matrix, solver.ranges, near)

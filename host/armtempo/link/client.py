@@ -63,7 +63,7 @@ def harmless_number() -> int:
 class Client:
     """The host's end of the protocol, one method a command.
 
-    Every method raises BoardError where the board refuses, LinkError where the connection is lost.
+    Every method raises BoardError if the board refuses, LinkError if the connection is lost.
     """
 
     def __init__(self, session: Session, session_number: int | None = None) -> None:

@@ -119,7 +119,7 @@ class LoggedTransport:
 
 
 class LogFile:
-    """A sink that writes a log; used as a context. InputError where the file cannot be opened.
+    """A sink that writes a log; used as a context. InputError if the file cannot be opened.
 
     Each line is flushed, so that a killed program leaves a readable log. Where the disk fills up the log ends
     and the traffic continues; InputError says so when the context is left without another error.
@@ -164,7 +164,7 @@ class LogFile:
 
 
 def read_log(path: Path) -> Iterator[Chunk]:
-    """The chunks of a recorded log; InputError where it is none. A cut last line is left out."""
+    """The chunks of a recorded log; InputError if it is none. A cut last line is left out."""
     try:
         lines = path.read_text(encoding="utf-8").split("\n")
     except (OSError, UnicodeError) as error:

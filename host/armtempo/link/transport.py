@@ -38,8 +38,8 @@ class Transport(Protocol):
 class SerialTransport:
     """A transport over pyserial: a device name, or a URL such as ``socket://host:port``.
 
-    Raises InputError where there is no such port, PortInUseError where another program has it, PortError where it
-    cannot be opened for another reason, LinkError where it breaks.
+    Raises InputError if there is no such port, PortInUseError if another program has it, PortError if it
+    cannot be opened for another reason, LinkError if it breaks.
     """
 
     def __init__(self, port: str, exclusive: bool = True) -> None:

@@ -128,7 +128,7 @@ def from_quaternion(position: Sequence[float], wxyz: Sequence[float], what: str 
 
 
 def to_rpy_deg(matrix: ArrayLike) -> RollPitchYaw:
-    """Roll, pitch and yaw of a pose (4, 4) or rotation (3, 3); roll is 0 where the x axis stands upright."""
+    """Roll, pitch and yaw of a pose (4, 4) or rotation (3, 3); roll is 0 if the x axis stands upright."""
     r = np.asarray(matrix, dtype=np.float64)
     level = math.hypot(r[0, 0], r[1, 0])
     pitch = math.atan2(-r[2, 0], level)

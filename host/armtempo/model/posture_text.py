@@ -20,7 +20,7 @@ _MARK = "\ufeff"
 def save(path: Path, arm: Arm, name: str, angles_deg: list[float], replace: bool) -> None:
     """Write ``[posture.NAME]`` into the file of ``arm``, whole or not at all, with its comments and layout kept.
 
-    InputError where the name is none, the arm cannot stand so, the file has this posture and ``replace`` is false,
+    InputError if the name is none, the arm cannot stand so, the file has this posture and ``replace`` is false,
     or it cannot be read, written, or changed in this one place.
     """
     if problem := named.name_problem(name):
@@ -53,7 +53,7 @@ def digits(arm: Arm, angles_deg: list[float]) -> list[float]:
 
 
 def with_posture(text: str, name: str, angles_deg: list[float], path: Path) -> str:
-    """The text of an arm file with the posture in it; InputError where that would change anything else."""
+    """The text of an arm file with the posture in it; InputError if that would change anything else."""
     end = "\r\n" if "\r\n" in text else "\n"
     values = f"[{', '.join(f'{angle:.12g}' for angle in angles_deg)}]"
     before = _parsed(text, path)

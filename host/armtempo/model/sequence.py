@@ -42,7 +42,7 @@ _KINDS = ("goto", "run", "output", "wait_s", "wait_input", "count", "repeat", "e
 
 
 def is_sequence(path: Path | str) -> bool:
-    """Whether a TOML file describes a sequence: it has steps. Raises InputError where it is not TOML."""
+    """Whether a TOML file describes a sequence: it has steps. Raises InputError if it is not TOML."""
     return Path(path).suffix == ".toml" and toml_table.read(path).has("step")
 
 

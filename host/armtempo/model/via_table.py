@@ -29,7 +29,7 @@ class ImportedPath:
     via_deg: Array
     lines: int
     thinned_to_deg: float | None = None
-    """The tolerance they keep to where there were more; None where every line is a via point."""
+    """The tolerance they keep to where there were more; None if every line is a via point."""
 
 
 def via_from_csv(

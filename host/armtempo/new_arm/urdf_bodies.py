@@ -38,7 +38,7 @@ class Body(NamedTuple):
 def of_joint(model: Any, base: str, joint: Any, after: Any) -> Body | None:
     """What turns with a joint but not with the one ``after`` it in the chain; fingers as they are at 0.
 
-    None where the URDF gives nothing of it a mass. Raises InputError for figures that no body has.
+    None if the URDF gives nothing of it a mass. Raises InputError for figures that no body has.
     """
     parts = [*_parts(model, base, _links(model, joint, after))]
     if not parts:

@@ -42,7 +42,7 @@ def fit(chain: Chain) -> Fit:
 
     URDF files give angles in rad with few digits (1.5708), which makes axes that were meant to be parallel meet
     kilometres away. So near ones are taken for parallel first, and the comparison says whether that was right.
-    Raises PlanError where no table comes that near.
+    Raises PlanError if no table comes that near.
     """
     angles = _postures(chain)
     wanted = chain.poses(angles)

@@ -46,7 +46,7 @@ class TurningJoint:
     speed_deg_s: float | None
     continuous: bool
     body: Body | None
-    """What it moves as far as the next joint; None where nothing of it has a mass."""
+    """What it moves as far as the next joint; None if nothing of it has a mass."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Chain:
 def read(path: Path, base: str | None = None, tip: str | None = None) -> Chain:
     """The chain from link ``base`` (None: the root) to link ``tip`` (None: see ``urdf_tip.choose``).
 
-    Raises MissingPackageError without yourdfpy, InputError where the file is no URDF, the chain is not one, or
+    Raises MissingPackageError without yourdfpy, InputError if the file is no URDF, the chain is not one, or
     a joint in it is of a kind that an arm file cannot describe: with every reason.
     """
     urdf = _reader()

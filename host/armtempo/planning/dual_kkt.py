@@ -44,7 +44,7 @@ class DualKkt:
         return self._columns[:-apart, first], first, second
 
     def factor(self, entries: Array) -> DualFactor:
-        """The matrix with B (2, 2, N G) and D, one after the other. Raises numpy's LinAlgError where it is singular."""
+        """The matrix with B (2, 2, N G) and D, one after the other. Raises numpy's LinAlgError if it is singular."""
         from scipy.linalg import lapack  # here, because loading it takes longer than most commands
 
         size = len(entries) - self._size

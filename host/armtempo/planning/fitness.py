@@ -20,7 +20,7 @@ checked without a grid."""
 _PENALTY = 30.0
 """Seconds that the penalty of Eq. (21) charges where a limit is exceeded by as much again."""
 _TINY = 1e-300
-"""Avoids 0 / 0 where a joint does not move."""
+"""Avoids 0 / 0 if a joint does not move."""
 
 
 class Fitness:

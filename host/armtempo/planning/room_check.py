@@ -79,7 +79,7 @@ class Bodies:
 
     @cached_property
     def reach_mm(self) -> Array:
-        """How far a segment is from the axis of a row at most, (2 joints, joints); 0 where that does not move it."""
+        """How far a segment is from the axis of a row at most, (2 joints, joints); 0 if that does not move it."""
         lengths = np.array([(abs(joint.d_mm), abs(joint.a_mm)) for joint in self.arm.joints]).ravel()
         found = np.zeros((len(lengths), len(self.arm.joints)))
         for segment in range(len(lengths)):
@@ -162,7 +162,7 @@ def posture_touches(arm: Arm, driven_deg: Iterable[float]) -> list[Touch]:
 
 
 def first_touch(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array) -> Touch | None:
-    """What touches in a motion, None where it is proven that nothing does.
+    """What touches in a motion, None if it is proven that nothing does.
 
     ``speeds_deg_s``: the joints' largest speeds in it, (J,). What touches at its start already may stay as deep: so an
     arm can be moved out.
@@ -209,7 +209,7 @@ def touch_of(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array | None = None
 
 
 def check(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array | None = None, through: bool = False) -> None:
-    """Raises PlanError where a motion leaves the room, naming what touches what, and when.
+    """Raises PlanError if a motion leaves the room, naming what touches what, and when.
 
     ``speeds_deg_s``: as for ``first_touch``, where they are known; ``through``: the message names via points too.
     """

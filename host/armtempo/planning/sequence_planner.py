@@ -34,7 +34,7 @@ def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> Sequ
     """All motions of a sequence, equal ones once, and the rows that the board goes through.
 
     Raises InputError, naming file and step, where a motion begins elsewhere than the one before it ends or the
-    sequence has no effect; PlanError where a motion cannot be planned.
+    sequence has no effect; PlanError if a motion cannot be planned.
     """
     compiler = _Compiler(arm, progress)
     source = sequence.source or f"sequence {sequence.name!r}"
@@ -60,7 +60,7 @@ class _Place:
 
 @dataclass(frozen=True)
 class _End:
-    """The same of where rows lead; None where nothing has moved yet."""
+    """The same of where rows lead; None if nothing has moved yet."""
 
     angles_deg: Angles | None
     name: str
@@ -193,7 +193,7 @@ class _Compiler:
         return _Place(_angles(trajectory(0.0)), f"the start of {motion.name}")
 
     def posture(self, posture: ArmPosture, where: str) -> _Place:
-        """Where the arm stands then; PlanError where it cannot."""
+        """Where the arm stands then; PlanError if it cannot."""
         try:
             return _Place(_angles(via_points.posture_deg(self.arm, posture)), posture.name)
         except ArmtempoError as error:

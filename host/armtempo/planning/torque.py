@@ -60,7 +60,7 @@ class MotorTorques:
 
     @property
     def least(self) -> LeastMargin | None:
-        """The smallest margin; None where no motor's torque is known."""
+        """The smallest margin; None if no motor's torque is known."""
         margin = np.where(np.isnan(self.held_nm), np.inf, self.margin)
         if np.all(np.isnan(self.held_nm)):
             return None
@@ -108,6 +108,6 @@ def of_motion(arm: Arm, trajectory: Trajectory) -> MotorTorques | None:
 
 
 def least_margin(arm: Arm, trajectory: Trajectory) -> LeastMargin | None:
-    """The smallest margin of a motion; None where the arm file does not say enough."""
+    """The smallest margin of a motion; None if the arm file does not say enough."""
     found = of_motion(arm, trajectory)
     return found.least if found else None

@@ -54,7 +54,7 @@ def remember_hanging(number: str) -> None:
 class Caller:
     """A connection to the program that has a port; used as a context, or ended by ``close``.
 
-    Raises NoAnswerError where that program hangs, LinkError where it is gone.
+    Raises NoAnswerError if that program hangs, LinkError if it is gone.
     """
 
     def __init__(self, claim: PortClaim) -> None:

@@ -22,7 +22,7 @@ def is_sim(port: str) -> bool:
 def sim_flash(port: str) -> Path | None:
     """The folder that is the virtual board's flash; None: a new one that goes with the board.
 
-    Raises InputError where the folder is not named.
+    Raises InputError if the folder is not named.
     """
     if port == SIM:
         return None

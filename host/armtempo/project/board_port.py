@@ -19,7 +19,7 @@ def choose(given: str | None = None, others: bool = False) -> Setting:
     """The port to use, and why it: ``given``, the variable, the project folder, else the one likely board.
 
     ``others``: a port that another program of armtempo has open will do too, if it is the only one; for commands
-    that go through that program. Raises InputError where there is no such port, or more than one.
+    that go through that program. Raises InputError if there is no such port, or more than one.
     """
     found = ProjectSettings().get(PORT, given)
     if found:

@@ -52,7 +52,7 @@ class EncodedMotion:
 def of_trajectory(trajectory: Trajectory, arm: Arm) -> EncodedMotion:
     """A trajectory of ``arm`` with the times in which it can brake to rest and change its speed.
 
-    Raises InputError or PlanError where the board could not replay it.
+    Raises InputError or PlanError if the board could not replay it.
     """
     brakes = brake_time.of_motion(trajectory, [joint.limits for joint in arm.driven])
     return EncodedMotion(trajectory.name, arm, trajectory, encode.motion_record(trajectory, arm, brakes))
@@ -74,6 +74,6 @@ def of_plan(plan: Plan, name: str | None = None) -> EncodedMotion:
 
 
 def of_record(name: str, data: bytes, arm: Arm) -> EncodedMotion:
-    """The motion that a record from the board holds; InputError where it is damaged or does not fit the arm."""
+    """The motion that a record from the board holds; InputError if it is damaged or does not fit the arm."""
     trajectory = decode.trajectory(data, arm.driven, name, f"arm {arm.name!r}")
     return EncodedMotion(name, arm, trajectory, data)

@@ -28,7 +28,7 @@ def arm_picture(arm: Arm) -> Figure:
     """One field for the home posture from the side and from above, one for each driven joint.
 
     A joint is seen along its axis, from the side where x, or else y, grows to the right. Raises
-    MissingPackageError where matplotlib is not installed.
+    MissingPackageError if matplotlib is not installed.
     """
     count = 2 + len(arm.driven)
     columns = min(_MOST_COLUMNS, (count + 1) // 2 if count > 3 else count)

@@ -33,7 +33,7 @@ _COLUMNS = {
 def write(folders: Sequence[Path], path: Path) -> Path:
     """Compare run folders on one page at ``path``; a folder that cannot be read is named there.
 
-    Raises RunFolderError where fewer than two can be read.
+    Raises RunFolderError if fewer than two can be read.
     """
     readable, complaints = _read(folders)
     if len(readable) < 2:

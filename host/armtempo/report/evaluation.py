@@ -39,7 +39,7 @@ class Evaluation:
 
     @property
     def limits(self) -> list[Limits]:
-        """Their limits; empty where the arm is not known."""
+        """Their limits; empty if the arm is not known."""
         return [joint.limits for joint in self.arm.driven] if self.arm else []
 
     @property
@@ -49,7 +49,7 @@ class Evaluation:
 
     @property
     def limit_checks(self) -> list[list[peaks.LimitCheck]]:
-        """``[joint]``: speed and acceleration beside the limits; empty where the arm is not known."""
+        """``[joint]``: speed and acceleration beside the limits; empty if the arm is not known."""
         if not self.limits:
             return []
         counts = [joint.counts_per_deg for joint in self.run.joints]
@@ -65,7 +65,7 @@ class Evaluation:
 def evaluate(folder: Path) -> Evaluation:
     """Read and analyse a run folder; what is incomplete is listed in ``complaints``.
 
-    Raises RunFolderError where it is not known what was to move, or there is not one sample.
+    Raises RunFolderError if it is not known what was to move, or there is not one sample.
     """
     run = reader.load(folder)
     plan = replayed.plan_of(run)

@@ -32,7 +32,7 @@ _POINTS = 600
 def new_figure(rows: int, columns: int, width: float, height: float) -> tuple[Figure, Any]:
     """A figure and its axes, an array (rows, columns).
 
-    Raises MissingPackageError where matplotlib is not installed.
+    Raises MissingPackageError if matplotlib is not installed.
     """
     try:
         from matplotlib.figure import Figure

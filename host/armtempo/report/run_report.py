@@ -34,7 +34,7 @@ _PATH_POINTS = 300
 def write(folder: Path) -> Path:
     """Write report.html and its figures (PNG and SVG) into the run folder; returns the page's path.
 
-    Raises RunFolderError where it is not known what was to move, or there is not one sample.
+    Raises RunFolderError if it is not known what was to move, or there is not one sample.
     """
     found = evaluate(folder)
     drawn = figures(found)

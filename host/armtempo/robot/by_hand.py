@@ -24,7 +24,7 @@ class HandGuided:
     """An arm without its motors' current, as a context; in the end it has it again, and its position by the encoders.
 
     The caller holds the arm: it sinks under its weight. Raises InputError for a driven joint without an
-    encoder, LinkError where the position is unknown before.
+    encoder, LinkError if the position is unknown before.
     """
 
     def __init__(self, client: Client, arm: Arm) -> None:
@@ -59,7 +59,7 @@ class HandGuided:
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Give the current back and declare where the arm is; LinkError where a joint is beyond its range."""
+        """Give the current back and declare where the arm is; LinkError if a joint is beyond its range."""
         self._client.drivers(True)
         time.sleep(SETTLES_S)
         scale = np.array([joint.steps_per_deg for joint in self._arm.driven])

@@ -41,7 +41,7 @@ def store(
 ) -> MotionKey:
     """Store a sequence: its motions first, itself last, so that it is whole or is not there.
 
-    Motions of an earlier sequence of this name that nobody needs any more are removed. Raises LinkError where the
+    Motions of an earlier sequence of this name that nobody needs any more are removed. Raises LinkError if the
     board keeps something else under one of the names, unless ``replace``.
     """
     client.need("sequences", f"sequence {encoded.plan.name!r}")
@@ -90,8 +90,8 @@ def run(
     """Start a stored sequence and follow it to its end; a stop request makes the board brake and end it.
 
     ``recorder`` gets the board's events and the end. A board that cannot be reached continues by itself; the host tries
-    to reconnect for RECONNECT_S. Raises BoardError where the board refuses to start or a fault ends the sequence,
-    LinkError where it cannot be reached any more.
+    to reconnect for RECONNECT_S. Raises BoardError if the board refuses to start or a fault ends the sequence,
+    LinkError if it cannot be reached any more.
     """
     client.session.stopping = lambda: stop.wanted
     stop.wake = client.session.wake

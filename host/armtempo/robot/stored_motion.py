@@ -37,7 +37,7 @@ def store(
 ) -> MotionKey:
     """Upload a motion record under ``name``, unless the board has just this one already.
 
-    Raises LinkError where the board keeps another motion under this name, unless ``replace``, or the name or what
+    Raises LinkError if the board keeps another motion under this name, unless ``replace``, or the name or what
     stands there is worth nothing: temporary or damaged.
     """
     key = MotionKey(name, wire.record_crc(data))
@@ -68,7 +68,7 @@ def replay(
 ) -> RunEnd:
     """Start a stored motion and follow it to its end; a stop request makes the board brake.
 
-    Whatever fails here stops the board. Raises BoardError where the board refuses to start, LinkError where it
+    Whatever fails here stops the board. Raises BoardError if the board refuses to start, LinkError if it
     cannot be reached any more, Stopped where the stop was asked for before the start.
     """
     client.session.stopping = lambda: stop.wanted
@@ -154,7 +154,7 @@ def _does_not_stop() -> None:
 
 
 def send_stop(client: Client, now: bool = False) -> bool:
-    """Tell the board to brake along the path, or to freeze; False where nothing moves, and nothing happens."""
+    """Tell the board to brake along the path, or to freeze; False if nothing moves, and nothing happens."""
     try:
         client.stop(now)
         return True

@@ -99,6 +99,6 @@ def _interpolated(values: Array, times_s: Array) -> Array:
 
 
 def _peak(values: Array) -> float:
-    """Largest magnitude of the measured values; NaN where there are none."""
+    """Largest magnitude of the measured values; NaN if there are none."""
     known = np.abs(values[~np.isnan(values)])
     return float(known.max()) if known.size else np.nan

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
 from armtempo_shared import wire
 from armtempo_shared.limits import MAX_STEP_RATE, MAX_STEP_RATE_SUM
 
 from armtempo.diagnosis.finding import Level
-from armtempo.selftest.result import Measurement
+from armtempo.link.board_messages import Hello
+from armtempo.selftest.result import Measurement, judged
 
 PART = "rates"
 JOINTS = (1, 2, 3, 6)
@@ -65,7 +67,7 @@ def to_state(found: Mapping[int, int | None]) -> tuple[int, int] | None:
 
 
 def judge(rate: int | None, count: int) -> Iterator[Measurement]:
-    """The line about the rate that was found for so many joints; a slower board is none that is wrong."""
+    """The line about the rate that was found for that many joints; a slower board is none that is wrong."""
     if rate is None:
         return
     expected = stated(count)
@@ -77,4 +79,20 @@ def judge(rate: int | None, count: int) -> Iterator[Measurement]:
         f"{round(expected / KEPT)}: what is stated, {expected}, and a quarter",
         Level.GOOD if is_enough else Level.ERROR if rate < expected else Level.NOTE,
         "" if is_enough else "lower max_speed or microsteps until 'armtempo run' is not refused as too fast",
+    )
+
+
+def judge_stated(found: Mapping[str, Any] | None, info: Hello) -> Iterator[Measurement]:
+    """What the board states when it has started again, against what was found to be stated."""
+    if found is None or found["states"] is None:
+        return
+    one, together = found["states"]
+    yield judged(
+        PART,
+        "what the board states from now on",
+        f"{info.max_rate} steps/s one joint, {info.max_rate_sum} all together, "
+        f"{'measured' if info.rates_measured else 'estimated'}",
+        f"{one}, {together}, measured",
+        (info.max_rate, info.max_rate_sum, info.rates_measured) == (one, together, True),
+        "correct what is wrong above, then run the self-test again",
     )

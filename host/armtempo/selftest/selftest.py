@@ -23,12 +23,13 @@ from armtempo.selftest.result import Measurement, SelfTest, judged
 _FEATURE = "sequences"
 """Of the program in the firmware, with the modules that the parts import; as files it is without both."""
 UNIQUE_ID_DIGITS = 24
-_ARM_RECORD = "/flash/armtempo/arm.ata"
+_ROOT = "/flash/armtempo"
+_ARM_RECORD = f"{_ROOT}/arm.ata"
 _BACK_S = 60.0
 _SIMULATED_TURN_US = 1000
 """What a turn of the loop takes on a virtual board, about as on the chip."""
 _SEED, _STOPS, _WAITS_US = 5, 50, (22_000, 75_000)
-_SIMULATED_STOPS = 5
+_SIMULATED_STOPS = 3
 """E-stops at random moments of the motion, which begins 20 ms after its start."""
 _LOOK_S = 0.3
 
@@ -48,6 +49,7 @@ def run(client: Client, progress: Progress | None = None) -> SelfTest:
         found.data[link_part.PART] = link_part.trips(client)
         _leave(client, lambda prompt: _at_prompt(prompt, found, work))
         found.add([_same_room(info.engine_room, client.info.engine_room)])
+        found.add(rate_part.judge_stated(found.data.get(rate_part.PART), client.info))
         work(1, 1)
     return found
 
@@ -92,7 +94,7 @@ def _leave(client: Client, work: Callable[[Prompt], None]) -> None:
 
 
 def _check_drivers(prompt: Prompt) -> None:
-    """LinkError, and the program goes on as it was, unless ENABLE is inactive or the board has no arm.
+    """LinkError, and the program continues as it was, unless ENABLE is inactive or the board has no arm.
 
     From here on the end of the prompt is a reset, which switches drivers off that are on.
     """
@@ -200,7 +202,11 @@ def _rates(prompt: Prompt, found: SelfTest, work: Progress) -> None:
         work(0.7 + 0.25 * number / len(counts), 1)
         highest[count] = rate_part.highest(lambda rate: _keeps_up(prompt, found, [rate] * count), count)  # noqa: B023
         found.add(rate_part.judge(highest[count], count))
-    found.data[rate_part.PART] = highest
+    states = rate_part.to_state(highest)
+    found.data[rate_part.PART] = {"highest": highest, "states": states}
+    if states and not found.failed_in(DRIVERS, pulse_part.PULSES, pulse_part.SAFETY, rate_part.PART):
+        arguments = {"root": _ROOT, "program_crc": found.program_crc, "rates": (*states, most)}
+        _part(prompt, found, "keep", "keep", **arguments)
 
 
 def _keeps_up(prompt: Prompt, found: SelfTest, rates: Sequence[int]) -> bool | None:
@@ -227,7 +233,7 @@ def _arguments(moved: motion.TestMotion, found: SelfTest) -> dict[str, Any]:
 
 
 def _back(client: Client) -> None:
-    """Greet the program, which starts again after the reset; LinkError where it does not answer in time."""
+    """Greet the program, which starts again after the reset; LinkError if it does not answer in time."""
     limit_s = time.monotonic() + _BACK_S
     while True:
         time.sleep(_LOOK_S)

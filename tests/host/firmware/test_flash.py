@@ -1,4 +1,4 @@
-"""`armtempo flash`: how a firmware gets onto a board, and what is said where it does not."""
+"""`armtempo flash`: how a firmware gets onto a board, and what is said if it does not."""
 
 from __future__ import annotations
 

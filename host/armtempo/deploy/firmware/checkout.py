@@ -138,7 +138,7 @@ def suitable(checkout: Checkout) -> list[str]:
 
 
 def check_submodules(checkout: Checkout, definition: BoardDefinition) -> None:
-    """InputError where a submodule that the port or the board needs is not there."""
+    """InputError if a submodule that the port or the board needs is not there."""
     make = (checkout.port / "Makefile").read_text(encoding="utf-8", errors="replace")
     needed = {*re.findall(r"lib/\S+", " ".join(re.findall(r"GIT_SUBMODULES \+=(.*)", make))), _LIBRARY}
     board_make = (definition.folder / "mpconfigboard.mk").read_text(encoding="utf-8", errors="replace")

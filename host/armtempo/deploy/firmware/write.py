@@ -58,8 +58,8 @@ def flash(given: Path, port: str | None, tool: str | None, tell: Tell, progress:
 
     ``port``: where the board answers. One that is not there, or None: the board in its bootloader, or at the
     ST-LINK; else the only MicroPython board that is plugged in. ``tool``: one of TOOLS; None: the first that is
-    installed. Raises InputError where the folder contains no firmware, LinkError where the board is moving or another
-    one than the firmware is for, ToolError where a tool is missing or fails.
+    installed. Raises InputError if the folder contains no firmware, LinkError if the board is moving or another
+    one than the firmware is for, ToolError if a tool is missing or fails.
     """
     with image.unpacked(given) as folder:
         firmware = image.read(folder)
@@ -81,7 +81,7 @@ def flash(given: Path, port: str | None, tool: str | None, tell: Tell, progress:
 
 
 def _choose(tool: str | None) -> str:
-    """The tool to use; ToolError where it is not installed."""
+    """The tool to use; ToolError if it is not installed."""
     wanted = TOOLS if tool is None else (tool,)
     found = next((name for name in wanted if shutil.which(name)), None)
     if found is None:
@@ -134,7 +134,7 @@ def _check_chip(tool: str, end: int) -> None:
 
 
 def _chips(tool: str) -> list[int]:
-    """Bytes of flash of each chip that the tool sees; ToolError where it may not look."""
+    """Bytes of flash of each chip that the tool sees; ToolError if it may not look."""
     try:
         done = subprocess.run(_LOOK[tool], capture_output=True, text=True, check=False)
     except FileNotFoundError:

@@ -61,7 +61,7 @@ def shortest(demand: Demand, effort: Effort, progress: Progress) -> Shortest:
     """The fastest motion that meets the demand, from several starts.
 
     Where via points have tolerances it comes from the one that passes them exactly, so it is never slower. Raises
-    PlanError where no start keeps ranges and corridor.
+    PlanError if no start keeps ranges and corridor.
     """
     if demand.tolerances:
         exact = shortest(replace(demand, tolerances={}), effort, progress)

@@ -46,7 +46,7 @@ _WIDER = 0.5 * checks.TOLERANCE
 def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
     """The motion through via angles (n + 1, J), which poses with a tolerance may be left by.
 
-    Raises InputError for a job that the board cannot hold, PlanError where no path stays within the ranges.
+    Raises InputError for a job that the board cannot hold, PlanError if no path stays within the ranges.
     """
     most = _most_segments(arm, job, len(via_deg))
     spline = None
@@ -86,7 +86,7 @@ def _in_corridor(job: Job) -> bool:
 
 
 def _on_spline(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned | None:
-    """The plan on the spline through the via points, inside any corridor; None where it leaves a joint's range."""
+    """The plan on the spline through the via points, inside any corridor; None if it leaves a joint's range."""
     on_it = replace(job, path="through", corridor_deg=None, corridor_mm=None, refine="auto")
     try:
         planned = through_plan.motion(arm, on_it, via_deg, progress)

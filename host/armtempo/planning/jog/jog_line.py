@@ -97,7 +97,7 @@ class ToolLine:
 
     @cached_property
     def fixed(self) -> tuple[str, ...]:
-        """What the arm can keep of the tool's orientation on this line; InputError where it cannot even begin."""
+        """What the arm can keep of the tool's orientation on this line; InputError if it cannot even begin."""
         for fixed in _TRIED[:2] if self.about else _TRIED:
             if self._turns(fixed) and self._begins(fixed):
                 return fixed
@@ -218,7 +218,7 @@ class FollowedLine:
         return float(self.ways[-1])
 
     def at(self, ways: Array) -> Array:
-        """The driven joints at ways along the line, degrees (K, J); InputError where one of them is not on it."""
+        """The driven joints at ways along the line, degrees (K, J); InputError if one of them is not on it."""
         found = []
         line = self.line
         for way in ways:

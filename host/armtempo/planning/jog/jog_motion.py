@@ -84,7 +84,7 @@ def move_of(
 ) -> JogMove:
     """What is to move: a joint by degrees, or the tool along an axis by mm or about it by degrees.
 
-    Raises InputError where the arguments do not go together, or the arm has no such joint.
+    Raises InputError if the arguments do not go together, or the arm has no such joint.
     """
     ways = [by for by in (by_deg, by_mm) if by is not None]
     if (joint is None) == (axis is None) or len(ways) != 1 or (joint is not None and by_deg is None):
@@ -214,7 +214,7 @@ def _tool(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tup
 
 
 def _on_line(name: str, followed: FollowedLine, length: float, speed: float) -> Trajectory | None:
-    """The motion along the line; None where a joint would leave its range, or the tool the line."""
+    """The motion along the line; None if a joint would leave its range, or the tool the line."""
     arm = followed.line.arm
     limits = _line_limits(followed, length, speed)
     for short_ramps, parts in itertools.product((False, True), LINE_PARTS):

@@ -148,7 +148,7 @@ def _floor(points: Array, knots: Sequence[int], limits: Sequence[Limits], about_
 
 
 def _asked(job: Job, via: int) -> tuple[float, float]:
-    """Limits of the tool's speed and acceleration on the way to a via point; infinite where there is none."""
+    """Limits of the tool's speed and acceleration on the way to a via point; infinite if there is none."""
     way = tool_way.at(job.ways, via)
     both = []
     for key in ("speed_mm_s", "acceleration_mm_s2"):

@@ -23,7 +23,7 @@ _MOST_PIECES = 100_000
 
 @dataclass(frozen=True, eq=False)
 class ToolLimits:
-    """Limits on each segment of a path, (S,); infinite where there is none."""
+    """Limits on each segment of a path, (S,); infinite if there is none."""
 
     speed_mm_s: Array
     acceleration_mm_s2: Array

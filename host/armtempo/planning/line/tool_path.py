@@ -78,7 +78,7 @@ class ToolPath:
         return float(self.starts[-1])
 
     def poses(self, way: Array) -> tuple[Array, Array]:
-        """Positions (N, 3) and rotations (N, 3, 3) at ways (N,); beyond the ends the way goes on."""
+        """Positions (N, 3) and rotations (N, 3, 3) at ways (N,); beyond the ends the way continues."""
         starts = self.starts
         number = np.clip(np.searchsorted(starts, way, side="right") - 1, 0, len(self.pieces) - 1)
         positions, rotated = np.empty((len(way), 3)), np.empty((len(way), 3, 3))

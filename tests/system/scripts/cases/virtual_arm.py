@@ -10,6 +10,7 @@ from arm import switches
 from arm.noise import Noise
 from arm.stepper import Stepper
 
+# all cases: not emulated
 MS = 84_000
 MODEL = {
     "holding_torque_nm": 0.65,

@@ -64,7 +64,7 @@ def address(name):
 
 
 def word_at(where):
-    """Word index of the register behind an address; ValueError where the virtual board has no register."""
+    """Word index of the register behind an address; ValueError if the virtual board has no register."""
     offset = where - base
     if 0 <= offset < SIZE:
         return offset >> 2
