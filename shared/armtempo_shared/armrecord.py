@@ -35,7 +35,7 @@ HEAD = (
 )
 FLAG_ENABLE_HIGH = 1  # ENABLE pin is active high
 FLAG_ESTOP_RELEASES = 2  # an E-stop also releases ENABLE
-FLAG_STOP_ON_LINK_LOSS = 4  # brake when the host disappears; otherwise finish the motion
+FLAG_STOP_ON_LINK_LOSS = 4  # brake when the host no longer answers; otherwise finish the motion
 FLAG_ESTOP_ACTIVE_HIGH = 8  # E-stop input trips when high (else when low)
 FLAG_ESTOP_FITTED = 16
 

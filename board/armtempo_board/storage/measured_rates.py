@@ -35,4 +35,4 @@ def write(root: str, board_id: bytes, program_crc: int, rates: "tuple[int, int, 
 
 
 def _sealed(fields: bytes, board_id: bytes, program_crc: int) -> bytes:
-    return fields + crc32(fields, crc32(board_id, program_crc)).to_bytes(_CRC_BYTES, "little")
+    return bytes(fields + crc32(fields, crc32(board_id, program_crc)).to_bytes(_CRC_BYTES, "little"))

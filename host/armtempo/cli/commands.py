@@ -188,6 +188,7 @@ GROUPS: dict[str, dict[str, Entry]] = {
             "Let the board measure itself: clocks, flash, memory, link, pulses, E-stop.",
             "selftest --port /dev/ttyACM0",
             "selftest --out first-power-on",
+            "selftest --with-motors --arm my_arm.toml",
         ),
         "configure": Entry(
             "deploy:configure",

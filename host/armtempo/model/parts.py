@@ -238,9 +238,13 @@ class Safety:
 
     estop_fitted: bool = field(default=False, metadata=key("an E-stop is wired to its input"))
     estop_active: str = field(default="low", metadata=key("level that trips it", choices=LEVELS))
-    estop_releases_enable: bool = field(default=False, metadata=key("it also takes the motors' current away"))
+    estop_releases_enable: bool = field(
+        default=False, metadata=key("it also switches the motors' current off")
+    )
     on_link_loss: str = field(
         default="finish",
         metadata=key("what becomes of a motion when the host disappears", choices=("finish", "stop")),
     )
-    link_timeout_ms: int = field(default=1000, metadata=key("silence that counts as that", 200, 60_000))
+    link_timeout_ms: int = field(
+        default=1000, metadata=key("time without a message that counts as that", 200, 60_000)
+    )

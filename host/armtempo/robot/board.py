@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
@@ -40,6 +40,7 @@ from armtempo.robot import (
 from armtempo.robot.board_state import BoardState
 from armtempo.robot.by_hand import HandGuided
 from armtempo.robot.jog import HeldJog
+from armtempo.robot.motor_test import MotorTest
 from armtempo.robot.outputs import BoardInput, BoardOutput
 from armtempo.robot.recording import Watcher
 from armtempo.robot.run import Run
@@ -352,7 +353,7 @@ class Board:
 
         Its rows and samples are recorded in a new run folder below ``out``; None: nowhere. The arm must be homed and
         be where the sequence begins, else LinkError or BoardError; the arm of a virtual board is brought there.
-        ``watcher`` gets how it stands. What an input that does not come does is the sequence's affair: an end as
+        ``watcher`` gets its state. What an input that does not come does is the sequence's affair: an end as
         ``timed_out``, or BoardError. With Stopped, its end is what ``client.sequence()`` says.
         """
         with self._stoppable(stop) as wanted:
@@ -456,6 +457,21 @@ class Board:
         something moves, or the program is not a part of the board's firmware; nothing was done then.
         """
         return selftest.run(self.client, progress)
+
+    def motor_test(
+        self, arm: Arm | Path | str, ask: Callable[[str], bool], tell: Callable[[str], object] = print
+    ) -> SelfTest:
+        """Try directions, encoders, switches and E-stop: each joint moves up to a degree there and back, slowly.
+
+        ``ask`` puts a question to the person at the arm, first one that names what will move, and gives True for
+        yes; ``tell`` says what to press. Lines to correct in the arm file are in the result's ``data["arm_file"]``.
+        Raises ArmtempoError without a yes, LinkError where a position is unknown; nothing moved then.
+        """
+        arm = Arm.of(arm)
+        self.configure(arm)
+        self._start.home_virtual_arm(arm)
+        with self._stoppable(None) as stop:
+            return MotorTest(self.client, arm, stop, ask, tell).run()
 
     def clear(self) -> None:
         """Clear a fault; BoardError while its cause is still there."""

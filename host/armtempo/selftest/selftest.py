@@ -29,7 +29,7 @@ _BACK_S = 60.0
 _SIMULATED_TURN_US = 1000
 """What a turn of the loop takes on a virtual board, about as on the chip."""
 _SEED, _STOPS, _WAITS_US = 5, 50, (22_000, 75_000)
-_SIMULATED_STOPS = 5
+_SIMULATED_STOPS = 3
 """E-stops at random moments of the motion, which begins 20 ms after its start."""
 _LOOK_S = 0.3
 

