@@ -117,7 +117,7 @@ def test_a_step_goes_as_far_as_it_says(by: float, speed: float) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("axis", ["x", "y", "z", "tool-x", "tool-y", "tool-z"])
-@pytest.mark.parametrize("by", [INF, -INF, 5.0, -0.1])
+@pytest.mark.parametrize("by", [-INF, 5.0, -0.1])
 def test_the_tool_moves_along_a_line_and_keeps_its_orientation(axis: str, by: float) -> None:
     here = on_steps(AR4, ELBOW_DEG)
     motion = jog_motion.plan("x", AR4, here, JogMove(by, axis=axis))

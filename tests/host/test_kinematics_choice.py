@@ -117,7 +117,7 @@ def unreachable(choice: Choice, number: int) -> tuple[float, int | None]:
 @pytest.mark.parametrize(
     ("planar", "up", "number", "amount", "line"),
     [
-        (SHAPE.farthest + 150.0, 0.0, 1, 250.0, 1),  # the front shoulder stands 100 behind axis 1
+        (SHAPE.farthest + 150.0, 0.0, 1, 250.0, 1),  # the front shoulder is 100 behind axis 1
         (SHAPE.farthest + 150.0, 0.0, 5, 50.0, 1),
         (100.0, -SHAPE.farthest - 30.0, 5, 30.0, 2),
         (100.0, SHAPE.farthest + 30.0, 5, 30.0, 3),

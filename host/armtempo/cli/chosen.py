@@ -244,7 +244,7 @@ def shared_or_own(
 
 
 def board_state(given: BoardOptions) -> BoardState:
-    """What the board says, whoever has the port, which ``given`` names."""
+    """What the board says, whichever program has the port, which ``given`` names."""
     while True:
         with shared_or_own(given, any_program=True) as found:
             try:

@@ -1,4 +1,4 @@
-"""Sequences on the terminal: what a planned one takes, and where one that runs stands."""
+"""Sequences on the terminal: what a planned one takes, and how far one that runs is."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ class Shown:
         self.last: SequenceState | None = None
 
     def __call__(self, state: SequenceState) -> None:
-        """Show where the sequence stands."""
+        """Show how far the sequence is."""
         self.last = state
         doing = f": {self._rows[state.row].words}" if state.row < len(self._rows) else ""
         if sys.stderr.isatty():
@@ -134,7 +134,7 @@ class Shown:
 def run_and_tell(
     board: Board, sequence: SequencePlan | str, replace: bool, out: Path | None, as_json: bool = False
 ) -> SequenceState:
-    """Run a sequence into a run folder below ``out`` (None: nowhere), print where it stands and how it ended.
+    """Run a sequence into a run folder below ``out`` (None: nowhere), print where it is and how it ended.
 
     ``as_json``: the end as JSON. Exit code 1 if an input did not come.
     """

@@ -78,7 +78,7 @@ def motion_lines(state: BoardState) -> list[str]:
 
 
 def _sequence(stand: SequenceStand) -> str:
-    """Which it is, where it stands, what it has counted."""
+    """Which it is, where it is, what it has counted."""
     cycles = f"{stand.cycle} whole cycle{'s' * (stand.cycle != 1)}"
     return f"{stand.name}: {stand.ending}, step {stand.step}, {cycles}{counted(stand.counters)}"
 

@@ -63,7 +63,7 @@ _IN_FIRMWARE = (
     *(f"{PACKAGES[1]}.sequence{name}" for name in ("", "_check")),
     *(f"{PACKAGES[0]}.app.sequence{name}" for name in ("_ahead", "_command", "_start", "r")),
 )
-"""Modules of what the core is without: features of which there is no heap beside files (board/docs/memory.md)."""
+"""Modules of what the core is without: there is no heap for these if it is in files (board/docs/memory.md)."""
 _AT_REST = {
     "start_up": (
         "app.arm_state.ArmState.__init__",

@@ -30,7 +30,7 @@ _FLOORS = {
 
 
 def lines(plan: Plan) -> list[str]:
-    """A plan: motion times beside their lower bounds, extremes beside their limits; one string a line.
+    """A plan: motion times next to their lower bounds, extremes next to their limits; one string a line.
 
     Then what the user should know: notes on the poses, joints whose steps are coarse.
     """

@@ -57,7 +57,7 @@ def way_deg(joint: DrivenJoint, at_deg: float) -> float:
 
 
 class MotorTest:
-    """``ask``: a question to whoever stands there, True for yes; ``tell``: what to do now."""
+    """``ask``: a question to the person there, True for yes; ``tell``: what to do now."""
 
     def __init__(
         self,
@@ -158,7 +158,7 @@ class MotorTest:
 
 
 def judge_encoder(joint: DrivenJoint, steps: int, counts: int) -> tuple[Measurement, list[str]]:
-    """What an encoder counted while its joint made so many steps; lines of the arm file's encoder to correct.
+    """What an encoder counted while its joint made this many steps; lines of the arm file's encoder to correct.
 
     ``counts``: as they are where the motor turns the right way.
     """

@@ -226,7 +226,7 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def written_head(name: str, started: str) -> dict[str, Any]:
-    """What run.json says of any run, behind its format: by which version, of what, when."""
+    """What run.json says of any run, after its format: by which version, of what, when."""
     return {"armtempo": installed_version(), "name": name, "started": started, "written": now()}
 
 
