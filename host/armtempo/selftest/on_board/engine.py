@@ -20,7 +20,8 @@ _RANGE = 1 << 24  # steps; with the drivers off a joint can go anywhere
 def make_engine(record, estop=False, rates=None, encoders=False, workspace=None):
     """(engine, rows of its joints); it steps the pins of this arm and no others, and the arm's E-stop stops it.
 
-    ``estop``: one is fitted, whatever the arm has. ``rates``: of that many joints, in the place of the arm's.
+    ``estop``: one is fitted, whatever the arm has. ``rates``: of that many joints, instead of the arm's;
+    they can go anywhere then.
     ``encoders``: they are read, but no joint is checked against them. ``workspace``: of a program that has one already.
     """
     from armtempo_board.app import room

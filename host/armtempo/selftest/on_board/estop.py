@@ -19,7 +19,7 @@ def trial(engine, wait_us, bit, idle_us):
 
 
 def starve(engine, motion, start_steps, idle_us):
-    """The fault after the interrupt that fills the rings was held off (TIM6 stopped) in a motion."""
+    """The fault where the interrupt that fills the rings is held off (TIM6 stops); the motion lasts longer."""
     load(engine, motion, start_steps)
     engine.start()
     then = time.ticks_us()
@@ -32,13 +32,13 @@ def starve(engine, motion, start_steps, idle_us):
     return fault
 
 
-def measure(record, motion, start_steps, waits_us, idle_us):
+def measure(record, motion, start_steps, rates, waits_us, starved, idle_us):
     """Cycles of each trial, the writing of the register taken off; the fault of each."""
     from binascii import unhexlify
 
     feed()
     count_cycles()
-    engine, _ = make_engine(record, True)
+    engine, _ = make_engine(record, True, rates)
     nothing = min([trial_cost() for _ in range(5)])
     took = []
     faults = []
@@ -53,12 +53,13 @@ def measure(record, motion, start_steps, waits_us, idle_us):
             faults.append(engine.fault)
             engine.clear()
             feed()
-        starved = starve(engine, motion, start_steps, idle_us)
+        engine.judged = False
+        fault = starve(engine, unhexlify(starved), [0] * len(rates), idle_us)
     finally:
         engine.freeze()
         off = enable()
         engine.close()
-    return {"cycles": took, "faults": faults, "starved": starved, "enable": off}
+    return {"cycles": took, "faults": faults, "starved": fault, "enable": off}
 
 
 def trial_cost():
