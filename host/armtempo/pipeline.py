@@ -96,7 +96,7 @@ def corridor_curve(arm: Arm, job: Job, progress: Progress | None = None) -> list
 
 @checked
 def summary(plan: Plan) -> list[str]:
-    """A plan in a few lines: motion times beside their lower bounds, extremes beside their limits."""
+    """A plan in a few lines: motion times next to their lower bounds, extremes next to their limits."""
     return text_summary.lines(plan)
 
 
@@ -138,7 +138,7 @@ def report(run: Run | SequenceRun) -> Path:
 
 @checked
 def compare(folders: abc.Sequence[Path | str], page: Path | str | None = None) -> Path:
-    """Write one page that compares recorded runs, by default beside the first; gives the page.
+    """Write one page that compares recorded runs, by default next to the first; gives the page.
 
     A folder that cannot be read is named there. Raises RunFolderError if fewer than two can be read.
     """

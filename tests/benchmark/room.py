@@ -1,4 +1,4 @@
-"""The heap beside every arm on MicroPython's own STM32F407 firmware: the tables of board/docs/memory.md.
+"""The heap that every arm leaves on MicroPython's own STM32F407 firmware: the tables of board/docs/memory.md.
 
     python -m tests.benchmark.room MICROPYTHON [CHANGES]
 
@@ -38,7 +38,7 @@ _BLOCK = 512
 _MOST_ARMS = 10  # whose frames the emulated flash has room for; more come from sending them again
 _PIECE = 200
 OWN = 2_400
-"""Bytes of heap for what this benchmark itself has in it, given beside the chip's: the stack does not need them."""
+"""Bytes of heap for what this benchmark itself has in it, given next to the chip's: the stack does not need them."""
 _DISK_BLOCKS = firmware.FLASH_BLOCKS
 USUAL = 'include("$(PORT_DIR)/boards/manifest.py")\n'
 _SEMIHOSTING = ("-semihosting-config", "enable=on,target=native")
@@ -208,7 +208,7 @@ def table(elf: Path, with_library: bool) -> None:
 
 
 def blocks(with_library: bool) -> None:
-    """Print the blocks of the flash that are in use beside MicroPython's own after each stage."""
+    """Print the blocks of the flash that are in use in addition to MicroPython's own after each stage."""
     files = {**program_files.start_files(), **(program_files.library(STM32F4) if with_library else {})}
     folders = 1 + with_library
     sizes = {"deployed": [len(data) for data in files.values()], "the largest motion": [MAX_MOTION_BYTES]}

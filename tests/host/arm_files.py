@@ -42,7 +42,7 @@ ALL = GRIPPER + PUMP + FAN + PART + DOOR
 
 
 def write(folder: Path, *tables: str, board: str = "") -> Path:
-    """The shipped arm's file with these tables behind it."""
+    """The shipped arm's file with these tables after it."""
     path = folder / "wired.toml"
     text = shipped.arm_path().read_text(encoding="utf-8")
     path.write_text(f'board = "{board}"\n{text}' if board else text, encoding="utf-8")

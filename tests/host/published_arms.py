@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from armtempo.kinematics import Geometry, Ranges, forward
 from armtempo.kinematics.shape import Shape
 from armtempo.model.arm import Arm
 
-FOLDER = Path(__file__).parents[1] / "data" / "arms"
-FILES = sorted(FOLDER.glob("*.toml"))
+FILE = Path(__file__).parents[1] / "data" / "arms.toml"
 PAPER = Geometry.of(Arm.paper())
 PAPER_FULL_SIZE = Geometry(
     tuple(5 * length / 10 for length in PAPER.d),
@@ -22,9 +22,7 @@ PAPER_FULL_SIZE = Geometry(
 """Table 1: five times the experimental arm, in cm."""
 
 
-def read(path: Path) -> tuple[Geometry, Ranges]:
-    """A published arm."""
-    arm = tomllib.loads(path.read_text())
+def _read(arm: dict[str, Any]) -> tuple[Geometry, Ranges]:
     assert arm["source"]
     low, high = np.radians(arm["range_deg"]).T
     geometry = Geometry(
@@ -45,7 +43,8 @@ def drawn(rng: np.random.Generator) -> Geometry:
     return Geometry(tuple(d), tuple(a), tuple(np.radians(alpha)), tuple(rng.uniform(-np.pi, np.pi, 6)))
 
 
-NAMED = {"paper": PAPER, **{path.stem: read(path)[0] for path in FILES}}
+PUBLISHED = {name: _read(arm) for name, arm in tomllib.loads(FILE.read_text()).items()}
+NAMED = {"paper": PAPER, **{name: geometry for name, (geometry, _) in PUBLISHED.items()}}
 EQ_16 = np.array([[0, 0, -1, -268.202], [0, 1, 0, 0], [1, 0, 0, 217.349], [0, 0, 0, 1]])
 TABLE_2 = (
     (180.0, -38.0, -52.0, 0.0, 0.0, 0.0),

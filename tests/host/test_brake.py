@@ -23,7 +23,7 @@ def changed_excess(
 ) -> Array:
     """Largest speed, and acceleration or jerk, over their limits as the rate goes from one to the other: (starts, 2).
 
-    By differences of the stretched motion; behind its end it rests, so differences there do not count.
+    By differences of the stretched motion; after its end it rests, so differences there do not count.
     """
     before, after = rate
     x = np.linspace(0.0, 1.0, 151)

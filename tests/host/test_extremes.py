@@ -59,20 +59,6 @@ def test_range_of_a_path() -> None:
     assert high == pytest.approx([seen.max(), 5.0], abs=1e-6)
 
 
-def test_golden_section_finds_single_extremes() -> None:
-    found = extremes.golden_section(lambda x: 3 - (x - 0.3) ** 2, [0.0, 0.25], [1.0, 0.9])
-    assert found == pytest.approx([3.0, 3.0], abs=1e-12)
-
-
-def test_golden_section_agrees_on_the_unoptimised_motion() -> None:
-    """Section 3.1 of the paper, where each segment has one extreme of the speed."""
-    via = np.array([0.0, 20, 40, 90, 130, 160, 180])
-    joint = JointSpline(5, 1, bspline.fit(via, 5), time_axis.control_points([2.0] * 6, 5))
-    times = joint.via_times_s
-    found = extremes.golden_section(lambda t: joint(t, 1), times[:-1], times[1:])
-    assert found.max() == pytest.approx(extremes.of_joint(joint).speed_deg_s, rel=1e-9)
-
-
 def test_bernstein_products_derivatives_and_halves() -> None:
     rng = np.random.default_rng(5)
     a, b = rng.normal(size=(3, 4)), rng.normal(size=(3, 6))

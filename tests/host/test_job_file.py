@@ -16,7 +16,7 @@ TWO = "via_deg = [[0, -60, 40], [20, -75, 50]]\n"
 
 
 def written(tmp_path: Path, text: str) -> Path:
-    """A job file with this text behind its name."""
+    """A job file with this text after its name."""
     path = tmp_path / "job.toml"
     path.write_text('name = "t"\n' + text)
     return path

@@ -82,7 +82,7 @@ def test_faults_of_a_line_are_seen(plan: Plan) -> None:
 
 
 def test_the_bound_holds_and_is_sharp() -> None:
-    """Random splines beside a line: no sample of them is beyond the bound, and it is near to the largest."""
+    """Random splines next to a line: no sample of them is beyond the bound, and it is near to the largest."""
     seed = 31
     rng = np.random.default_rng(seed)
     led = line_path.led_stretches(ARM, replace(JOB, via=JOB.via[:2], ways=JOB.ways[:1]), _via(JOB)[:2])[0]

@@ -1,4 +1,4 @@
-"""Peaks beside limits: nothing is called kept or exceeded that the measurement cannot tell."""
+"""Peaks next to limits: nothing is called kept or exceeded that the measurement cannot tell."""
 
 from __future__ import annotations
 

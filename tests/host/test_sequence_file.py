@@ -34,7 +34,7 @@ JOB = 'name = "j"\nrefine = 1\npolish = false\niterations = 2\nvia_deg = [[1, -6
 
 
 def written(folder: Path, *steps: str, top: str = "", name: str = "seq") -> Path:
-    """A sequence file of these steps, each the inside of a table, and a job file beside it."""
+    """A sequence file of these steps, each the inside of a table, and a job file next to it."""
     path = folder / f"{name}.toml"
     rows = "".join(f"[[step]]\n{step}\n" for step in steps)
     path.write_text(f'name = "{name}"\n{top}\n{POSTURES}\n{rows}')

@@ -7,14 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.basics.errors import InputError
+from armtempo.basics.errors import InputError, PlanError
 from armtempo.diagnosis.arm_check import check_arm
 from armtempo.kinematics.dynamics import GRAVITY_M_S2, joint_torques
 from armtempo.kinematics.of_arm import forward
 from armtempo.model.arm import Arm
+from armtempo.model.job import Job
 from armtempo.model.parts import Dynamics, Joint, JointModel
 from armtempo.model.plan import Plan
-from armtempo.planning import torque
+from armtempo.planning import by_torque, planner, torque
+from armtempo.planning.line.line_move import slower
 from armtempo.report import run_report, text_summary
 
 DATA = Path(__file__).parents[1] / "data"
@@ -175,6 +177,33 @@ def test_plan_report_and_check_say_how_much_is_to_spare() -> None:
     light = Plan.load(DATA / "trajectory_before_tolerances.json")
     assert text_summary.values(light)["torque"] is None
     assert not any("the least to spare" in line for line in text_summary.lines(light))
+
+
+def test_plans_by_torque_leave_each_motor_what_is_prudent(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a planner whose motions are as much faster as the limits allow, up to a speed limit."""
+    plan, fastest = weighty(((0.0, 0.31), (6000.0, 0.3))), 8.0
+
+    def planned(arm: Arm, job: Job, progress: object) -> Plan:
+        own, given = (one.driven[0].limits.acceleration_deg_s2 for one in (plan.arm, arm))
+        faster = slower(plan.trajectory, min((given / own) ** 0.5, fastest))
+        return replace(plan, arm=arm, trajectory=faster)
+
+    monkeypatch.setattr(planner, "plan", planned)
+    found = by_torque.plan(plan.arm, plan.job)
+    least = torque.least_margin(found.arm, found.trajectory)
+    assert least is not None
+    assert torque.ENOUGH <= least.margin < 1.02 * torque.ENOUGH
+    assert found.notes[-1].endswith("as the motors' torque allows")
+    assert [one.limits.speed_deg_s for one in found.arm.driven] == [
+        one.limits.speed_deg_s for one in plan.arm.driven
+    ]
+    strong = weighty(((0.0, 20.0), (6000.0, 20.0)))
+    assert by_torque.plan(strong.arm, plan.job).total_s == pytest.approx(plan.total_s / fastest)
+    weak = weighty(((0.0, 0.1), (6000.0, 0.1)))
+    with pytest.raises(PlanError, match="slower motions do not help: joint 2: at"):
+        by_torque.plan(weak.arm, plan.job)
+    with pytest.raises(InputError, match="cannot be planned by torque"):
+        by_torque.plan(Arm.paper(), plan.job)
 
 
 def test_check_tells_of_odd_bodies() -> None:

@@ -174,7 +174,12 @@ LEAVES = {
     "pick_and_place.py": "two-parts.toml",
 }
 FEW = ["--populations", "4", "--seeds", "2", "--iterations", "3"]
-SHORTER = (("repeat=3", "repeat=1"), ("iterations=200", "iterations=20, refine=1"))
+SHORTER = (
+    ("repeat=3", "repeat=1"),
+    ("iterations=200", "iterations=20, refine=1"),
+    ("RATE_HZ = 10", "RATE_HZ = 2"),
+    ("PARTS = 2", "PARTS = 1"),
+)
 """What takes time and shows nothing new here."""
 ARGUMENTS = {"sweep.py": ["--jobs", "6"], "compare_searches.py": FEW}
 

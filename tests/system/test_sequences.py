@@ -64,7 +64,7 @@ def status_lines(board: armtempo.Board) -> list[str]:
 
 
 def test_whatever_ends_it_leaves_a_board_that_says_where(tmp_path: Path) -> None:
-    """E-stop in a motion, no part, a stop; after each one the next sequence starts where the arm stands."""
+    """E-stop in a motion, no part, a stop; after each one the next sequence starts where the arm is."""
     plan = small(tmp_path, 20, "fault")
     faults = [InjectedFault("input", 0.1, 2, name=sequences.ESTOP, level=0)]
     options = LaunchOptions(arm=ARM, faults=[part_lies_there(), *faults])

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from armtempo.basics.errors import InputError, PortGivenUpError
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import tell
-from armtempo.formats.spelling import did_you_mean
+from armtempo.formats.text import did_you_mean
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job, is_name
@@ -244,7 +244,7 @@ def shared_or_own(
 
 
 def board_state(given: BoardOptions) -> BoardState:
-    """What the board says, whoever has the port, which ``given`` names."""
+    """What the board says, whichever program has the port, which ``given`` names."""
     while True:
         with shared_or_own(given, any_program=True) as found:
             try:

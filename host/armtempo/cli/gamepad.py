@@ -1,4 +1,4 @@
-"""A gamepad beside the keys of the terminal: what is held repeats as a held key does, its buttons are keys.
+"""A gamepad in addition to the keys of the terminal: what is held repeats as a held key does, its buttons are keys.
 
 pygame reads it, in a thread of its own, which nothing else asks. A gamepad that is unplugged holds nothing.
 """

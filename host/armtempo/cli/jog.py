@@ -87,7 +87,7 @@ def _one_move(
 
 
 def prepare(board: Board, arm: Arm, replace_arm: bool = False) -> None:
-    """Set the board up; LinkError if the position is unknown. A virtual arm that has just come stands at home."""
+    """Set the board up; LinkError if the position is unknown. A virtual arm that has just come is at home."""
     board.configure(arm, replace=replace_arm)
     try:
         board.posture_deg()

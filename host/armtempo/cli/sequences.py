@@ -1,4 +1,4 @@
-"""Sequences on the terminal: what a planned one takes, and where one that runs stands."""
+"""Sequences on the terminal: what a planned one takes, and how far one that runs is."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from armtempo.cli import chosen, results
 from armtempo.cli.progress import ProgressBar
 from armtempo.cli.state import counted
 from armtempo.formats.atomic_file import check_not_input
-from armtempo.formats.text_table import aligned
+from armtempo.formats.text import aligned
 from armtempo.link.board_messages import SequenceState
 from armtempo.model.sequence import Sequence, arm_named
 from armtempo.model.sequence_plan import PAUSE_S, SequencePlan, SequenceRow, Share
@@ -116,7 +116,7 @@ class Shown:
         self.last: SequenceState | None = None
 
     def __call__(self, state: SequenceState) -> None:
-        """Show where the sequence stands."""
+        """Show how far the sequence is."""
         self.last = state
         doing = f": {self._rows[state.row].words}" if state.row < len(self._rows) else ""
         if sys.stderr.isatty():
@@ -134,7 +134,7 @@ class Shown:
 def run_and_tell(
     board: Board, sequence: SequencePlan | str, replace: bool, out: Path | None, as_json: bool = False
 ) -> SequenceState:
-    """Run a sequence into a run folder below ``out`` (None: nowhere), print where it stands and how it ended.
+    """Run a sequence into a run folder below ``out`` (None: nowhere), print where it is and how it ended.
 
     ``as_json``: the end as JSON. Exit code 1 if an input did not come.
     """

@@ -10,7 +10,7 @@ import click
 from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, options, results
 from armtempo.cli.options import BoardOptions
-from armtempo.formats.text_table import aligned
+from armtempo.formats.text import aligned
 from armtempo.model.arm import Arm
 from armtempo.robot.board_state import BoardState, JointState, SequenceStand, ToolPlace
 
@@ -78,7 +78,7 @@ def motion_lines(state: BoardState) -> list[str]:
 
 
 def _sequence(stand: SequenceStand) -> str:
-    """Which it is, where it stands, what it has counted."""
+    """Which it is, where it is, what it has counted."""
     cycles = f"{stand.cycle} whole cycle{'s' * (stand.cycle != 1)}"
     return f"{stand.name}: {stand.ending}, step {stand.step}, {cycles}{counted(stand.counters)}"
 

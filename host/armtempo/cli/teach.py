@@ -1,4 +1,4 @@
-"""``armtempo teach``: where the arm stands becomes a posture of its file, or the via points of a job."""
+"""``armtempo teach``: where the arm is becomes a posture of its file, or the via points of a job."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ class TaughtPoints:
         return {TAKE: self.take, UNDO: self.undo}
 
     def take(self) -> str:
-        """Take where the arm stands; says what was done."""
+        """Take where the arm is; says what was done."""
         point = posture_text.digits(self._arm, self.where().tolist())
         if problem := self._arm.angles_problem(point):
             return f"not taken: {problem}"

@@ -63,7 +63,7 @@ _IN_FIRMWARE = (
     *(f"{PACKAGES[1]}.sequence{name}" for name in ("", "_check")),
     *(f"{PACKAGES[0]}.app.sequence{name}" for name in ("_ahead", "_command", "_start", "r")),
 )
-"""Modules of what the core is without: features of which there is no heap beside files (board/docs/memory.md)."""
+"""Modules of what the core is without: there is no heap for these if it is in files (board/docs/memory.md)."""
 _AT_REST = {
     "start_up": (
         "app.arm_state.ArmState.__init__",
@@ -72,7 +72,7 @@ _AT_REST = {
         "hardware.sampler.Sampler.__init__",
         "link.frame_reader.FrameReader.__init__",
         "link.serial_link.SerialLink.__init__",
-        "motion.engine_parts.EngineParts.home",
+        "motion.engine.Engine.home",
         "motion.ring_feeder.RingFeeder.__init__",
     ),
     "set_up": (

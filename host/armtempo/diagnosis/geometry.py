@@ -72,9 +72,7 @@ def _ends(arm: Arm) -> list[Finding]:
         if _gap_mm(end.points_mm, near) < near:
             crossing.append(where)
     found = []
-    next_step = (
-        "keep it in mind: armtempo does not look for collisions; narrow range_deg where it is never wanted"
-    )
+    next_step = "give [room] and radius_mm, so that motions are checked for it, or narrow range_deg"
     if below:
         found.append(
             note("ranges", f"from home, the arm goes below its base plane with {', '.join(below)}", next_step)
@@ -97,7 +95,7 @@ def _wide(arm: Arm) -> list[Finding]:
 def _gap_mm(points: Array, shortest: float) -> float:
     """Smallest distance between two lines of the outline that are not neighbours; infinite if there are none.
 
-    Lines shorter than ``shortest`` are left out: what stands before and behind them is near in any posture.
+    Lines shorter than ``shortest`` are left out: what is before and after them is near in any posture.
     """
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     links = [(points[i], points[i + 1]) for i in np.flatnonzero(lengths > max(shortest, _BELOW_MM))]

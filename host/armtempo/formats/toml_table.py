@@ -12,8 +12,7 @@ from typing import Any
 
 from armtempo.basics.errors import InputError
 from armtempo.formats.atomic_file import why
-from armtempo.formats.plain_text import is_plain
-from armtempo.formats.spelling import did_you_mean, misspelt
+from armtempo.formats.text import did_you_mean, is_plain, misspelt
 
 _REQUIRED: Any = object()
 
@@ -56,7 +55,7 @@ class Table:
         self._asked: list[str] = []
 
     def fail(self, key: str, allowed: str) -> InputError:
-        """The error for a key: say what is there and what is allowed."""
+        """The error for a key: say what it has and what is allowed."""
         name = f"{self.place}{key}"
         if key not in self._values:
             return InputError(
@@ -75,7 +74,7 @@ class Table:
         return key in self._values
 
     def peek(self, key: str) -> Any:
-        """The value as it stands there, unchecked, or None; for one that may be of several kinds."""
+        """The value as given, unchecked, or None; for one that may be of several kinds."""
         return self._values.get(key)
 
     def is_text(self, key: str) -> bool:

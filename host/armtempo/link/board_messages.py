@@ -12,7 +12,7 @@ from armtempo_shared.messages import FEATURES, RATES_MEASURED
 from armtempo_shared.sequence import ENDINGS
 
 from armtempo.basics.virtual_id import is_virtual
-from armtempo.formats.plain_text import visible
+from armtempo.formats.text import visible
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ class StoredMotion:
 
 @dataclass(frozen=True)
 class SequenceState:
-    """Where a sequence stands, or where the last one ended."""
+    """How far a sequence is, or where the last one ended."""
 
     ending: str
     """One of ``armtempo_shared.sequence.ENDINGS``."""
@@ -215,7 +215,7 @@ def state_name(number: int) -> str:
 
 
 def ending_name(number: int) -> str:
-    """How a sequence stands; a number the host does not know is shown as such."""
+    """The state of a sequence; a number the host does not know is shown as such."""
     return ENDINGS[number] if number < len(ENDINGS) else f"ending {number}"
 
 

@@ -207,7 +207,7 @@ class Client:
         self.session.command("set_default", (), name, silence_timeout_s=FLASH_TIMEOUT_S)
 
     def sequence(self) -> board_messages.SequenceState:
-        """Where the sequence stands, or where the last one since the board's start ended."""
+        """How far the sequence is, or where the last one since the board's start ended."""
         if not self.info.can("sequences"):
             return board_messages.SequenceState("none", 0, 0, 0, 0, "")
         try:

@@ -1,4 +1,4 @@
-"""The traffic log: every byte to and from the board, decoded beside it.
+"""The traffic log: every byte to and from the board, with its meaning.
 
 A log is a text file, one line a chunk of bytes, tab-separated::
 

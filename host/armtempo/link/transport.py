@@ -14,7 +14,7 @@ from armtempo.basics.errors import InputError, LinkError, PortError, PortInUseEr
 
 BAUD_RATE = 115_200
 """Has no effect over USB; a UART between host and board would use it."""
-_ADVICE = "'armtempo ports' lists what is there"
+_ADVICE = "'armtempo ports' lists the ports"
 
 
 class Transport(Protocol):

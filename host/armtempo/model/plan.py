@@ -31,7 +31,7 @@ from armtempo.splines.trajectory import JointSpline, Trajectory
 FORMAT = "armtempo trajectory"
 VERSION = 2
 _RUN = "run.json"
-"""A run folder has this beside its trajectory file."""
+"""A run folder has this next to its trajectory file."""
 RULE = "a trajectory file is replaced by one of the same job, by its name, for an arm of the same name"
 LOG = logging.getLogger("armtempo")
 

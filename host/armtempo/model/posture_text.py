@@ -82,7 +82,7 @@ def _changed(text: str, name: str, values: str, end: str) -> str:
 
 
 def _place(lines: list[str], name: str) -> tuple[int, int] | None:
-    """Where the table stands: the line of its header, and the line behind it; None if there is none."""
+    """Where the table is: the line of its header, and the line after it; None if there is none."""
     header = re.compile(rf"\s*\[\s*posture\s*\.\s*[\"']?{re.escape(name)}[\"']?\s*\]\s*(#.*)?")
     heads = [number for number, line in enumerate(lines) if header.fullmatch(line.rstrip("\r\n"))]
     for head in heads[:1]:
@@ -102,7 +102,7 @@ def _is_whole(lines: list[str]) -> bool:
 
 
 def _replaced(table: list[str], values: str, end: str) -> list[str]:
-    """The lines of a table with other values; comments before, behind and beside them stay."""
+    """The lines of a table with other values; comments before, after and next to them stay."""
     text = "".join(table)
     keys = tomllib.loads(text.replace("\r\n", "\n"))
     if [*keys] == ["angles_deg"]:

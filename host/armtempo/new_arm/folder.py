@@ -91,7 +91,7 @@ def check_free(folder: Path) -> None:
 
 
 def _put(folder: Path, files: dict[str, str]) -> None:
-    """Written beside the folder, then put in its place in one step."""
+    """Written next to the folder, then put in its place in one step."""
     folder.parent.mkdir(parents=True, exist_ok=True)
     aside = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
     try:

@@ -35,7 +35,7 @@ _REASONS = {
 
 @dataclass(frozen=True)
 class TurningJoint:
-    """One revolute joint where it stands while all joints are at 0, in the base link's frame."""
+    """One revolute joint where it is while all joints are at 0, in the base link's frame."""
 
     name: str
     point_mm: Array

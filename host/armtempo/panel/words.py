@@ -31,9 +31,7 @@ JOINTS, TOOL, POSTURES, OUTPUTS, INPUTS = "Joints", "Tool", "Postures", "Outputs
 SPEED_OF_JOG = "Speed of jogs, % of the limits"
 SPEED_OF_MOTION = "Speed of the motion, %"
 HOLD_HINT = "Moves while the button is held."
-AXES_OF_TOOL = "Axes of the tool"
 HOME, GO, CLEAR, PAUSE, RESUME = "The arm is at home", "Go", "Clear the fault", "Pause", "Resume"
-HOME_HINT = "Says that the arm is in its home posture; nothing moves."
 SURE = "Is the arm in its home posture? Its position is taken as this."
 
 DRAG_HINT = "Drag a via point in the picture, or click it to see the other postures that reach it."

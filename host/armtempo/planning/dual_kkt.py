@@ -36,7 +36,7 @@ class DualKkt:
         self._rows = (_SHARED + 1) * self._block
 
     def _both(self, apart: int) -> tuple[Index, Index, Index]:
-        """Variables that a cell and that ``apart`` behind share: their numbers there, and their places in both.
+        """Variables that a cell and that ``apart`` after share: their numbers there, and their places in both.
 
         They have the same places in all cells but perhaps the last.
         """

@@ -138,7 +138,7 @@ class Bodies:
         """How fast each of the distances can shrink at speeds of the driven joints, (J,): (M,)."""
         rows = self.turned @ np.radians(speeds_deg_s)
         found = [float(self.reach_mm[segment] @ rows) for segment in self.moves for _ in self.obstacles]
-        for one, other in self.pairs:  # seen from the first, only the rows behind it move the other
+        for one, other in self.pairs:  # seen from the first, only the rows after it move the other
             after = np.arange(len(rows)) >= one // 2 + one % 2
             found.append(float(self.reach_mm[other, after] @ rows[after]))
         return np.array(found)

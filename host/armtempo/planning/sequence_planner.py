@@ -193,7 +193,7 @@ class _Compiler:
         return _Place(_angles(trajectory(0.0)), f"the start of {motion.name}")
 
     def posture(self, posture: ArmPosture, where: str) -> _Place:
-        """Where the arm stands then; PlanError if it cannot."""
+        """Where the arm is then; PlanError if it cannot."""
         try:
             return _Place(_angles(via_points.posture_deg(self.arm, posture)), posture.name)
         except ArmtempoError as error:

@@ -243,7 +243,7 @@ def _needs(setup: _Setup, needed: Array) -> str:
 
 
 def _branch(setup: _Setup, posture: Array, before: Branch | None) -> Branch:
-    """The branch at a via point; where the arm stands between two, it still counts as on the one before."""
+    """The branch at a via point; where the arm is between two, it still counts as on the one before."""
     here = branch_of(setup.solver.geometry, posture)
     return here.after(before) if before else here
 

@@ -64,7 +64,7 @@ class PortClaim(NamedTuple):
         os.replace(aside, path)
 
     def _marker(self, path: Path) -> Path:
-        """Where it stands who has taken the port over from this program, also when that has given it up again."""
+        """Who has taken the port over from this program, also when that has given it up again."""
         return path.with_name(f"{self.number}.taken")
 
     def taken_by(self) -> PortClaim | None:

@@ -43,6 +43,6 @@ def _unclear(candidates: list[str]) -> InputError:
     seen = (
         f"{len(candidates)} could be meant: {', '.join(candidates)}"
         if candidates
-        else "none is plugged in ('armtempo ports' lists what is there)"
+        else "none is plugged in ('armtempo ports' lists the ports)"
     )
     return nothing_set(PORT, f"which board? {seen}. '--port {SIM}' is a virtual one; for a real one")

@@ -49,7 +49,7 @@ class Evaluation:
 
     @property
     def limit_checks(self) -> list[list[peaks.LimitCheck]]:
-        """``[joint]``: speed and acceleration beside the limits; empty if the arm is not known."""
+        """``[joint]``: speed and acceleration next to the limits; empty if the arm is not known."""
         if not self.limits:
             return []
         counts = [joint.counts_per_deg for joint in self.run.joints]

@@ -9,7 +9,7 @@ from armtempo_shared import motion
 from armtempo_shared.limits import MAX_MOTION_BYTES
 
 from armtempo.diagnosis.resolution import findings as coarse_steps
-from armtempo.formats.text_table import aligned
+from armtempo.formats.text import aligned
 from armtempo.model.job import AUTO, GRADIENT
 from armtempo.model.plan import Plan, Search
 from armtempo.planning import checks, path_deviation, torque
@@ -30,7 +30,7 @@ _FLOORS = {
 
 
 def lines(plan: Plan) -> list[str]:
-    """A plan: motion times beside their lower bounds, extremes beside their limits; one string a line.
+    """A plan: motion times next to their lower bounds, extremes next to their limits; one string a line.
 
     Then what the user should know: notes on the poses, joints whose steps are coarse.
     """

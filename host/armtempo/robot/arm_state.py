@@ -53,7 +53,7 @@ def home(client: Client, arm: Arm, angles_deg: ArrayLike | None = None) -> None:
 
 
 def home_unknown(client: Client, arm: Arm) -> None:
-    """Declare that every joint whose position is unknown stands at home."""
+    """Declare that every joint whose position is unknown is at home."""
     status = client.status()
     steps = [
         None if status.joint_known(index) else round(joint.home_deg * joint.steps_per_deg)

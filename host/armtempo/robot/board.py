@@ -353,7 +353,7 @@ class Board:
 
         Its rows and samples are recorded in a new run folder below ``out``; None: nowhere. The arm must be homed and
         be where the sequence begins, else LinkError or BoardError; the arm of a virtual board is brought there.
-        ``watcher`` gets how it stands. What an input that does not come does is the sequence's affair: an end as
+        ``watcher`` gets its state. What an input that does not come does is the sequence's affair: an end as
         ``timed_out``, or BoardError. With Stopped, its end is what ``client.sequence()`` says.
         """
         with self._stoppable(stop) as wanted:
@@ -463,7 +463,7 @@ class Board:
     ) -> SelfTest:
         """Try directions, encoders, switches and E-stop: each joint moves up to a degree there and back, slowly.
 
-        ``ask`` puts a question to whoever stands at the arm, first one that names what will move, and gives True for
+        ``ask`` puts a question to the person at the arm, first one that names what will move, and gives True for
         yes; ``tell`` says what to press. Lines to correct in the arm file are in the result's ``data["arm_file"]``.
         Raises ArmtempoError without a yes, LinkError where a position is unknown; nothing moved then.
         """

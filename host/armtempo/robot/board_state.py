@@ -38,7 +38,7 @@ class JointState:
 
 @dataclass(frozen=True)
 class SequenceStand:
-    """Where a sequence stands, or where the last one since the board's start ended."""
+    """How far a sequence is, or where the last one since the board's start ended."""
 
     name: str
     ending: str

@@ -43,7 +43,7 @@ def rest_s(motion: JogMotion, told: bool = False) -> float:
 
 
 def plan(client: Client, arm: Arm, move: JogMove, speed: float = jog_motion.SPEED) -> JogMotion:
-    """The jog from where the arm stands; LinkError if that is unknown, else errors as of ``jog_motion.plan``."""
+    """The jog from where the arm is; LinkError if that is unknown, else errors as of ``jog_motion.plan``."""
     return jog_motion.plan(NAME, arm, arm_state.posture_deg(client, arm).tolist(), move, speed)
 
 

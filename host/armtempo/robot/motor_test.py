@@ -57,7 +57,7 @@ def way_deg(joint: DrivenJoint, at_deg: float) -> float:
 
 
 class MotorTest:
-    """``ask``: a question to whoever stands there, True for yes; ``tell``: what to do now."""
+    """``ask``: a question to the person there, True for yes; ``tell``: what to do now."""
 
     def __init__(
         self,
@@ -76,7 +76,10 @@ class MotorTest:
         """All of it. Raises LinkError where a position is unknown, ArmtempoError without a yes; nothing moved then."""
         posture_deg = arm_state.posture_deg(self._client, self._arm)
         if not self._ask(question(self._arm, posture_deg)):
-            raise ArmtempoError("the test with motors was not confirmed: nothing moved")
+            raise ArmtempoError(
+                "the test with motors was not confirmed: nothing moved",
+                "run it again and answer y when it is safe",
+            )
         try:
             for joint, at_deg in zip(self._arm.driven, posture_deg, strict=True):
                 self._joint(joint, way_deg(joint, at_deg))
@@ -158,7 +161,7 @@ class MotorTest:
 
 
 def judge_encoder(joint: DrivenJoint, steps: int, counts: int) -> tuple[Measurement, list[str]]:
-    """What an encoder counted while its joint made so many steps; lines of the arm file's encoder to correct.
+    """What an encoder counted while its joint made this many steps; lines of the arm file's encoder to correct.
 
     ``counts``: as they are where the motor turns the right way.
     """

@@ -21,9 +21,9 @@ from armtempo.robot.sequence_recording import Recorder
 from armtempo.robot.stop_request import StopRequest
 
 LOOK_S = 0.1
-"""How often the board is asked where it stands."""
+"""How often the board is asked where it is."""
 SequenceWatcher = Callable[[SequenceState], object]
-"""Gets how the sequence stands, each time it stands otherwise."""
+"""Gets the state of the sequence, each time it changes."""
 
 
 @dataclass(frozen=True)

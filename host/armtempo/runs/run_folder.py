@@ -27,7 +27,7 @@ from typing import Any, Self
 from armtempo_shared import limits
 
 from armtempo.basics.errors import InputError, RunFolderError
-from armtempo.basics.version import installed_version
+from armtempo.basics.installation import installed_version
 from armtempo.formats.atomic_file import replace_text
 from armtempo.link.board_messages import Positions, Sample
 from armtempo.link.follow import Gap
@@ -226,7 +226,7 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def written_head(name: str, started: str) -> dict[str, Any]:
-    """What run.json says of any run, behind its format: by which version, of what, when."""
+    """What run.json says of any run, after its format: by which version, of what, when."""
     return {"armtempo": installed_version(), "name": name, "started": started, "written": now()}
 
 

@@ -78,7 +78,7 @@ class PowerCycle:
         return cut
 
     def _before(self, zero: int) -> int:
-        """Tick from which on edges belong to the motion of this time 0: the clock was stopped behind the one before."""
+        """Tick from which on edges belong to the motion of this time 0: the clock was stopped after the one before."""
         stopped = bisect.bisect_left(self.ends, zero)
         return max([zero - _LEAD_TICKS, *self.ends[max(stopped - 1, 0) : stopped]])
 

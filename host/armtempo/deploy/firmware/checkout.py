@@ -17,7 +17,7 @@ BOARDS = ("STM32F4DISC", "OLIMEX_H407", "VCC_GND_F407ZG")
 """Boards that releases bring a firmware for; any other of the port with an STM32F405 or F407 can be built."""
 _CHIPS = ("STM32F405xx", "STM32F407xx")
 _FLASH_KB = {"E": 512, "G": 1024}
-"""By the letter behind the number of pins in the chip's name (data sheet, ordering information)."""
+"""By the letter after the number of pins in the chip's name (data sheet, ordering information)."""
 _FLASH_START = 0x08000000
 _PARTS = ("MAJOR", "MINOR", "MICRO")
 _LIBRARY = "lib/micropython-lib"

@@ -277,7 +277,7 @@ class Improver:
         return replace(
             motion,
             angle_points_deg=self.variables.angle_points(x) * self._size,
-            # A dwell far shorter than the segments beside it may be missed; then it lasts longer.
+            # A dwell far shorter than the segments next to it may be missed; then it lasts longer.
             differences_s=np.maximum(self.variables.time_differences(x), least) * unit_s,
         )
 

@@ -34,7 +34,7 @@ from armtempo.splines.trajectory import JointSpline, Trajectory
 _BEYOND = 2.0
 """A free path is kept within this many times what its via points span on each side of them."""
 _WORTH_USING = 1e-3
-"""A tolerance of less than so many mm or degrees is not made use of."""
+"""A tolerance of less than this many mm or degrees is not made use of."""
 _ROUNDED = 1.001
 """Time is stretched by no more than this for what rounding does."""
 _START_GAP = 1e-3
@@ -102,7 +102,7 @@ def _on_spline(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planne
 
 
 def _axis_s(demand: Demand, spline: Planned, pieces: int) -> Array:
-    """Differences of the best time axis that has so many segments for each stretch of the spline."""
+    """Differences of the best time axis that has this many segments for each stretch of the spline."""
     joint = spline.trajectory.joints[0]
     start = time_axis.cut(np.diff(joint.time_points_s), joint.refine, pieces, DEGREE)
     limits = [Limits(*values) for values in demand.limits]

@@ -1,4 +1,4 @@
-"""A jog: one joint, or the tool along or about an axis, from where the arm stands; straight, and quick to stop."""
+"""A jog: one joint, or the tool along or about an axis, from where the arm is; straight, and quick to stop."""
 
 from __future__ import annotations
 

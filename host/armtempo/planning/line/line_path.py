@@ -129,7 +129,7 @@ def proven_path(
 ) -> tuple[LinePath, dict[int, LineDeviation]]:
     """The spline with as few segments as prove that the tool stays near its way, and how near in each stretch.
 
-    Raises PlanError if the board could not hold so many.
+    Raises PlanError if the board could not hold that many.
     """
     stretches = cut.of_job(job)
     most = _most_segments(arm)

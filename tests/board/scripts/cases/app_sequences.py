@@ -151,9 +151,9 @@ def case_a_motion_is_checked_once_in_a_run():
         begin(host)
         for at in (10, 0, 10, 0):
             arrive(app, host, at)
-            assert not engine.judged
+            assert not engine.skip_check
         checks = [call for call in engine.calls if call == "check" or call.startswith("load")]
-        assert checks == ["check"] * 3 + ["load judged"] + ["load ready"] * 3, checks
+        assert checks == ["check"] * 3 + ["load unchecked"] + ["load ready"] * 3, checks
     start(host)
     assert engine.calls[-2:] == ["load", "start"]
 
@@ -188,7 +188,7 @@ def case_what_comes_next_is_prepared_over_rows_between():
     for _ in range(2):
         stand_in.Clock.now_ms += 500
         host.turn(5)
-    assert loads(app) == ["judged", "ready", "ready"]
+    assert loads(app) == ["unchecked", "ready", "ready"]
     host.turn(30)
     assert engine.calls.count("prepare") == 2, "nothing comes"
     arrive(app, host, 3)
@@ -207,7 +207,7 @@ def case_without_room_nothing_is_prepared():
         host.turn(20)
         for at in (10, 0, 10, 0):
             arrive(app, host, at)
-        assert stands(host)[0] == "finished" and loads(app) == ["judged"] * 4
+        assert stands(host)[0] == "finished" and loads(app) == ["unchecked"] * 4
         assert engine.calls.count("prepare") == late
         assert engine.calls.count("give back") == late
 
@@ -219,10 +219,10 @@ def case_where_the_arm_stands_elsewhere_what_is_prepared_is_given_up():
     host.turn(20)
     assert engine.calls.count("prepare") == 1
     arrive(app, host, 9)
-    assert loads(app) == ["judged", "judged"]
+    assert loads(app) == ["unchecked", "unchecked"]
     arrive(app, host, 0)
     arrive(app, host, 9)
-    assert loads(app) == ["judged", "judged", "ready", "ready"], "it ends there each time"
+    assert loads(app) == ["unchecked", "unchecked", "ready", "ready"], "it ends there each time"
 
 
 def case_without_time_it_is_prepared_between_two():
@@ -233,14 +233,14 @@ def case_without_time_it_is_prepared_between_two():
     begin(host)
     assert "prepare" not in engine.calls
     arrive(app, host, 10)
-    assert loads(app) == ["judged", "ready"]
+    assert loads(app) == ["unchecked", "ready"]
     host.ask("speed", (500,))
     arrive(app, host, 0)
     host.turn(20)
     assert engine.calls.count("prepare") == 2 and not engine.moving
     stand_in.Clock.now_ms += 500
     host.turn(5)
-    assert loads(app) == ["judged", "ready", "ready"]
+    assert loads(app) == ["unchecked", "ready", "ready"]
 
 
 def case_behind_a_stop_nothing_is_prepared():
@@ -273,7 +273,7 @@ def case_a_record_that_is_another_now_is_refused_though_it_was_checked():
         file.write(b"\x55")
     arrive(app, host, 0)
     assert stands(host)[:2] == ("refused", codes.BAD_RECORD), stands(host)
-    assert runs(app) == 2 and not app.controller.engine.judged
+    assert runs(app) == 2 and not app.controller.engine.skip_check
 
 
 def case_for_ever_ends_only_by_a_stop():

@@ -50,7 +50,7 @@ class Encoder:
 
 
 def stepper(seed=1, **changed):
-    """A motor with the paper's first joint behind it, and its DIR line and encoder."""
+    """A motor with the paper's first joint after it, and its DIR line and encoder."""
     joint = {
         "dir_inverted": 0,
         "encoder_inverted": 0,

@@ -64,7 +64,7 @@ def address(name):
 
 
 def word_at(where):
-    """Word index of the register behind an address; ValueError if the virtual board has no register."""
+    """Word index of the register at an address; ValueError if the virtual board has no register."""
     offset = where - base
     if 0 <= offset < SIZE:
         return offset >> 2
@@ -75,7 +75,7 @@ def word_at(where):
 
 
 def place(where):
-    """(words, index) of the register or the memory behind an address; ValueError as above."""
+    """(words, index) of the register or the memory at an address; ValueError as above."""
     for begin in (backup_base, _BACKUP_ON_CHIP):
         if 0 <= where - begin < 4 * BACKUP_WORDS:
             return backup, where - begin >> 2
