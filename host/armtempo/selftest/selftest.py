@@ -190,7 +190,8 @@ def _move(prompt: Prompt, found: SelfTest, work: Progress) -> None:
     work(0.6, 1)
     count = _SIMULATED_STOPS if found.simulated else _STOPS
     waits_us = np.random.default_rng(_SEED).integers(*_WAITS_US, count).tolist()
-    arguments |= {"waits_us": waits_us, "starved": motion.at_rates(_own(joints), _STARVED_S).hex()}
+    motions = [arguments.pop("motion"), motion.at_rates(_own(joints), _STARVED_S).hex()]
+    arguments |= {"motions": motions, "waits_us": waits_us}
     if measured := _part(prompt, found, pulse_part.SAFETY, "engine", "estop", **arguments):
         found.add(pulse_part.judge_stops(measured.values))
         found.add([_still_off(measured, found)])

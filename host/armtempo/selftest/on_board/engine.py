@@ -26,6 +26,7 @@ def make_engine(record, estop=False, rates=None, encoders=False, workspace=None)
     """
     from armtempo_board.app import room
     from armtempo_board.motion.engine import Engine
+    from armtempo_board.motion.engine_parts import EngineParts
 
     with open(record, "rb") as file:
         head, joints, _ = armrecord.unpack(file.read())
@@ -44,7 +45,7 @@ def make_engine(record, estop=False, rates=None, encoders=False, workspace=None)
         workspace = room.workspace()
     else:
         room.share(workspace, len(joints))
-    engine = Engine(head, joints, workspace)
+    engine = Engine(EngineParts(head, joints, workspace))
     engine.inputs.enable_pin = NoPin()
     if head["flags"] & armrecord.FLAG_ESTOP_FITTED:
         pull_inactive(engine)

@@ -32,8 +32,11 @@ def starve(engine, motion, start_steps, idle_us):
     return fault
 
 
-def measure(record, motion, start_steps, rates, waits_us, starved, idle_us):
-    """Cycles of each trial, the writing of the register taken off; the fault of each."""
+def measure(record, motions, start_steps, rates, waits_us, idle_us):
+    """Cycles of each trial, the writing of the register taken off; the fault of each.
+
+    ``motions``: that of the trials, and the one in which the rings run dry, from step 0.
+    """
     from binascii import unhexlify
 
     feed()
@@ -42,19 +45,19 @@ def measure(record, motion, start_steps, rates, waits_us, starved, idle_us):
     nothing = min([trial_cost() for _ in range(5)])
     took = []
     faults = []
-    motion = unhexlify(motion)
+    motion, starved = [unhexlify(one) for one in motions]
     try:
         for wait_us in waits_us:
             load(engine, motion, start_steps)
-            engine.judged = True  # the next ones are the same motion
+            engine.skip_check = True  # the next ones are the same motion
             took.append(max(trial(engine, wait_us, 1 << _ESTOP_LINE, idle_us) - nothing, -1))
             while engine.moving:
                 serve(engine, idle_us)
             faults.append(engine.fault)
             engine.clear()
             feed()
-        engine.judged = False
-        fault = starve(engine, unhexlify(starved), [0] * len(rates), idle_us)
+        engine.skip_check = False
+        fault = starve(engine, starved, [0] * len(rates), idle_us)
     finally:
         engine.freeze()
         off = enable()
