@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -15,9 +16,10 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.panel.access import COOKIE, MOST_BYTES, Access
 from armtempo.panel.desk import Desk
-from armtempo.panel.held_jog import ALIVE_S, ButtonHold, JogButton
+from armtempo.panel.held_jog import ALIVE_S, ButtonHold
 from armtempo.panel.operator import Needs, Operator
 from armtempo.panel.sequence_desk import SequenceDesk
+from armtempo.planning.jog.jog_motion import JogMove
 
 ARM = Arm.paper()
 ME, OTHER = "me", "other"
@@ -205,7 +207,7 @@ def test_stop_twice_freezes(operator: Operator) -> None:
 @pytest.mark.parametrize("how", ["released", "silent", "other in control"])
 def test_a_jog_ends_with_its_button(operator: Operator, how: str) -> None:
     hold, jog = ButtonHold(operator), operator.board.jog  # type: ignore[attr-defined]
-    hold.press(ME, JogButton(joint=1), 0.25)
+    hold.press(ME, JogMove(math.inf, joint=0), 0.25)
     wait(lambda: jog.held > 2)
     begin_s = time.monotonic()
     if how == "released":

@@ -171,11 +171,11 @@ def opened(window: Any, address: str) -> Any:
     return page
 
 
-def wait_for(page: Any, *words: str) -> None:
-    """Until the line of the state has all the words."""
+def wait_for(page: Any, *words: str, place: str = "armtempo-state") -> None:
+    """Until the line of the state, or another place, has all the words."""
     page.wait_for_function(
-        "words => words.every(word => document.getElementById('armtempo-state').textContent.includes(word))",
-        arg=list(words),
+        "([place, words]) => words.every(word => document.getElementById(place).textContent.includes(word))",
+        arg=[place, words],
         polling=50,
     )
 
@@ -192,10 +192,13 @@ def hold(page: Any) -> None:
     button = page.locator('[aria-label$=" +"]').first
     for _ in range(20):
         button.hover()
+        before = page.inner_text("#armtempo-where")
         page.mouse.down()
         with suppress(Exception):  # a time-out
             page.wait_for_function(
-                "document.getElementById('armtempo-state').textContent.includes('moving')",
+                """before => document.getElementById('armtempo-state').textContent.includes('moving')
+                   && document.getElementById('armtempo-where').textContent != before""",
+                arg=before,
                 timeout=3000,
                 polling=50,
             )

@@ -69,9 +69,18 @@ def test_the_whole_way(window: Any, panel: Panel) -> None:
     page.get_by_role("tab", name="Run").click()
     page.get_by_role("button", name="Run", exact=True).click()
     wait_for(page, "moving", "Run")
-    page.keyboard.press("Escape")
+    page.get_by_role("button", name="Pause").click()
+    wait_for(page, "in a pause", "Run")
+    page.get_by_role("button", name="Resume").click()  # on along the path
+    page.wait_for_function("!document.getElementById('armtempo-state').textContent.includes('in a pause')")
+    page.keyboard.press(" ")  # the button just pressed has the focus, and does not take it
     wait_for(page, "idle")
-    page.get_by_role("button", name="Go to the start").click()
+    joints = panel.state().joints
+    panels.wait_for(page, *(f"{joint.angle_deg:.2f}°" for joint in joints), place="armtempo-where")
+    assert 0.0 < (joints[0].angle_deg or 0.0) < 180.0
+    page.get_by_role(
+        "button", name="Go to the start"
+    ).click()  # from a stop no motion continues: a new one begins
     wait_for(page, "moving")
     page.get_by_role("button", name="Run", exact=True).click()
     wait_for(page, "moving")
