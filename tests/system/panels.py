@@ -162,6 +162,11 @@ def opened(window: Any, address: str) -> Any:
     page = window.new_page()
     page.set_default_timeout(WAIT_S * 1000)
     page.goto(address)
+    return in_control(page)
+
+
+def in_control(page: Any) -> Any:
+    """A page that has control, and knows the board."""
     page.wait_for_selector("button:has-text('control')")
     take = page.get_by_role("button", name="Take control")
     if take.is_visible():
@@ -181,19 +186,20 @@ def wait_for(page: Any, *words: str, place: str = "armtempo-state") -> None:
 
 
 def home(page: Any) -> None:
-    """Say that the arm is at home."""
+    """Say that the arm is at home, on the tab where it is moved."""
+    page.get_by_role("tab", name="Move").click()
     page.get_by_role("button", name="The arm is at home").click()
     page.get_by_role("dialog").get_by_role("button", name="The arm is at home").click()
     page.wait_for_selector('[aria-label$=" +"]:not([disabled])')
 
 
-def hold(page: Any) -> None:
+def hold(page: Any, by_key: bool = False) -> None:
     """Hold a jog button until the arm moves; again if a busy browser was silent for too long, as then it lets go."""
     button = page.locator('[aria-label$=" +"]').first
     for _ in range(20):
-        button.hover()
+        (button.focus if by_key else button.hover)()
         before = page.inner_text("#armtempo-where")
-        page.mouse.down()
+        page.keyboard.down("Enter") if by_key else page.mouse.down()
         with suppress(Exception):  # a time-out
             page.wait_for_function(
                 """before => document.getElementById('armtempo-state').textContent.includes('moving')
@@ -203,7 +209,7 @@ def hold(page: Any) -> None:
                 polling=50,
             )
             return
-        page.mouse.up()
+        page.keyboard.up("Enter") if by_key else page.mouse.up()
         wait_for(page, "idle")
     raise AssertionError("the arm does not move")
 

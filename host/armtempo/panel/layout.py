@@ -14,7 +14,7 @@ from armtempo.basics.errors import InputError
 from armtempo.kinematics.chain import tool_path_mm
 from armtempo.kinematics.of_arm import forward
 from armtempo.panel import arm_scene, board_tab, move_tab, plan_tab, run_tab, sequence_tab, words
-from armtempo.panel.arm_scene import ArmScene, ArmShape
+from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.held_jog import ButtonHold
 from armtempo.panel.operator import Needs, Operator
 from armtempo.panel.panel_page import LOOK_S, PanelPage
@@ -38,13 +38,13 @@ def build(operator: Operator, hold: ButtonHold, shape: ArmShape) -> PanelPage:
     _header(page)
     with ui.element("div").classes("armtempo-page"):
         with ui.column().classes("armtempo-half"):
-            with ui.element("div").classes("armtempo-scene"):
-                page.scene = ArmScene(shape)
+            page.picture = ui.element("div").classes("armtempo-scene")
             _below_scene(page)
         page.on_look(Paths(page).look)
         with ui.column().classes("armtempo-half"):
             _tabs(page)
     _events(page)
+    ui.timer(0.0, lambda: page.scene, once=True)
     ui.timer(LOOK_S, page.refresh)
     return page
 
@@ -66,6 +66,7 @@ def _below_scene(page: PanelPage) -> None:
         ui.label(words.SPEED_OF_MOTION).classes("text-caption")
         page.control(speed.classes("armtempo-speed"), Needs.BOARD)
     ui.label("").props('id="armtempo-where"')
+    ui.label("").props('id="armtempo-said" role="status"')
 
 
 class Paths:
@@ -151,7 +152,7 @@ def _events(page: PanelPage) -> None:
     ui.on("armtempo-held", lambda: hold.alive(page.client))
     ui.on("armtempo-release", lambda: hold.release(page.client))
     lost = json.dumps(words.LOST)
-    ui.run_javascript(f"document.body.dataset.lost = {lost}; armtempo.begin({page.scene.parts})")
+    ui.run_javascript(f"document.body.dataset.lost = {lost}; armtempo.begin()")
 
 
 def message(operator: Operator, shape: ArmShape) -> dict[str, Any]:
@@ -161,7 +162,8 @@ def message(operator: Operator, shape: ArmShape) -> dict[str, Any]:
     with suppress(InputError):
         x, y, z = forward(operator.arm, angles)[:3, 3]
         where = f"x {x:.1f}  y {y:.1f}  z {z:.1f} mm  ·  {where}"
-    texts = {"armtempo-state": state_line(operator), "armtempo-where": where}
+    said = operator.log[-1] if operator.log else ""
+    texts = {"armtempo-state": state_line(operator), "armtempo-where": where, "armtempo-said": said}
     for number, angle in enumerate(angles, 1):
         texts[f"armtempo-angle-{number}"] = f"{angle:.2f}°"
     target = operator.target_deg

@@ -30,6 +30,7 @@ from armtempo.robot.board_state import BoardState
 from armtempo.robot.sharing import sample_json
 from armtempo.robot.stop_request import Stopped
 from armtempo.robot.where import Where, posture_deg
+from armtempo.selftest.result import SelfTest
 
 LOOK_S = 0.25
 """Interval of the board's states while no samples come."""
@@ -134,6 +135,8 @@ class Operator:
         self.sequences = SequenceDesk(desk.arm, desk.folder)
         self.sequence: SequenceState | None = None
         """Where the sequence that was started last is."""
+        self.tested: SelfTest | None = None
+        """The last self-test."""
         self.target_deg: Array | None = None
         """Where the arm goes, (J,), while it goes to a posture."""
         self.traffic: deque[str] = deque(maxlen=500)
@@ -287,6 +290,10 @@ class Operator:
         self.board.upload(plan, replace=True)
         self.plan_run = plan
         self.board.run(plan, times, self.runs, self.part).report()
+
+    def selftest(self) -> None:
+        """Let the board measure itself."""
+        self.tested = self.board.selftest(self.part)
 
     def part(self, done: float, whole: float) -> None:
         """The progress of what is under way."""

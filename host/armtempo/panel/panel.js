@@ -17,10 +17,14 @@ window.armtempo = {
   SMOOTH_MS: 100,
   SILENT_MS: 900,
 
-  begin(parts) {
+  // the scene is there, some time after the page
+  show(parts) {
     this.parts = parts;
     import("nicegui-scene").then((module) => (this.THREE = module.THREE));
     requestAnimationFrame(() => this.draw());
+  },
+
+  begin() {
     setInterval(() => this.look(), 100);
     addEventListener("keydown", (event) => this.key(event), true); // before a button takes the space bar for itself
     addEventListener("keyup", (event) => event.key === "Enter" && this.release(), true);

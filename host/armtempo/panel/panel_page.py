@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from nicegui import ui
@@ -62,7 +63,16 @@ class PanelPage:
     jogs: list[JogMove] = field(default_factory=list)
     """What the buttons move that are held, by their numbers."""
     jog_percent: float = 25.0
-    scene: ArmScene = field(init=False)
+    picture: Element = field(init=False)
+    """Where the scene is."""
+
+    @cached_property
+    def scene(self) -> ArmScene:
+        """The arm in 3-D, made when it is first needed: the first view does not wait for what draws it."""
+        with self.picture:
+            scene = ArmScene(self.shape)
+            ui.run_javascript(f"armtempo.show({scene.parts})")
+        return scene
 
     def control(self, element: Element, needs: Needs = Needs.MOVE, jog: JogMove | None = None) -> Any:
         """An element that is greyed, with the reason as its hint, while it cannot be used."""

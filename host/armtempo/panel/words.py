@@ -40,6 +40,7 @@ DRAG_HINT = "Drag a via point in the picture, or click it to see the other postu
 POSTURES_OF = "P{number}: postures of the arm with the tool there, {count}; the nearest is taken"
 NEW_VIA, FROM_ARM, DELETE = "Add a via point", "Take the arm's posture", "Delete"
 PASTE, PASTE_HINT = "Paste", "Rows of angles from a spreadsheet, one row a via point"
+PASTED = "the pasted rows"
 PLAN, CANCEL, SAVE = "Plan", "Cancel", "Save the job"
 PATH, PATHS = "Path", {"through": "spline through the via points", "free": "free between the via points"}
 MOTION_TIME = "Motion time {total:.3f} s; no motion along this path is shorter than {floor:.3f} s."
@@ -86,6 +87,11 @@ STATUS, LOG, TRAFFIC = "Status", "Log", "Traffic"
 REFRESH, RENAME, REMOVE, NEW_NAME = "Read again", "Rename", "Remove", "New name"
 A_SEQUENCE, BY_BUTTON = "sequence", " · started by the board's button"
 SURE_REMOVE = "Remove {name} from the board?"
+SELFTEST, SURE_SELFTEST = (
+    "Self-test",
+    "The board measures itself with its drivers off, and is reset: the arm's position is unknown afterwards.",
+)
+VERDICT_KEYS = ("verdict", "part", "what", "measured", "expected", "cure")
 PROGRAM, DEPLOY, FLASH = "Board program", "Deploy", "Flash"
 SURE_DEPLOY = "Put this version's program on the board? The arm's position is unknown afterwards."
 SURE_FLASH = (
